@@ -1,0 +1,71 @@
+"""Errors a user can act on.
+
+EngineError
+|-- CaptureError      a capture folder cannot be used; carries every problem found
+|-- ProjectError      a project folder, clip state or configuration cannot be used
+|-- PreparationError  clouds or masks could not be built from this capture
+|-- TrainingError     training could not go on
+    |-- NonFiniteLoss the loss or a gradient stopped being a number
+
+Messages state the cause first, with numbers, then what was done; the hint says what to do; the path comes last.
+Programming mistakes are assertions or ValueError/TypeError, not these.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+
+class EngineError(Exception):
+    """A failure with a cause, a hint and where it happened.
+
+    Args:
+        message: Cause first, with numbers, then what was done about it. One sentence or two, no path.
+        hint: What the user can do. May be empty.
+        path: File or folder concerned, shown last.
+    """
+
+    def __init__(self, message: str, *, hint: str = "", path: Path | str | None = None) -> None:
+        self.message = message
+        self.hint = hint
+        self.path = None if path is None else Path(path)
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        text = " ".join(part for part in (self.message, self.hint) if part)
+        return f"{text} - {self.path}" if self.path is not None else text
+
+    def __reduce__(self):  # keeps keyword-only arguments through a process boundary
+        return (_rebuild, (type(self), self.message, self.hint, self.path))
+
+
+def _rebuild(kind: type["EngineError"], message: str, hint: str, path: Path | None) -> "EngineError":
+    return kind(message, hint=hint, path=path)
+
+
+class CaptureError(EngineError):
+    """A capture folder cannot be used. `problems` lists everything that is wrong, not only the first thing."""
+
+    def __init__(
+        self, message: str, *, hint: str = "", path: Path | str | None = None, problems: Sequence[EngineError] = ()
+    ) -> None:
+        self.problems = tuple(problems)
+        super().__init__(message, hint=hint, path=path)
+
+    def __str__(self) -> str:
+        return "\n".join([super().__str__(), *(f"  {problem}" for problem in self.problems)])
+
+
+class ProjectError(EngineError):
+    """A project folder, a clip state or a configuration value cannot be used."""
+
+
+class PreparationError(EngineError):
+    """Clouds, masks or backgrounds could not be built."""
+
+
+class TrainingError(EngineError):
+    """Training could not go on."""
+
+
+class NonFiniteLoss(TrainingError):
+    """The loss or a gradient stopped being a finite number; the last good state was kept."""

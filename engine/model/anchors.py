@@ -1,0 +1,84 @@
+"""AnchorSet: named rows of anchors that share a role (static, moving, residual).
+
+An anchor is a fixed position with a static feature and two sets of log scales; Gaussians are decoded from it. Sets
+are kept apart by name and never recovered by position in a concatenation. A set whose `presence` is None is static:
+it has no dynamic feature and exists at all times.
+"""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor, nn
+
+_COLOR_EDGE = 0.02  # keeps the logit of a cloud colour finite
+
+
+class AnchorSet(nn.Module):
+    """Anchors of one role. Owns positions, features, scales and the gate in time; does not decode.
+
+    Shapes: positions [A, 3] scene units; color_logits [A, 3]; features [A, F]; log_offset_scales and
+    log_base_scales [A, 3], log of scene units; presence [A, M] bool or None for a static set.
+    """
+
+    positions: Tensor
+    color_logits: Tensor
+    presence: Tensor | None
+
+    def __init__(
+        self,
+        *,
+        positions: Tensor,
+        color_logits: Tensor,
+        features: Tensor,
+        log_offset_scales: Tensor,
+        log_base_scales: Tensor,
+        presence: Tensor | None,
+        is_trainable: bool,
+    ) -> None:
+        super().__init__()
+        self.register_buffer("positions", positions.float().contiguous())
+        self.register_buffer("color_logits", color_logits.float().contiguous())
+        self.register_buffer("presence", presence)
+        self.features = nn.Parameter(features.float().contiguous(), requires_grad=is_trainable)
+        self.log_offset_scales = nn.Parameter(log_offset_scales.float().contiguous(), requires_grad=is_trainable)
+        self.log_base_scales = nn.Parameter(log_base_scales.float().contiguous(), requires_grad=is_trainable)
+        self.is_trainable = is_trainable
+
+    def __len__(self) -> int:
+        return self.positions.shape[0]
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether these anchors have a dynamic feature."""
+        return self.presence is not None
+
+    @classmethod
+    def from_cloud(
+        cls, points: Tensor, colors: Tensor, *, spacing: float, feature_dim: int, presence: Tensor | None
+    ) -> AnchorSet:
+        """Fresh trainable anchors on a cloud: zero features, Gaussians about as large as the anchor spacing.
+
+        Args:
+            points: Scene units. [A, 3]
+            colors: Scene colours in 0..1, the start of the Gaussians' colour. [A, 3]
+            spacing: Distance between neighbours, scene units.
+            feature_dim: Width of the static feature.
+            presence: Frames of the clip in which each anchor exists, or None for a static set. [A, M] bool
+        """
+        log_scales = torch.full((len(points), 3), float(torch.log(torch.tensor(spacing))))
+        return cls(
+            positions=points,
+            color_logits=torch.logit(colors.float().clamp(_COLOR_EDGE, 1 - _COLOR_EDGE)),
+            features=torch.zeros(len(points), feature_dim),
+            log_offset_scales=log_scales,
+            # the shape head halves this at the start (sigmoid of about 0), so 1.2 spacings give 0.6: neighbours overlap
+            log_base_scales=log_scales + float(torch.log(torch.tensor(1.2))),
+            presence=presence,
+            is_trainable=True,
+        )
+
+    def alive(self, frame_in_clip: int) -> Tensor:
+        """Rows that exist at this frame. [n] int64"""
+        if self.presence is None:
+            return torch.arange(len(self))
+        return self.presence[:, frame_in_clip].nonzero()[:, 0]

@@ -1,0 +1,280 @@
+"""ClipModel: everything that is visible in one clip. Reference and source clip are this one class.
+
+What differs is data: which anchor sets there are, which of them are trainable, and whether decoder and static sets are
+inherited. Sets: "static" and "moving" come from the reference clip; "residual" is what a source clip adds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from engine.errors import ProjectError
+from engine.model.anchors import AnchorSet
+from engine.model.clip_state import ClipState
+from engine.model.decoder import Decoder
+from engine.model.field import FieldShape, SpatioTemporalField
+from engine.model.grid import CornerTable
+from engine.raster.gaussians import Gaussians
+
+_ANCHOR_ARRAYS = ("positions", "color_logits", "features", "log_offset_scales", "log_base_scales", "presence")
+
+
+@dataclass(frozen=True, slots=True)
+class AnchorView:
+    """Anchor positions for display, scene units, numpy float32.
+
+    Attributes:
+        inherited_positions: Anchors of the reference clip in a source clip; empty in the reference clip. [A0, 3]
+        own_positions: Anchors this clip trains. [A, 3]
+        own_is_dynamic: Whether each own anchor has a dynamic feature. [A] bool
+        inherited_is_dynamic: Likewise. [A0] bool
+    """
+
+    inherited_positions: np.ndarray
+    own_positions: np.ndarray
+    own_is_dynamic: np.ndarray
+    inherited_is_dynamic: np.ndarray
+
+
+class ClipModel(nn.Module):
+    """Anchor sets, field and decoder of one clip. Owns no pixels, no optimiser, no files.
+
+    Args:
+        sets: Anchor sets by role.
+        decoder: Shared heads.
+        field: Field of this clip; None while only static anchors exist.
+        clip_length: M, the divisor of clip_time.
+        n_frames: Frames of this clip.
+    """
+
+    def __init__(
+        self,
+        *,
+        sets: dict[str, AnchorSet],
+        decoder: Decoder,
+        field: SpatioTemporalField | None,
+        clip_length: int,
+        n_frames: int,
+    ) -> None:
+        super().__init__()
+        self.sets = nn.ModuleDict(sets)
+        self.decoder = decoder
+        self.clip_length, self.n_frames = clip_length, n_frames
+        self._corners: dict[str, CornerTable] = {}
+        self._frozen: dict[str, Gaussians] = {}
+        self.field: SpatioTemporalField | None = None
+        if field is not None:
+            self.attach_field(field)
+
+    def anchor_set(self, role: str) -> AnchorSet:
+        """The set of a role. KeyError when there is none."""
+        anchors = self.sets[role]
+        assert isinstance(anchors, AnchorSet)
+        return anchors
+
+    def roles(self) -> list[str]:
+        """Roles in decode order."""
+        return list(self.sets.keys())
+
+    def add_set(self, role: str, anchors: AnchorSet) -> None:
+        """Add anchors of a new role; a field attached later covers them."""
+        self.sets[role] = anchors
+
+    def attach_field(self, field: SpatioTemporalField) -> None:
+        """Set the field and compute the interpolation constants of every dynamic set."""
+        self.field = field
+        dynamic = (role for role in self.roles() if self.anchor_set(role).is_dynamic)
+        self._corners = {role: field.corners(self.anchor_set(role).positions) for role in dynamic}
+
+    def is_constant(self, role: str) -> bool:
+        """Whether the set's Gaussians never change: static anchors under a frozen decoder."""
+        anchors = self.anchor_set(role)
+        is_decoder_frozen = not any(p.requires_grad for p in self.decoder.parameters())
+        return not anchors.is_dynamic and not anchors.is_trainable and is_decoder_frozen
+
+    def knots(self, clip_time: float) -> list[tuple[int, float]]:
+        """Frames of the clip around this time and their weights."""
+        if self.field is not None:
+            return self.field.knots(clip_time, self.clip_length)
+        return [(min(max(round(clip_time * self.clip_length), 0), self.n_frames - 1), 1.0)]
+
+    def alive(self, role: str, clip_time: float) -> Tensor:
+        """Rows of a set that exist at this time: at a frame of its knots. [n] int64"""
+        anchors = self.anchor_set(role)
+        if anchors.presence is None:
+            return torch.arange(len(anchors))
+        frames = [knot for knot, _ in self.knots(clip_time)]
+        return anchors.presence[:, frames].any(1).nonzero()[:, 0]
+
+    def decode(self, clip_time: float, rows: dict[str, Tensor] | None = None) -> Gaussians:
+        """Gaussians at a time of the clip, in [0, 1).
+
+        Args:
+            clip_time: frame_in_clip / clip_length; times between frames are interpolated.
+            rows: Rows per role to decode, for instance those a camera can see; None decodes all that exist. Rows of
+                dynamic sets should exist at this time, others are decoded all the same.
+        Returns:
+            K Gaussians per row; sets follow each other in the order of `roles`.
+        """
+        knots = self.knots(clip_time)
+        parts = []
+        for role in self.roles():
+            chosen = self.alive(role, clip_time) if rows is None else rows[role]
+            if len(chosen):
+                parts.append(self._decode_set(role, chosen, knots))
+        if not parts:
+            zeros = torch.zeros
+            return Gaussians(zeros(0, 3), zeros(0, 4), zeros(0, 3), zeros(0), zeros(0, 3))
+        return Gaussians.concatenate(parts)
+
+    def _decode_set(self, role: str, rows: Tensor, knots: list[tuple[int, float]]) -> Gaussians:
+        anchors = self.anchor_set(role)
+        if self.is_constant(role):
+            if role not in self._frozen:
+                with torch.no_grad():
+                    self._frozen[role] = self._decode_rows(anchors, torch.arange(len(anchors)), None)
+            k = self.decoder.gaussians_per_anchor
+            return self._frozen[role][(rows[:, None] * k + torch.arange(k)).reshape(-1)]
+        dynamic_features = None
+        if anchors.is_dynamic and self.field is not None:
+            dynamic_features = self.field(rows.numpy(), self._corners[role], knots)
+        return self._decode_rows(anchors, rows, dynamic_features)
+
+    def _decode_rows(self, anchors: AnchorSet, rows: Tensor, dynamic_features: Tensor | None) -> Gaussians:
+        return self.decoder(
+            positions=anchors.positions[rows],
+            color_logits=anchors.color_logits[rows],
+            log_offset_scales=anchors.log_offset_scales.index_select(0, rows),
+            log_base_scales=anchors.log_base_scales.index_select(0, rows),
+            static_features=anchors.features.index_select(0, rows),
+            dynamic_features=dynamic_features,
+        )
+
+    def anchors(self) -> AnchorView:
+        """Positions for display."""
+        inherited, own = [], []
+        for role in self.roles():
+            anchors = self.anchor_set(role)
+            (own if anchors.is_trainable else inherited).append(anchors)
+
+        def positions(sets: list[AnchorSet]) -> np.ndarray:
+            return np.concatenate([np.zeros((0, 3), np.float32), *(s.positions.numpy() for s in sets)])
+
+        def dynamic(sets: list[AnchorSet]) -> np.ndarray:
+            return np.concatenate([np.zeros(0, bool), *(np.full(len(s), s.is_dynamic) for s in sets)])
+
+        return AnchorView(positions(inherited), positions(own), dynamic(own), dynamic(inherited))
+
+    def own_arrays(self) -> dict[str, np.ndarray]:
+        """Everything this clip must store; inherited sets leave only their presence in this clip. Copies."""
+        arrays: dict[str, np.ndarray] = {}
+        for role in self.roles():
+            anchors = self.anchor_set(role)
+            if not anchors.is_trainable:
+                if anchors.presence is not None:
+                    arrays[f"inherited.{role}.presence"] = anchors.presence.numpy().copy()
+                continue
+            for name in _ANCHOR_ARRAYS:
+                value = getattr(anchors, name)
+                if value is not None:
+                    arrays[f"sets.{role}.{name}"] = value.detach().numpy().copy()
+        if any(p.requires_grad for p in self.decoder.parameters()):
+            arrays |= {f"decoder.{k}": v.detach().numpy().copy() for k, v in self.decoder.state_dict().items()}
+        if self.field is not None:
+            arrays |= {f"field.{k}": v.detach().numpy().copy() for k, v in self.field.state_dict().items()}
+        return arrays
+
+
+def decoder_sizes(decoder: Decoder) -> dict[str, int]:
+    """Constructor arguments of a decoder, for a header."""
+    return {
+        "static_dim": decoder.static_dim,
+        "dynamic_dim": decoder.dynamic_dim,
+        "gaussians_per_anchor": decoder.gaussians_per_anchor,
+        "hidden": decoder.hidden,
+    }
+
+
+def inherit(reference: ClipState, presence: dict[str, Tensor]) -> tuple[dict[str, AnchorSet], Decoder]:
+    """Frozen anchor sets and frozen decoder of a reference clip.
+
+    Args:
+        reference: A finished reference clip.
+        presence: Gate in time of each dynamic set in the clip that inherits. [A, M] bool per role
+    """
+    decoder = _read_decoder(reference)
+    decoder.requires_grad_(requires_grad=False)
+    roles = _roles(reference.arrays)
+    sets = {role: _read_set(reference.arrays, role, is_trainable=False) for role in roles}
+    for role, anchors in sets.items():
+        if anchors.presence is not None:
+            anchors.presence = presence[role]
+    return sets, decoder
+
+
+def load_clip_model(state: ClipState, reference: ClipState | None) -> ClipModel:
+    """Rebuild a clip for viewing or for going on.
+
+    Args:
+        state: The clip.
+        reference: What it inherits from; not used for a reference clip.
+    Raises:
+        ProjectError: A source clip without its reference, or with another one than it was trained on.
+    """
+    header = state.header
+    if state.is_reference:
+        roles = _roles(state.arrays)
+        sets = {role: _read_set(state.arrays, role, is_trainable=True) for role in roles}
+        decoder = _read_decoder(state)
+    else:
+        if reference is None:
+            raise ProjectError(f"Clip {header['clip_index']} inherits from a reference clip that is not there.")
+        if reference.header["fingerprint"] != header["reference_fingerprint"]:
+            raise ProjectError(
+                f"Clip {header['clip_index']} was trained on reference {header['reference_fingerprint']}, "
+                f"the project now has {reference.header['fingerprint']}.",
+                hint="Train this clip again.",
+            )
+        prefix, suffix = "inherited.", ".presence"
+        presence = {
+            name.removeprefix(prefix).removesuffix(suffix): torch.from_numpy(array)
+            for name, array in state.arrays.items()
+            if name.startswith(prefix)
+        }
+        sets, decoder = inherit(reference, presence)
+        sets |= {role: _read_set(state.arrays, role, is_trainable=True) for role in _roles(state.arrays)}
+    field = None
+    if header.get("field"):
+        field = SpatioTemporalField(FieldShape.from_dict(header["field"]))
+        field.load_state_dict(_strip(state.arrays, "field."))
+    return ClipModel(
+        sets=sets, decoder=decoder, field=field, clip_length=header["clip_length"], n_frames=header["n_frames"]
+    )
+
+
+def _roles(arrays: dict[str, np.ndarray]) -> list[str]:
+    return sorted({name.split(".")[1] for name in arrays if name.startswith("sets.")}, key=_ROLE_ORDER.index)
+
+
+_ROLE_ORDER = ["static", "moving", "residual"]
+
+
+def _read_set(arrays: dict[str, np.ndarray], role: str, *, is_trainable: bool) -> AnchorSet:
+    values: dict[str, Any] = {name: arrays.get(f"sets.{role}.{name}") for name in _ANCHOR_ARRAYS}
+    tensors = {name: None if value is None else torch.from_numpy(value) for name, value in values.items()}
+    return AnchorSet(**tensors, is_trainable=is_trainable)  # type: ignore[arg-type]
+
+
+def _read_decoder(state: ClipState) -> Decoder:
+    decoder = Decoder(**state.header["decoder"])
+    decoder.load_state_dict(_strip(state.arrays, "decoder."))
+    return decoder
+
+
+def _strip(arrays: dict[str, np.ndarray], prefix: str) -> dict[str, Tensor]:
+    return {k.removeprefix(prefix): torch.from_numpy(v.copy()) for k, v in arrays.items() if k.startswith(prefix)}

@@ -1,0 +1,98 @@
+"""ClipState: a clip on disk and between processes: named arrays and a JSON header, nothing else.
+
+One format for the saved clip, the live snapshot and, with the optimiser's arrays added, the checkpoint. Files are
+safetensors; they appear under their final name only when complete. Source clips store what they own, not what they
+inherit; `reference_fingerprint` ties them to the reference they were trained on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save_file
+
+from engine.errors import ProjectError
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True, slots=True)
+class ClipState:
+    """Named arrays and a header. A value.
+
+    Header keys: schema, role ("reference" or "source"), clip_index, clip_length, n_frames, start, step, n_steps,
+    seed, config (difference from defaults), camera_names (of the gains), near_plane, spacing, fingerprint,
+    reference_fingerprint, field (FieldShape or None), metrics.
+    """
+
+    arrays: dict[str, np.ndarray]
+    header: dict[str, Any]
+
+    @property
+    def is_reference(self) -> bool:
+        """Whether other clips can inherit from this one."""
+        return self.header["role"] == "reference"
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of the arrays, 16 hexadecimal digits: names what a source clip was trained against."""
+        digest = hashlib.sha256()
+        for name in sorted(self.arrays):
+            array = np.ascontiguousarray(self.arrays[name])
+            digest.update(f"{name}{array.dtype}{array.shape}".encode())
+            digest.update(array.view(np.uint8).reshape(-1).data if array.size else b"")
+        return digest.hexdigest()[:16]
+
+
+def write_clip_state(path: Path | str, state: ClipState) -> None:
+    """Write atomically: a complete file appears under `path`, or none.
+
+    Raises:
+        ProjectError: The disk refused.
+    """
+    path = Path(path)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    arrays = {name: np.ascontiguousarray(array) for name, array in state.arrays.items()}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        save_file(arrays, partial, metadata={"header": json.dumps(state.header)})
+        os.replace(partial, path)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise ProjectError(
+            f"The clip could not be written ({error.strerror}).", hint="Free some space and try again.", path=path
+        ) from error
+
+
+def read_clip_state(path: Path | str) -> ClipState:
+    """Read a state written by `write_clip_state`.
+
+    Raises:
+        ProjectError: The file is missing, damaged, or of a newer schema.
+    """
+    path = Path(path)
+    try:
+        with safe_open(path, framework="numpy") as file:
+            metadata = file.metadata() or {}
+            header = json.loads(metadata["header"])
+            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
+    except FileNotFoundError as error:
+        raise ProjectError("The clip file does not exist.", hint="Train the clip first.", path=path) from error
+    except (OSError, SafetensorError, KeyError, ValueError) as error:
+        raise ProjectError(
+            f"The clip file is damaged or no clip file ({error}).", hint="Train the clip again.", path=path
+        ) from error
+    if header.get("schema") != SCHEMA:
+        raise ProjectError(
+            f"The clip file has schema {header.get('schema')}, this version reads {SCHEMA}.",
+            hint="Use the version that wrote it or train the clip again.",
+            path=path,
+        )
+    return ClipState(arrays, header)

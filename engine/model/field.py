@@ -1,0 +1,113 @@
+"""SpatioTemporalField: position and clip time to a dynamic feature. One per clip.
+
+Knots lie exactly on the frames of the clip, so the temporal resolution is that of the capture and no frame falls
+between two knots; times between frames interpolate the two neighbouring knots linearly. The field starts at (nearly)
+zero, so an untrained field leaves the static look of the anchors unchanged.
+Source: ClipGStream, spatio-temporal field; sizes follow the number of anchors instead of fixed 16 levels.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from engine.model.grid import CornerTable, corner_table, encode
+
+_TABLE_INIT = 1e-3  # uniform half-width of the start; small enough that the field starts at zero look
+
+
+@dataclass(frozen=True, slots=True)
+class FieldShape:
+    """Sizes of a field, saved beside it.
+
+    Attributes:
+        n_knots: Frames of the clip, one table set each.
+        cells: Cells along the longest side per level.
+        n_entries: Table entries per level, a power of two.
+        channels: Values per entry.
+        hidden: Width of the network's hidden layer.
+        feature_dim: Width of the dynamic feature.
+        bounds_min: Lower corner of the cube, scene units. [3]
+        side: Length of the cube's side, scene units.
+    """
+
+    n_knots: int
+    cells: tuple[int, ...]
+    n_entries: int
+    channels: int
+    hidden: int
+    feature_dim: int
+    bounds_min: tuple[float, float, float]
+    side: float
+
+    def as_dict(self) -> dict:
+        """JSON-able copy."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict) -> FieldShape:
+        """Inverse of `as_dict` after a trip through JSON."""
+        return cls(**{**values, "cells": tuple(values["cells"]), "bounds_min": tuple(values["bounds_min"])})
+
+
+def derive_cells(*, side: float, spacing: float, base: int, growth: float, max_levels: int) -> tuple[int, ...]:
+    """Cells per level: base * growth^l until a cell is at most 1.5 anchor spacings; finer would be hash noise."""
+    cells = [base]
+    while len(cells) < max_levels and side / cells[-1] > 1.5 * spacing:
+        cells.append(max(cells[-1] + 1, round(base * growth ** len(cells))))
+    return tuple(cells)
+
+
+def derive_log2_entries(n_alive: int) -> int:
+    """log2 of the table entries per level and knot for this many anchors alive in one frame."""
+    return min(max(math.ceil(math.log2(max(2 * n_alive, 1))), 10), 15)
+
+
+class SpatioTemporalField(nn.Module):
+    """(anchor rows, clip time) to f_d. Owns its tables and network; corner constants belong to the caller."""
+
+    def __init__(self, shape: FieldShape, generator: torch.Generator | None = None) -> None:
+        super().__init__()
+        self.shape = shape
+        size = (len(shape.cells), shape.n_entries, shape.channels)
+        # One parameter per knot: knots without gradient are left alone by the optimiser, which makes it lazy for free.
+        self.tables = nn.ParameterList(
+            nn.Parameter((torch.rand(size, generator=generator) * 2 - 1) * _TABLE_INIT) for _ in range(shape.n_knots)
+        )
+        n_in = len(shape.cells) * shape.channels
+        self.hidden = nn.Linear(n_in, shape.hidden, bias=False)
+        self.out = nn.Linear(shape.hidden, shape.feature_dim, bias=False)
+        for layer in (self.hidden, self.out):
+            bound = 1.0 / math.sqrt(layer.in_features)
+            with torch.no_grad():
+                layer.weight.copy_((torch.rand(layer.weight.shape, generator=generator) * 2 - 1) * bound)
+
+    def corners(self, positions: Tensor) -> CornerTable:
+        """Interpolation constants of fixed positions, scene units. [A, 3]"""
+        lower = np.asarray(self.shape.bounds_min)
+        unit = (positions.detach().cpu().numpy().astype(np.float64) - lower) / self.shape.side
+        return corner_table(unit, self.shape.cells, self.shape.n_entries)
+
+    def knots(self, clip_time: float, clip_length: int) -> list[tuple[int, float]]:
+        """Knots around a clip time and their weights; one knot when the time is a frame's, the last one beyond it."""
+        position = min(max(clip_time * clip_length, 0.0), self.shape.n_knots - 1.0)
+        lower = math.floor(position + 1e-6)
+        fraction = position - lower
+        if fraction < 1e-6:
+            return [(lower, 1.0)]
+        return [(lower, 1.0 - fraction), (lower + 1, fraction)]
+
+    def forward(self, rows: np.ndarray, corners: CornerTable, knots: list[tuple[int, float]]) -> Tensor:
+        """Dynamic features of the chosen anchors. [n, feature_dim]
+
+        Args:
+            rows: Rows of the corner table. [n] int64
+            corners: From `corners`.
+            knots: From `knots`.
+        """
+        encoded = sum(weight * encode(self.tables[knot], rows, corners) for knot, weight in knots)
+        return self.out(torch.relu(self.hidden(encoded)))

@@ -1,0 +1,165 @@
+"""TrainConfig: every number of a clip's training, with unit and reason. Free of torch so that a window can import it.
+
+Saved as the difference from the defaults; unknown keys and values outside their range are errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import MISSING, asdict, dataclass, fields
+from typing import Any
+
+from engine.errors import ProjectError
+
+
+@dataclass(frozen=True, slots=True)
+class TrainConfig:
+    """All settings of one clip's training.
+
+    Defaults follow the small preset: features 16/16, five Gaussians per anchor, a field of at most seven levels
+    whose knots lie on the frames. Step counts of 0 mean "derived from the number of training pictures".
+    """
+
+    # sizes of the model
+    static_feature_dim: int = 16
+    """Width of the static feature f_s of an anchor."""
+    dynamic_feature_dim: int = 16
+    """Width of the dynamic feature f_d that the field gives."""
+    gaussians_per_anchor: int = 5
+    """K; 4 to 6 once anchors are two to three pixels apart."""
+    head_hidden: int = 64
+    """Hidden width of each decoder head."""
+    field_hidden: int = 64
+    """Hidden width of the field's network."""
+    field_channels: int = 4
+    """Values per hash table entry."""
+    field_base_cells: int = 8
+    """Cells along the longest side at the coarsest level."""
+    field_growth: float = 1.6
+    """Ratio of cells between levels."""
+    field_max_levels: int = 7
+    """Levels are added until a cell is about 1.5 anchor spacings, at most this many."""
+    field_log2_entries: int = 0
+    """log2 of the entries per level and knot; 0 derives it from the anchors alive in a frame."""
+
+    # sizes of the clouds
+    max_static_points: int = 22_000
+    """Anchors of the static part; the voxel grows until they fit."""
+    max_moving_points: int = 32_000
+    """Anchors of the moving part over the whole clip; the voxel grows until they fit."""
+    background_frames: int = 50
+    """Frames, spread over the capture, from which each camera's background is estimated."""
+
+    # length of the training, steps; one step renders one picture
+    static_steps: int = 0
+    """Steps on the backgrounds before the moving part is added; 0 derives 30 per training camera, 300 to 1000."""
+    joint_steps: int = 0
+    """Steps of the reference clip after that; 0 derives 8 per training picture, 1200 to 3000."""
+    source_steps: int = 0
+    """Steps of a source clip; 0 derives 8 per training picture, 1000 to 3000."""
+
+    # learning rates; all fall log-linearly to `final_lr_ratio` of their start over the phase
+    feature_lr: float = 7.5e-3
+    scale_lr: float = 7e-3
+    table_lr: float = 5e-3
+    field_mlp_lr: float = 2e-3
+    opacity_head_lr: float = 2e-3
+    shape_head_lr: float = 4e-3
+    color_head_lr: float = 4e-3
+    offset_head_lr: float = 4e-3
+    gain_lr: float = 3e-4
+    """Per-camera colour gains, reference clip only."""
+    final_lr_ratio: float = 0.02
+
+    # loss
+    ssim_weight: float = 0.2
+    """Loss = (1 - w) L1 + w (1 - SSIM) + volume term."""
+    volume_weight: float = 1e-3
+    """Weight of the mean Gaussian volume, measured in cubes of the anchor spacing so that no scene scale enters."""
+    max_gradient_norm: float = 0.0
+    """Global gradient norm clip; 0 switches it off."""
+
+    # gate
+    gate: str = "hull"
+    """hull: static anchors have no dynamic feature, moving ones are decoded only at times where that frame's hull
+    has them. off: the published method, every anchor is evaluated at every time."""
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in _RANGES.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ProjectError(f"{name} is {value}; it has to lie between {low} and {high}.")
+        if self.gate not in ("hull", "off"):
+            raise ProjectError(f"gate is '{self.gate}'; it has to be 'hull' or 'off'.")
+
+    def difference(self) -> dict[str, Any]:
+        """Only the values that differ from the defaults."""
+        default = TrainConfig()
+        return {name: value for name, value in asdict(self).items() if value != getattr(default, name)}
+
+    def n_static_steps(self, n_cameras: int) -> int:
+        """Steps of the static phase for this many training cameras."""
+        return self.static_steps or min(max(30 * n_cameras, 300), 1000)
+
+    def n_joint_steps(self, n_pictures: int) -> int:
+        """Steps of the joint phase of a reference clip with this many training pictures."""
+        return self.joint_steps or min(max(8 * n_pictures, 1200), 3000)
+
+    def n_source_steps(self, n_pictures: int) -> int:
+        """Steps of a source clip with this many training pictures."""
+        return self.source_steps or min(max(8 * n_pictures, 1000), 3000)
+
+
+_RANGES: dict[str, tuple[float, float]] = {
+    "static_feature_dim": (1, 256),
+    "dynamic_feature_dim": (1, 256),
+    "gaussians_per_anchor": (1, 32),
+    "head_hidden": (4, 1024),
+    "field_hidden": (4, 1024),
+    "field_channels": (1, 16),
+    "field_base_cells": (2, 64),
+    "field_growth": (1.1, 4.0),
+    "field_max_levels": (1, 16),
+    "field_log2_entries": (0, 20),
+    "max_static_points": (1, 1_000_000),
+    "max_moving_points": (1, 1_000_000),
+    "background_frames": (2, 1000),
+    "static_steps": (0, 1_000_000),
+    "joint_steps": (0, 1_000_000),
+    "source_steps": (0, 1_000_000),
+    "feature_lr": (0.0, 1.0),
+    "scale_lr": (0.0, 1.0),
+    "table_lr": (0.0, 1.0),
+    "field_mlp_lr": (0.0, 1.0),
+    "opacity_head_lr": (0.0, 1.0),
+    "shape_head_lr": (0.0, 1.0),
+    "color_head_lr": (0.0, 1.0),
+    "offset_head_lr": (0.0, 1.0),
+    "gain_lr": (0.0, 1.0),
+    "final_lr_ratio": (1e-6, 1.0),
+    "ssim_weight": (0.0, 1.0),
+    "volume_weight": (0.0, 10.0),
+    "max_gradient_norm": (0.0, 1e6),
+}
+
+
+def parse_overrides(assignments: Sequence[str]) -> dict[str, Any]:
+    """Turn ["key=value", ...] into keyword arguments of TrainConfig.
+
+    Raises:
+        ProjectError: An assignment is malformed, a key is unknown or a value has the wrong type.
+    """
+    kinds = {f.name: type(f.default) for f in fields(TrainConfig) if f.default is not MISSING}
+    values: dict[str, Any] = {}
+    for assignment in assignments:
+        key, separator, text = assignment.partition("=")
+        key = key.strip()
+        if not separator:
+            raise ProjectError(f"Setting '{assignment}' has no '='.", hint="Write it as key=value.")
+        if key not in kinds:
+            raise ProjectError(f"Setting '{key}' does not exist.", hint=f"Known settings: {', '.join(sorted(kinds))}.")
+        try:
+            values[key] = kinds[key](text.strip())
+        except ValueError as error:
+            raise ProjectError(f"Setting '{key}' is '{text}', which is no {kinds[key].__name__}.") from error
+    return values

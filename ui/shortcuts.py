@@ -1,0 +1,249 @@
+"""One table: key -> action -> help text. The F1 sheet and the key handling read the same rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from imgui_bundle import imgui
+
+from app.commands import (
+    HomeView,
+    LookThrough,
+    PauseTraining,
+    ResumeTraining,
+    SetCompare,
+    SetFrame,
+    StopTraining,
+    ToggleOverlay,
+    TogglePlay,
+    TrainNextClip,
+)
+from ui.state import Dispatch, UiState
+
+Action = Callable[[Any, Dispatch, UiState], None]
+
+OVERLAY_NAMES = ("show_frusta", "show_inherited", "show_residual")
+COMPARE_MODES = ("off", "wipe", "side")
+
+
+@dataclass(frozen=True)
+class Shortcut:
+    """One row: a key with exact modifiers, what it does, and how the help sheet says it.
+
+    Attributes:
+        key_name: Attribute of imgui.Key, for example "space".
+        label: The key as printed.
+        needs_capture: Ignored until a capture is open.
+        repeats: Holding the key repeats the action.
+    """
+
+    key_name: str
+    label: str
+    text: str
+    group: str
+    action: Action
+    is_ctrl: bool = False
+    is_shift: bool = False
+    needs_capture: bool = True
+    repeats: bool = False
+
+    @property
+    def key(self) -> Any:
+        """The ImGui key."""
+        return getattr(imgui.Key, self.key_name)
+
+
+# ---- actions ---------------------------------------------------------------------------------------------------
+
+
+def go_to_frame(session: Any, dispatch: Dispatch, frame_index: int) -> None:
+    """Move the playhead, held inside the capture."""
+    last = max(session.timeline.n_frames - 1, 0)
+    dispatch(SetFrame(int(np.clip(frame_index, 0, last))))
+
+
+def _step_by(n: int) -> Action:
+    def step(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        go_to_frame(session, dispatch, session.timeline.frame_index + n)
+
+    return step
+
+
+def _step_second(sign: int) -> Action:
+    def step(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        n = max(1, round(session.timeline.fps))
+        go_to_frame(session, dispatch, session.timeline.frame_index + sign * n)
+
+    return step
+
+
+def _first_frame(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    go_to_frame(session, dispatch, 0)
+
+
+def _last_frame(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    go_to_frame(session, dispatch, session.timeline.n_frames - 1)
+
+
+def _previous_clip(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    starts = [clip.start for clip in session.clips if clip.start < session.timeline.frame_index]
+    go_to_frame(session, dispatch, starts[-1] if starts else 0)
+
+
+def _next_clip(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    starts = [clip.start for clip in session.clips if clip.start > session.timeline.frame_index]
+    go_to_frame(session, dispatch, starts[0] if starts else session.timeline.n_frames - 1)
+
+
+def _toggle_play(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(TogglePlay())
+
+
+def _toggle_loop(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    session.timeline.is_looping = not session.timeline.is_looping
+
+
+def _camera_by(step: int) -> Action:
+    def hop(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        n_cameras = len(session.rig)
+        shown = session.view.look_through
+        if shown is None:
+            dispatch(LookThrough(nearest_camera(session)))
+        else:
+            dispatch(LookThrough((shown + step) % n_cameras))
+
+    return hop
+
+
+def _home(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(HomeView())
+
+
+def nearest_camera(session: Any) -> int:
+    """The capture camera that looks most like the current view: near in place and direction."""
+    rig = session.rig
+    world_to_camera = np.asarray(session.view.world_to_camera(), dtype=np.float64)
+    center = -world_to_camera[:3, :3].T @ world_to_camera[:3, 3]
+    distances = np.linalg.norm(rig.centers - center, axis=1)
+    spread = max(float(np.linalg.norm(rig.centers - rig.centers.mean(0), axis=1).max()), 1e-9)
+    turns = 1.0 - rig.forwards @ world_to_camera[2, :3]
+    return int(np.argmin(distances / spread + turns))
+
+
+def set_compare(session: Any, dispatch: Dispatch, mode: str) -> None:
+    """Compare with the captured picture; needs a capture camera, so the nearest one is taken from a free view."""
+    if mode != "off" and session.view.look_through is None:
+        dispatch(LookThrough(nearest_camera(session)))
+    dispatch(SetCompare(mode))
+
+
+def _cycle_compare(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    shown = COMPARE_MODES.index(session.overlays.compare)
+    set_compare(session, dispatch, COMPARE_MODES[(shown + 1) % len(COMPARE_MODES)])
+
+
+def _toggle_overlays(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    shown = tuple(name for name in OVERLAY_NAMES if getattr(session.overlays, name))
+    if shown:
+        ui.hidden_overlays = shown
+    for name in shown or ui.hidden_overlays or OVERLAY_NAMES:
+        dispatch(ToggleOverlay(name))
+
+
+def _toggle_overlay(name: str) -> Action:
+    def toggle(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        dispatch(ToggleOverlay(name))
+
+    return toggle
+
+
+def train_or_pause(session: Any, dispatch: Dispatch) -> None:
+    """One key for the whole loop: start the next clip, pause what runs, resume what is paused."""
+    status = session.training
+    if status.state in ("starting", "preparing", "running"):
+        dispatch(PauseTraining())
+    elif status.state == "paused":
+        dispatch(ResumeTraining())
+    elif status.can_train_next:
+        dispatch(TrainNextClip())
+
+
+def _train(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    train_or_pause(session, dispatch)
+
+
+def _stop_training(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    if session.training.state not in ("idle", "failed", "stopping"):
+        dispatch(StopTraining())
+
+
+def _help(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    ui.is_help_open = not ui.is_help_open
+
+
+def _open(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    ui.is_open_requested = True
+
+
+def _quit(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    ui.quit_requested = True
+
+
+TIME, VIEW, COMPARE, TRAIN, WINDOW = "Time", "View", "Show and compare", "Train", "Window"
+
+SHORTCUTS: tuple[Shortcut, ...] = (
+    Shortcut("space", "Space", "Play or pause", TIME, _toggle_play),
+    Shortcut("left_arrow", "Left", "One frame back", TIME, _step_by(-1), repeats=True),
+    Shortcut("right_arrow", "Right", "One frame forward", TIME, _step_by(1), repeats=True),
+    Shortcut("left_arrow", "Shift+Left", "One second back", TIME, _step_second(-1), is_shift=True, repeats=True),
+    Shortcut("right_arrow", "Shift+Right", "One second forward", TIME, _step_second(1), is_shift=True, repeats=True),
+    Shortcut("home", "Home", "First frame", TIME, _first_frame),
+    Shortcut("end", "End", "Last frame", TIME, _last_frame),
+    Shortcut("up_arrow", "Up", "Start of this or the previous clip", TIME, _previous_clip, repeats=True),
+    Shortcut("down_arrow", "Down", "Start of the next clip", TIME, _next_clip, repeats=True),
+    Shortcut("l", "L", "Loop on or off", TIME, _toggle_loop),
+    Shortcut("f", "F", "Frame the whole scene", VIEW, _home),
+    Shortcut("left_bracket", "[", "Look through the previous camera", VIEW, _camera_by(-1), repeats=True),
+    Shortcut("right_bracket", "]", "Look through the next camera", VIEW, _camera_by(1), repeats=True),
+    Shortcut("g", "G", "Compare with the captured picture: wipe, side by side, off", COMPARE, _cycle_compare),
+    Shortcut("tab", "Tab", "Show or hide cameras and anchors", COMPARE, _toggle_overlays),
+    Shortcut("_1", "1", "Show or hide cameras", COMPARE, _toggle_overlay("show_frusta")),
+    Shortcut("_2", "2", "Show or hide inherited anchors", COMPARE, _toggle_overlay("show_inherited")),
+    Shortcut("_3", "3", "Show or hide residual anchors", COMPARE, _toggle_overlay("show_residual")),
+    Shortcut("_4", "4", "Show or hide the point cloud", COMPARE, _toggle_overlay("show_points")),
+    Shortcut("t", "T", "Train the next clip, pause or resume", TRAIN, _train),
+    Shortcut("t", "Ctrl+T", "Stop training and keep what was learned", TRAIN, _stop_training, is_ctrl=True),
+    Shortcut("o", "Ctrl+O", "Open a capture folder", WINDOW, _open, is_ctrl=True, needs_capture=False),
+    Shortcut("f1", "F1", "This sheet", WINDOW, _help, needs_capture=False),
+    Shortcut("q", "Ctrl+Q", "Quit; what was learned is kept", WINDOW, _quit, is_ctrl=True, needs_capture=False),
+)
+
+MOUSE_HELP: tuple[tuple[str, str], ...] = (
+    ("Left drag", "Orbit around the pivot"),
+    ("Right drag, or Shift + middle drag", "Move the view sideways"),
+    ("Wheel, or Ctrl + middle drag", "Move nearer or farther"),
+    ("Middle drag", "Orbit"),
+    ("Drag on the timeline", "Move through time"),
+    ("Drag the white line", "Wipe between render and captured picture"),
+    ("Drop a folder on the window", "Open it as a capture"),
+)
+
+
+def handle_shortcuts(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    """Run the actions of keys pressed since the last frame. Text fields keep their keys."""
+    io = imgui.get_io()
+    if imgui.is_key_pressed(imgui.Key.escape, False):
+        ui.is_help_open = False
+    if io.want_text_input:
+        return
+    for shortcut in SHORTCUTS:
+        if shortcut.is_ctrl != io.key_ctrl or shortcut.is_shift != io.key_shift or io.key_alt:
+            continue
+        if not imgui.is_key_pressed(shortcut.key, shortcut.repeats):
+            continue
+        if shortcut.needs_capture and session.capture is None:
+            continue
+        shortcut.action(session, dispatch, ui)
