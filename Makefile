@@ -1,0 +1,50 @@
+# Two commands matter: `make run` and `make test`. Both make the environment first; see setup.sh.
+# The other targets are parts of them, for daily work.
+
+VENV := .venv
+BIN := $(VENV)/bin
+SAMPLE := assets/sample
+SETUP_FLAGS :=
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.PHONY: help setup run test lint types fmt bench golden clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## /  make \1	/p' Makefile | expand -t 16
+
+setup: ## make .venv from requirements.lock, add missing system libraries
+	@./setup.sh $(SETUP_FLAGS)
+
+run: setup ## start on the sample capture: the window, or the same job headless where there is no display
+	@if [ -n "$$DISPLAY$$WAYLAND_DISPLAY" ] || [ "$$(uname -s)" = Darwin ]; then \
+		$(BIN)/clipgstream $(SAMPLE); \
+	else \
+		$(BIN)/clipgstream demo $(SAMPLE); \
+	fi
+
+test: SETUP_FLAGS := --tests
+test: setup lint types ## everything CI runs: linters, types, import contracts, tests
+	@$(BIN)/python -m pytest --durations=15
+
+lint: setup ## ruff (rules and format) and the import contracts
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/lint-imports
+
+types: setup ## pyright
+	@$(BIN)/pyright --pythonpath $(BIN)/python
+
+fmt: setup ## format and apply the safe fixes
+	@$(BIN)/ruff check --fix .
+	@$(BIN)/ruff format .
+
+bench: setup ## measure the figures of the README and print them as a table
+	@$(BIN)/python -m tests.benchmarks
+
+golden: setup ## draw the golden pictures anew; look at each before committing it
+	@$(BIN)/python -m pytest tests --update-golden -k golden
+
+clean: ## remove the environment, caches and outputs
+	rm -rf $(VENV) out *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find app engine ui tests -name __pycache__ -type d -prune -exec rm -rf {} +

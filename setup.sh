@@ -1,0 +1,184 @@
+#!/usr/bin/env bash
+# Makes the environment: a virtual environment in .venv with the exact versions of requirements.lock, and the system
+# libraries it needs. Running it again costs a second: a stamp in .venv remembers what was installed.
+#
+#   ./setup.sh              everything `make run` needs
+#   ./setup.sh --tests      the same, and what the end-to-end test of the window needs (Xvfb, xdotool)
+#
+#   PYTHON=/path/to/python           take this interpreter (3.11, 3.12 or 3.13)
+#   CLIPGSTREAM_TORCH_INDEX=URL      take the CPU build of torch from this package index
+#   CLIPGSTREAM_TORCH=default        take whatever build of torch the default index gives, CUDA libraries (GBs) included
+#
+# As root, or with a sudo that asks no password, missing system libraries are installed with apt-get. Otherwise the one
+# line that installs them is printed. Missing libraries never stop training without a window.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")"
+
+VENV=.venv
+STAMP=$VENV/.setup-stamp
+TORCH_CPU_INDEX=https://download.pytorch.org/whl/cpu
+WITH_TESTS=no
+[ "${1:-}" = "--tests" ] && WITH_TESTS=yes
+
+say() { printf 'setup: %s\n' "$*"; }
+fail() {
+    printf 'setup: %s\n' "$@" >&2
+    exit 1
+}
+
+# ---------------------------------------------------------------- system packages
+as_root() { # runs a command as root, or returns 1 when that needs a password
+    if [ "$(id -u)" = 0 ]; then "$@"; elif command -v sudo >/dev/null && sudo -n true 2>/dev/null; then sudo -n "$@"; else return 1; fi
+}
+may_be_root() { as_root true 2>/dev/null; }
+
+apt_updated=no
+apt_install() { # best effort, never hangs on a dead mirror; 1 when it did not work
+    command -v apt-get >/dev/null && may_be_root || return 1
+    local options=(-qq -o Acquire::Retries=1 -o Acquire::http::Timeout=20 -o Acquire::https::Timeout=20 -o DPkg::Lock::Timeout=60)
+    if [ "$apt_updated" = no ]; then
+        as_root apt-get "${options[@]}" update >/dev/null 2>&1 || true # a stale list may still do
+        apt_updated=yes
+    fi
+    as_root env DEBIAN_FRONTEND=noninteractive \
+        apt-get "${options[@]}" install -y --no-install-recommends "$@" >/dev/null 2>&1
+}
+
+# ---------------------------------------------------------------- interpreter
+find_python() {
+    local candidate
+    for candidate in ${PYTHON:-python3.11 python3.12 python3.13 python3}; do
+        if "$candidate" -c 'import sys; raise SystemExit(not (3, 11) <= sys.version_info[:2] < (3, 14))' 2>/dev/null; then
+            printf '%s' "$candidate"
+            return
+        fi
+    done
+    fail "Python 3.11, 3.12 or 3.13 was not found (looked for: ${PYTHON:-python3.11 python3.12 python3.13 python3})." \
+        "Install it (Debian 12: apt-get install -y python3 python3-venv) or name it: make setup PYTHON=/path/to/python"
+}
+
+make_venv() {
+    local python=$1
+    if ! "$python" -c 'import ensurepip, venv' 2>/dev/null; then
+        say "this Python has no venv; installing python3-venv"
+        apt_install python3-venv || true
+        "$python" -c 'import ensurepip, venv' 2>/dev/null ||
+            fail "$python cannot make virtual environments. Run: apt-get install -y python3-venv"
+    fi
+    say "making $VENV with $("$python" --version)"
+    "$python" -m venv --clear "$VENV"
+}
+
+# ---------------------------------------------------------------- packages
+pip() { "$VENV/bin/python" -m pip --disable-pip-version-check --no-input "$@"; }
+
+is_reachable() { # any HTTP answer within five seconds
+    "$VENV/bin/python" - "$1" <<'PYTHON' 2>/dev/null
+import sys, urllib.request
+urllib.request.urlopen(urllib.request.Request(sys.argv[1], method="HEAD"), timeout=5)
+PYTHON
+}
+
+# Sets `torch_options`: pip options after which the torch of the lock file is a build without CUDA.
+choose_torch() {
+    local version=$1 index offered
+    torch_options=()
+    if [ "$(uname -s)" != Linux ] || [ "${CLIPGSTREAM_TORCH:-}" = default ]; then
+        return # other systems' default build is the CPU (or Metal) one
+    fi
+    offered=$(pip index versions torch --timeout 10 --retries 1 2>/dev/null || true)
+    if printf '%s' "$offered" | grep -qF "$version+cpu"; then
+        say "torch $version+cpu comes from the configured package index"
+    else
+        index=${CLIPGSTREAM_TORCH_INDEX:-$TORCH_CPU_INDEX}
+        is_reachable "$index/torch/" || fail \
+            "no CPU build of torch $version in reach: the configured index has none and $index did not answer." \
+            "Name an index that has it with CLIPGSTREAM_TORCH_INDEX=URL, or accept the default build with CUDA (several GB)" \
+            "with CLIPGSTREAM_TORCH=default."
+        say "torch $version+cpu comes from $index"
+        torch_options+=(--extra-index-url "$index")
+    fi
+    printf 'torch==%s+cpu\n' "$version" >"$VENV/torch-cpu.txt"
+    torch_options+=(--constraint "$VENV/torch-cpu.txt")
+}
+
+install_packages() {
+    local version
+    version=$(sed -n 's/^torch==\([0-9.]*\).*/\1/p' requirements.lock)
+    choose_torch "$version"
+    say "installing the packages of requirements.lock (about 2.5 GB on disk)"
+    pip install --quiet --no-deps --retries 2 ${torch_options[@]+"${torch_options[@]}"} -r requirements.lock ||
+        fail "pip could not install requirements.lock; its own message is above." \
+            "Wheels exist for Linux x86-64 (glibc 2.35 or newer), macOS on Apple silicon and Windows, with Python 3.11 to 3.13."
+    if [ "$(uname -s)" = Linux ] && [ "${CLIPGSTREAM_TORCH:-}" = default ]; then
+        pip install --quiet --retries 2 "torch==$version" # now with the CUDA libraries that build asks for
+    fi
+    pip install --quiet --no-deps --no-build-isolation --editable .
+}
+
+fingerprint() { # what decides whether the environment is current; the folder counts because a venv cannot be moved
+    { cat requirements.lock pyproject.toml setup.sh && pwd && printf '%s\n' "${CLIPGSTREAM_TORCH:-}" "${PYTHON:-}"; } | cksum
+}
+
+# ---------------------------------------------------------------- system libraries
+missing_libraries() { # Debian packages whose library cannot be loaded, one line
+    [ "$(uname -s)" = Linux ] || return 0
+    "$VENV/bin/python" - <<'PYTHON'
+import ctypes, glob
+
+LIBRARIES = {
+    "libegl1": "libEGL.so.1",
+    "libgl1": "libGL.so.1",
+    "libglx-mesa0": "libGLX_mesa.so.0",
+    "libegl-mesa0": "libEGL_mesa.so.0",
+    "libx11-6": "libX11.so.6",
+    "libusb-1.0-0": "libusb-1.0.so.0",
+    "libgomp1": "libgomp.so.1",
+    "libudev1": "libudev.so.1",
+    "libidn2-0": "libidn2.so.0",
+}
+
+def loads(name):
+    try:
+        ctypes.CDLL(name)
+    except OSError:
+        return False
+    return True
+
+missing = [package for package, name in LIBRARIES.items() if not loads(name)]
+if not glob.glob("/usr/lib/*/dri/*_dri.so") + glob.glob("/usr/lib*/dri/*_dri.so"):
+    missing.append("libgl1-mesa-dri")
+print(" ".join(missing))
+PYTHON
+}
+
+check_system() {
+    local missing
+    missing=$(missing_libraries)
+    if [ "$WITH_TESTS" = yes ] && [ "$(uname -s)" = Linux ]; then
+        command -v Xvfb >/dev/null || missing="$missing xvfb"
+        command -v xdotool >/dev/null || missing="$missing xdotool"
+    fi
+    missing=$(echo $missing) # trims
+    [ -n "$missing" ] || return 0
+    say "missing system packages: $missing"
+    # shellcheck disable=SC2086  # a list of words
+    if apt_install $missing; then
+        say "installed them with apt-get"
+    else
+        say "this line installs them:  sudo apt-get install -y --no-install-recommends $missing"
+        say "going on without: training and metrics need none of the GL libraries, the window and its tests do"
+    fi
+}
+
+# ---------------------------------------------------------------- main
+if [ ! -x "$VENV/bin/python" ] || [ "$(cat "$STAMP" 2>/dev/null)" != "$(fingerprint)" ]; then
+    started=$SECONDS
+    make_venv "$(find_python)"
+    check_system
+    install_packages
+    fingerprint >"$STAMP.new" && mv "$STAMP.new" "$STAMP"
+    say "ready in $((SECONDS - started)) s: $VENV"
+else
+    check_system
+fi

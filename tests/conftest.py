@@ -1,0 +1,55 @@
+"""Shared fixtures: fixed seeds, few torch threads, a tiny capture with known truth, and the golden-picture switch."""
+
+import random
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+SEED = 20_240
+TORCH_THREADS = 2  # what the smallest machine has; more would make sums, and so results, depend on the machine
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--update-golden",
+        action="store_true",
+        default=False,
+        help="write the golden pictures anew instead of comparing with them; look at each before committing it",
+    )
+
+
+@pytest.fixture
+def update_golden(request: pytest.FixtureRequest) -> bool:
+    """Whether golden pictures are to be written instead of compared."""
+    return bool(request.config.getoption("--update-golden"))
+
+
+@pytest.fixture(autouse=True)
+def _fixed_seeds() -> Iterator[None]:
+    """Every test starts from the same state of every random generator, whichever tests ran before it."""
+    random.seed(SEED)
+    np.random.seed(SEED)  # noqa: NPY002 - libraries we call may still draw from the global generator
+    torch = sys.modules.get("torch")  # not imported here: tests that need no torch stay fast without it
+    if torch is not None:
+        torch.manual_seed(SEED)
+        torch.set_num_threads(TORCH_THREADS)
+    yield
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    """A generator with a fixed seed, one per test."""
+    return np.random.default_rng(SEED)
+
+
+@pytest.fixture(scope="session")
+def tiny_capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a small capture in the layout of the shipped sample, made once per session by our own generator."""
+    from engine.synthetic import write_capture
+
+    folder = tmp_path_factory.mktemp("tiny_capture")
+    write_capture(folder)
+    return folder
