@@ -37,7 +37,9 @@ def activate(
     n, k = len(raw), gaussians_per_anchor
     opacity, color, shape, offset = raw.split([k, 3 * k, 7 * k, 3 * k], dim=1)
     shape = shape.reshape(n, k, 7)
-    means = positions[:, None] + offset.reshape(n, k, 3) * log_offset_scales.exp()[:, None]
+    means = (
+        positions[:, None] + offset.reshape(n, k, 3) * log_offset_scales.exp()[:, None]
+    )
     scales = log_base_scales.exp()[:, None] * torch.sigmoid(shape[..., :3])
     colors = torch.sigmoid(color.reshape(n, k, 3) + color_logits[:, None])
     return Gaussians(

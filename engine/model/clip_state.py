@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save_file
 
 from engine.errors import ProjectError
+from engine.files import atomic_path
 
 SCHEMA = 1
 
@@ -57,17 +57,15 @@ def write_clip_state(path: Path | str, state: ClipState) -> None:
     Raises:
         ProjectError: The disk refused.
     """
-    path = Path(path)
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     arrays = {name: np.ascontiguousarray(array) for name, array in state.arrays.items()}
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        save_file(arrays, partial, metadata={"header": json.dumps(state.header)})
-        os.replace(partial, path)
+        with atomic_path(path) as partial:
+            save_file(arrays, partial, metadata={"header": json.dumps(state.header)})
     except OSError as error:
-        partial.unlink(missing_ok=True)
         raise ProjectError(
-            f"The clip could not be written ({error.strerror}).", hint="Free some space and try again.", path=path
+            f"The clip could not be written ({error.strerror}).",
+            hint="Free some space and try again.",
+            path=path,
         ) from error
 
 
@@ -84,10 +82,14 @@ def read_clip_state(path: Path | str) -> ClipState:
             header = json.loads(metadata["header"])
             arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
     except FileNotFoundError as error:
-        raise ProjectError("The clip file does not exist.", hint="Train the clip first.", path=path) from error
+        raise ProjectError(
+            "The clip file does not exist.", hint="Train the clip first.", path=path
+        ) from error
     except (OSError, SafetensorError, KeyError, ValueError) as error:
         raise ProjectError(
-            f"The clip file is damaged or no clip file ({error}).", hint="Train the clip again.", path=path
+            f"The clip file is damaged or no clip file ({error}).",
+            hint="Train the clip again.",
+            path=path,
         ) from error
     if header.get("schema") != SCHEMA:
         raise ProjectError(

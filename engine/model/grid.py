@@ -17,7 +17,11 @@ import torch
 from numba import njit, prange
 from torch import Tensor
 
-_PRIMES = (1, 2654435761, 805459861)  # the usual spatial hash primes (Teschner et al. 2003; Mueller et al. 2022)
+_PRIMES = (
+    1,
+    2654435761,
+    805459861,
+)  # the usual spatial hash primes (Teschner et al. 2003; Mueller et al. 2022)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +37,9 @@ class CornerTable:
     weights: np.ndarray
 
 
-def corner_table(unit_positions: np.ndarray, cells: tuple[int, ...], n_entries: int) -> CornerTable:
+def corner_table(
+    unit_positions: np.ndarray, cells: tuple[int, ...], n_entries: int
+) -> CornerTable:
     """Corners and weights of positions in the unit cube.
 
     Args:
@@ -57,14 +63,18 @@ def corner_table(unit_positions: np.ndarray, cells: tuple[int, ...], n_entries: 
             offset = np.array([bits & 1, bits >> 1 & 1, bits >> 2 & 1])
             knot = (corner + offset).astype(np.uint64)  # [A, 3]
             if is_dense:
-                index = knot[:, 0] + np.uint64(n_knots) * (knot[:, 1] + np.uint64(n_knots) * knot[:, 2])
+                index = knot[:, 0] + np.uint64(n_knots) * (
+                    knot[:, 1] + np.uint64(n_knots) * knot[:, 2]
+                )
             else:
                 mixed = knot[:, 0] * np.uint64(_PRIMES[0])
                 mixed ^= knot[:, 1] * np.uint64(_PRIMES[1])
                 mixed ^= knot[:, 2] * np.uint64(_PRIMES[2])
                 index = mixed & np.uint64(n_entries - 1)
             indices[:, level, bits] = index.astype(np.int32)
-            weights[:, level, bits] = np.where(offset, fraction, 1.0 - fraction).prod(axis=1)
+            weights[:, level, bits] = np.where(offset, fraction, 1.0 - fraction).prod(
+                axis=1
+            )
     return CornerTable(indices, weights)
 
 
@@ -80,7 +90,9 @@ def _gather(rows, indices, weights, table, out):
                 entry = indices[row, level, corner]
                 weight = weights[row, level, corner]
                 for channel in range(n_channels):
-                    out[i, level * n_channels + channel] += weight * table[level, entry, channel]
+                    out[i, level * n_channels + channel] += (
+                        weight * table[level, entry, channel]
+                    )
 
 
 @njit(parallel=True, cache=True, nogil=True, error_model="numpy")
@@ -95,14 +107,18 @@ def _scatter(rows, indices, weights, out_grad, table_grad):
                 entry = indices[row, level, corner]
                 weight = weights[row, level, corner]
                 for channel in range(n_channels):
-                    table_grad[level, entry, channel] += weight * out_grad[i, level * n_channels + channel]
+                    table_grad[level, entry, channel] += (
+                        weight * out_grad[i, level * n_channels + channel]
+                    )
 
 
 class _Encode(torch.autograd.Function):
     @staticmethod
     def forward(ctx, table: Tensor, rows: np.ndarray, corners: CornerTable) -> Tensor:
         out = torch.empty(len(rows), table.shape[0] * table.shape[2])
-        _gather(rows, corners.indices, corners.weights, table.detach().numpy(), out.numpy())
+        _gather(
+            rows, corners.indices, corners.weights, table.detach().numpy(), out.numpy()
+        )
         ctx.rows, ctx.corners, ctx.table_shape = rows, corners, table.shape
         return out
 
@@ -110,7 +126,13 @@ class _Encode(torch.autograd.Function):
     def backward(ctx, out_grad: Tensor):
         table_grad = torch.empty(ctx.table_shape)
         corners = ctx.corners
-        _scatter(ctx.rows, corners.indices, corners.weights, out_grad.contiguous().numpy(), table_grad.numpy())
+        _scatter(
+            ctx.rows,
+            corners.indices,
+            corners.weights,
+            out_grad.contiguous().numpy(),
+            table_grad.numpy(),
+        )
         return table_grad, None, None
 
 

@@ -39,7 +39,14 @@ def _blur_row(padded, out):
 @njit(inline="always")
 def _blur_column(rows, y, out):
     """11-tap blur along y; `rows` has 5 zero rows on both ends."""
-    a, b, c, d, e, f = rows[y], rows[y + 1], rows[y + 2], rows[y + 3], rows[y + 4], rows[y + 5]
+    a, b, c, d, e, f = (
+        rows[y],
+        rows[y + 1],
+        rows[y + 2],
+        rows[y + 3],
+        rows[y + 4],
+        rows[y + 5],
+    )
     g, h, i, j, k = rows[y + 6], rows[y + 7], rows[y + 8], rows[y + 9], rows[y + 10]
     for x in range(out.shape[0]):
         out[x] = (
@@ -52,7 +59,13 @@ def _blur_column(rows, y, out):
         )
 
 
-@njit(parallel=True, cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz", "arcp"})
+@njit(
+    parallel=True,
+    cache=True,
+    nogil=True,
+    error_model="numpy",
+    fastmath={"contract", "nsz", "arcp"},
+)
 def _loss_kernel(image, truth, weight, moments, partials, gradient, row_sums):
     """image, truth, gradient [H, 3W]; moments [5, H + 10, 3W] and partials [3, H + 10, 3W] with zero borders;
     row_sums [H, 2] receives the sums of |difference| and SSIM of each row."""
@@ -110,8 +123,14 @@ def _loss_kernel(image, truth, weight, moments, partials, gradient, row_sums):
             a, b = image[y, x], truth[y, x]
             difference = a - b
             total += abs(difference)
-            sign = l1_scale if difference > _ZERO else (-l1_scale if difference < _ZERO else _ZERO)
-            gradient[y, x] = sign + ssim_scale * (mean[0, x] + _TWO * a * mean[1, x] + b * mean[2, x])
+            sign = (
+                l1_scale
+                if difference > _ZERO
+                else (-l1_scale if difference < _ZERO else _ZERO)
+            )
+            gradient[y, x] = sign + ssim_scale * (
+                mean[0, x] + _TWO * a * mean[1, x] + b * mean[2, x]
+            )
         row_sums[y, 0] = total
 
 
@@ -126,8 +145,10 @@ class LossWorkspace:
 
 class _Photometric(torch.autograd.Function):
     @staticmethod
-    def forward(ctx, image: Tensor, truth: Tensor, ssim_weight: float, workspace: LossWorkspace) -> Tensor:
-        height, width, _ = image.shape
+    def forward(
+        ctx, image: Tensor, truth: Tensor, ssim_weight: float, workspace: LossWorkspace
+    ) -> Tensor:
+        height = image.shape[0]
         image, truth = image.detach().contiguous(), truth.contiguous()
         gradient = torch.empty_like(image)
         _loss_kernel(
@@ -141,14 +162,18 @@ class _Photometric(torch.autograd.Function):
         )
         l1, ssim = workspace.row_sums.sum(0) / image.numel()
         ctx.gradient = gradient
-        return torch.tensor((1 - ssim_weight) * l1 + ssim_weight * (1 - ssim), dtype=image.dtype)
+        return torch.tensor(
+            (1 - ssim_weight) * l1 + ssim_weight * (1 - ssim), dtype=image.dtype
+        )
 
     @staticmethod
     def backward(ctx, loss_grad: Tensor):
         return ctx.gradient * loss_grad, None, None, None
 
 
-def photometric_loss(image: Tensor, truth: Tensor, *, ssim_weight: float, workspace: LossWorkspace) -> Tensor:
+def photometric_loss(
+    image: Tensor, truth: Tensor, *, ssim_weight: float, workspace: LossWorkspace
+) -> Tensor:
     """(1 - w) L1 + w (1 - SSIM) of one picture.
 
     Args:
@@ -165,17 +190,33 @@ def photometric_loss(image: Tensor, truth: Tensor, *, ssim_weight: float, worksp
 def ssim_map(image: Tensor, truth: Tensor) -> Tensor:
     """SSIM of each pixel and channel, any float dtype, differentiable. [H, W, 3]"""
     window = torch.from_numpy(_window / _window.sum()).to(image.dtype)
-    stack = torch.stack([image, truth, image * image, truth * truth, image * truth])  # [5, H, W, 3]
-    planes = stack.permute(0, 3, 1, 2).reshape(1, 15, *image.shape[:2])  # depthwise: channels stay channels
-    planes = functional.conv2d(planes, window.view(1, 1, 1, -1).repeat(15, 1, 1, 1), padding=(0, _RADIUS), groups=15)
-    planes = functional.conv2d(planes, window.view(1, 1, -1, 1).repeat(15, 1, 1, 1), padding=(_RADIUS, 0), groups=15)
+    stack = torch.stack(
+        [image, truth, image * image, truth * truth, image * truth]
+    )  # [5, H, W, 3]
+    planes = stack.permute(0, 3, 1, 2).reshape(
+        1, 15, *image.shape[:2]
+    )  # depthwise: channels stay channels
+    planes = functional.conv2d(
+        planes,
+        window.view(1, 1, 1, -1).repeat(15, 1, 1, 1),
+        padding=(0, _RADIUS),
+        groups=15,
+    )
+    planes = functional.conv2d(
+        planes,
+        window.view(1, 1, -1, 1).repeat(15, 1, 1, 1),
+        padding=(_RADIUS, 0),
+        groups=15,
+    )
     mu_a, mu_b, aa, bb, ab = planes.reshape(5, 3, *image.shape[:2])
     numerator = (2 * mu_a * mu_b + C1) * (2 * (ab - mu_a * mu_b) + C2)
     denominator = (mu_a**2 + mu_b**2 + C1) * (aa - mu_a**2 + bb - mu_b**2 + C2)
     return (numerator / denominator).permute(1, 2, 0)
 
 
-def photometric_loss_reference(image: Tensor, truth: Tensor, *, ssim_weight: float) -> Tensor:
+def photometric_loss_reference(
+    image: Tensor, truth: Tensor, *, ssim_weight: float
+) -> Tensor:
     """Slow truth of `photometric_loss`, any float dtype, by torch autograd."""
     l1 = (image - truth).abs().mean()
     return (1 - ssim_weight) * l1 + ssim_weight * (1 - ssim_map(image, truth).mean())

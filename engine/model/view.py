@@ -1,0 +1,112 @@
+"""Seeing a ClipModel through a camera: which anchors to decode, and the rendered picture.
+
+Decoding anchors that no pixel can see is most of the work of a naive step, so anchors are culled before decoding. The
+test is conservative: an anchor's Gaussians may sit a few spacings away from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from engine.model.clip_model import ClipModel
+from engine.raster import Rendering, rasterize
+from engine.raster.gaussians import Gaussians
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A pinhole camera at a picture size.
+
+    Attributes:
+        world_to_camera: Rigid map, OpenCV axes. [4, 4] float32
+        K: Intrinsics in pixels at this size, pixel centres at +0.5. [3, 3] float32
+        width, height: Pixels.
+        near_plane: Nearest depth that is drawn, scene units.
+    """
+
+    world_to_camera: Tensor
+    K: Tensor
+    width: int
+    height: int
+    near_plane: float
+
+    @classmethod
+    def from_arrays(
+        cls,
+        world_to_camera: np.ndarray,
+        K: np.ndarray,
+        *,
+        width: int,
+        height: int,
+        near_plane: float,
+    ) -> View:
+        """From numpy arrays of any float type."""
+        to_tensor = torch.from_numpy
+        return cls(
+            to_tensor(np.ascontiguousarray(world_to_camera, np.float32)),
+            to_tensor(np.ascontiguousarray(K, np.float32)),
+            int(width),
+            int(height),
+            float(near_plane),
+        )
+
+    def sees(self, positions: Tensor, *, reach: float) -> Tensor:
+        """Whether something within `reach` scene units of each position may touch a pixel. [A] bool"""
+        p_camera = (
+            positions @ self.world_to_camera[:3, :3].T + self.world_to_camera[:3, 3]
+        )
+        x, y, z = p_camera.unbind(1)
+        depth = z.clamp_min(self.near_plane)
+        fx, fy, cx, cy = self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]
+        u, v = fx * x / depth + cx, fy * y / depth + cy
+        reach_x, reach_y = (
+            fx * reach / depth + 2.0,
+            fy * reach / depth + 2.0,
+        )  # +2 px for the low-pass filter
+        is_inside = (
+            (u > -reach_x)
+            & (u < self.width + reach_x)
+            & (v > -reach_y)
+            & (v < self.height + reach_y)
+        )
+        return is_inside & (z > self.near_plane - reach)
+
+
+def visible_rows(
+    model: ClipModel, view: View, clip_time: float, *, reach: float
+) -> dict[str, Tensor]:
+    """Rows per role that exist at this time and that the view may see."""
+    rows = {}
+    for role in model.roles():
+        alive = model.alive(role, clip_time)
+        positions = model.anchor_set(role).positions[alive]
+        rows[role] = alive[view.sees(positions, reach=reach)]
+    return rows
+
+
+def render_gaussians(
+    gaussians: Gaussians, view: View, *, background: Tensor | None = None
+) -> Rendering:
+    """Rasterize through one view; tensors of the rendering have a leading camera axis of 1."""
+    return rasterize(
+        gaussians,
+        view.world_to_camera[None],
+        view.K[None],
+        view.width,
+        view.height,
+        background=background,
+        near_plane=view.near_plane,
+    )
+
+
+def render_model(
+    model: ClipModel, view: View, clip_time: float, *, reach: float
+) -> Tensor:
+    """Picture of a clip at a time, scene colours over black, without gradient. [H, W, 3]"""
+    with torch.no_grad():
+        rows = visible_rows(model, view, clip_time, reach=reach)
+        return render_gaussians(model.decode(clip_time, rows), view).image[0]

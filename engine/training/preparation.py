@@ -1,0 +1,207 @@
+"""From pixels to clouds: what has to be known before a clip can be trained.
+
+Reference clip: backgrounds of the training cameras and a dense static cloud first; once the static part has been
+trained, its renders correct the backgrounds, and what differs from them is what moves. Source clip: the reference's
+corrected backgrounds are reused, only the clip's own motion is looked at.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save_file
+
+from engine.capture.capture import Capture
+from engine.capture.rig import CameraRig
+from engine.cloud.background import estimate_background
+from engine.cloud.masks import motion_mask
+from engine.cloud.moving_cloud import MovingCloud, build_moving_cloud
+from engine.cloud.recheck import recheck_background
+from engine.cloud.sparse import triangulate
+from engine.cloud.static_cloud import StaticCloud, build_static_cloud
+from engine.files import atomic_path
+from engine.training.config import TrainConfig
+from engine.training.pictures import TrainingPictures
+from engine.training.report import Progress, ReportProgress
+
+BACKGROUNDS_FILE = "backgrounds.safetensors"
+
+
+@dataclass(frozen=True, slots=True)
+class Backgrounds:
+    """What each training camera sees when nothing moves.
+
+    Attributes:
+        images: [C, H, W, 3] uint8
+        is_stable: Pixels whose background is trusted. [C, H, W] bool
+    """
+
+    images: np.ndarray
+    is_stable: np.ndarray
+
+
+def spread_frames(n_frames: int, at_most: int) -> list[int]:
+    """Frame indices spread evenly over a capture."""
+    count = min(n_frames, at_most)
+    return sorted({round(i * (n_frames - 1) / max(count - 1, 1)) for i in range(count)})
+
+
+def estimate_backgrounds(
+    capture: Capture,
+    camera_indices: Sequence[int],
+    config: TrainConfig,
+    report: ReportProgress,
+) -> Backgrounds:
+    """Backgrounds from frames spread over the whole capture."""
+    frames = spread_frames(capture.n_frames, config.background_frames)
+    images, stable = [], []
+    for row, camera in enumerate(camera_indices):
+        background = estimate_background(capture.frames_of(camera, frames))
+        images.append(background.image)
+        stable.append(background.is_stable)
+        report(
+            Progress("Looking for what stands still", (row + 1) / len(camera_indices))
+        )
+    is_stable = np.stack(stable)
+    share = 100 * is_stable.mean()
+    report(
+        Progress(
+            "Looking for what stands still",
+            1.0,
+            f"{len(frames)} frames each, {share:.0f} % of pixels stable",
+        )
+    )
+    return Backgrounds(np.stack(images), is_stable)
+
+
+def static_cloud(
+    backgrounds: Backgrounds,
+    rig: CameraRig,
+    config: TrainConfig,
+    report: ReportProgress,
+) -> StaticCloud:
+    """Dense points of what stands still, with white balance gains."""
+
+    def say(line: str) -> None:
+        report(Progress("Building the static cloud", 0.5, line))
+
+    sparse = triangulate(backgrounds.images, rig, report=say)
+    return build_static_cloud(
+        backgrounds.images,
+        backgrounds.is_stable,
+        rig,
+        max_points=config.max_static_points,
+        sparse_points=sparse.points if len(sparse.points) else None,
+        report=say,
+    )
+
+
+def correct_backgrounds(
+    backgrounds: Backgrounds,
+    pictures: TrainingPictures,
+    render_static: Callable[[int], np.ndarray],
+    report: ReportProgress,
+) -> Backgrounds:
+    """Backgrounds after a look at the trained static part, which knows what other cameras saw behind a person.
+
+    Args:
+        render_static: Camera row to the static render in that camera's colours. [H, W, 3] float
+    """
+    corrected = backgrounds.images.copy()
+    for row in range(len(corrected)):
+        frames = np.stack([pictures.raw(row, i) for i in range(pictures.clip.n_frames)])
+        corrected[row] = recheck_background(
+            backgrounds.images[row],
+            backgrounds.is_stable[row],
+            render_static(row),
+            frames,
+        )
+        report(Progress("Checking backgrounds", (row + 1) / len(corrected)))
+    changed = 100 * (corrected != backgrounds.images).any(-1).mean()
+    report(
+        Progress(
+            "Checking backgrounds",
+            1.0,
+            f"{changed:.1f} % of pixels taken from the static render",
+        )
+    )
+    return Backgrounds(corrected, backgrounds.is_stable)
+
+
+def motion_masks(
+    pictures: TrainingPictures, backgrounds: Backgrounds, report: ReportProgress
+) -> np.ndarray:
+    """What differs from the background, per frame and camera. [M, C, H, W] bool"""
+    n_frames, n_cameras = pictures.clip.n_frames, len(pictures.camera_indices)
+    masks = np.empty((n_frames, *backgrounds.is_stable.shape), bool)
+    for row in range(n_cameras):
+        for frame in range(n_frames):
+            masks[frame, row] = motion_mask(
+                pictures.raw(row, frame), backgrounds.images[row]
+            )
+        report(Progress("Finding what moves", (row + 1) / n_cameras))
+    report(
+        Progress(
+            "Finding what moves", 1.0, f"{100 * masks.mean():.1f} % of pixels move"
+        )
+    )
+    return masks
+
+
+def moving_cloud(
+    pictures: TrainingPictures,
+    masks: np.ndarray,
+    rig: CameraRig,
+    gains: np.ndarray,
+    static_points: np.ndarray,
+    config: TrainConfig,
+    report: ReportProgress,
+) -> MovingCloud:
+    """Surface points of what moves, fused over the frames of the clip, with the frames each exists in."""
+
+    def say(line: str) -> None:
+        report(Progress("Carving what moves", 0.5, line))
+
+    lower, upper = (
+        np.quantile(static_points, 0.01, axis=0),
+        np.quantile(static_points, 0.99, axis=0),
+    )
+    return build_moving_cloud(
+        pictures.raw,
+        masks,
+        rig,
+        gains,
+        bounds_min=lower,
+        bounds_max=upper,
+        max_points=config.max_moving_points,
+        report=say,
+    )
+
+
+def write_backgrounds(prep_dir: Path, backgrounds: Backgrounds, key: dict) -> None:
+    """Keep backgrounds for source clips and resumed trainings, atomically. `key` says what they belong to."""
+    arrays = {
+        "images": backgrounds.images,
+        "is_stable": np.packbits(backgrounds.is_stable, axis=-1),
+    }
+    with atomic_path(prep_dir / BACKGROUNDS_FILE) as partial:
+        save_file(arrays, partial, metadata={"key": json.dumps(key, sort_keys=True)})
+
+
+def read_backgrounds(prep_dir: Path, key: dict) -> Backgrounds | None:
+    """Backgrounds kept earlier, or None when there are none for this key or the file is damaged."""
+    try:
+        with safe_open(prep_dir / BACKGROUNDS_FILE, framework="numpy") as file:
+            if (file.metadata() or {}).get("key") != json.dumps(key, sort_keys=True):
+                return None
+            images, packed = file.get_tensor("images"), file.get_tensor("is_stable")
+    except (OSError, SafetensorError, KeyError):
+        return None  # a cache: estimated again by the caller
+    return Backgrounds(
+        images, np.unpackbits(packed, axis=-1, count=images.shape[2]).astype(bool)
+    )
