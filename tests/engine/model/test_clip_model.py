@@ -1,0 +1,175 @@
+"""ClipModel: gate in time, inheritance, round trips. Small hand-made clips, no pictures."""
+
+import numpy as np
+import pytest
+import torch
+
+from engine.errors import ProjectError
+from engine.model.anchors import AnchorSet
+from engine.model.clip_model import ClipModel, decoder_sizes, inherit, load_clip_model
+from engine.model.clip_state import SCHEMA, ClipState
+from engine.model.decoder import HEADS, Decoder
+from engine.model.field import FieldShape, SpatioTemporalField
+
+N_FRAMES = 4
+K = 3
+
+
+def make_anchors(n: int, *, seed: int, presence: torch.Tensor | None) -> AnchorSet:
+    generator = torch.Generator().manual_seed(seed)
+    anchors = AnchorSet.from_cloud(
+        torch.rand(n, 3, generator=generator),
+        torch.rand(n, 3, generator=generator),
+        spacing=0.1,
+        feature_dim=8,
+        presence=presence,
+    )
+    with torch.no_grad():
+        anchors.features.normal_(generator=generator)
+    return anchors
+
+
+def make_field(seed: int) -> SpatioTemporalField:
+    shape = FieldShape(
+        n_knots=N_FRAMES,
+        cells=(4, 7),
+        n_entries=512,
+        channels=4,
+        hidden=16,
+        feature_dim=6,
+        bounds_min=(0.0, 0.0, 0.0),
+        side=1.0,
+    )
+    return SpatioTemporalField(shape, torch.Generator().manual_seed(seed))
+
+
+def make_reference() -> ClipModel:
+    presence = torch.zeros(10, N_FRAMES, dtype=torch.bool)
+    presence[:6, 0] = True
+    presence[4:, 1] = True
+    sets = {"static": make_anchors(20, seed=0, presence=None), "moving": make_anchors(10, seed=1, presence=presence)}
+    decoder = Decoder(
+        static_dim=8, dynamic_dim=6, gaussians_per_anchor=K, hidden=16, generator=torch.Generator().manual_seed(2)
+    )
+    return ClipModel(sets=sets, decoder=decoder, field=make_field(3), clip_length=N_FRAMES, n_frames=N_FRAMES)
+
+
+def state_of(model: ClipModel, *, role: str, clip_index: int = 0, reference: ClipState | None = None) -> ClipState:
+    assert model.field is not None
+    header = {
+        "schema": SCHEMA,
+        "role": role,
+        "clip_index": clip_index,
+        "clip_length": N_FRAMES,
+        "n_frames": N_FRAMES,
+        "decoder": decoder_sizes(model.decoder),
+        "field": model.field.shape.as_dict(),
+    }
+    state = ClipState(model.own_arrays(), header)
+    header["fingerprint"] = state.fingerprint
+    if reference is not None:
+        header["reference_fingerprint"] = reference.header["fingerprint"]
+    return state
+
+
+def make_source(reference: ClipState) -> ClipModel:
+    inherited = torch.ones(10, N_FRAMES, dtype=torch.bool)
+    sets, decoder = inherit(reference, {"moving": inherited})
+    sets["residual"] = make_anchors(5, seed=7, presence=torch.ones(5, N_FRAMES, dtype=torch.bool))
+    return ClipModel(sets=sets, decoder=decoder, field=make_field(8), clip_length=N_FRAMES, n_frames=N_FRAMES)
+
+
+def test_only_anchors_that_exist_are_decoded():
+    model = make_reference()
+    assert len(model.decode(0.0)) == (20 + 6) * K
+    assert len(model.decode(2 / N_FRAMES)) == 20 * K
+    # half way between frames 0 and 1 both frames' anchors are there
+    assert len(model.decode(0.5 / N_FRAMES)) == (20 + 10) * K
+
+
+def test_decoded_values_are_activated_and_finite():
+    gaussians = make_reference().decode(0.0)
+    assert all(torch.isfinite(tensor).all() for tensor in gaussians.tensors())
+    assert (gaussians.scales > 0).all()
+    for values in (gaussians.opacities, gaussians.colors):
+        assert ((values >= 0) & (values <= 1)).all()
+
+
+def test_a_fresh_field_leaves_the_static_look_almost_unchanged():
+    model = make_reference()
+    rows = model.alive("moving", 0.0)
+    assert model.field is not None
+    dynamic = model.field(rows.numpy(), model.field.corners(model.anchor_set("moving").positions), [(0, 1.0)])
+    # tables start within 1e-3 and two layers of weights below 1 follow
+    assert dynamic.abs().max() < 1e-2
+
+
+def test_times_between_frames_interpolate_the_field():
+    model = make_reference()
+    assert model.knots(0.25) == [(1, 1.0)]
+    (lower, a), (upper, b) = model.knots(1.25 / N_FRAMES)
+    assert (lower, upper) == (1, 2)
+    assert a == pytest.approx(0.75)
+    assert b == pytest.approx(0.25)
+    assert model.knots(0.999) == [(3, 1.0)]  # beyond the last frame its knot holds
+
+
+def test_reference_round_trip_gives_the_same_gaussians():
+    model = make_reference()
+    again = load_clip_model(state_of(model, role="reference"), None)
+    for ours, theirs in zip(model.decode(0.25).tensors(), again.decode(0.25).tensors(), strict=True):
+        assert torch.equal(ours, theirs)
+
+
+def test_source_clip_freezes_everything_it_inherits_and_stores_only_its_own():
+    reference = state_of(make_reference(), role="reference")
+    source = make_source(reference)
+    trainable = {name for name, parameter in source.named_parameters() if parameter.requires_grad}
+    assert trainable
+    assert all(name.startswith(("sets.residual.", "field.")) for name in trainable)
+    assert not any(name.startswith(("decoder.", "sets.static", "sets.moving")) for name in source.own_arrays())
+    again = load_clip_model(state_of(source, role="source", clip_index=1, reference=reference), reference)
+    for ours, theirs in zip(source.decode(0.5).tensors(), again.decode(0.5).tensors(), strict=True):
+        assert torch.equal(ours, theirs)
+
+
+def test_constant_sets_are_decoded_once_and_equal_the_plain_decode():
+    reference = state_of(make_reference(), role="reference")
+    source = make_source(reference)
+    assert source.is_constant("static")
+    assert not source.is_constant("moving")
+    rows = {"static": torch.tensor([3, 1]), "moving": torch.zeros(0, dtype=torch.int64)}
+    rows["residual"] = rows["moving"]
+    cached = source.decode(0.0, rows)
+    plain = load_clip_model(reference, None).decode(0.0, {"static": rows["static"], "moving": rows["moving"]})
+    assert torch.allclose(cached.means, plain.means, atol=1e-6)  # the same sums in another order
+
+
+def test_a_source_clip_refuses_a_missing_or_another_reference():
+    reference = state_of(make_reference(), role="reference")
+    state = state_of(make_source(reference), role="source", clip_index=1, reference=reference)
+    with pytest.raises(ProjectError, match="not there"):
+        load_clip_model(state, None)
+    other = ClipState(reference.arrays, reference.header | {"fingerprint": "0" * 16})
+    with pytest.raises(ProjectError, match="0000"):
+        load_clip_model(state, other)
+
+
+def test_anchor_view_separates_inherited_from_own():
+    reference = state_of(make_reference(), role="reference")
+    view = make_source(reference).anchors()
+    assert view.inherited_positions.shape == (30, 3)
+    assert view.own_positions.shape == (5, 3)
+    assert view.inherited_is_dynamic.sum() == 10
+
+
+def test_every_head_changes_the_output():
+    model = make_reference()
+    before = [tensor.clone() for tensor in model.decode(0.0).detach().tensors()]
+    for head in HEADS:
+        with torch.no_grad():
+            model.decoder.second_bias[head] += 0.3
+        after = model.decode(0.0).detach().tensors()
+        assert any(not torch.equal(a, b) for a, b in zip(before, after, strict=True)), head
+        before = [tensor.clone() for tensor in after]
+    assert np.isfinite(before[0].numpy()).all()
