@@ -1,0 +1,307 @@
+"""Visual hull of one frame: the voxels that every camera's motion mask allows, carved coarse to fine.
+
+Owns occupancy, surface, visibility and colour of one frame's hull. Fusing frames is engine.cloud.moving_cloud.
+Source: Laurentini 1994. A hull is an upper bound of the object; one camera may disagree (mask holes), and enough
+cameras have to agree, so that places few cameras look at do not fill up.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from engine.cloud.parallel import map_ordered, row_spans
+
+BLOCK = 8
+"""Voxels along a coarse block's edge."""
+COLOR_SLACK_VOXELS = 2.0
+"""A surface voxel this far behind the hull's nearest surface in a camera still counts as seen by it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """A box of cubic voxels. origin [3] is its lowest corner; size the voxel edge; n_blocks [3] of BLOCK^3 voxels."""
+
+    origin: np.ndarray
+    size: float
+    n_blocks: np.ndarray
+
+    @staticmethod
+    def over(bounds_min: np.ndarray, bounds_max: np.ndarray, size: float) -> Grid:
+        """The grid that covers the bounds."""
+        extent = np.asarray(bounds_max, dtype=np.float64) - np.asarray(bounds_min, dtype=np.float64)
+        n_blocks = np.maximum(np.ceil(extent / (size * BLOCK)), 1).astype(np.int64)
+        return Grid(np.asarray(bounds_min, dtype=np.float64), float(size), n_blocks)
+
+    @property
+    def shape(self) -> np.ndarray:
+        """Voxels along each axis. [3] int64"""
+        return self.n_blocks * BLOCK
+
+    def centers(self, voxels: np.ndarray) -> np.ndarray:
+        """World centres of integer voxels [P, 3]."""
+        return self.origin + (voxels + 0.5) * self.size
+
+
+def carve(
+    masks: np.ndarray, projections: np.ndarray, grid: Grid, *, near: float, n_misses: int, min_hits: int
+) -> np.ndarray:
+    """Voxels of the hull.
+
+    Args:
+        masks: Motion masks of one frame. [C, H, W] bool
+        projections: K [R | t] at mask size. [C, 3, 4]
+        near: Points nearer than this to a camera are not judged by it, scene units.
+        n_misses: Cameras that see the voxel outside their mask and are outvoted.
+        min_hits: Cameras that have to see the voxel inside their mask.
+    Returns:
+        Integer voxels, sorted by block and then x, y, z. [P, 3] int64
+    """
+    integrals = np.stack(map_ordered(_integral, masks))
+    blocks = np.stack(np.meshgrid(*(np.arange(n) for n in grid.n_blocks), indexing="ij"), axis=-1).reshape(-1, 3)
+    arguments = (integrals, projections, grid.origin, grid.size, near, n_misses, min_hits)
+
+    def coarse(span: tuple[int, int]) -> np.ndarray:
+        return _carve_blocks(blocks[span[0] : span[1]], *arguments)
+
+    blocks = blocks[np.concatenate(map_ordered(coarse, row_spans(len(blocks))))]
+    if len(blocks) == 0:
+        return np.zeros((0, 3), dtype=np.int64)
+
+    def fine(span: tuple[int, int]) -> np.ndarray:
+        return _carve_voxels(blocks[span[0] : span[1]], *arguments)
+
+    return np.concatenate(map_ordered(fine, row_spans(len(blocks))))
+
+
+def surface_rows(voxels: np.ndarray, grid: Grid) -> np.ndarray:
+    """Voxels with at least one of their six neighbours empty. bool [P]"""
+    if len(voxels) == 0:
+        return np.zeros(0, dtype=bool)
+    low = voxels.min(0) - 1
+    occupied = np.zeros(voxels.max(0) - low + 2, dtype=bool)
+    local = voxels - low
+    occupied[tuple(local.T)] = True
+    is_surface = np.zeros(len(voxels), dtype=bool)
+    for axis in range(3):
+        for step in (-1, 1):
+            neighbor = local.copy()
+            neighbor[:, axis] += step
+            is_surface |= ~occupied[tuple(neighbor.T)]
+    return is_surface
+
+
+def hull_colors(
+    points: np.ndarray,
+    size: float,
+    pictures: np.ndarray,
+    masks: np.ndarray,
+    projections: np.ndarray,
+    gains: np.ndarray,
+    *,
+    near: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Median white-balanced colour of surface voxels over the cameras that see them.
+
+    Cameras for which the hull itself hides the voxel are left out unless no other is left.
+
+    Args:
+        points: Centres of surface voxels. [P, 3]
+        size: Voxel edge, scene units.
+        pictures: One frame of every camera. [C, H, W, 3] uint8
+        masks: [C, H, W] bool
+        gains: camera_colour = gain * scene_colour. [C, 3]
+    Returns:
+        colours 0..255 [P, 3] float32, NaN where no mask contains the voxel; number of unhidden cameras [P].
+    """
+    n_cameras = len(pictures)
+    samples = np.full((n_cameras, len(points), 3), np.nan, dtype=np.float32)
+    is_visible = np.zeros((n_cameras, len(points)), dtype=bool)
+
+    def sample(camera: int) -> None:
+        _sample_camera(
+            points,
+            size,
+            pictures[camera],
+            masks[camera],
+            projections[camera],
+            near,
+            samples[camera],
+            is_visible[camera],
+        )
+
+    map_ordered(sample, range(n_cameras))
+    samples /= gains[:, None, :].astype(np.float32)
+    n_visible = is_visible.sum(0)
+    samples[~is_visible & (n_visible > 0)] = np.nan
+    return _nan_medians(samples), n_visible
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _integral(mask):
+    """Sums of the mask over all pixels left of and above each corner. int32 [H + 1, W + 1]"""
+    height, width = mask.shape
+    sums = np.zeros((height + 1, width + 1), np.int32)
+    for y in range(height):
+        run = 0
+        for x in range(width):
+            run += mask[y, x]
+            sums[y + 1, x + 1] = sums[y, x + 1] + run
+    return sums
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _box_has_foreground(integral, x, y, radius):
+    """Any mask pixel whose area the square around (x, y) touches, after cutting it to the picture."""
+    height, width = integral.shape[0] - 1, integral.shape[1] - 1
+    x0, x1 = min(max(int(math.floor(x - radius)), 0), width), min(max(int(math.floor(x + radius)) + 1, 0), width)
+    y0, y1 = min(max(int(math.floor(y - radius)), 0), height), min(max(int(math.floor(y + radius)) + 1, 0), height)
+    return integral[y1, x1] - integral[y0, x1] - integral[y1, x0] + integral[y0, x0] > 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _carve_blocks(blocks, integrals, projections, origin, size, near, n_misses, min_hits):
+    """Blocks that may hold a hull voxel: conservative, a block is dropped only if every voxel of it would be."""
+    n_cameras = len(projections)
+    height, width = integrals.shape[1] - 1, integrals.shape[2] - 1
+    edge = size * BLOCK
+    ball = 0.5 * math.sqrt(3.0) * edge
+    is_kept = np.zeros(len(blocks), np.bool_)
+    focal = np.empty(n_cameras)
+    for c in range(n_cameras):
+        row0, row1, row2 = projections[c, 0, :3], projections[c, 1, :3], projections[c, 2, :3]
+        # |d pixel| <= |d point| (|row| + |pixel| |row2|) / depth; rows of K R bound the footprint without knowing K
+        focal[c] = max(math.sqrt((row0 * row0).sum()), math.sqrt((row1 * row1).sum()))
+        focal[c] += max(width, height) * math.sqrt((row2 * row2).sum())
+    for b in range(len(blocks)):
+        px = origin[0] + (blocks[b, 0] + 0.5) * edge
+        py = origin[1] + (blocks[b, 1] + 0.5) * edge
+        pz = origin[2] + (blocks[b, 2] + 0.5) * edge
+        misses, hits = 0, 0
+        for c in range(n_cameras):
+            p = projections[c]
+            depth = p[2, 0] * px + p[2, 1] * py + p[2, 2] * pz + p[2, 3]
+            if depth + ball < near:
+                continue
+            if depth - ball < 0.5 * near:
+                hits += 1  # too close to bound: may be seen
+                continue
+            x = (p[0, 0] * px + p[0, 1] * py + p[0, 2] * pz + p[0, 3]) / depth
+            y = (p[1, 0] * px + p[1, 1] * py + p[1, 2] * pz + p[1, 3]) / depth
+            radius = ball * focal[c] / (depth - ball) + 2.0
+            if x + radius < 0 or y + radius < 0 or x - radius > width or y - radius > height:
+                continue
+            if _box_has_foreground(integrals[c], x, y, radius):
+                hits += 1
+            elif x - radius >= 0 and y - radius >= 0 and x + radius <= width and y + radius <= height:
+                if depth - ball > near:
+                    misses += 1
+                    if misses > n_misses:
+                        break
+        is_kept[b] = misses <= n_misses and hits >= min_hits
+    return is_kept
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _carve_voxels(blocks, integrals, projections, origin, size, near, n_misses, min_hits):
+    n_cameras = len(projections)
+    height, width = integrals.shape[1] - 1, integrals.shape[2] - 1
+    found = np.empty((len(blocks) * BLOCK * BLOCK * BLOCK, 3), np.int64)
+    n_found = 0
+    for b in range(len(blocks)):
+        for i in range(BLOCK):
+            for j in range(BLOCK):
+                for k in range(BLOCK):
+                    vx, vy, vz = blocks[b, 0] * BLOCK + i, blocks[b, 1] * BLOCK + j, blocks[b, 2] * BLOCK + k
+                    px = origin[0] + (vx + 0.5) * size
+                    py = origin[1] + (vy + 0.5) * size
+                    pz = origin[2] + (vz + 0.5) * size
+                    misses, hits = 0, 0
+                    for c in range(n_cameras):
+                        p = projections[c]
+                        depth = p[2, 0] * px + p[2, 1] * py + p[2, 2] * pz + p[2, 3]
+                        if depth < near:
+                            continue
+                        x = (p[0, 0] * px + p[0, 1] * py + p[0, 2] * pz + p[0, 3]) / depth
+                        y = (p[1, 0] * px + p[1, 1] * py + p[1, 2] * pz + p[1, 3]) / depth
+                        if x < 0 or y < 0 or x >= width or y >= height:
+                            continue
+                        if _box_has_foreground(integrals[c], x, y, 1.0):
+                            hits += 1
+                        else:
+                            misses += 1
+                            if misses > n_misses:
+                                break
+                    if misses <= n_misses and hits >= min_hits:
+                        found[n_found, 0], found[n_found, 1], found[n_found, 2] = vx, vy, vz
+                        n_found += 1
+    return found[:n_found].copy()
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _sample_camera(points, size, picture, mask, projection, near, samples, is_visible):
+    """Nearest colours inside the mask and a depth test against the splatted hull (buffer at a quarter of the size)."""
+    height, width = mask.shape
+    shrink = 4
+    small_h, small_w = (height + shrink - 1) // shrink, (width + shrink - 1) // shrink
+    nearest = np.full((small_h, small_w), np.inf)
+    row = projection[0, :3]
+    third = projection[2, :3]
+    focal = math.sqrt(max((row * row).sum() - (row * third).sum() ** 2, 1e-12))  # |K R row 0| minus its cx part
+    n_points = len(points)
+    pixels = np.empty((n_points, 3))
+    for i in range(n_points):
+        a, b, c = points[i, 0], points[i, 1], points[i, 2]
+        depth = projection[2, 0] * a + projection[2, 1] * b + projection[2, 2] * c + projection[2, 3]
+        pixels[i, 2] = depth
+        if depth < near:
+            continue
+        x = (projection[0, 0] * a + projection[0, 1] * b + projection[0, 2] * c + projection[0, 3]) / depth
+        y = (projection[1, 0] * a + projection[1, 1] * b + projection[1, 2] * c + projection[1, 3]) / depth
+        pixels[i, 0], pixels[i, 1] = x, y
+        if x < 0 or y < 0 or x >= width or y >= height:
+            pixels[i, 2] = -1.0
+            continue
+        radius = 0.5 * size * focal / depth
+        x0, x1 = max(int((x - radius) / shrink), 0), min(int((x + radius) / shrink), small_w - 1)
+        y0, y1 = max(int((y - radius) / shrink), 0), min(int((y + radius) / shrink), small_h - 1)
+        for v in range(y0, y1 + 1):
+            for u in range(x0, x1 + 1):
+                if depth < nearest[v, u]:
+                    nearest[v, u] = depth
+    for i in range(n_points):
+        depth = pixels[i, 2]
+        if depth < near:
+            continue
+        ix, iy = int(pixels[i, 0]), int(pixels[i, 1])
+        if not mask[iy, ix]:
+            continue
+        for channel in range(3):
+            samples[i, channel] = picture[iy, ix, channel]
+        is_visible[i] = depth <= nearest[iy // shrink, ix // shrink] + COLOR_SLACK_VOXELS * size
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _nan_medians(samples):
+    """Median over the first axis of [C, P, 3], ignoring NaN. float32 [P, 3]"""
+    n_cameras, n_points, _ = samples.shape
+    medians = np.full((n_points, 3), np.nan, np.float32)
+    ranked = np.empty(n_cameras, np.float32)
+    for p in range(n_points):
+        for channel in range(3):
+            n = 0
+            for c in range(n_cameras):
+                value = samples[c, p, channel]
+                if np.isfinite(value):
+                    j = n
+                    while j > 0 and ranked[j - 1] > value:
+                        ranked[j] = ranked[j - 1]
+                        j -= 1
+                    ranked[j] = value
+                    n += 1
+            if n > 0:
+                medians[p, channel] = np.float32(0.5) * (ranked[(n - 1) // 2] + ranked[n // 2])
+    return medians
