@@ -7,7 +7,8 @@
 #
 #   PYTHON=/path/to/python           take this interpreter (3.11, 3.12 or 3.13)
 #   CLIPGSTREAM_TORCH_INDEX=URL      take the CPU build of torch from this package index
-#   CLIPGSTREAM_TORCH=default        take whatever build of torch the default index gives, CUDA libraries (GBs) included
+#   CLIPGSTREAM_TORCH=cpu|default    cpu: only a CPU build will do; default: the default index's build, on Linux with GBs
+#                                    of CUDA libraries. Unset: the CPU build if any index in reach has it, else the default
 #
 # As root, or with a sudo that asks no password, missing system libraries are installed with apt-get. Otherwise the one
 # line that installs them is printed. Missing libraries never stop training without a window.
@@ -79,25 +80,30 @@ urllib.request.urlopen(urllib.request.Request(sys.argv[1], method="HEAD"), timeo
 PYTHON
 }
 
-# Sets `torch_options`: pip options after which the torch of the lock file is a build without CUDA.
+# Sets `torch_build` to cpu or default, and `torch_options` to the pip options that lead to that build of the lock file's
+# torch. The default build for Linux brings several GB of CUDA libraries, so it is the last resort.
 choose_torch() {
-    local version=$1 index offered
+    local version=$1 index=${CLIPGSTREAM_TORCH_INDEX:-$TORCH_CPU_INDEX} offered
+    torch_build=default
     torch_options=()
     if [ "$(uname -s)" != Linux ] || [ "${CLIPGSTREAM_TORCH:-}" = default ]; then
-        return # other systems' default build is the CPU (or Metal) one
+        return # other systems' default build needs no CUDA
     fi
     offered=$(pip index versions torch --timeout 10 --retries 1 2>/dev/null || true)
     if printf '%s' "$offered" | grep -qF "$version+cpu"; then
         say "torch $version+cpu comes from the configured package index"
-    else
-        index=${CLIPGSTREAM_TORCH_INDEX:-$TORCH_CPU_INDEX}
-        is_reachable "$index/torch/" || fail \
-            "no CPU build of torch $version in reach: the configured index has none and $index did not answer." \
-            "Name an index that has it with CLIPGSTREAM_TORCH_INDEX=URL, or accept the default build with CUDA (several GB)" \
-            "with CLIPGSTREAM_TORCH=default."
+    elif is_reachable "$index/torch/"; then
         say "torch $version+cpu comes from $index"
         torch_options+=(--extra-index-url "$index")
+    elif [ "${CLIPGSTREAM_TORCH:-}" = cpu ]; then
+        fail "no CPU build of torch $version in reach: the configured index has none and $index did not answer." \
+            "Name an index that has it: make setup CLIPGSTREAM_TORCH_INDEX=URL"
+    else
+        say "no CPU build of torch $version in reach: the configured index has none and $index did not answer"
+        say "taking the default build, whose CUDA libraries are several GB; CLIPGSTREAM_TORCH_INDEX=URL names another index"
+        return
     fi
+    torch_build=cpu
     printf 'torch==%s+cpu\n' "$version" >"$VENV/torch-cpu.txt"
     torch_options+=(--constraint "$VENV/torch-cpu.txt")
 }
@@ -110,8 +116,8 @@ install_packages() {
     pip install --quiet --no-deps --retries 2 ${torch_options[@]+"${torch_options[@]}"} -r requirements.lock ||
         fail "pip could not install requirements.lock; its own message is above." \
             "Wheels exist for Linux x86-64 (glibc 2.35 or newer), macOS on Apple silicon and Windows, with Python 3.11 to 3.13."
-    if [ "$(uname -s)" = Linux ] && [ "${CLIPGSTREAM_TORCH:-}" = default ]; then
-        pip install --quiet --retries 2 "torch==$version" # now with the CUDA libraries that build asks for
+    if [ "$torch_build" = default ]; then
+        pip install --quiet --retries 2 "torch==$version" # and the libraries, on Linux CUDA's, which that build asks for
     fi
     pip install --quiet --no-deps --no-build-isolation --editable .
 }

@@ -2,7 +2,6 @@
 
 import random
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +27,7 @@ def update_golden(request: pytest.FixtureRequest) -> bool:
 
 
 @pytest.fixture(autouse=True)
-def _fixed_seeds() -> Iterator[None]:
+def _fixed_seeds() -> None:
     """Every test starts from the same state of every random generator, whichever tests ran before it."""
     random.seed(SEED)
     np.random.seed(SEED)  # noqa: NPY002 - libraries we call may still draw from the global generator
@@ -36,7 +35,6 @@ def _fixed_seeds() -> Iterator[None]:
     if torch is not None:
         torch.manual_seed(SEED)
         torch.set_num_threads(TORCH_THREADS)
-    yield
 
 
 @pytest.fixture

@@ -1,0 +1,92 @@
+"""The arrows between the packages hold, and the guard that says so can fail.
+
+Static rules are import-linter contracts (pyproject.toml); what a fresh interpreter really loads is looked at here too,
+because a contract cannot see an import made through a library.
+"""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+WINDOW_LIBRARIES = {"pyglet", "moderngl", "imgui_bundle"}
+
+
+def lint_imports(root: Path) -> subprocess.CompletedProcess[str]:
+    """Run the import contracts of `root` in a child, which sees the packages below `root` only."""
+    code = "import sys; sys.path.insert(0, '.'); from importlinter.cli import lint_imports; sys.exit(lint_imports())"
+    return subprocess.run(
+        [sys.executable, "-P", "-c", code], cwd=root, capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+def loaded_modules(statement: str) -> set[str]:
+    """Top-level modules that a fresh interpreter holds after `statement`."""
+    code = f"import json, sys\n{statement}\nprint(json.dumps(sorted({{name.split('.')[0] for name in sys.modules}})))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
+@pytest.fixture
+def copied_tree(tmp_path: Path) -> Path:
+    """A copy of the packages and their contracts that a test may spoil."""
+    for package in ("app", "engine", "ui"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    return tmp_path
+
+
+def test_import_contracts_hold() -> None:
+    done = lint_imports(ROOT)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    ("bad_file", "bad_import", "broken_contract"),
+    [
+        ("engine/seeded.py", "import app.seeded_target", "Arrows point one way"),
+        ("engine/seeded.py", "from ui import seeded_target", "Arrows point one way"),
+        ("app/seeded.py", "def late():\n    import ui.seeded_target", "Arrows point one way"),
+        ("app/seeded.py", "import moderngl", "app and engine know no window"),
+        ("engine/seeded.py", "from pyglet import window", "app and engine know no window"),
+        ("ui/seeded.py", "import torch", "ui imports no torch"),
+    ],
+)
+def test_contracts_refuse_a_seeded_bad_import(
+    copied_tree: Path, bad_file: str, bad_import: str, broken_contract: str
+) -> None:
+    for package in ("app", "ui"):
+        (copied_tree / package / "seeded_target.py").write_text("")
+    assert lint_imports(copied_tree).returncode == 0, "the copy must be clean before it is spoiled"
+    (copied_tree / bad_file).write_text(bad_import + "\n")
+    done = lint_imports(copied_tree)
+    assert done.returncode == 1, done.stdout + done.stderr
+    broken = [line for line in done.stdout.splitlines() if line.endswith("BROKEN")]
+    assert len(broken) == 1, done.stdout
+    assert broken_contract in broken[0]
+
+
+def test_importing_ui_main_loads_no_torch_and_no_window_library() -> None:
+    # A spawned child imports the parent's main module again: what ui.main loads, every worker would load.
+    assert not loaded_modules("import ui.main") & (WINDOW_LIBRARIES | {"torch"})
+
+
+def test_importing_the_worker_loads_no_window_library() -> None:
+    loaded = loaded_modules("import app.training.worker")
+    assert not loaded & WINDOW_LIBRARIES
+    assert "engine" in loaded, "the worker is expected to load the engine; otherwise this test looks at nothing"
+
+
+def test_importing_the_command_line_loads_no_window_library() -> None:
+    assert not loaded_modules("import app.cli") & WINDOW_LIBRARIES
+
+
+def test_loaded_modules_sees_an_import() -> None:
+    assert "moderngl" in loaded_modules("import moderngl"), "the probe of this file must be able to see a bad import"

@@ -1,0 +1,148 @@
+"""Rules for our own source that no linter knows: no pickle, no eval, no network, no paths of one person's machine.
+
+Each rule is shown to fail on a seeded sample, so that a green run means something.
+"""
+
+import ast
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("app", "engine", "ui")
+
+BANNED_MODULES = {
+    # pickle, by any of its names: opening a file must never run code from it
+    "pickle": "pickle",
+    "cPickle": "pickle",
+    "dill": "pickle",
+    "joblib": "pickle",
+    "marshal": "pickle",
+    "shelve": "pickle",
+    # network: the application works on local files and talks to nobody
+    "aiohttp": "network",
+    "ftplib": "network",
+    "http": "network",
+    "httpx": "network",
+    "requests": "network",
+    "smtplib": "network",
+    "socket": "network",
+    "socketserver": "network",
+    "urllib": "network",
+    "urllib3": "network",
+    "webbrowser": "network",
+    "xmlrpc": "network",
+}
+BANNED_CALLS = {"eval", "exec", "compile", "__import__"}
+BANNED_ATTRIBUTES = {("torch", "save"), ("torch", "load"), ("os", "system"), ("os", "fork")}
+
+# Home folders of people, the temporary folder, drive letters: text that works on one machine only.
+MACHINE_PATH = re.compile(r"(?<![\w./~*-])(?:/(?:home|Users|root|tmp|work|mnt|media|scratch)/[\w.]|[A-Z]:\\\w)")
+TEXT_SUFFIXES = {".py", ".md", ".toml", ".lock", ".sh", ".json", ".yml", ".yaml", ".txt", ".glsl", ".cfg", ".ini", ""}
+
+
+def python_files() -> list[Path]:
+    """Every source file of the application."""
+    return sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+
+
+def banned_uses(source: str) -> Iterator[str]:
+    """Describe each banned import, call or attribute in `source`, as "line: what"."""
+    for node in ast.walk(ast.parse(source)):
+        match node:
+            case ast.Import(names=names):
+                modules = [alias.name for alias in names]
+            case ast.ImportFrom(module=str(module)):
+                modules = [module]
+            case ast.Call(func=ast.Name(id=name)) if name in BANNED_CALLS:
+                yield f"{node.lineno}: {name}()"
+                continue
+            case ast.Attribute(value=ast.Name(id=owner), attr=attribute) if (owner, attribute) in BANNED_ATTRIBUTES:
+                yield f"{node.lineno}: {owner}.{attribute}"
+                continue
+            case ast.keyword(arg="allow_pickle", value=ast.Constant(value=True)):
+                yield f"{node.value.lineno}: allow_pickle=True"
+                continue
+            case _:
+                continue
+        for module in modules:
+            if kind := BANNED_MODULES.get(module.split(".")[0]):
+                yield f"{node.lineno}: imports {module} ({kind})"
+
+
+def machine_paths(text: str) -> list[str]:
+    """Lines of `text` that hold an absolute path of somebody's machine, as "line: text"."""
+    return [f"{n}: {line.strip()}" for n, line in enumerate(text.splitlines(), 1) if MACHINE_PATH.search(line)]
+
+
+def tracked_text_files() -> list[Path]:
+    """Text files under version control; everything text-like below the root where there is no git."""
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=False)
+    if listed.returncode == 0 and listed.stdout:
+        paths = [ROOT / name for name in listed.stdout.decode().split("\0") if name]
+    else:
+        paths = [path for package in (*PACKAGES, "tests") for path in (ROOT / package).rglob("*")]
+    return [path for path in paths if path.suffix in TEXT_SUFFIXES and path.is_file()]
+
+
+def test_our_code_uses_no_pickle_eval_or_network() -> None:
+    files = python_files()
+    assert len(files) > 20, "the packages were not found"
+    found = [f"{path.relative_to(ROOT)}:{use}" for path in files for use in banned_uses(path.read_text("utf-8"))]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    "seeded",
+    [
+        "import pickle",
+        "from pickle import loads",
+        "import os, pickle as p",
+        "def late():\n    import urllib.request",
+        "from http.client import HTTPConnection",
+        "import socket",
+        "value = eval(text)",
+        "exec(code)",
+        "state = torch.load(path)",
+        "torch.save(state, path)",
+        "np.load(path, allow_pickle=True)",
+        "os.fork()",
+    ],
+)
+def test_rule_refuses_seeded_source(seeded: str) -> None:
+    assert list(banned_uses(seeded))
+
+
+@pytest.mark.parametrize(
+    "innocent", ["model.eval()", "import re\nre.compile('x')", "np.load(path)", "import multiprocessing", "import json"]
+)
+def test_rule_accepts_innocent_source(innocent: str) -> None:
+    assert not list(banned_uses(innocent))
+
+
+def test_tracked_text_holds_no_machine_paths() -> None:
+    here = Path(__file__).resolve()  # this file seeds such paths itself
+    found = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for path in tracked_text_files()
+        if path != here
+        for line in machine_paths(path.read_text("utf-8", errors="replace"))
+    ]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    "seeded", ["/home/ann/capture", "path = '/tmp/x'", r"C:\Users\bob", "(/root/.cache)", "/work/a"]
+)
+def test_machine_path_rule_refuses_seeded_text(seeded: str) -> None:
+    assert machine_paths(seeded)
+
+
+@pytest.mark.parametrize(
+    "innocent", ["a/tmp/b", "https://host/home/x", "~/home/x", "/usr/lib", "either/or", "$OUT/tmp/x"]
+)
+def test_machine_path_rule_accepts_innocent_text(innocent: str) -> None:
+    assert not machine_paths(innocent)
