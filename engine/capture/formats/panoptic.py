@@ -1,0 +1,241 @@
+"""CMU Panoptic captures as packaged for Dynamic 3D Gaussians: train_meta.json, test_meta.json and ims/<camera>/.
+
+Both files hold `w`, `h` and, per frame t and camera i, `k[t][i]` 3x3, `w2c[t][i]` 4x4 (OpenCV axes), `fn[t][i]` (file
+below ims/) and `cam_id[t][i]`. The cameras of the two files are merged and sorted by id; those of test_meta.json are
+the default hold-out. Cameras must not move. The dome records at 30 frames per second, which the files do not say.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from engine.capture.checks import (
+    check_equal_counts,
+    check_image_file,
+    check_image_size,
+    check_K,
+    check_names,
+    check_pose,
+    image_size_of,
+    parse_matrix,
+    raise_problems,
+    read_json_object,
+    shortened,
+)
+from engine.capture.frames import ImageFrames
+from engine.capture.layout import CameraEntry, Layout
+from engine.errors import CaptureError
+
+FORMAT = "panoptic"
+FPS = 30.0
+META_FILES = ("train_meta.json", "test_meta.json")
+KEYS = ("w", "h", "k", "w2c", "fn", "cam_id")
+
+
+@dataclass(frozen=True, slots=True)
+class _MetaCamera:
+    """One camera of one meta file, not yet checked for its frames."""
+
+    camera_id: int
+    K: np.ndarray  # [3, 3]
+    world_to_camera: np.ndarray  # [4, 4]
+    image_size: tuple[int, int]
+    files: tuple[str, ...]  # below ims/, one per frame
+    meta_path: Path
+    is_test: bool
+
+
+def probe(folder: Path) -> str | None:
+    """None when the folder looks like this layout, otherwise why not."""
+    if any((folder / name).is_file() for name in META_FILES):
+        return None
+    return "no train_meta.json or test_meta.json"
+
+
+def read(folder: Path) -> Layout:
+    """Read cameras and the frame index; no pixels.
+
+    Raises:
+        CaptureError: Listing every problem found.
+    """
+    problems: list[CaptureError] = []
+    cameras: list[_MetaCamera] = []
+    for name in META_FILES:
+        if name == META_FILES[1] and not (folder / name).is_file():
+            continue  # a capture may come without its own hold-out
+        try:
+            cameras += _read_meta(folder / name, problems)
+        except CaptureError as error:
+            problems.append(error)
+    cameras.sort(key=lambda camera: camera.camera_id)
+    if cameras or not problems:
+        problems += check_names([str(camera.camera_id) for camera in cameras], folder / META_FILES[0])
+
+    entries, warnings = _read_frames(folder, cameras, problems)
+    raise_problems(problems, folder)
+    return Layout(
+        format=FORMAT,
+        cameras=tuple(entries),
+        n_frames=entries[0].source.n_frames,
+        fps=FPS,
+        default_holdout=tuple(str(camera.camera_id) for camera in cameras if camera.is_test),
+        warnings=tuple(warnings),
+    )
+
+
+def _read_meta(path: Path, problems: list[CaptureError]) -> list[_MetaCamera]:
+    """The cameras of one meta file. Adds what is wrong with single cameras; raises when the file is unusable."""
+    meta = read_json_object(path)
+    hint = "Export the capture again."
+    missing = [key for key in KEYS if key not in meta]
+    if missing:
+        raise CaptureError(f"The file lacks {', '.join(missing)}.", hint=hint, path=path)
+    image_size = _image_size(meta, path)
+    n_frames, n_cameras = _table_shape(meta["fn"])
+    if n_frames == 0 or n_cameras == 0:
+        raise CaptureError("fn must list at least one frame with at least one camera.", hint=hint, path=path)
+    Ks = parse_matrix(meta["k"], (n_frames, n_cameras, 3, 3))
+    poses = parse_matrix(meta["w2c"], (n_frames, n_cameras, 4, 4))
+    camera_ids = parse_matrix(meta["cam_id"], (n_frames, n_cameras))
+    for key, table, shape in (("k", Ks, "3x3"), ("w2c", poses, "4x4"), ("cam_id", camera_ids, "number")):
+        if table is None:
+            found = f"{key} must hold one {shape} for each of {n_frames} frames and {n_cameras} cameras, as fn does."
+            raise CaptureError(found, hint=hint, path=path)
+    assert Ks is not None and poses is not None and camera_ids is not None
+    if not (np.isfinite(camera_ids).all() and (camera_ids == camera_ids[0]).all()):
+        raise CaptureError("cam_id must list the same cameras in the same order in each frame.", hint=hint, path=path)
+
+    cameras = []
+    for i in range(n_cameras):
+        camera = _MetaCamera(
+            camera_id=int(camera_ids[0, i]),
+            K=Ks[0, i],
+            world_to_camera=poses[0, i],
+            image_size=image_size,
+            files=tuple(str(row[i]) for row in meta["fn"]),
+            meta_path=path,
+            is_test=path.name == META_FILES[1],
+        )
+        found = check_K(str(camera.camera_id), camera.K, image_size, path)
+        found += check_pose(str(camera.camera_id), camera.world_to_camera, path)
+        problems += found or _check_motionless(str(camera.camera_id), Ks[:, i], poses[:, i], path)
+        cameras.append(camera)
+    return cameras
+
+
+def _image_size(meta: dict[str, Any], path: Path) -> tuple[int, int]:
+    size = (meta["w"], meta["h"])
+    if not all(isinstance(value, int) and value > 0 for value in size):
+        raise CaptureError(
+            f"w and h are {size[0]!r} and {size[1]!r}, expected positive whole numbers.",
+            hint="Export the capture again.",
+            path=path,
+        )
+    return size
+
+
+def _table_shape(table: Any) -> tuple[int, int]:
+    """Frames and cameras of a table of file names; zeros when it is none."""
+    if not isinstance(table, list) or not table or not all(isinstance(row, list) for row in table):
+        return 0, 0
+    n_cameras = len(table[0])
+    if any(len(row) != n_cameras or not all(isinstance(name, str) for name in row) for row in table):
+        return 0, 0
+    return len(table), n_cameras
+
+
+def _check_motionless(name: str, Ks: np.ndarray, poses: np.ndarray, path: Path) -> list[CaptureError]:
+    is_same = (np.abs(Ks - Ks[0]).max((1, 2)) < 1e-6) & (np.abs(poses - poses[0]).max((1, 2)) < 1e-6)  # [T]
+    if is_same.all():
+        return []
+    return [
+        CaptureError(
+            f'Camera "{name}" moves or has NaN from frame {int(np.argmin(is_same))} on.',
+            hint="Only cameras that stand still are supported; take this one out.",
+            path=path,
+        )
+    ]
+
+
+def _read_frames(
+    folder: Path, cameras: list[_MetaCamera], problems: list[CaptureError]
+) -> tuple[list[CameraEntry], list[str]]:
+    """Match the meta files against what lies in ims/. Adds problems; returns entries and warnings."""
+    n_listed = max((len(camera.files) for camera in cameras), default=0)
+    present = _present_files(folder, cameras)
+    found = [[name in present for name in camera.files] for camera in cameras]
+    n_common = min((_leading(row) for row in found), default=0)
+    is_cut_alike = n_common > 0 and all(sum(row) == n_common for row in found)
+    if is_cut_alike:  # the meta files may describe more frames than were unpacked, if it is the same for all
+        cameras_files = [camera.files[:n_common] for camera in cameras]
+    else:
+        cameras_files = [camera.files for camera in cameras]
+        problems += _missing_frames(folder, cameras, found)
+
+    entries = []
+    for camera, files in zip(cameras, cameras_files, strict=True):
+        paths = [folder / "ims" / name for name in files]
+        directory = paths[0].parent
+        problems += _check_images(camera, [path for path, name in zip(paths, files, strict=True) if name in present])
+        source = ImageFrames(directory, paths)
+        entries.append(CameraEntry(str(camera.camera_id), camera.K, camera.world_to_camera, camera.image_size, source))
+    warnings = []
+    if is_cut_alike and n_common < n_listed:
+        warnings.append(f"The calibration lists {n_listed} frames, the first {n_common} are there and are used.")
+    return entries, warnings
+
+
+def _present_files(folder: Path, cameras: list[_MetaCamera]) -> set[str]:
+    """Names below ims/ that exist, by one directory listing per camera."""
+    directories = {name.rpartition("/")[0] for camera in cameras for name in camera.files}
+    present = set()
+    for directory in directories:
+        full = folder / "ims" / directory
+        if full.is_dir():
+            present.update(f"{directory}/{file.name}" if directory else file.name for file in full.iterdir())
+    return present
+
+
+def _leading(row: list[bool]) -> int:
+    """How many frames are there before the first missing one."""
+    return row.index(False) if False in row else len(row)
+
+
+def _missing_frames(folder: Path, cameras: list[_MetaCamera], found: list[list[bool]]) -> list[CaptureError]:
+    counts = {str(camera.camera_id): sum(row) for camera, row in zip(cameras, found, strict=True)}
+    paths = {str(camera.camera_id): (folder / "ims" / camera.files[0]).parent for camera in cameras}
+    problems = check_equal_counts(counts, paths)
+    for camera, row in zip(cameras, found, strict=True):
+        missing = [name for name, is_there in zip(camera.files, row, strict=True) if not is_there]
+        if missing and len(missing) < len(row):
+            problems.append(
+                CaptureError(
+                    f'Camera "{camera.camera_id}" lacks {len(missing)} of {len(row)} listed frames: '
+                    f"{shortened(missing)}.",
+                    hint="Put these images back or take the frames out of the meta file.",
+                    path=folder / "ims" / missing[0],
+                )
+            )
+    return problems
+
+
+def _check_images(camera: _MetaCamera, paths: list[Path]) -> list[CaptureError]:
+    """Ends of all files, size of the first one."""
+    hint = "Copy or export this file again."
+    damaged = [(path, reason) for path in paths if (reason := check_image_file(path)) is not None]
+    problems = [
+        CaptureError(f'An image of camera "{camera.camera_id}" {reason}.', hint=hint, path=path)
+        for path, reason in damaged
+    ]
+    whole = [path for path in paths if path not in {path for path, _ in damaged}]
+    if whole:
+        try:
+            size = image_size_of(whole[0])
+        except CaptureError as error:
+            return [*problems, error]
+        problems += check_image_size(str(camera.camera_id), size, camera.image_size, whole[0])
+    return problems

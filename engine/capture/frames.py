@@ -1,0 +1,295 @@
+"""Pixels on demand: frame sources (image files, video files) and the byte-bounded cache in front of them.
+
+Nothing here knows about calibration. A source decodes full-size frames of one camera; the FrameStore resizes them to
+the working size, keeps the most recently used ones and may be called from several threads.
+"""
+
+from __future__ import annotations
+
+import threading
+from bisect import bisect_left
+from collections import OrderedDict
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import av
+import av.error
+import numpy as np
+from PIL import Image, UnidentifiedImageError
+
+from engine.errors import CaptureError
+
+MAX_FORWARD_DECODE = 64
+"""Frames decoded forward before a seek is considered cheaper even inside one group of pictures."""
+
+
+class FrameSource(Protocol):
+    """The frames of one camera at their native size. Implementations are safe to call from several threads."""
+
+    @property
+    def path(self) -> Path:
+        """File or folder the frames come from."""
+        ...
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames."""
+        ...
+
+    def read(self, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
+        """Decode frames in the order given, each [H, W, 3] uint8 RGB. Raises CaptureError for unreadable data."""
+        ...
+
+    def close(self) -> None:
+        """Let go of open files; the next read opens them again."""
+        ...
+
+
+class ImageFrames:
+    """One image file per frame. Owns paths only."""
+
+    def __init__(self, folder: Path, files: Sequence[Path]) -> None:
+        self.path = folder
+        self.files = tuple(files)
+
+    @property
+    def n_frames(self) -> int:
+        """Number of files."""
+        return len(self.files)
+
+    def read(self, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
+        """Decode these files, each [H, W, 3] uint8 RGB.
+
+        Raises:
+            CaptureError: A file is missing, truncated or no image.
+        """
+        for frame_index in frame_indices:
+            yield read_image(self.files[frame_index])
+
+    def close(self) -> None:
+        """Nothing is held open between reads."""
+
+
+def read_image(path: Path) -> np.ndarray:
+    """Decode one image file to [H, W, 3] uint8 RGB.
+
+    Raises:
+        CaptureError: The file is missing, truncated or no image.
+    """
+    try:
+        with Image.open(path) as image:
+            return np.asarray(image.convert("RGB"))
+    except FileNotFoundError:
+        raise CaptureError("The image is missing.", hint="Put the file back or export it again.", path=path) from None
+    except (OSError, UnidentifiedImageError, SyntaxError) as error:
+        raise CaptureError(
+            f"The image cannot be decoded ({error}), so it is truncated or damaged.",
+            hint="Copy or export this file again.",
+            path=path,
+        ) from error
+
+
+class VideoFrames:
+    """One video file, decoded forward from the nearest key frame. Owns one open container and its position."""
+
+    def __init__(self, path: Path, n_frames: int) -> None:
+        self.path = path
+        self._n_frames = n_frames
+        self._lock = threading.Lock()
+        self._container: Any = None
+        self._decoder: Iterator[Any] = iter(())
+        self._pts: list[int] = []  # presentation times of all frames, sorted: position in it = frame index
+        self._key_indices: list[int] = []  # frame indices at which decoding can start
+        self._next_index = 0  # frame index that the decoder delivers next
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames according to the container."""
+        return self._n_frames
+
+    def read(self, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
+        """Decode these frames, each [H, W, 3] uint8 RGB; rising indices decode without seeking.
+
+        Raises:
+            CaptureError: The video ends early or its data is damaged.
+        """
+        for frame_index in frame_indices:
+            with self._lock:
+                picture = self._read_one(frame_index)
+            yield picture
+
+    def close(self) -> None:
+        """Close the container."""
+        with self._lock:
+            self._close()
+
+    def _close(self) -> None:
+        if self._container is not None:
+            self._container.close()
+        self._container, self._decoder, self._next_index = None, iter(()), 0
+
+    def _read_one(self, frame_index: int) -> np.ndarray:
+        try:
+            if self._container is None:
+                self._open()
+            if self._must_seek(frame_index):
+                self._seek(frame_index)
+            for frame in self._decoder:
+                index = bisect_left(self._pts, frame.pts)
+                self._next_index = index + 1
+                if index < frame_index:
+                    continue
+                if index > frame_index or frame.is_corrupt:
+                    break
+                return frame.to_ndarray(format="rgb24")
+        except av.error.FFmpegError as error:
+            self._close()
+            raise self._damaged(frame_index, str(error.strerror)) from error
+        self._close()
+        raise self._damaged(frame_index, "its data ends or is damaged there")
+
+    def _damaged(self, frame_index: int, reason: str) -> CaptureError:
+        return CaptureError(
+            f"Frame {frame_index} of {self._n_frames} cannot be decoded ({reason}).",
+            hint="Copy or export this video again.",
+            path=self.path,
+        )
+
+    def _open(self) -> None:
+        container = av.open(str(self.path))
+        stream = container.streams.video[0]
+        if not self._pts:  # packets are read but not decoded; needed because a video's frame times need not be even
+            packets = [
+                (pts, packet.is_keyframe)
+                for packet in container.demux(stream)
+                if (pts := shown_pts(packet)) is not None
+            ]
+            self._pts = sorted(pts for pts, _ in packets)
+            self._key_indices = sorted(bisect_left(self._pts, pts) for pts, is_key in packets if is_key)
+            container.seek(self._pts[0] if self._pts else 0, stream=stream, backward=True)
+        self._container = container
+        self._decoder = container.decode(stream)
+        self._next_index = 0
+
+    def _must_seek(self, frame_index: int) -> bool:
+        ahead = frame_index - self._next_index
+        if ahead < 0:
+            return True
+        key_before = self._key_indices[max(bisect_left(self._key_indices, frame_index + 1) - 1, 0)]
+        return key_before > self._next_index or ahead > MAX_FORWARD_DECODE
+
+    def _seek(self, frame_index: int) -> None:
+        stream = self._container.streams.video[0]
+        self._container.seek(self._pts[frame_index], stream=stream, backward=True)
+        self._decoder = self._container.decode(stream)
+
+
+def shown_pts(packet: Any) -> int | None:
+    """Presentation time of a demuxed packet; None for the flush packet and for what an edit list discards."""
+    return None if packet.size == 0 or packet.is_discard else packet.pts
+
+
+class FrameCache:
+    """Most recently used frames, bounded in bytes. Safe to use from several threads."""
+
+    def __init__(self, max_bytes: int) -> None:
+        self.max_bytes = max_bytes
+        self.n_bytes = 0
+        self._lock = threading.Lock()
+        self._frames: OrderedDict[tuple[int, int], np.ndarray] = OrderedDict()
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def get(self, key: tuple[int, int]) -> np.ndarray | None:
+        """The frame, now the most recently used one, or None."""
+        with self._lock:
+            frame = self._frames.get(key)
+            if frame is not None:
+                self._frames.move_to_end(key)
+            return frame
+
+    def put(self, key: tuple[int, int], frame: np.ndarray) -> None:
+        """Keep a frame and drop the least recently used ones above the bound; a frame above it alone is not kept."""
+        if frame.nbytes > self.max_bytes:
+            return
+        with self._lock:
+            replaced = self._frames.pop(key, None)
+            self.n_bytes += frame.nbytes - (0 if replaced is None else replaced.nbytes)
+            self._frames[key] = frame
+            while self.n_bytes > self.max_bytes:
+                _, dropped = self._frames.popitem(last=False)
+                self.n_bytes -= dropped.nbytes
+
+    def clear(self) -> None:
+        """Forget everything."""
+        with self._lock:
+            self._frames.clear()
+            self.n_bytes = 0
+
+
+class FrameStore:
+    """Sources of all cameras, the working size of each, and the cache. What Capture.frame asks."""
+
+    def __init__(
+        self,
+        sources: Sequence[FrameSource],
+        *,
+        native_sizes: np.ndarray,
+        working_sizes: np.ndarray,
+        cache_bytes: int,
+    ) -> None:
+        self.sources = tuple(sources)
+        self.native_sizes = np.asarray(native_sizes)
+        self.working_sizes = np.asarray(working_sizes)
+        self.cache = FrameCache(cache_bytes)
+
+    def frames(self, camera_index: int, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
+        """Frames of one camera at the working size, each a read-only [H, W, 3] uint8.
+
+        Raises:
+            CaptureError: A frame cannot be decoded or is not of the calibrated size.
+        """
+        for frame_index in frame_indices:
+            key = (camera_index, frame_index)
+            frame = self.cache.get(key)
+            if frame is None:
+                frame = self._decode(camera_index, frame_index)
+                self.cache.put(key, frame)
+            yield frame
+
+    def close(self) -> None:
+        """Close files and forget cached frames."""
+        for source in self.sources:
+            source.close()
+        self.cache.clear()
+
+    def _decode(self, camera_index: int, frame_index: int) -> np.ndarray:
+        source = self.sources[camera_index]
+        native = next(iter(source.read([frame_index])))
+        width, height = (int(value) for value in self.native_sizes[camera_index])
+        if native.shape[:2] != (height, width):
+            raise CaptureError(
+                f"Frame {frame_index} is {native.shape[1]}x{native.shape[0]}, the calibration says {width}x{height}.",
+                hint="Export all frames at the calibrated size.",
+                path=source.path,
+            )
+        frame = resize_area(native, self.working_sizes[camera_index])
+        frame.flags.writeable = False  # shared between all callers through the cache
+        return frame
+
+
+def resize_area(image: np.ndarray, size: np.ndarray | tuple[int, int]) -> np.ndarray:
+    """Resample with a box filter: each new pixel is the mean of the area it covers.
+
+    Args:
+        image: [H, W, 3] uint8
+        size: New width and height.
+    Returns:
+        [new H, new W, 3] uint8; an own copy, also where the size stays.
+    """
+    width, height = int(size[0]), int(size[1])
+    if image.shape[:2] == (height, width):
+        return np.array(image)
+    return np.array(Image.fromarray(image).resize((width, height), Image.Resampling.BOX))
