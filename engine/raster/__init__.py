@@ -1,0 +1,7 @@
+"""Rasterizers for Gaussians: one public op, a readable reference and a fast path for the CPU."""
+
+from engine.raster.gaussians import Gaussians
+from engine.raster.rasterize import rasterize
+from engine.raster.rendering import Rendering
+
+__all__ = ["Gaussians", "Rendering", "rasterize"]

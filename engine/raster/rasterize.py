@@ -1,0 +1,91 @@
+"""`rasterize`: Gaussians to pictures, differentiable. Checks arguments and picks a back end; computes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import torch
+from torch import Tensor
+
+from engine.raster.gaussians import Gaussians
+from engine.raster.reference import rasterize_reference
+from engine.raster.rendering import Rendering
+from engine.raster.view import PinholeView, pinhole_views
+
+BackendName = Literal["auto", "cpu", "reference"]
+Backend = Callable[[Gaussians, list[PinholeView], Tensor, bool], Rendering]
+
+BACKENDS: dict[str, Backend] = {"reference": rasterize_reference}
+"""Name to implementation; arguments are checked Gaussians, views, background [3] and whether to make means2d."""
+
+
+def rasterize(
+    gaussians: Gaussians,
+    viewmats: Tensor,
+    Ks: Tensor,
+    width: int,
+    height: int,
+    *,
+    background: Tensor | None = None,
+    near_plane: float = 0.01,
+    backend: BackendName = "auto",
+    want_means2d: bool = False,
+) -> Rendering:
+    """Render Gaussians from C cameras.
+
+    Differentiable in every Gaussian parameter and in the background, not in the cameras. Rows that cannot be drawn
+    (NaN, infinite, a zero quaternion, behind the near plane, opacity below 1/255) are left out and get a zero
+    gradient. Safe to call from several threads at once.
+
+    Args:
+        gaussians: What to draw; all five tensors share one floating dtype and one device.
+        viewmats: World to camera, OpenCV axes. [C, 4, 4]
+        Ks: Pinhole intrinsics for `width` x `height`, no skew. [C, 3, 3]
+        width, height: Image size, pixels.
+        background: Colour behind everything; black if None. [3]
+        near_plane: Centres at or before this depth are dropped, scene units.
+        backend: "cpu" (float32 tensors in main memory), "reference" (anything, slowly), or "auto": cpu if it can.
+        want_means2d: Also return projected centres that receive a gradient, for densification.
+    Returns:
+        Rendering with image [C, H, W, 3] and alpha [C, H, W, 1].
+    Raises:
+        TypeError: A dtype or device that does not fit. Names the argument.
+        ValueError: A shape or value that does not fit. Names the argument, and both shapes.
+    """
+    _check_gaussians(gaussians)
+    views = pinhole_views(viewmats, Ks, int(width), int(height), near_plane)
+    means = gaussians.means
+    if background is None:
+        background = means.new_zeros(3)
+    elif background.shape != (3,):
+        raise ValueError(f"background must be [3], got {list(background.shape)}")
+    background = background.to(means)
+    is_fast = means.dtype == torch.float32 and means.device.type == "cpu"
+    if backend == "auto":
+        backend = "cpu" if is_fast and "cpu" in BACKENDS else "reference"
+    if backend not in BACKENDS:
+        raise ValueError(f"backend must be auto or one of {', '.join(sorted(BACKENDS))}, got {backend!r}")
+    if backend == "cpu" and not is_fast:
+        raise TypeError(f"backend 'cpu' needs float32 tensors on the cpu, got means {means.dtype} on {means.device}")
+    return BACKENDS[backend](gaussians, views, background, want_means2d)
+
+
+def _check_gaussians(gaussians: Gaussians) -> None:
+    means = gaussians.means
+    if means.ndim != 2 or means.shape[1] != 3:
+        raise ValueError(f"means must be [N, 3], got {list(means.shape)}")
+    if not means.dtype.is_floating_point:
+        raise TypeError(f"means must be floating point, got {means.dtype}")
+    n_rows = len(means)
+    wanted = {"quats": (n_rows, 4), "scales": (n_rows, 3), "opacities": (n_rows,), "colors": (n_rows, 3)}
+    for name, shape in wanted.items():
+        tensor = getattr(gaussians, name)
+        if tensor.shape != shape:
+            raise ValueError(
+                f"{name} must be {list(shape)} to match means {list(means.shape)}, got {list(tensor.shape)}"
+            )
+        if tensor.dtype != means.dtype or tensor.device != means.device:
+            raise TypeError(
+                f"{name} must be {means.dtype} on {means.device} like means, got {tensor.dtype} on {tensor.device}"
+            )
