@@ -42,6 +42,12 @@ def _rebuild(kind: type["EngineError"], message: str, hint: str, path: Path | No
     return kind(message, hint=hint, path=path)
 
 
+def _rebuild_capture_error(
+    message: str, hint: str, path: Path | None, problems: tuple[EngineError, ...]
+) -> "CaptureError":
+    return CaptureError(message, hint=hint, path=path, problems=problems)
+
+
 class CaptureError(EngineError):
     """A capture folder cannot be used. `problems` lists everything that is wrong, not only the first thing."""
 
@@ -50,6 +56,9 @@ class CaptureError(EngineError):
     ) -> None:
         self.problems = tuple(problems)
         super().__init__(message, hint=hint, path=path)
+
+    def __reduce__(self):  # the listed problems cross a process boundary too
+        return (_rebuild_capture_error, (self.message, self.hint, self.path, self.problems))
 
     def __str__(self) -> str:
         return "\n".join([super().__str__(), *(f"  {problem}" for problem in self.problems)])

@@ -17,7 +17,7 @@ import av.error
 import numpy as np
 from PIL import Image, UnidentifiedImageError
 
-from engine.capture.frames import is_shown
+from engine.capture.frames import shown_pts
 from engine.errors import CaptureError
 
 ROTATION_TOLERANCE = 1e-3
@@ -97,23 +97,16 @@ def check_pose(name: str, world_to_camera: np.ndarray, path: Path) -> list[Captu
     rotation = world_to_camera[:3, :3]
     error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     determinant = float(np.linalg.det(rotation))
-    problems = []
-    if error > ROTATION_TOLERANCE:
-        found = f"R R^T differs from the identity by {error:.3g}, determinant {determinant:.3g}"
-        problems.append(
-            CaptureError(f'Camera "{name}" has a pose that is no rotation ({found}).', hint=hint, path=path)
-        )
-    elif determinant < 0:
-        found = f"determinant {determinant:.3g}, a reflection"
-        problems.append(
-            CaptureError(f'Camera "{name}" has a pose that is no rotation ({found}).', hint=hint, path=path)
+    found = []
+    if error > ROTATION_TOLERANCE or determinant < 0:
+        found.append(
+            "is no rotation: R R^T differs from the identity by "
+            f"{error:.3g}, the determinant is {determinant:.3g} and must be 1"
         )
     if not np.array_equal(world_to_camera[3], [0.0, 0.0, 0.0, 1.0]):
         row = " ".join(f"{value:g}" for value in world_to_camera[3])
-        problems.append(
-            CaptureError(f'Camera "{name}" has {row} as last row of its pose, not 0 0 0 1.', hint=hint, path=path)
-        )
-    return problems
+        found.append(f"has {row} as its last row, not 0 0 0 1")
+    return [CaptureError(f'The pose of camera "{name}" {text}.', hint=hint, path=path) for text in found]
 
 
 def check_K(name: str, K: np.ndarray, image_size: tuple[int, int], path: Path) -> list[CaptureError]:
@@ -139,9 +132,10 @@ def check_image_size(name: str, found: tuple[int, int], calibrated: tuple[int, i
     """Stored frames of another size than the one the calibration belongs to."""
     if found == calibrated:
         return []
+    sizes = f"{found[0]}x{found[1]} frames, its calibration is for {calibrated[0]}x{calibrated[1]}"
     return [
         CaptureError(
-            f'Camera "{name}" has {found[0]}x{found[1]} frames, its calibration is for {calibrated[0]}x{calibrated[1]}.',
+            f'Camera "{name}" has {sizes}.',
             hint="Export frames at the calibrated size or the calibration for this size.",
             path=path,
         )
@@ -234,7 +228,7 @@ def inspect_video(path: Path) -> tuple[int, tuple[int, int], float]:
             rate = float(stream.average_rate or 0)
             entries = [entry for entry in stream.index_entries if not entry.is_discard]
             if len(entries) < stream.frames or not entries:  # containers whose index lists key frames only
-                return sum(1 for packet in container.demux(stream) if is_shown(packet)), size, rate
+                return sum(shown_pts(packet) is not None for packet in container.demux(stream)), size, rate
             n_whole = sum(entry.pos + entry.size <= n_bytes for entry in entries)
     except av.error.FFmpegError as error:
         raise CaptureError(

@@ -101,11 +101,10 @@ def _read_meta(path: Path, problems: list[CaptureError]) -> list[_MetaCamera]:
     Ks = parse_matrix(meta["k"], (n_frames, n_cameras, 3, 3))
     poses = parse_matrix(meta["w2c"], (n_frames, n_cameras, 4, 4))
     camera_ids = parse_matrix(meta["cam_id"], (n_frames, n_cameras))
-    for key, table, shape in (("k", Ks, "3x3"), ("w2c", poses, "4x4"), ("cam_id", camera_ids, "number")):
-        if table is None:
-            found = f"{key} must hold one {shape} for each of {n_frames} frames and {n_cameras} cameras, as fn does."
-            raise CaptureError(found, hint=hint, path=path)
-    assert Ks is not None and poses is not None and camera_ids is not None
+    if Ks is None or poses is None or camera_ids is None:
+        key, shape = ("k", "3x3") if Ks is None else ("w2c", "4x4") if poses is None else ("cam_id", "number")
+        found = f"{key} must hold one {shape} for each of {n_frames} frames and {n_cameras} cameras, as fn does."
+        raise CaptureError(found, hint=hint, path=path)
     if not (np.isfinite(camera_ids).all() and (camera_ids == camera_ids[0]).all()):
         raise CaptureError("cam_id must list the same cameras in the same order in each frame.", hint=hint, path=path)
 

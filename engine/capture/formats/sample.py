@@ -79,14 +79,16 @@ def _read_camera(index: int, row: Any, folder: Path, problems: list[CaptureError
         problems.append(CaptureError(f"Camera number {index} has no name or no file.", hint=hint, path=path))
         return None
     name, found = row["name"], []
-    size = (row.get("width"), row.get("height"))
-    if not all(isinstance(value, int) and value > 0 for value in size):
-        text = f'Camera "{name}" has width {size[0]!r} and height {size[1]!r}, expected positive whole numbers.'
-        found.append(CaptureError(text, hint=hint, path=path))
+    width, height = row.get("width"), row.get("height")
+    size = (width, height) if isinstance(width, int) and isinstance(height, int) else (0, 0)
+    if min(size) < 1:
+        text = f'Camera "{name}" has width {width!r} and height {height!r}, expected positive whole numbers.'
+        problems.append(CaptureError(text, hint=hint, path=path))
+        return None
     K, world_to_camera = parse_matrix(row.get("K"), (3, 3)), parse_matrix(row.get("world_to_camera"), (4, 4))
     if K is None:
         found.append(CaptureError(f'Camera "{name}" has no 3x3 matrix K.', hint=hint, path=path))
-    elif not found:
+    else:
         found += check_K(name, K, size, path)
     if world_to_camera is None:
         found.append(CaptureError(f'Camera "{name}" has no 4x4 matrix world_to_camera.', hint=hint, path=path))
@@ -99,7 +101,7 @@ def _read_camera(index: int, row: Any, folder: Path, problems: list[CaptureError
     return CameraEntry(name, K, world_to_camera, size, VideoFrames(folder / row["file"], n_frames))
 
 
-def _check_video(name: str, path: Path, size: tuple[Any, Any], found: list[CaptureError]) -> int | None:
+def _check_video(name: str, path: Path, size: tuple[int, int], found: list[CaptureError]) -> int | None:
     """Frames in the container, or None when it cannot be used. Adds problems."""
     try:
         n_frames, video_size, _ = inspect_video(path)
