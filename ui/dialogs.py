@@ -18,6 +18,7 @@ from app.commands import OpenCapture
 from ui import theme
 from ui.shortcuts import MOUSE_HELP, SHORTCUTS
 from ui.state import Dispatch, UiState
+from ui.widgets import text_wrapped_dim
 
 _LINUX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 _POPUP = "Open a capture folder"
@@ -153,10 +154,10 @@ def draw_help(ui: UiState) -> None:
             imgui.table_next_column()
             for group in groups[:2]:
                 _draw_group(group, [(s.label, s.text) for s in SHORTCUTS if s.group == group])
+            _draw_group("Mouse", list(MOUSE_HELP))
             imgui.table_next_column()
             for group in groups[2:]:
                 _draw_group(group, [(s.label, s.text) for s in SHORTCUTS if s.group == group])
-            _draw_group("Mouse", list(MOUSE_HELP))
             imgui.end_table()
     imgui.end()
     ui.is_help_open = bool(is_kept)
@@ -166,18 +167,15 @@ def _draw_group(title: str, rows: list[tuple[str, str]]) -> None:
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*theme.SKY))
     imgui.separator_text(title)
     imgui.pop_style_color()
+    key_width = max(imgui.calc_text_size(label).x for label, _ in rows) + 14
     if not imgui.begin_table(title, 2):
         return
-    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, 110.0)
+    imgui.table_setup_column("key", imgui.TableColumnFlags_.width_fixed, key_width)
     imgui.table_setup_column("text")
     for label, text in rows:
         imgui.table_next_row()
         imgui.table_next_column()
-        imgui.push_text_wrap_pos(0.0)
-        imgui.text_colored(theme.TEXT, label)
-        imgui.pop_text_wrap_pos()
+        imgui.text(label)
         imgui.table_next_column()
-        imgui.push_text_wrap_pos(0.0)
-        imgui.text_disabled(text)
-        imgui.pop_text_wrap_pos()
+        text_wrapped_dim(text)
     imgui.end_table()

@@ -21,12 +21,13 @@ from app.commands import (
     TogglePlay,
     TrainNextClip,
 )
+from app.status import COMPARE_MODES
 from ui.state import Dispatch, UiState
 
 Action = Callable[[Any, Dispatch, UiState], None]
 
-OVERLAY_NAMES = ("show_frusta", "show_inherited", "show_residual")
-COMPARE_MODES = ("off", "wipe", "side")
+MARK_NAMES = ("show_frusta", "show_inherited", "show_residual")
+"""The overlays that Tab shows or hides together."""
 
 
 @dataclass(frozen=True)
@@ -89,13 +90,11 @@ def _last_frame(session: Any, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _previous_clip(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    starts = [clip.start for clip in session.clips if clip.start < session.timeline.frame_index]
-    go_to_frame(session, dispatch, starts[-1] if starts else 0)
+    go_to_frame(session, dispatch, session.timeline.previous_clip_start(session.timeline.frame_index))
 
 
 def _next_clip(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    starts = [clip.start for clip in session.clips if clip.start > session.timeline.frame_index]
-    go_to_frame(session, dispatch, starts[0] if starts else session.timeline.n_frames - 1)
+    go_to_frame(session, dispatch, session.timeline.next_clip_start(session.timeline.frame_index))
 
 
 def _toggle_play(session: Any, dispatch: Dispatch, ui: UiState) -> None:
@@ -146,11 +145,10 @@ def _cycle_compare(session: Any, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _toggle_overlays(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    shown = tuple(name for name in OVERLAY_NAMES if getattr(session.overlays, name))
-    if shown:
-        ui.hidden_overlays = shown
-    for name in shown or ui.hidden_overlays or OVERLAY_NAMES:
-        dispatch(ToggleOverlay(name))
+    is_all_shown = all(getattr(session.overlays, name) for name in MARK_NAMES)
+    for name in MARK_NAMES:
+        if getattr(session.overlays, name) == is_all_shown:
+            dispatch(ToggleOverlay(name))
 
 
 def _toggle_overlay(name: str) -> Action:
@@ -223,12 +221,11 @@ SHORTCUTS: tuple[Shortcut, ...] = (
 
 MOUSE_HELP: tuple[tuple[str, str], ...] = (
     ("Left drag", "Orbit around the pivot"),
-    ("Right drag, or Shift + middle drag", "Move the view sideways"),
-    ("Wheel, or Ctrl + middle drag", "Move nearer or farther"),
-    ("Middle drag", "Orbit"),
-    ("Drag on the timeline", "Move through time"),
-    ("Drag the white line", "Wipe between render and captured picture"),
-    ("Drop a folder on the window", "Open it as a capture"),
+    ("Right drag", "Move the view sideways (also Shift + middle drag)"),
+    ("Wheel", "Move nearer or farther (also Ctrl + middle drag)"),
+    ("Timeline drag", "Move through time"),
+    ("White line drag", "Wipe between render and captured picture"),
+    ("Folder drop", "Open it as a capture"),
 )
 
 

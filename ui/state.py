@@ -70,8 +70,6 @@ class UiState:
     is_help_open: bool = False
     is_open_requested: bool = False
     is_layout_reset_requested: bool = False
-    are_overlays_hidden: bool = False
-    hidden_overlays: tuple[str, ...] = ()
     redraw_in_s: float | None = None
     frame_ms: float = 0.0
     quit_requested: bool = False

@@ -35,6 +35,8 @@ def u32(color: Color) -> int:
 
 # Okabe-Ito
 SKY = rgb(86, 180, 233)
+SKY_LIGHT = rgb(120, 198, 242)
+SKY_DARK = rgb(60, 158, 214)
 ORANGE = rgb(230, 159, 0)
 GREEN = rgb(0, 158, 115)
 YELLOW = rgb(240, 228, 66)
@@ -168,8 +170,8 @@ def apply_style() -> None:
     style.popup_border_size = 1
     style.tab_bar_border_size = 0
     style.docking_separator_size = 3
+    style.selectable_text_align = ImVec2(0.0, 0.5)
     style.window_menu_button_position = imgui.Dir.none
-    style.anti_aliased_lines_use_tex = True
     col = imgui.Col_
     table: dict[int, Color] = {
         col.text: TEXT,

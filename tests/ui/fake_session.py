@@ -1,0 +1,171 @@
+"""A Session stand-in with the surface the window uses: a small made-up capture, no files, no threads, no worker.
+
+Every command is recorded in `commands`; those that only change what is shown are carried out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app import commands
+from app.notices import Notices
+from app.status import ClipStatus, JobStatus, Overlays, TrainingStatus
+from app.timeline import Timeline
+from app.view import OrbitView
+from engine.capture.clip import split_clips
+from engine.capture.rig import CameraRig
+
+
+def make_rig(n_cameras: int = 8, width: int = 320, height: int = 240) -> CameraRig:
+    """Cameras on a ring of radius 3, slightly above, all looking at the origin; y points down."""
+    maps, Ks = [], []
+    for angle in np.linspace(0, 2 * np.pi, n_cameras, endpoint=False):
+        center = np.array([3 * np.cos(angle), -0.8, 3 * np.sin(angle)])
+        forward = -center / np.linalg.norm(center)
+        right = np.cross(np.array([0.0, 1.0, 0.0]), forward)
+        right /= np.linalg.norm(right)
+        rotation = np.stack([right, np.cross(forward, right), forward])
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = rotation, -rotation @ center
+        maps.append(matrix)
+        Ks.append(np.array([[width * 0.9, 0, width / 2], [0, width * 0.9, height / 2], [0, 0, 1.0]]))
+    return CameraRig(
+        names=tuple(f"cam{i:02d}" for i in range(n_cameras)),
+        world_to_camera=np.stack(maps),
+        Ks=np.stack(Ks),
+        image_sizes=np.tile(np.array([[width, height]]), (n_cameras, 1)),
+    )
+
+
+@dataclass(frozen=True)
+class FakeCapture:
+    """What the panels read of a Capture."""
+
+    rig: CameraRig
+    path: Path = Path("/captures/juggling_room")
+    format: str = "sample"
+    n_frames: int = 30
+    fps: float = 30.0
+
+
+@dataclass(frozen=True)
+class FakePicture:
+    """An image, what it shows, and whether something newer is on its way."""
+
+    image: np.ndarray
+    key: Any
+    is_stale: bool = False
+
+
+@dataclass(frozen=True)
+class FakeAnchors:
+    """Anchor positions by origin."""
+
+    inherited_positions: np.ndarray
+    own_positions: np.ndarray
+    key: Any
+
+
+class FakeSession:
+    """See the module docstring. `has_capture=False` starts empty."""
+
+    def __init__(self, *, has_capture: bool = True, seed: int = 0) -> None:
+        self.commands: list[Any] = []
+        self.notices = Notices()
+        self.jobs: list[JobStatus] = []
+        self.overlays = Overlays()
+        self.training = TrainingStatus(can_train_next=True, next_clip_index=0)
+        self.holdout: tuple[int, ...] = (0, 3)
+        self.is_closed = False
+        self.n_renders = 0
+        random = np.random.default_rng(seed)
+        self._points = random.normal(0, 0.6, (6000, 3)).astype(np.float32)
+        self._colors = (0.5 + 0.5 * np.sin(self._points * 3 + np.array([0, 2, 4]))).astype(np.float32)
+        self._anchors = FakeAnchors(self._points[:1500], self._points[1500:1800] * 0.4, key=("anchors", 0))
+        self.capture: FakeCapture | None = None
+        self.rig: CameraRig | None = None
+        self.clips: list[Any] = []
+        self.clip_states: list[ClipStatus] = []
+        self.project = None
+        self.timeline = Timeline()
+        self.view = OrbitView()
+        if has_capture:
+            self._open(FakeCapture(make_rig()))
+
+    def _open(self, capture: FakeCapture) -> None:
+        self.capture, self.rig = capture, capture.rig
+        self.clips = split_clips(capture.n_frames, 10)
+        self.clip_states = [ClipStatus() for _ in self.clips]
+        self.timeline = Timeline(self.clips, fps=capture.fps)
+        self.view = OrbitView(capture.rig)
+
+    def dispatch(self, command: Any) -> None:
+        """Record the command; carry out what needs no worker."""
+        self.commands.append(command)
+        match command:
+            case commands.OpenCapture(path=path):
+                self._open(replace(FakeCapture(make_rig()), path=Path(path)))
+            case commands.SetFrame():
+                self.timeline.seek(command.frame_index)
+            case commands.TogglePlay():
+                self.timeline.toggle_play()
+            case commands.LookThrough():
+                self.view.look(command.camera_index)
+            case commands.SetCompare(mode=mode):
+                self.overlays.compare = mode
+            case commands.ToggleOverlay(name=name):
+                setattr(self.overlays, name, not getattr(self.overlays, name))
+            case commands.HomeView():
+                self.view.home()
+            case commands.DismissNotice():
+                self.notices.dismiss(command.index)
+
+    def poll(self) -> bool:
+        """Nothing happens by itself here."""
+        return False
+
+    def close(self) -> None:
+        """Remember that the window asked."""
+        self.is_closed = True
+
+    # ---- pictures --------------------------------------------------------------------------------------------
+
+    def _is_trained(self) -> bool:
+        clip = self.timeline.clip_of(self.timeline.frame_index)
+        return clip is not None and self.clip_states[clip.clip_index].state == "trained"
+
+    def request_render(self, width: int, height: int) -> FakePicture | None:
+        """A gradient that depends on the frame, for trained clips."""
+        if not self._is_trained():
+            return None
+        self.n_renders += 1
+        x = np.linspace(40, 200, width, dtype=np.float32)[None, :, None]
+        y = np.linspace(60, 160, height, dtype=np.float32)[:, None, None]
+        tint = np.array([1.0, 0.8, 0.6], dtype=np.float32)
+        image = ((x * 0.5 + y * 0.5) * tint).astype(np.uint8)
+        matrix = np.asarray(self.view.world_to_camera())
+        return FakePicture(image, key=(self.timeline.frame_index, width, height, matrix.tobytes()))
+
+    def shown_gaussians(self) -> None:
+        """No Gaussians here."""
+        return
+
+    def shown_anchors(self) -> FakeAnchors | None:
+        """Anchors of trained clips."""
+        return self._anchors if self._is_trained() else None
+
+    def shown_points(self) -> tuple[np.ndarray, np.ndarray, Any] | None:
+        """A coloured ball of points."""
+        return self._points, self._colors, ("points", 0)
+
+    def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> FakePicture:
+        """Stripes that differ per camera."""
+        height = max_width * 3 // 4
+        x = np.arange(max_width)[None, :, None] * 255 // max_width
+        image = np.broadcast_to(x, (height, max_width, 3)).astype(np.uint8).copy()
+        image[:, :, camera_index % 3] = (camera_index * 37) % 255
+        return FakePicture(image, key=(camera_index, frame_index, max_width))

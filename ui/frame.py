@@ -1,0 +1,304 @@
+"""One UI frame in fixed order, and the rule that a broken panel costs a notice, not the window.
+
+Order: drain the session, tick time, decide whether anything changed, draw menus, panels, popups, toasts, then ImGui.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import moderngl
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from ui import theme
+from ui.dialogs import OpenFolderDialog, draw_help
+from ui.gl import ImageTexture
+from ui.imgui_backend import ImGuiBackend
+from ui.panels.capture import CapturePanel
+from ui.panels.notices import NoticesPanel
+from ui.panels.timeline import draw_timeline
+from ui.panels.training import draw_training, duration_text
+from ui.panels.viewport import ViewportPanel
+from ui.panels.welcome import SAMPLE_PATH
+from ui.scene import Scene
+from ui.shortcuts import SHORTCUTS, handle_shortcuts, train_or_pause
+from ui.state import Dispatch, Rect, UiState
+from ui.theme import Icon
+
+logger = logging.getLogger(__name__)
+
+FRAMES_AFTER_INPUT = 3
+"""ImGui spreads a press and its release over frames, so input asks for a few."""
+TRAINING_REFRESH_S = 0.1
+MAX_TICK_S = 0.25
+STATUS_BAR_HEIGHT = 28.0
+VIEWPORT, TIMELINE, TRAINING, CAPTURE = "Viewport", "Timeline", "Training", "Capture"
+
+
+def free_dropped(ctx: moderngl.Context) -> int:
+    """Release GL objects that were dropped without `release()`, on this thread; returns how many.
+
+    ctx.gc() of moderngl 5.13 fails on objects that were released by hand before they were dropped.
+    """
+    n_released = 0
+    while ctx.objects:
+        dropped = ctx.objects.popleft()
+        if hasattr(dropped, "release"):
+            dropped.release()
+            n_released += 1
+    return n_released
+
+
+class Frame:
+    """Draws the whole window; owns panels and the redraw plan.
+
+    Args:
+        window: pyglet window whose GL context is current.
+        ctx: moderngl context adopted from it.
+        session: The program's state; see app.session.Session.
+        fixed_delta_s: Seconds per frame as told to ImGui; tests fix it.
+    """
+
+    def __init__(self, window: Any, ctx: moderngl.Context, session: Any, *, fixed_delta_s: float | None = None) -> None:
+        self._window = window
+        self._ctx = ctx
+        self.session = session
+        self.backend = ImGuiBackend(window, on_input=self.request_redraw, fixed_delta_s=fixed_delta_s)
+        self.ui = UiState(fonts=theme.load_fonts())
+        theme.apply_style()
+        self.viewport = ViewportPanel(Scene(ctx))
+        self.capture = CapturePanel(lambda: ImageTexture(ctx))
+        self.notices = NoticesPanel()
+        self.dialog = OpenFolderDialog()
+        self._frames_wanted = FRAMES_AFTER_INPUT
+        self._drawn_s = -1e9
+        self._is_laid_out = False
+        self._failed_panels: set[str] = set()
+        self._panels: tuple[tuple[str, Callable[[Any, Dispatch, UiState], None], bool], ...] = (
+            (VIEWPORT, self.viewport.draw, False),
+            (CAPTURE, self.capture.draw, True),
+            (TRAINING, draw_training, True),
+            (TIMELINE, draw_timeline, True),
+        )
+
+    # ---- the redraw plan -------------------------------------------------------------------------------------
+
+    def request_redraw(self, frames: int = FRAMES_AFTER_INPUT) -> None:
+        """Draw at least this many frames from now on."""
+        self._frames_wanted = max(self._frames_wanted, frames)
+
+    def update(self, dt_s: float) -> bool:
+        """Drain the session and move time on. True when a frame has to be drawn."""
+        session = self.session
+        shown_frame = session.timeline.frame_index
+        if session.poll():
+            self.request_redraw(1)
+        session.timeline.tick(min(dt_s, MAX_TICK_S))
+        if session.timeline.frame_index != shown_frame or self.viewport.has_news(session):
+            self.request_redraw(1)
+        if self._frames_wanted > 0 or self.backend.needs_follow_up:
+            return True
+        since_s = time.perf_counter() - self._drawn_s
+        if self.ui.redraw_in_s is not None and since_s >= self.ui.redraw_in_s:
+            return True
+        is_busy = session.training.state not in ("idle", "failed", "paused") or bool(session.jobs)
+        return is_busy and since_s >= TRAINING_REFRESH_S
+
+    # ---- one frame -------------------------------------------------------------------------------------------
+
+    def draw(self) -> None:
+        """Draw one frame into the window's framebuffer."""
+        started_s = time.perf_counter()
+        self._frames_wanted = max(self._frames_wanted - 1, 0)
+        self.ui.redraw_in_s = None
+        self.ui.rects.clear()
+        self.backend.new_frame()
+        self._compose()
+        self._ctx.screen.use()
+        self._ctx.viewport = (0, 0, *self._window.get_framebuffer_size())
+        self._ctx.clear(*theme.VOID)
+        self.backend.end_frame()
+        free_dropped(self._ctx)
+        self._drawn_s = time.perf_counter()
+        self.ui.frame_ms = (self._drawn_s - started_s) * 1e3
+
+    def _compose(self) -> None:
+        session, ui, dispatch = self.session, self.ui, self.dispatch
+        self._guard("Keys", lambda: handle_shortcuts(session, dispatch, ui))
+        self._guard("Menu", self._draw_menu_bar)
+        self._guard("Status bar", self._draw_status_bar)
+        dock_id = imgui.dock_space_over_viewport(0, imgui.get_main_viewport(), imgui.DockNodeFlags_.none)
+        if not self._is_laid_out or ui.is_layout_reset_requested:
+            self._lay_out(dock_id)
+        for title, draw_panel, has_padding in self._panels:
+            self._draw_panel(title, draw_panel, has_padding)
+        if ui.is_open_requested:
+            ui.is_open_requested = False
+            self.dialog.open()
+        self._guard("Open dialog", lambda: self.dialog.draw(dispatch, ui))
+        self._guard("Help", lambda: draw_help(ui))
+        size = imgui.get_main_viewport().size
+        whole = Rect(0.0, 0.0, size.x, size.y - STATUS_BAR_HEIGHT)
+        toast_area = ui.rects.get("viewport.canvas", whole)
+        self._guard("Notices", lambda: self.notices.draw(session, dispatch, ui, toast_area))
+
+    def dispatch(self, command: object) -> None:
+        """Hand a command to the session and plan a redraw."""
+        self.session.dispatch(command)
+        self.request_redraw(2)
+
+    def open_path(self, path: Path) -> None:
+        """Open a capture folder, or the folder of a file that was dropped."""
+        from app.commands import OpenCapture  # here to keep the module's imports about drawing
+
+        self.dispatch(OpenCapture(path if path.is_dir() or not path.exists() else path.parent))
+
+    def _draw_panel(self, title: str, draw_panel: Callable[..., None], has_padding: bool) -> None:
+        if not has_padding:
+            imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
+        flags = imgui.WindowFlags_.no_collapse
+        if title in (VIEWPORT, TIMELINE):
+            flags |= imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
+        is_visible, _ = imgui.begin(title, None, flags)
+        if not has_padding:
+            imgui.pop_style_var()
+        if is_visible:
+            self._guard(title, lambda: draw_panel(self.session, self.dispatch, self.ui))
+        imgui.end()
+
+    def _guard(self, title: str, draw_part: Callable[[], None]) -> None:
+        """Run one part of the frame; a failure becomes a notice, told once until the part works again."""
+        stack = imgui.internal.ErrorRecoveryState()
+        imgui.internal.error_recovery_store_state(stack)
+        try:
+            draw_part()
+        except Exception as error:  # the frame loop's edge: the window has to survive a broken panel
+            imgui.internal.error_recovery_try_to_recover_state(stack)
+            if title not in self._failed_panels:
+                self._failed_panels.add(title)
+                logger.exception("The panel %s could not be drawn", title)
+                self.session.notices.add(
+                    "error",
+                    f"The {title.lower()} could not be drawn",
+                    f"{type(error).__name__}: {error}",
+                    "The rest of the window goes on. Copy this and report it.",
+                )
+                self.request_redraw()
+        else:
+            self._failed_panels.discard(title)
+
+    # ---- layout ----------------------------------------------------------------------------------------------
+
+    def _lay_out(self, dock_id: int) -> None:
+        """Capture left, training right, timeline below, viewport in the rest."""
+        self._is_laid_out = True
+        self.ui.is_layout_reset_requested = False
+        internal = imgui.internal
+        size = imgui.get_main_viewport().work_size
+        internal.dock_builder_remove_node(dock_id)
+        internal.dock_builder_add_node(dock_id, internal.DockNodeFlagsPrivate_.dock_space)
+        internal.dock_builder_set_node_size(dock_id, size)
+        bottom_share = min(max(176.0 / max(size.y, 1.0), 0.12), 0.4)
+        _, bottom, top = internal.dock_builder_split_node_py(dock_id, imgui.Dir.down, bottom_share)
+        left_share = min(max(236.0 / max(size.x, 1.0), 0.1), 0.3)
+        _, left, rest = internal.dock_builder_split_node_py(top, imgui.Dir.left, left_share)
+        right_share = min(max(312.0 / max(size.x - 236.0, 1.0), 0.12), 0.4)
+        _, right, middle = internal.dock_builder_split_node_py(rest, imgui.Dir.right, right_share)
+        for title, node in ((VIEWPORT, middle), (CAPTURE, left), (TRAINING, right), (TIMELINE, bottom)):
+            internal.dock_builder_dock_window(title, node)
+        internal.dock_builder_get_node(middle).set_local_flags(internal.DockNodeFlagsPrivate_.no_tab_bar)
+        internal.dock_builder_finish(dock_id)
+
+    # ---- menu and status bar ---------------------------------------------------------------------------------
+
+    def _draw_menu_bar(self) -> None:
+        session, ui = self.session, self.ui
+        if not imgui.begin_main_menu_bar():
+            return
+        has_capture = session.capture is not None
+        if imgui.begin_menu("File"):
+            if imgui.menu_item(f"{Icon.FOLDER}  Open a capture folder", "Ctrl+O", False, True)[0]:
+                ui.is_open_requested = True
+            if SAMPLE_PATH.is_dir() and imgui.menu_item(f"{Icon.FILM}  Open the sample capture", "", False, True)[0]:
+                self.open_path(SAMPLE_PATH)
+            imgui.separator()
+            if imgui.menu_item("Quit", "Ctrl+Q", False, True)[0]:
+                ui.quit_requested = True
+            imgui.end_menu()
+        self._draw_table_menu("View", ("View", "Show and compare"), has_capture)
+        if imgui.begin_menu("Train", has_capture):
+            is_going = session.training.state in ("starting", "preparing", "running")
+            label = "Pause" if is_going else "Resume" if session.training.state == "paused" else "Train next clip"
+            if imgui.menu_item(f"{Icon.TRAIN}  {label}", "T", False, True)[0]:
+                train_or_pause(session, self.dispatch)
+            imgui.end_menu()
+        if imgui.begin_menu("Window"):
+            if imgui.menu_item("Reset the layout", "", False, True)[0]:
+                ui.is_layout_reset_requested = True
+            if imgui.menu_item(f"{Icon.HELP}  Keys and mouse", "F1", ui.is_help_open, True)[0]:
+                ui.is_help_open = not ui.is_help_open
+            imgui.end_menu()
+        name = session.capture.path.name if has_capture else "no capture open"
+        width = imgui.calc_text_size(name).x
+        imgui.same_line(imgui.get_window_width() - width - 24)
+        imgui.text_disabled(name)
+        imgui.end_main_menu_bar()
+
+    def _draw_table_menu(self, title: str, groups: tuple[str, ...], is_enabled: bool) -> None:
+        if not imgui.begin_menu(title, is_enabled):
+            return
+        for shortcut in SHORTCUTS:
+            if shortcut.group in groups and imgui.menu_item(shortcut.text, shortcut.label, False, True)[0]:
+                shortcut.action(self.session, self.dispatch, self.ui)
+        imgui.end_menu()
+
+    def _draw_status_bar(self) -> None:
+        flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_docking
+        imgui.push_style_color(imgui.Col_.window_bg, ImVec4(*theme.STATUS_BAR))
+        imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.STATUS_TEXT))
+        imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(14, 5))
+        viewport = imgui.get_main_viewport()
+        if imgui.internal.begin_viewport_side_bar("##status", viewport, imgui.Dir.down, STATUS_BAR_HEIGHT, flags):
+            imgui.text(self._status_text())
+            right = self._status_right()
+            imgui.same_line(max(imgui.get_window_width() - imgui.calc_text_size(right).x - 14, 0))
+            imgui.text(right)
+        imgui.end()
+        imgui.pop_style_var()
+        imgui.pop_style_color(2)
+
+    def _status_text(self) -> str:
+        session = self.session
+        if session.jobs:
+            job = session.jobs[0]
+            share = f"{job.done * 100:.0f} %" if job.done > 0 else ""
+            return "  ".join(part for part in (job.name, share, job.message) if part)
+        status = session.training
+        if status.state == "running":
+            return (
+                f"Training clip {status.clip_index}: step {status.step} of {status.n_steps}, "
+                f"{duration_text(status.eta_s)} left"
+            )
+        if status.state in ("starting", "preparing", "stopping", "paused"):
+            words = {"starting": "Starting", "preparing": "Preparing", "stopping": "Stopping", "paused": "Paused:"}
+            return f"{words[status.state]} clip {status.clip_index}  {status.message or ''}"
+        if session.capture is None:
+            return "Open a capture folder to begin"
+        trained = sum(state.state == "trained" for state in session.clip_states)
+        return f"{trained} of {len(session.clips)} clips trained"
+
+    def _status_right(self) -> str:
+        worst = [notice for notice in self.session.notices if notice.kind != "info"]
+        notices = f"{Icon.WARNING} {len(worst)}    " if worst else ""
+        renderer = "software drawing" if self.viewport.scene.is_software else "graphics card"
+        return f"{notices}{renderer}    {self.ui.frame_ms:.0f} ms"
+
+    def close(self) -> None:
+        """Release GL objects and ImGui. The GL context must still be current."""
+        self.viewport.release()
+        self.capture.release()
+        self.backend.close()

@@ -1,0 +1,114 @@
+"""Composition root and argument routing. Nothing here imports torch, GL or a window before it is known to be needed:
+the training worker re-imports this module when it is started from the console script.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+COMMANDS = ("train", "eval", "render", "inspect", "doctor")
+"""Subcommands that app.cli serves without a window."""
+EXIT_BAD_INPUT = 2
+
+
+def has_display() -> bool:
+    """Is there a desktop to open a window on? Windows and macOS always have one."""
+    if not sys.platform.startswith("linux"):
+        return True
+    return bool(os.environ.get("DISPLAY"))
+
+
+def sample_path() -> Path:
+    """The capture that ships with the program."""
+    return Path(__file__).resolve().parents[1] / "assets" / "sample"
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Arguments of the window and of the headless demo; the other commands have their own."""
+    parser = argparse.ArgumentParser(
+        prog="clipgstream",
+        description="View, train and replay dynamic captures clip by clip.",
+        epilog=f"Without a window: clipgstream {{{','.join(COMMANDS)}}} --help, or clipgstream demo [PATH].",
+    )
+    parser.add_argument("path", nargs="?", type=Path, help="capture or project folder to open")
+    parser.add_argument("--size", default=None, metavar="WxH", help="window size in pixels, for example 1440x900")
+    parser.add_argument("--verbose", action="store_true", help="log more")
+    return parser
+
+
+def build_demo_parser() -> argparse.ArgumentParser:
+    """Arguments of the headless job."""
+    parser = argparse.ArgumentParser(
+        prog="clipgstream demo",
+        description="Train the first two clips without a window, then write a picture of the window and a video.",
+    )
+    parser.add_argument("path", nargs="?", type=Path, default=None, help="capture folder (default: the sample)")
+    parser.add_argument("--out", type=Path, default=Path("demo_output"), help="folder for the results")
+    parser.add_argument("--quick", action="store_true", help="a few steps only; shows that every part works")
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Route to a subcommand, the demo, or the window.
+
+    Returns:
+        Process exit code: 0 done, 2 bad input, other values from the subcommands.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if arguments and arguments[0] in COMMANDS:
+        from app.cli import main as run_command
+
+        return int(run_command(arguments) or 0)
+    if arguments and arguments[0] == "demo":
+        return _run_demo(build_demo_parser().parse_args(arguments[1:]))
+    options = build_parser().parse_args(arguments)
+    logging.basicConfig(level=logging.DEBUG if options.verbose else logging.INFO, format="%(levelname)s %(message)s")
+    if not has_display():
+        demo_arguments = [] if options.path is None else [str(options.path)]
+        return _run_demo(build_demo_parser().parse_args(demo_arguments))
+    return _run_window(options)
+
+
+def _run_demo(options: argparse.Namespace) -> int:
+    from ui.demo import run_demo
+
+    return run_demo(options.path or sample_path(), options.out, quick=options.quick)
+
+
+def _parse_size(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    width, _, height = text.lower().partition("x")
+    if not (width.isdigit() and height.isdigit()):
+        return None
+    return int(width), int(height)
+
+
+def _run_window(options: argparse.Namespace) -> int:
+    import pyglet
+
+    pyglet.options.shadow_window = False  # no hidden second context
+    pyglet.options.dpi_scaling = "stretch"
+    from app.commands import OpenCapture
+    from app.session import Session
+    from ui.window import DEFAULT_SIZE, StudioWindow
+
+    width, height = _parse_size(options.size) or DEFAULT_SIZE
+    session = Session()
+    window = StudioWindow(session, width=width, height=height)
+    try:
+        if options.path is not None:
+            session.dispatch(OpenCapture(options.path))
+        window.run()
+    finally:
+        window.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,134 @@
+"""The capture panel: what was opened, and its cameras as a list; a click looks through one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from imgui_bundle import ImVec2, imgui
+
+from app.commands import LookThrough
+from ui import theme
+from ui.state import Dispatch, Rect, UiState
+from ui.theme import Icon
+from ui.widgets import pop_bold, push_bold, text_wrapped_dim
+
+THUMBNAIL_WIDTH_PX = 160
+ROW_HEIGHT = 50.0
+PICTURE_SIZE = (64.0, 40.0)
+
+
+class CapturePanel:
+    """Draws the list; owns the thumbnail textures and nothing else.
+
+    Args:
+        make_texture: Makes an empty texture with `set(image)`, `texture` and `release()` (ui.gl.ImageTexture).
+    """
+
+    def __init__(self, make_texture: Any) -> None:
+        self._make_texture = make_texture
+        self._thumbnails: dict[int, Any] = {}
+        self._capture_path: Any = None
+        self._filter = ""
+        self._shown_camera: int | None = None
+
+    def release(self) -> None:
+        """Free the thumbnails. GL thread only."""
+        for texture in self._thumbnails.values():
+            texture.release()
+        self._thumbnails.clear()
+
+    def draw(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        """Summary, then one row per camera."""
+        capture = session.capture
+        if capture is None:
+            text_wrapped_dim("The cameras of a capture are listed here.")
+            return
+        if capture.path != self._capture_path:
+            self.release()
+            self._capture_path = capture.path
+        self._draw_summary(session, ui)
+        is_free = session.view.look_through is None
+        if imgui.selectable(f"{Icon.EYE}  Free view", is_free, 0, ImVec2(0, 24))[0] and not is_free:
+            dispatch(LookThrough(None))
+        ui.mark("capture.free")
+        imgui.separator()
+        if imgui.begin_child("cameras"):
+            self._draw_cameras(session, dispatch, ui)
+        imgui.end_child()
+
+    def _draw_summary(self, session: Any, ui: UiState) -> None:
+        capture = session.capture
+        push_bold(ui, ui.fonts.body_size + 1)
+        imgui.text(capture.path.name)
+        pop_bold(ui)
+        imgui.set_item_tooltip(str(capture.path))
+        seconds = capture.n_frames / max(capture.fps, 1e-6)
+        imgui.text_disabled(f"{len(capture.rig)} cameras, {capture.n_frames} frames, {seconds:.1f} s")
+        held_out = held_out_cameras(session)
+        imgui.text_disabled(f"{len(session.clips)} clips")
+        if held_out:
+            imgui.same_line(0, 4)
+            imgui.text_disabled(f"- {len(held_out)} held out for measuring")
+        imgui.spacing()
+
+    def _draw_cameras(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        rig = session.capture.rig
+        held_out = held_out_cameras(session)
+        shown = session.view.look_through
+        has_asked = False
+        for index, name in enumerate(rig.names):
+            imgui.push_id(index)
+            top_left = imgui.get_cursor_screen_pos()
+            is_clicked, _ = imgui.selectable("##camera", shown == index, 0, ImVec2(0, ROW_HEIGHT))
+            is_visible = imgui.is_item_visible()
+            low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+            if is_visible:
+                ui.mark(f"capture.camera{index}")
+            if is_clicked:
+                dispatch(LookThrough(None if shown == index else index))
+            if shown == index and shown != self._shown_camera:
+                imgui.set_scroll_here_y(0.5)
+                self._shown_camera = shown
+            if is_visible:
+                has_asked = self._ask_thumbnail(session, index, has_asked, ui)
+                self._draw_row(Rect(top_left.x, low.y, high.x, high.y), index, name, rig, index in held_out)
+            imgui.pop_id()
+        if shown is None:
+            self._shown_camera = None
+
+    def _ask_thumbnail(self, session: Any, index: int, has_asked: bool, ui: UiState) -> bool:
+        """One missing thumbnail is asked for per frame, so that decoding never crowds out the viewport."""
+        if index in self._thumbnails or has_asked:
+            return has_asked
+        picture = session.ground_truth(index, 0, THUMBNAIL_WIDTH_PX)
+        if picture is not None:
+            texture = self._make_texture()
+            texture.set(picture.image)
+            self._thumbnails[index] = texture
+        ui.redraw_within(0.1)
+        return True
+
+    def _draw_row(self, row: Rect, index: int, name: str, rig: Any, is_held_out: bool) -> None:
+        draw = imgui.get_window_draw_list()
+        box = Rect(row.x0 + 4, row.y0 + 5, row.x0 + 4 + PICTURE_SIZE[0], row.y0 + 5 + PICTURE_SIZE[1])
+        texture = self._thumbnails.get(index)
+        if texture is None:
+            draw.add_rect_filled(box.low, box.high, theme.u32(theme.BACKDROP), 3)
+            draw.add_text(ImVec2(box.x0 + 24, box.y0 + 12), theme.u32(theme.OUTLINE), Icon.CAMERA)
+        else:
+            draw.add_image(imgui.ImTextureRef(texture.texture.glo), box.low, box.high)
+        x = box.x1 + 10
+        draw.add_text(ImVec2(x, row.y0 + 6), theme.u32(theme.TEXT), name)
+        width, height = (int(v) for v in rig.image_sizes[index])
+        draw.add_text(ImVec2(x, row.y0 + 26), theme.u32(theme.TEXT_DIM), f"{width} x {height}")
+        if is_held_out:
+            label = "held out"
+            text_width = imgui.calc_text_size(label).x
+            tag = Rect(row.x1 - text_width - 18, row.y0 + 6, row.x1 - 4, row.y0 + 25)
+            draw.add_rect(tag.low, tag.high, theme.u32(theme.HELD_OUT), 4)
+            draw.add_text(ImVec2(tag.x0 + 7, tag.y0 + 1), theme.u32(theme.HELD_OUT), label)
+
+
+def held_out_cameras(session: Any) -> frozenset[int]:
+    """Camera indices that training never sees."""
+    return frozenset(int(index) for index in getattr(session, "holdout", ()) or ())

@@ -1,0 +1,183 @@
+"""The training panel: what runs, how fast, how well, and the buttons that start, pause and stop it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from imgui_bundle import ImVec2, ImVec4, imgui, implot
+
+from app.commands import PauseTraining, ResumeTraining, StopTraining, TrainNextClip
+from ui import theme
+from ui.panels.timeline import STATE_WORDS
+from ui.state import Dispatch, UiState
+from ui.theme import Icon
+from ui.widgets import grouped, primary_button, text_right, text_wrapped_dim
+
+MAX_PLOT_POINTS = 600
+
+
+def duration_text(seconds: float | None) -> str:
+    """Minutes and seconds as people read them; a dash when unknown."""
+    if seconds is None or not np.isfinite(seconds) or seconds < 0:
+        return "–"
+    whole = round(seconds)
+    hours, rest = divmod(whole, 3600)
+    if hours:
+        return f"{hours} h {rest // 60:02d} min"
+    return f"{rest // 60}:{rest % 60:02d}"
+
+
+def plot_arrays(history: Sequence[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
+    """(step, value) pairs as two contiguous float64 arrays, finite rows only, thinned to MAX_PLOT_POINTS."""
+    pairs = np.asarray(list(history), dtype=np.float64).reshape(-1, 2)
+    pairs = pairs[np.isfinite(pairs).all(axis=1)]
+    if len(pairs) > MAX_PLOT_POINTS:
+        rows = np.linspace(0, len(pairs) - 1, MAX_PLOT_POINTS).round().astype(np.int64)
+        pairs = pairs[rows]
+    return np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
+
+
+def draw_training(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    """Buttons, progress, curves, then one row per clip."""
+    if session.capture is None:
+        text_wrapped_dim("Training starts from here when a capture is open.")
+        return
+    status = session.training
+    _draw_buttons(session, dispatch, ui)
+    if status.state in ("starting", "preparing", "running", "paused", "stopping"):
+        _draw_progress(status, ui)
+    imgui.spacing()
+    _draw_curves(status, ui)
+    imgui.spacing()
+    _draw_clips(session)
+
+
+def _draw_buttons(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    status = session.training
+    width = imgui.get_content_region_avail().x
+    if status.state in ("idle", "failed"):
+        index = status.next_clip_index
+        is_offered = bool(status.can_train_next) and index is not None
+        imgui.begin_disabled(not is_offered)
+        label = f"{Icon.TRAIN}  Train next clip" if index is not None else f"{Icon.CHECK}  Every clip is trained"
+        if primary_button(label, ImVec2(width, 36), ui):
+            dispatch(TrainNextClip())
+        ui.mark("training.next")
+        imgui.end_disabled()
+        imgui.set_item_tooltip("T")
+        if index is not None and index < len(session.clips):
+            clip = session.clips[index]
+            kind = "the reference: it sees the scene first" if index == 0 else "starts from the reference"
+            text_wrapped_dim(f"Next is clip {index}, frames {clip.start} to {clip.start + clip.n_frames - 1}; {kind}.")
+        return
+    half = (width - 8) / 2
+    if status.state == "paused":
+        if primary_button(f"{Icon.PLAY}  Resume", ImVec2(half, 36), ui):
+            dispatch(ResumeTraining())
+        ui.mark("training.resume")
+    else:
+        imgui.begin_disabled(status.state not in ("running", "preparing"))
+        if imgui.button(f"{Icon.PAUSE}  Pause", ImVec2(half, 36)):
+            dispatch(PauseTraining())
+        ui.mark("training.pause")
+        imgui.end_disabled()
+    imgui.same_line()
+    imgui.begin_disabled(status.state == "stopping")
+    if imgui.button(f"{Icon.STOP}  Stop", ImVec2(half, 36)):
+        dispatch(StopTraining())
+    ui.mark("training.stop")
+    imgui.end_disabled()
+    imgui.set_item_tooltip("Ends this clip now and keeps what it learned")
+
+
+def _draw_progress(status: Any, ui: UiState) -> None:
+    is_stepping = status.n_steps > 0 and status.state in ("running", "paused", "stopping")
+    share = status.step / status.n_steps if is_stepping else float(getattr(status, "progress", 0.0) or 0.0)
+    words = {"starting": "Starting", "preparing": "Preparing", "running": "Training"}
+    words |= {"paused": "Paused", "stopping": "Stopping"}
+    imgui.spacing()
+    imgui.text(f"{words[status.state]} clip {status.clip_index}")
+    if status.stage:
+        imgui.same_line()
+        imgui.text_disabled(str(status.stage))
+    bar_color = theme.YELLOW if status.state == "paused" else theme.SKY
+    imgui.push_style_color(imgui.Col_.plot_histogram, ImVec4(*bar_color))
+    imgui.progress_bar(min(max(share, 0.0), 1.0), ImVec2(-1, 8), "")
+    imgui.pop_style_color()
+    ui.mark("training.progress")
+    if is_stepping:
+        _pair(f"Step {grouped(status.step)} of {grouped(status.n_steps)}", f"{share * 100:.0f} %")
+        rate = f"{status.steps_per_s:.1f} steps/s" if status.steps_per_s else "–"
+        _pair(rate, f"{duration_text(status.eta_s)} left")
+    elif status.eta_s is not None:
+        _pair("", f"about {duration_text(status.eta_s)} left")
+    if status.message:
+        text_wrapped_dim(str(status.message))
+
+
+def _pair(left: str, right: str) -> None:
+    imgui.text(left)
+    text_right(right)
+
+
+def _draw_curves(status: Any, ui: UiState) -> None:
+    height = min(max((imgui.get_content_region_avail().y - 190) / 2, 84.0), 150.0)
+    _draw_curve("Held-out PSNR, dB", status.psnr_history, theme.GREEN, height, has_markers=True, digits=2)
+    ui.mark("training.psnr")
+    _draw_curve("Loss", status.loss_history, theme.SKY, height, has_markers=False, digits=4)
+    ui.mark("training.loss")
+
+
+def _draw_curve(title: str, history: Any, color: theme.Color, height: float, *, has_markers: bool, digits: int) -> None:
+    steps, values = plot_arrays(history)
+    _pair(title, f"{values[-1]:.{digits}f}" if len(values) else "–")
+    flags = implot.Flags_.canvas_only | implot.Flags_.no_inputs | implot.Flags_.no_frame
+    if not implot.begin_plot(f"##{title}", ImVec2(-1, height), flags):
+        return
+    axis = implot.AxisFlags_.no_menus | implot.AxisFlags_.no_highlight | implot.AxisFlags_.no_tick_marks
+    if len(values):
+        low, high = float(values.min()), float(values.max())
+        margin = max((high - low) * 0.1, abs(high) * 0.01, 1e-6)
+        implot.setup_axes("", "", axis, axis)
+        implot.setup_axes_limits(
+            float(steps[0]), float(max(steps[-1], steps[0] + 1)), low - margin, high + margin, implot.Cond_.always
+        )
+        spec = implot.Spec(line_color=ImVec4(*color), line_weight=2.0)
+        if has_markers:
+            spec.marker = implot.Marker_.circle
+            spec.marker_size = 3.0
+        implot.plot_line(title, steps, values, spec=spec)
+    else:
+        bare = axis | implot.AxisFlags_.no_decorations
+        implot.setup_axes("", "", bare, bare)
+    implot.end_plot()
+
+
+def _draw_clips(session: Any) -> None:
+    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.borders_inner_h | imgui.TableFlags_.scroll_y
+    flags |= imgui.TableFlags_.sizing_fixed_fit
+    if not imgui.begin_table("clips", 4, flags, ImVec2(0, max(imgui.get_content_region_avail().y - 4, 90))):
+        return
+    imgui.table_setup_scroll_freeze(0, 1)
+    imgui.table_setup_column("Clip", imgui.TableColumnFlags_.width_stretch)
+    imgui.table_setup_column("PSNR")
+    imgui.table_setup_column("Inherited")
+    imgui.table_setup_column("Own")
+    imgui.table_headers_row()
+    for clip, status in zip(session.clips, session.clip_states, strict=False):
+        imgui.table_next_row()
+        imgui.table_next_column()
+        icon = theme.CLIP_ICONS.get(status.state, "")
+        words = STATE_WORDS.get(status.state, status.state)
+        imgui.text(f"{clip.clip_index}")
+        imgui.same_line(24)
+        imgui.text_colored(ImVec4(*theme.status_color(status.state)), f"{icon}  {words}" if icon else words)
+        imgui.table_next_column()
+        imgui.text("–" if status.held_out_psnr is None else f"{status.held_out_psnr:.1f}")
+        imgui.table_next_column()
+        imgui.text(grouped(status.n_inherited) if status.n_inherited else "–")
+        imgui.table_next_column()
+        imgui.text(grouped(status.n_own) if status.n_own else "–")
+    imgui.end_table()

@@ -1,0 +1,338 @@
+"""The viewport: the scene at the user's time and view, compared with the captured picture, with overlays and a HUD.
+
+Turns pointer input over the picture into view changes. What is drawn off screen, and when, is ui.scene's business.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Any
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from app.commands import LookThrough, ToggleOverlay
+from app.status import COMPARE_MODES
+from ui import theme
+from ui.panels.welcome import draw_welcome
+from ui.scene import Scene, SceneView
+from ui.shortcuts import set_compare
+from ui.state import Dispatch, Rect, UiState
+from ui.theme import Icon
+from ui.widgets import chip, grouped
+
+MOVING_S = 0.22
+"""The view counts as moving for this long after the last change of it."""
+WIPE_GRAB_PX = 9.0
+STALE_AFTER_S = 0.15
+COMPARE_WORDS = {"off": "Off", "wipe": "Wipe", "side": "Side by side"}
+
+
+@dataclass(frozen=True)
+class Panes:
+    """Where the rendered and the captured picture lie."""
+
+    rendered: Rect
+    captured: Rect | None
+
+
+def fit(area: Rect, width: float, height: float) -> Rect:
+    """The largest rectangle of this aspect, centred in the area."""
+    scale = min(area.width / max(width, 1.0), area.height / max(height, 1.0))
+    x, y = area.center
+    return Rect(x - width * scale / 2, y - height * scale / 2, x + width * scale / 2, y + height * scale / 2)
+
+
+def arrange(area: Rect, image_size: tuple[int, int] | None, compare: str) -> Panes:
+    """Lay out the panes; without a capture camera the whole area is the rendered picture."""
+    if image_size is None:
+        return Panes(area, None)
+    if compare == "side":
+        middle = area.center[0]
+        left = fit(Rect(area.x0, area.y0, middle - 2, area.y1), *image_size)
+        right = fit(Rect(middle + 2, area.y0, area.x1, area.y1), *image_size)
+        return Panes(rendered=right, captured=left)
+    pane = fit(area, *image_size)
+    return Panes(pane, pane if compare == "wipe" else None)
+
+
+class ViewportPanel:
+    """Owns the scene's GL objects and the drag in progress."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self._drag: str | None = None
+        self._moved_s = -1e9
+        self._stale_since_s: float | None = None
+        self._fps = 0.0
+
+    def release(self) -> None:
+        """Free GL objects. GL thread only."""
+        self.scene.release()
+
+    @property
+    def is_moving(self) -> bool:
+        """Did the view change a moment ago?"""
+        return time.perf_counter() - self._moved_s < MOVING_S
+
+    def note_moved(self) -> None:
+        """The view was changed by something else than the pointer here."""
+        self._moved_s = time.perf_counter()
+
+    def has_news(self, session: Any) -> bool:
+        """Did a picture arrive that the window does not show yet? Cheap; asked at every tick."""
+        return session.capture is not None and self.scene.has_news(session)
+
+    def draw(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        """Toolbar, picture, HUD."""
+        if session.capture is None:
+            origin, size = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
+            area = Rect(origin.x, origin.y, origin.x + size.x, origin.y + size.y)
+            imgui.get_window_draw_list().add_rect_filled(area.low, area.high, theme.u32(theme.VOID))
+            draw_welcome(session, dispatch, ui, area)
+            return
+        self._draw_toolbar(session, dispatch, ui)
+        origin, size = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
+        if size.x < 32 or size.y < 32:
+            return
+        area = Rect(origin.x, origin.y, origin.x + size.x, origin.y + size.y)
+        buttons = imgui.ButtonFlags_
+        flags = buttons.mouse_button_left | buttons.mouse_button_right | buttons.mouse_button_middle
+        imgui.invisible_button("canvas", size, flags)
+        ui.mark_rect("viewport.canvas", area)
+        shown = session.view.look_through
+        image_size = None if shown is None else tuple(int(v) for v in session.rig.image_sizes[shown])
+        panes = arrange(area, image_size, session.overlays.compare)
+        self._navigate(session, dispatch, panes)
+        # Looking through a camera may just have ended; the picture then fills the area from the next frame on.
+        self._draw_picture(session, ui, area, panes)
+        self._draw_hud(session, ui, area, panes)
+
+    # ---- toolbar ---------------------------------------------------------------------------------------------
+
+    def _draw_toolbar(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        imgui.set_cursor_pos(ImVec2(imgui.get_cursor_pos_x() + 8, imgui.get_cursor_pos_y() + 6))
+        shown = session.view.look_through
+        names = session.rig.names
+        imgui.align_text_to_frame_padding()
+        imgui.text_disabled("View")
+        imgui.same_line()
+        imgui.set_next_item_width(150)
+        if imgui.begin_combo("##camera", "Free" if shown is None else names[shown]):
+            if imgui.selectable("Free", shown is None)[0]:
+                dispatch(LookThrough(None))
+            for index, name in enumerate(names):
+                if imgui.selectable(name, shown == index)[0]:
+                    dispatch(LookThrough(index))
+            imgui.end_combo()
+        ui.mark("viewport.camera")
+        imgui.set_item_tooltip("Look through a capture camera ([ and ])")
+        imgui.same_line(0, 18)
+        imgui.text_disabled("Compare")
+        for mode in COMPARE_MODES:
+            imgui.same_line(0, 8 if mode == "off" else 2)
+            if _segment(COMPARE_WORDS[mode], session.overlays.compare == mode):
+                set_compare(session, dispatch, mode)
+            ui.mark(f"viewport.compare.{mode}")
+            imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")
+        imgui.same_line(0, 18)
+        if imgui.button(f"{Icon.EYE}  Show"):
+            imgui.open_popup("overlays")
+        ui.mark("viewport.overlays")
+        self._draw_overlay_menu(session, dispatch, ui)
+
+    def _draw_overlay_menu(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        if not imgui.begin_popup("overlays"):
+            return
+        rows = (
+            ("show_frusta", "Cameras", "1"),
+            ("show_inherited", "Inherited anchors (sky circles)", "2"),
+            ("show_residual", "Residual anchors (orange diamonds)", "3"),
+            ("show_points", "Point cloud", "4"),
+        )
+        for name, label, key_label in rows:
+            if imgui.menu_item(label, key_label, bool(getattr(session.overlays, name)), True)[0]:
+                dispatch(ToggleOverlay(name))
+        imgui.separator()
+        imgui.text_disabled("Tab hides or shows cameras and anchors")
+        imgui.end_popup()
+
+    # ---- pointer ---------------------------------------------------------------------------------------------
+
+    def _navigate(self, session: Any, dispatch: Dispatch, panes: Panes) -> None:
+        io = imgui.get_io()
+        view = session.view
+        if imgui.is_item_hovered() and io.mouse_wheel != 0.0:
+            self._leave_camera(session, dispatch)
+            view.dolly(0.9**io.mouse_wheel)
+            self.note_moved()
+        if imgui.is_item_activated():
+            self._drag = "wipe" if self._is_on_wipe(session, panes, io.mouse_pos) else "view"
+        if not imgui.is_item_active():
+            self._drag = None
+            if imgui.is_item_hovered() and self._is_on_wipe(session, panes, io.mouse_pos):
+                imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
+            return
+        if self._drag == "wipe":
+            share = (io.mouse_pos.x - panes.rendered.x0) / max(panes.rendered.width, 1.0)
+            session.overlays.wipe_position = min(max(share, 0.0), 1.0)
+            imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
+            return
+        dx, dy = io.mouse_delta.x, io.mouse_delta.y
+        if dx == 0.0 and dy == 0.0:
+            return
+        self._leave_camera(session, dispatch)
+        is_middle = imgui.is_mouse_down(imgui.MouseButton_.middle)
+        if imgui.is_mouse_down(imgui.MouseButton_.right) or (is_middle and io.key_shift):
+            view.pan(dx, dy)
+        elif is_middle and io.key_ctrl:
+            view.dolly(1.01**dy)
+        else:
+            view.orbit(dx, dy)
+        self.note_moved()
+
+    def _leave_camera(self, session: Any, dispatch: Dispatch) -> None:
+        if session.view.look_through is not None:
+            dispatch(LookThrough(None))
+
+    def _is_on_wipe(self, session: Any, panes: Panes, pointer: ImVec2) -> bool:
+        if session.overlays.compare != "wipe" or panes.captured is None:
+            return False
+        x = panes.rendered.x0 + panes.rendered.width * session.overlays.wipe_position
+        return abs(pointer.x - x) <= WIPE_GRAB_PX and panes.rendered.y0 <= pointer.y <= panes.rendered.y1
+
+    # ---- picture ---------------------------------------------------------------------------------------------
+
+    def _draw_picture(self, session: Any, ui: UiState, area: Rect, panes: Panes) -> None:
+        draw = imgui.get_window_draw_list()
+        draw.push_clip_rect(area.low, area.high, True)
+        draw.add_rect_filled(area.low, area.high, theme.u32(theme.VOID))
+        pane = panes.rendered
+        ui.mark_rect("viewport.rendered", pane)
+        density = imgui.get_io().display_framebuffer_scale.x
+        size = (max(round(pane.width * density), 16), max(round(pane.height * density), 16))
+        view = SceneView(
+            world_to_camera=session.view.world_to_camera(),
+            K=session.view.K(*size),
+            width=size[0],
+            height=size[1],
+            is_moving=self.is_moving,
+        )
+        layers = self.scene.compose(session, view)
+        for layer in layers.textures:
+            draw.add_image(imgui.ImTextureRef(layer.glo), pane.low, pane.high, layer.uv0, layer.uv1)
+        if self.is_moving:
+            ui.redraw_within(MOVING_S)
+        self._note_stale(layers.is_stale, ui)
+        if panes.captured is not None:
+            self._draw_captured(session, draw, panes)
+        draw.pop_clip_rect()
+
+    def _note_stale(self, is_stale: bool, ui: UiState) -> None:
+        if not is_stale:
+            self._stale_since_s = None
+            return
+        if self._stale_since_s is None:
+            self._stale_since_s = time.perf_counter()
+        ui.redraw_within(STALE_AFTER_S)
+
+    def _draw_captured(self, session: Any, draw: Any, panes: Panes) -> None:
+        captured = panes.captured
+        assert captured is not None
+        texture = self.scene.captured(session, round(captured.width))
+        if session.overlays.compare == "side":
+            if texture is not None:
+                draw.add_image(imgui.ImTextureRef(texture.glo), captured.low, captured.high, texture.uv0, texture.uv1)
+            chip(draw, captured.x0 + 10, captured.y0 + 10, "Captured")
+            chip(draw, panes.rendered.x0 + 10, panes.rendered.y0 + 10, "Rendered")
+            return
+        share = session.overlays.wipe_position
+        x = captured.x0 + captured.width * share
+        if texture is not None:
+            u = texture.uv0.x + (texture.uv1.x - texture.uv0.x) * share
+            draw.add_image(
+                imgui.ImTextureRef(texture.glo),
+                captured.low,
+                ImVec2(x, captured.y1),
+                texture.uv0,
+                ImVec2(u, texture.uv1.y),
+            )
+        white = theme.u32(theme.PLAYHEAD)
+        draw.add_line_v(x, captured.y0, captured.y1, white, 2)
+        middle = captured.center[1]
+        draw.add_circle_filled(ImVec2(x, middle), 9, white)
+        dark = theme.u32(theme.VOID)
+        draw.add_triangle_filled(ImVec2(x - 6, middle), ImVec2(x - 2, middle - 4), ImVec2(x - 2, middle + 4), dark)
+        draw.add_triangle_filled(ImVec2(x + 6, middle), ImVec2(x + 2, middle + 4), ImVec2(x + 2, middle - 4), dark)
+        if share > 0.15:
+            chip(draw, captured.x0 + 10, captured.y0 + 10, "Captured")
+        if share < 0.85:
+            chip(draw, captured.x1 - 10, captured.y0 + 10, "Rendered", is_right=True)
+
+    # ---- HUD -------------------------------------------------------------------------------------------------
+
+    def _draw_hud(self, session: Any, ui: UiState, area: Rect, panes: Panes) -> None:
+        draw = imgui.get_window_draw_list()
+        timeline, shown = session.timeline, session.view.look_through
+        delta_s = imgui.get_io().delta_time
+        if delta_s < 0.5:
+            self._fps = 0.9 * self._fps + 0.1 / max(delta_s, 1e-3)
+        camera = "free view" if shown is None else session.rig.names[shown]
+        if shown is not None and shown in (getattr(session, "holdout", ()) or ()):
+            camera += " (held out)"
+        parts = [f"frame {timeline.frame_index}", f"{timeline.frame_index / max(timeline.fps, 1e-6):.2f} s", camera]
+        if timeline.is_playing or self.is_moving:
+            parts.append(f"{self._fps:.0f} fps")
+        x = chip(draw, area.x0 + 12, area.y1 - 34, "   ".join(parts)) + 8
+        note = self._note(session)
+        if note:
+            x = chip(draw, x, area.y1 - 34, note[0], color=note[1]) + 8
+        stale_s = 0.0 if self._stale_since_s is None else time.perf_counter() - self._stale_since_s
+        if stale_s >= STALE_AFTER_S:
+            chip(draw, x, area.y1 - 34, f"{Icon.CLOCK}  stale", color=theme.YELLOW)
+        self._draw_legend(session, draw, area)
+
+    def _note(self, session: Any) -> tuple[str, theme.Color] | None:
+        clip = session.timeline.clip_of(session.timeline.frame_index)
+        if clip is None:
+            return None
+        clip_index = clip.clip_index
+        status = session.clip_states[clip_index]
+        if status.state in ("preparing", "training", "paused"):
+            return f"{theme.CLIP_ICONS[status.state]}  clip {clip_index} {status.state}", theme.SKY
+        if status.state == "trained":
+            return None
+        return f"{self.scene.shows}, clip {clip_index} is not trained", theme.TEXT_DIM
+
+    def _draw_legend(self, session: Any, draw: Any, area: Rect) -> None:
+        counts = self.scene.counts
+        rows = []
+        if session.overlays.show_inherited and counts.n_inherited:
+            rows.append(("circle", theme.INHERITED, f"{grouped(counts.n_inherited)} inherited anchors"))
+        if session.overlays.show_residual and counts.n_residual:
+            rows.append(("diamond", theme.RESIDUAL, f"{grouped(counts.n_residual)} residual anchors"))
+        y = area.y0 + 12
+        for shape, color, text in rows:
+            width = imgui.calc_text_size(text).x
+            x = area.x1 - width - 46
+            draw.add_rect_filled(
+                ImVec2(x, y), ImVec2(area.x1 - 12, y + 24), theme.u32(theme.faded(theme.VOID, 0.78)), 4
+            )
+            middle = ImVec2(x + 14, y + 12)
+            if shape == "circle":
+                draw.add_circle(middle, 5, theme.u32(color), 0, 2)
+            else:
+                draw.add_ngon_filled(middle, 6, theme.u32(color), 4)
+            draw.add_text(ImVec2(x + 26, y + 3), theme.u32(theme.TEXT), text)
+            y += 28
+
+
+def _segment(label: str, is_on: bool) -> bool:
+    if is_on:
+        imgui.push_style_color(imgui.Col_.button, ImVec4(*theme.faded(theme.SKY, 0.9)))
+        imgui.push_style_color(imgui.Col_.button_hovered, ImVec4(*theme.SKY))
+        imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_ON_ACCENT))
+    is_clicked = imgui.button(f"{label}##compare")
+    if is_on:
+        imgui.pop_style_color(3)
+    return is_clicked

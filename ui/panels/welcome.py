@@ -1,0 +1,54 @@
+"""What the viewport shows before a capture is open: how to open one, and the sample."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from app.commands import OpenCapture
+from ui import theme
+from ui.state import Dispatch, Rect, UiState
+from ui.theme import Icon
+from ui.widgets import pop_bold, primary_button, push_bold, text_wrapped_dim
+
+SAMPLE_PATH = Path(__file__).resolve().parents[2] / "assets" / "sample"
+CARD_SIZE = (520.0, 316.0)
+
+
+def draw_welcome(session: Any, dispatch: Dispatch, ui: UiState, area: Rect) -> None:
+    """A card in the middle of the area."""
+    x, y = area.center
+    imgui.set_cursor_screen_pos(ImVec2(x - CARD_SIZE[0] / 2, y - CARD_SIZE[1] / 2))
+    imgui.push_style_color(imgui.Col_.child_bg, ImVec4(*theme.PANEL))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(36, 30))
+    imgui.begin_child("welcome", ImVec2(*CARD_SIZE), imgui.ChildFlags_.always_use_window_padding)
+    imgui.pop_style_var()
+    push_bold(ui, ui.fonts.title_size)
+    imgui.text("ClipGStream Studio")
+    pop_bold(ui)
+    text_wrapped_dim(
+        "See a multi-camera capture in space and time. Open a folder, train it clip by clip, and watch it sharpen."
+    )
+    imgui.dummy(ImVec2(0, 8))
+    is_busy = bool(session.jobs)
+    imgui.begin_disabled(is_busy)
+    if primary_button(f"{Icon.FOLDER}  Open a capture folder", ImVec2(-1, 40), ui):
+        ui.is_open_requested = True
+    ui.mark("welcome.open")
+    if SAMPLE_PATH.is_dir():
+        if imgui.button(f"{Icon.FILM}  Open the sample capture", ImVec2(-1, 36)):
+            dispatch(OpenCapture(SAMPLE_PATH))
+        ui.mark("welcome.sample")
+    imgui.end_disabled()
+    imgui.dummy(ImVec2(0, 4))
+    if is_busy:
+        job = session.jobs[0]
+        imgui.text(f"{job.name}  {job.message}")
+        imgui.progress_bar(min(max(job.done, 0.0), 1.0), ImVec2(-1, 6), "")
+    else:
+        imgui.text_disabled(f"{Icon.DROP}  or drop a folder on this window")
+        imgui.text_disabled(f"{Icon.HELP}  F1 shows every key")
+    imgui.end_child()
+    imgui.pop_style_color()

@@ -1,0 +1,63 @@
+"""Small drawing pieces that several panels share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from ui import theme
+from ui.state import Rect, UiState
+
+
+def text_right(text: str, color: theme.Color = theme.TEXT_DIM) -> None:
+    """Text at the right end of the current line, pushed right rather than overlapping what is there."""
+    imgui.same_line()
+    free = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(free, 0.0))
+    imgui.text_colored(ImVec4(*color), text)
+
+
+def text_wrapped_dim(text: str) -> None:
+    """Secondary text, wrapped at the panel's edge."""
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_colored(ImVec4(*theme.TEXT_DIM), text)
+    imgui.pop_text_wrap_pos()
+
+
+def primary_button(label: str, size: ImVec2, ui: UiState) -> bool:
+    """The one button of a panel that the user most likely wants."""
+    imgui.push_style_color(imgui.Col_.button, ImVec4(*theme.SKY))
+    imgui.push_style_color(imgui.Col_.button_hovered, ImVec4(*theme.SKY_LIGHT))
+    imgui.push_style_color(imgui.Col_.button_active, ImVec4(*theme.SKY_DARK))
+    imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_ON_ACCENT))
+    push_bold(ui, ui.fonts.body_size)
+    is_clicked = imgui.button(label, size)
+    pop_bold(ui)
+    imgui.pop_style_color(4)
+    return is_clicked
+
+
+def push_bold(ui: UiState, size: float) -> None:
+    """Bold face at a size; the built-in face keeps its own look."""
+    imgui.push_font(ui.fonts.bold, size)
+
+
+def pop_bold(ui: UiState) -> None:
+    """Undo push_bold."""
+    imgui.pop_font()
+
+
+def chip(draw: Any, x: float, y: float, text: str, *, color: theme.Color = theme.TEXT, is_right: bool = False) -> float:
+    """Text on a dark plate over a picture; returns its right edge. With is_right, x is the right edge."""
+    width = imgui.calc_text_size(text).x + 18
+    left = x - width if is_right else x
+    plate = Rect(left, y, left + width, y + 24)
+    draw.add_rect_filled(plate.low, plate.high, theme.u32(theme.faded(theme.VOID, 0.78)), 4)
+    draw.add_text(ImVec2(left + 9, y + 4), theme.u32(color), text)
+    return plate.x1
+
+
+def grouped(number: int) -> str:
+    """An integer with thin spaces between thousands."""
+    return f"{number:,}".replace(",", "\u2009")

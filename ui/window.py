@@ -1,0 +1,172 @@
+"""The pyglet window: a GL 3.3 core context, the loop, and the events that are not ImGui's (drop, close, resize).
+
+Owns the window and its context. What is drawn is ui.frame's business.
+"""
+
+from __future__ import annotations
+
+import logging
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+import moderngl
+import pyglet
+from pyglet.event import EVENT_HANDLED
+
+from ui.frame import Frame, free_dropped
+
+logger = logging.getLogger(__name__)
+
+TICK_S = 1 / 60
+DEFAULT_SIZE = (1440, 900)
+MIN_SIZE = (880, 560)
+TITLE = "ClipGStream Studio"
+
+
+def make_window(width: int, height: int, *, is_visible: bool = True) -> Any:
+    """A window with the context everything here is written for.
+
+    Eight bits per channel are asked for by name: the EGL default is a 16-bit format.
+    """
+    config = pyglet.gl.Config(
+        major_version=3,
+        minor_version=3,
+        forward_compatible=True,
+        double_buffer=True,
+        red_size=8,
+        green_size=8,
+        blue_size=8,
+        alpha_size=8,
+        depth_size=24,
+    )
+    screen = pyglet.display.get_display().get_default_screen()
+    if not pyglet.options.headless:
+        width, height = min(width, screen.width), min(height, screen.height)
+    window = pyglet.window.Window(
+        width,
+        height,
+        caption=TITLE,
+        resizable=True,
+        vsync=False,
+        config=config,
+        visible=is_visible,
+        file_drops=not pyglet.options.headless,
+    )
+    if not pyglet.options.headless:
+        window.set_minimum_size(*MIN_SIZE)
+    return window
+
+
+class StudioWindow:
+    """One window on one session.
+
+    Args:
+        session: See app.session.Session; closed by `close`.
+        width, height: Logical pixels.
+        fixed_delta_s: Seconds per frame as told to ImGui; tests fix it, None measures.
+    """
+
+    def __init__(
+        self,
+        session: Any,
+        *,
+        width: int = DEFAULT_SIZE[0],
+        height: int = DEFAULT_SIZE[1],
+        fixed_delta_s: float | None = None,
+    ) -> None:
+        self.session = session
+        self.window = make_window(width, height)
+        self.ctx = moderngl.create_context(require=330)
+        self.ctx.gc_mode = "context_gc"  # dropped objects wait for free_dropped() on this thread
+        self.frame = Frame(self.window, self.ctx, session, fixed_delta_s=fixed_delta_s)
+        self._handlers = {
+            "on_file_drop": self._file_dropped,
+            "on_close": self._close_asked,
+            "on_resize": self._resized,
+            "on_expose": self._exposed,
+            "on_show": self._exposed,
+        }
+        self.window.push_handlers(**self._handlers)
+        self._is_closed = False
+        self._title = ""
+
+    # ---- the loop --------------------------------------------------------------------------------------------
+
+    def run(self) -> None:
+        """Serve events and draw on demand until the window is closed."""
+        previous = signal.signal(signal.SIGTERM, lambda *_: pyglet.app.exit())
+        pyglet.clock.schedule_interval(self.tick, TICK_S)
+        try:
+            pyglet.app.run(None)
+        except KeyboardInterrupt:
+            logger.info("Interrupted; closing")
+        finally:
+            pyglet.clock.unschedule(self.tick)
+            signal.signal(signal.SIGTERM, previous)
+
+    def tick(self, dt_s: float) -> None:
+        """Update the session; draw when something changed."""
+        if self.frame.update(dt_s):
+            self.draw()
+        if self.frame.ui.quit_requested:
+            pyglet.app.exit()
+        self._show_title()
+
+    def draw(self) -> None:
+        """Draw one frame now."""
+        self.window.switch_to()
+        self.frame.draw()
+        self.window.flip()
+
+    def settle(self, frames: int = 4, *, until_idle_s: float = 0.0) -> None:
+        """Draw some frames without an event loop, for tests and pictures of the window.
+
+        Args:
+            until_idle_s: Go on this long at most while frames are still wanted.
+        """
+        deadline_s = time.perf_counter() + until_idle_s
+        drawn = 0
+        while drawn < frames or time.perf_counter() < deadline_s:
+            if not self.frame.update(TICK_S) and drawn >= frames:
+                break
+            self.draw()
+            drawn += 1
+
+    def _show_title(self) -> None:
+        capture = self.session.capture
+        title = TITLE if capture is None else f"{capture.path.name} - {TITLE}"
+        if title != self._title:
+            self._title = title
+            self.window.set_caption(title)
+
+    # ---- events ----------------------------------------------------------------------------------------------
+
+    def _file_dropped(self, x: int, y: int, paths: list[str]) -> None:
+        if paths:
+            self.frame.open_path(Path(paths[0]))
+
+    def _close_asked(self) -> bool:
+        pyglet.app.exit()
+        return EVENT_HANDLED  # the default would close the window before GL objects are released
+
+    def _resized(self, width: int, height: int) -> bool:
+        self.frame.request_redraw()
+        return EVENT_HANDLED
+
+    def _exposed(self) -> None:
+        self.frame.request_redraw()
+
+    def close(self) -> None:
+        """Stop the session, then release GL, ImGui and the window. Safe to call twice."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        self.session.close()
+        self.window.switch_to()
+        self.frame.close()
+        self.window.remove_handlers(**self._handlers)
+        free_dropped(self.ctx)
+        self.ctx.release()
+        self.window.close()
