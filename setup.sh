@@ -138,6 +138,7 @@ LIBRARIES = {
     "libglx-mesa0": "libGLX_mesa.so.0",
     "libegl-mesa0": "libEGL_mesa.so.0",
     "libx11-6": "libX11.so.6",
+    "libxext6": "libXext.so.6",
     "libusb-1.0-0": "libusb-1.0.so.0",
     "libgomp1": "libgomp.so.1",
     "libudev1": "libudev.so.1",
