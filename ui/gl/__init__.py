@@ -1,0 +1,33 @@
+"""Drawing with moderngl into off-screen pictures: splats, pictures, lines, points. No window, no ImGui, no torch.
+
+Whoever makes one of these objects releases it, on the thread of its context.
+"""
+
+from ui.gl.camera import NEAR, clip_matrix, resized_K
+from ui.gl.context import ContextError, is_software, make_headless_context, renderer_name
+from ui.gl.image import ImagePainter, ImageTexture, Rect, fit_rect
+from ui.gl.lines import LineRenderer, frusta_lines
+from ui.gl.points import INHERITED_ANCHOR_COLOR, RESIDUAL_ANCHOR_COLOR, PointRenderer
+from ui.gl.splat_renderer import SplatRenderer
+from ui.gl.targets import Target
+
+__all__ = [
+    "INHERITED_ANCHOR_COLOR",
+    "NEAR",
+    "RESIDUAL_ANCHOR_COLOR",
+    "ContextError",
+    "ImagePainter",
+    "ImageTexture",
+    "LineRenderer",
+    "PointRenderer",
+    "Rect",
+    "SplatRenderer",
+    "Target",
+    "clip_matrix",
+    "fit_rect",
+    "frusta_lines",
+    "is_software",
+    "make_headless_context",
+    "renderer_name",
+    "resized_K",
+]
