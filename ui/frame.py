@@ -53,6 +53,17 @@ def free_dropped(ctx: moderngl.Context) -> int:
     return n_released
 
 
+def _recover(stack: Any) -> None:
+    """End windows, tables and groups that the failed part left open."""
+    io = imgui.get_io()
+    is_assert_on = io.config_error_recovery_enable_assert
+    io.config_error_recovery_enable_assert = False  # it would raise at the first thing left open
+    try:
+        imgui.internal.error_recovery_try_to_recover_state(stack)
+    finally:
+        io.config_error_recovery_enable_assert = is_assert_on
+
+
 class Frame:
     """Draws the whole window; owns panels and the redraw plan.
 
@@ -177,7 +188,7 @@ class Frame:
         try:
             draw_part()
         except Exception as error:  # the frame loop's edge: the window has to survive a broken panel
-            imgui.internal.error_recovery_try_to_recover_state(stack)
+            _recover(stack)
             if title not in self._failed_panels:
                 self._failed_panels.add(title)
                 logger.exception("The panel %s could not be drawn", title)

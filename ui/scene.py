@@ -1,54 +1,251 @@
-"""stub"""
+"""What the viewport shows, drawn off screen into one texture: splats, or the CPU rasterizer's picture, or the cloud,
+with camera frusta and anchors on top.
+
+On a graphics card the Gaussians are drawn as splats. On software GL the session's own rasterizer is several times
+faster, so its picture is uploaded instead. Redrawn only when the key of what it shows changes. Knows no ImGui.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any
-from imgui_bundle import ImVec2
+
+import moderngl
+import numpy as np
+
+from ui.gl import (
+    INHERITED_ANCHOR_COLOR,
+    NEAR,
+    RESIDUAL_ANCHOR_COLOR,
+    ImageTexture,
+    LineRenderer,
+    PointRenderer,
+    SplatRenderer,
+    Target,
+    frusta_lines,
+    is_software,
+)
+
+BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
+MAX_PICTURE_WIDTH = 960
+"""The CPU rasterizer is not asked for more than this; the picture is stretched."""
+MOVING_SHARE = 0.5
+"""Share of the full size that the CPU rasterizer draws while the view moves."""
+FRUSTUM_SHARE = 0.09
+"""Length of a camera's pyramid as a share of the rig's radius."""
+CLOUD, CAPTURED, MARKS = "Point cloud", "Captured picture", "Cameras only"
 
 
 @dataclass(frozen=True)
 class SceneView:
-    world_to_camera: Any
-    K: Any
+    """From where, through which lens, at which size.
+
+    Attributes:
+        world_to_camera: Rigid map, OpenCV axes. [4, 4]
+        K: Intrinsics in pixels of width x height. [3, 3]
+        is_moving: The view changes just now; a coarser picture that comes sooner is better.
+    """
+
+    world_to_camera: np.ndarray
+    K: np.ndarray
     width: int
     height: int
     is_moving: bool
 
-
-@dataclass(frozen=True)
-class Layer:
-    glo: int
-    uv0: ImVec2
-    uv1: ImVec2
-
-
-@dataclass(frozen=True)
-class Layers:
-    textures: tuple
-    is_stale: bool = False
+    @property
+    def key(self) -> Hashable:
+        """Differs whenever the picture would."""
+        matrices = (np.asarray(m, dtype=np.float64).tobytes() for m in (self.world_to_camera, self.K))
+        return (*matrices, self.width, self.height)
 
 
 @dataclass(frozen=True)
-class Counts:
+class Composed:
+    """The finished picture, and whether something newer is under way."""
+
+    texture: moderngl.Texture
+    is_stale: bool
+
+
+@dataclass(frozen=True)
+class AnchorCounts:
+    """Anchors held for the overlays, by origin."""
+
     n_inherited: int = 0
     n_residual: int = 0
 
 
 class Scene:
-    def __init__(s, ctx):
-        s.ctx = ctx
-        s.counts = Counts(1500, 300)
-        s.shows = "cloud"
-        s.is_software = True
+    """Owns the target, the renderers and the captured picture's texture. GL thread only."""
 
-    def release(s):
-        pass
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self.is_software = is_software(ctx)
+        self.counts = AnchorCounts()
+        self.shows = MARKS
+        self._target = Target(ctx)
+        self._picture = ImageTexture(ctx)
+        self._captured = ImageTexture(ctx)
+        self._splats = SplatRenderer(ctx)
+        self._cloud = PointRenderer(ctx)
+        self._inherited = PointRenderer(ctx)
+        self._residual = PointRenderer(ctx)
+        self._frusta = LineRenderer(ctx)
+        self._drawn_key: Hashable = None
+        self._asked_size: tuple[int, int] | None = None
+        self._asked_capture: tuple[int, int, int] | None = None
+        self._picture_key: Hashable = None
+        self._captured_key: Hashable = None
 
-    def has_news(s, session):
+    def release(self) -> None:
+        """Free every GL object."""
+        owned = (
+            self._target,
+            self._picture,
+            self._captured,
+            self._splats,
+            self._cloud,
+            self._inherited,
+            self._residual,
+            self._frusta,
+        )
+        for thing in owned:
+            thing.release()
+
+    # ---- what arrived ----------------------------------------------------------------------------------------
+
+    def has_news(self, session: Any) -> bool:
+        """Did a picture arrive since the last compose? Asks again for what was asked last."""
+        if self._asked_size is not None:
+            picture = session.request_render(*self._asked_size)
+            if picture is not None and picture.key != self._picture_key:
+                return True
+        if self._asked_capture is not None:
+            captured = session.ground_truth(*self._asked_capture)
+            if captured is not None and captured.key != self._captured_key:
+                return True
         return False
 
-    def compose(s, session, view):
-        return Layers(())
+    # ---- the picture -----------------------------------------------------------------------------------------
 
-    def captured(s, session, w):
-        return None
+    def compose(self, session: Any, view: SceneView) -> Composed:
+        """Draw what belongs to the session's frame from this view, unless it is drawn already."""
+        self._target.resize(view.width, view.height)
+        if self.is_software:
+            base_key, is_stale = self._take_picture(session, view)
+        else:
+            base_key, is_stale = self._take_gaussians(session)
+        points_key = self._take_points(session) if base_key is None else None
+        needs_capture = base_key is None and points_key is None and session.view.look_through is not None
+        captured_key = self._take_captured(session, view.width) if needs_capture else None
+        marks_key = self._take_marks(session)
+        key = (view.key, base_key, points_key, captured_key, marks_key)
+        if key != self._drawn_key or self._splats.is_order_stale:
+            self._drawn_key = key
+            self._draw(view, base_key, points_key, captured_key, session)
+        is_stale = is_stale or self._splats.is_order_stale
+        return Composed(self._target.texture, is_stale)
+
+    def captured(self, session: Any, width_px: int) -> moderngl.Texture | None:
+        """The captured picture of the camera looked through, at the session's frame; None until it was decoded."""
+        self._take_captured(session, width_px)
+        return None if self._captured.is_empty else self._captured.texture
+
+    def _take_picture(self, session: Any, view: SceneView) -> tuple[Hashable, bool]:
+        share = min(MAX_PICTURE_WIDTH / view.width, 1.0) * (MOVING_SHARE if view.is_moving else 1.0)
+        self._asked_size = (max(round(view.width * share), 16), max(round(view.height * share), 16))
+        picture = session.request_render(*self._asked_size)
+        if picture is None:
+            self._picture_key = None
+            return None, False
+        self._picture.set(picture.image, key=picture.key)
+        self._picture_key = picture.key
+        return picture.key, bool(picture.is_stale)
+
+    def _take_gaussians(self, session: Any) -> tuple[Hashable, bool]:
+        gaussians = session.shown_gaussians()
+        if gaussians is None:
+            return None, False
+        self._splats.upload(gaussians)
+        return gaussians.key, False
+
+    def _take_points(self, session: Any) -> Hashable:
+        points = session.shown_points() if session.overlays.show_points else None
+        if points is None or len(points[0]) == 0:
+            return None
+        positions, colors, key = points
+        self._cloud.set(positions, colors, key=key)
+        return key
+
+    def _take_captured(self, session: Any, width_px: int) -> Hashable:
+        camera_index = session.view.look_through
+        if camera_index is None:
+            self._asked_capture = None
+            return None
+        own_width = int(session.rig.image_sizes[camera_index, 0])
+        self._asked_capture = (camera_index, session.timeline.frame_index, min(width_px, own_width))
+        captured = session.ground_truth(*self._asked_capture)
+        if captured is None:
+            return None
+        self._captured.set(captured.image, key=captured.key)
+        self._captured_key = captured.key
+        return captured.key
+
+    def _take_marks(self, session: Any) -> Hashable:
+        overlays = session.overlays
+        frusta_key = None
+        if overlays.show_frusta:
+            held_out = tuple(session.holdout)
+            frusta_key = (id(session.rig), held_out)
+            centers = session.rig.centers
+            radius = float(np.linalg.norm(centers - session.rig.focus_point(), axis=1).mean())
+            self._frusta.set(*frusta_lines(session.rig, FRUSTUM_SHARE * radius, held_out), key=frusta_key)
+        anchors = session.shown_anchors()
+        if anchors is None:
+            self.counts = AnchorCounts()
+            return (frusta_key, session.view.look_through)
+        self.counts = AnchorCounts(len(anchors.inherited_positions), len(anchors.own_positions))
+        if overlays.show_inherited:
+            self._inherited.set(anchors.inherited_positions, np.array(INHERITED_ANCHOR_COLOR), key=anchors.key)
+        if overlays.show_residual:
+            self._residual.set(anchors.own_positions, np.array(RESIDUAL_ANCHOR_COLOR), key=anchors.key)
+        return (
+            frusta_key,
+            session.view.look_through,
+            anchors.key,
+            overlays.show_inherited,
+            overlays.show_residual,
+        )
+
+    def _draw(
+        self, view: SceneView, base_key: Hashable, points_key: Hashable, captured_key: Hashable, session: Any
+    ) -> None:
+        camera = (view.world_to_camera, view.K, view.width, view.height)
+        target = self._target
+        target.clear()
+        if base_key is not None:
+            if self.is_software:
+                target.draw_image(self._picture)
+            else:
+                self._splats.draw(target, *camera, NEAR)
+        elif points_key is not None:
+            self.shows = CLOUD
+            self._cloud.draw(target, *camera, shape="circle", size=self._cloud_point_px(view), is_depth_tested=True)
+        elif captured_key is not None:
+            self.shows = CAPTURED
+            target.draw_image(self._captured)
+        else:
+            self.shows = MARKS
+        is_free = session.view.look_through is None
+        if session.overlays.show_frusta and is_free:  # from inside a camera the others are only in the way
+            self._frusta.draw(target, *camera, width_px=1.5, opacity=0.8)
+        if self.counts.n_inherited and session.overlays.show_inherited:
+            self._inherited.draw(target, *camera, shape="ring", size=5.0, opacity=0.75)
+        if self.counts.n_residual and session.overlays.show_residual:
+            self._residual.draw(target, *camera, shape="diamond", size=7.0, outline_px=1.0)
+        target.resolve(BACKGROUND)
+
+    def _cloud_point_px(self, view: SceneView) -> float:
+        """Fewer points are drawn larger, so that a thin cloud still reads as surfaces."""
+        per_point_px2 = view.width * view.height / max(len(self._cloud), 1)
+        return float(np.clip(0.45 * np.sqrt(per_point_px2), 2.0, 5.0))

@@ -94,7 +94,9 @@ def _draw_transport(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     imgui.text_disabled("Frame")
     imgui.same_line()
     imgui.set_next_item_width(64)
+    imgui.push_item_flag(imgui.ItemFlags_.no_tab_stop, True)  # Tab shows and hides marks; it must not land here
     is_edited, typed = imgui.input_int("##frame", timeline.frame_index, 0, 0)
+    imgui.pop_item_flag()
     ui.mark("timeline.frame")
     if is_edited:
         go_to_frame(session, dispatch, typed)

@@ -218,12 +218,11 @@ class ViewportPanel:
             height=size[1],
             is_moving=self.is_moving,
         )
-        layers = self.scene.compose(session, view)
-        for layer in layers.textures:
-            draw.add_image(imgui.ImTextureRef(layer.glo), pane.low, pane.high, layer.uv0, layer.uv1)
+        composed = self.scene.compose(session, view)
+        draw.add_image(imgui.ImTextureRef(composed.texture.glo), pane.low, pane.high)
         if self.is_moving:
             ui.redraw_within(MOVING_S)
-        self._note_stale(layers.is_stale, ui)
+        self._note_stale(composed.is_stale, ui)
         if panes.captured is not None:
             self._draw_captured(session, draw, panes)
         draw.pop_clip_rect()
@@ -242,20 +241,15 @@ class ViewportPanel:
         texture = self.scene.captured(session, round(captured.width))
         if session.overlays.compare == "side":
             if texture is not None:
-                draw.add_image(imgui.ImTextureRef(texture.glo), captured.low, captured.high, texture.uv0, texture.uv1)
+                draw.add_image(imgui.ImTextureRef(texture.glo), captured.low, captured.high)
             chip(draw, captured.x0 + 10, captured.y0 + 10, "Captured")
             chip(draw, panes.rendered.x0 + 10, panes.rendered.y0 + 10, "Rendered")
             return
         share = session.overlays.wipe_position
         x = captured.x0 + captured.width * share
         if texture is not None:
-            u = texture.uv0.x + (texture.uv1.x - texture.uv0.x) * share
             draw.add_image(
-                imgui.ImTextureRef(texture.glo),
-                captured.low,
-                ImVec2(x, captured.y1),
-                texture.uv0,
-                ImVec2(u, texture.uv1.y),
+                imgui.ImTextureRef(texture.glo), captured.low, ImVec2(x, captured.y1), ImVec2(0, 0), ImVec2(share, 1)
             )
         white = theme.u32(theme.PLAYHEAD)
         draw.add_line_v(x, captured.y0, captured.y1, white, 2)

@@ -1,0 +1,133 @@
+"""The panels' arithmetic and tables; no window, no GL."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ui.main import COMMANDS, main
+from ui.panels.timeline import MIN_TICK_SPACING_PX, cell_left, frame_at, tick_step
+from ui.panels.training import MAX_PLOT_POINTS, duration_text, plot_arrays
+from ui.panels.viewport import arrange, fit
+from ui.shortcuts import SHORTCUTS
+from ui.state import Rect
+
+
+@given(frames=st.integers(1, 20_000), width=st.floats(50, 4000))
+def test_ticks_are_round_and_far_enough_apart(frames: int, width: float) -> None:
+    step = tick_step(frames, width)
+    leading = int(str(step).rstrip("0"))
+    assert leading in (1, 2, 5)
+    assert step == 1 or step * width / frames >= MIN_TICK_SPACING_PX * (1 - 1e-9)
+
+
+@given(frames=st.integers(1, 5000), share=st.floats(-1, 2))
+def test_frame_under_the_pointer_is_inside_the_capture_and_its_cell(frames: int, share: float) -> None:
+    track = Rect(10, 0, 910, 40)
+    x = track.x0 + share * track.width
+    frame_index = frame_at(x, track, frames)
+    assert 0 <= frame_index < frames
+    if 0 <= share < 1:
+        # a thousandth of a pixel: rounding of the division at cell borders
+        assert cell_left(frame_index, track, frames) <= x + 1e-3
+        assert x <= cell_left(frame_index + 1, track, frames) + 1e-3
+
+
+def test_plot_arrays_are_contiguous_finite_and_short() -> None:
+    history = [(step, float("nan") if step == 3 else 1.0 / (step + 1)) for step in range(5000)]
+    steps, values = plot_arrays(history)
+    assert steps.flags.c_contiguous and values.flags.c_contiguous
+    assert len(steps) == len(values) == MAX_PLOT_POINTS
+    assert np.isfinite(values).all()
+    assert (steps[0], steps[-1]) == (0, 4999)
+    assert plot_arrays([])[0].shape == (0,)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(None, "–"), (float("nan"), "–"), (0, "0:00"), (61.4, "1:01"), (3725, "1 h 02 min")]
+)
+def test_duration_text(seconds: float | None, text: str) -> None:
+    assert duration_text(seconds) == text
+
+
+def test_panes_keep_the_camera_s_aspect_and_do_not_overlap() -> None:
+    area = Rect(0, 0, 1000, 500)
+    for compare in ("off", "wipe", "side"):
+        panes = arrange(area, (320, 240), compare)
+        assert panes.rendered.width / panes.rendered.height == pytest.approx(320 / 240)
+        assert (panes.captured is None) == (compare == "off")
+    side = arrange(area, (320, 240), "side")
+    assert side.captured is not None
+    assert side.captured.x1 <= side.rendered.x0
+    assert arrange(area, None, "side").rendered == area
+    assert fit(area, 500, 500).width == pytest.approx(500)
+
+
+def test_shortcut_table_is_complete_and_unambiguous() -> None:
+    chords = [(s.key_name, s.is_ctrl, s.is_shift) for s in SHORTCUTS]
+    assert len(set(chords)) == len(chords)
+    assert all(s.text and s.label and s.group for s in SHORTCUTS)
+    promised = {"Space", "Left", "Right", "Home", "End", "Up", "Down", "[", "]", "G", "Tab", "T", "F", "F1", "Ctrl+O"}
+    assert promised <= {s.label for s in SHORTCUTS}
+    assert "escape" not in {s.key_name for s in SHORTCUTS}
+    for shortcut in SHORTCUTS:
+        assert shortcut.key is not None
+        assert shortcut.is_ctrl == shortcut.label.startswith("Ctrl+")
+        assert shortcut.is_shift == shortcut.label.startswith("Shift+")
+
+
+@pytest.mark.parametrize("module", ["ui.main", "ui.__main__"])
+def test_importing_the_entry_point_loads_no_torch_and_no_window(module: str) -> None:
+    code = (
+        f"import sys, {module}\n"
+        "heavy = {'torch', 'numba', 'pyglet', 'moderngl', 'imgui_bundle', 'pycolmap', 'open3d'} & set(sys.modules)\n"
+        "sys.exit(','.join(sorted(heavy)) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_the_window_itself_needs_no_torch() -> None:
+    code = (
+        "import sys, pyglet\n"
+        "pyglet.options.headless = True\n"
+        "import ui.window\n"
+        "sys.exit(','.join(sorted({'torch', 'numba', 'pycolmap', 'open3d'} & set(sys.modules))) or 0)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_subcommands_go_to_the_command_line(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[list[str]] = []
+
+    class FakeCli:
+        @staticmethod
+        def main(arguments: list[str]) -> int:
+            seen.append(list(arguments))
+            return 2
+
+    monkeypatch.setitem(sys.modules, "app.cli", FakeCli)
+    assert main([command, "somewhere"]) == 2
+    assert seen == [[command, "somewhere"]]
+
+
+def test_without_a_display_the_demo_runs_instead(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[tuple[object, object, bool]] = []
+
+    class FakeDemo:
+        @staticmethod
+        def run_demo(path: object, out: object, *, quick: bool) -> int:
+            seen.append((path, out, quick))
+            return 0
+
+    monkeypatch.setitem(sys.modules, "ui.demo", FakeDemo)
+    monkeypatch.setattr("ui.main.has_display", lambda: False)
+    assert main(["some_capture"]) == 0
+    assert [str(path) for path, _, _ in seen] == ["some_capture"]

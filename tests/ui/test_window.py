@@ -1,0 +1,293 @@
+"""The whole window on a made-up session: pointer, keys, panels, failures. No display, a fixed clock."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pyglet.window import key, mouse
+
+from app.commands import (
+    DismissNotice,
+    LookThrough,
+    OpenCapture,
+    PauseTraining,
+    SetCompare,
+    SetFrame,
+    StopTraining,
+    ToggleOverlay,
+    TogglePlay,
+    TrainNextClip,
+)
+from app.status import ClipStatus
+from tests.ui.fake_session import FakeSession
+from tests.ui.pilot import CTRL, SHIFT, Pilot
+from ui.screenshot import read_window, write_png
+
+pytestmark = pytest.mark.gl
+
+
+def test_dragging_along_the_timeline_visits_the_frames_under_the_pointer(pilot: Pilot) -> None:
+    track = pilot.rects["timeline.track"]
+    y = track.y0 + 12
+    cell = track.width / pilot.session.timeline.n_frames
+    pilot.drag((track.x0 + 2.5 * cell, y), (track.x0 + 20.5 * cell, y), steps=6)
+    assert [command.frame_index for command in pilot.sent(SetFrame)] == [2, 5, 8, 11, 14, 17, 20]
+    assert pilot.session.timeline.frame_index == 20
+
+
+def test_scrubbing_beyond_the_track_stays_inside_the_capture(pilot: Pilot) -> None:
+    track = pilot.rects["timeline.track"]
+    pilot.drag((track.center[0], track.y0 + 12), (track.x1 + 3, track.y0 + 12))
+    assert pilot.session.timeline.frame_index == pilot.session.timeline.n_frames - 1
+
+
+def test_left_drag_orbits_by_the_pointer_s_path(pilot: Pilot) -> None:
+    view, (x, y) = pilot.session.view, pilot.rects["viewport.canvas"].center
+    expected = FakeSession().view
+    expected.orbit(80, 40)
+    pilot.drag((x, y), (x + 80, y + 40))
+    # both are sums of the same small moves in another order
+    assert view.yaw == pytest.approx(expected.yaw, abs=1e-6)
+    assert view.pitch == pytest.approx(expected.pitch, abs=1e-6)
+
+
+def test_right_drag_pans_and_keeps_the_angles(pilot: Pilot) -> None:
+    view, (x, y) = pilot.session.view, pilot.rects["viewport.canvas"].center
+    yaw, pivot = view.yaw, np.array(view.pivot)
+    pilot.drag((x, y), (x + 60, y), button=mouse.RIGHT)
+    assert view.yaw == yaw
+    assert np.linalg.norm(view.pivot - pivot) > 0.01 * view.distance
+
+
+def test_shift_middle_drag_pans_like_right_drag(pilot: Pilot) -> None:
+    view, (x, y) = pilot.session.view, pilot.rects["viewport.canvas"].center
+    yaw, pivot = view.yaw, np.array(view.pivot)
+    pilot.studio.window.dispatch_event("on_key_press", SHIFT, 0)
+    pilot.drag((x, y), (x + 60, y), button=mouse.MIDDLE)
+    pilot.studio.window.dispatch_event("on_key_release", SHIFT, 0)
+    assert view.yaw == yaw
+    assert np.linalg.norm(view.pivot - pivot) > 0.01 * view.distance
+
+
+def test_wheel_moves_nearer_over_the_viewport_only(pilot: Pilot) -> None:
+    view, before = pilot.session.view, pilot.session.view.distance
+    pilot.move(*pilot.rects["viewport.canvas"].center)
+    pilot.wheel(2)
+    assert view.distance == pytest.approx(before * 0.81, rel=1e-6)  # 0.9 per tick
+    pilot.move(*pilot.rects["timeline.track"].center)
+    pilot.wheel(2)
+    assert view.distance == pytest.approx(before * 0.81, rel=1e-6)
+
+
+def test_orbiting_leaves_the_capture_camera(pilot: Pilot) -> None:
+    pilot.click("capture.camera2")
+    assert pilot.session.view.look_through == 2
+    x, y = pilot.rects["viewport.canvas"].center
+    pilot.drag((x, y), (x + 30, y))
+    assert pilot.session.view.look_through is None
+
+
+def test_play_by_button_and_by_space(pilot: Pilot) -> None:
+    pilot.click("timeline.play")
+    assert pilot.session.timeline.is_playing
+    pilot.key(key.SPACE)
+    assert not pilot.session.timeline.is_playing
+    assert len(pilot.sent(TogglePlay)) == 2
+
+
+def test_train_button_and_key_ask_for_the_next_clip(pilot: Pilot) -> None:
+    pilot.click("training.next")
+    pilot.key(key.T)
+    assert len(pilot.sent(TrainNextClip)) == 2
+
+
+def test_running_training_offers_pause_and_stop(pilot: Pilot) -> None:
+    session = pilot.session
+    session.training = dataclasses.replace(session.training, state="running", clip_index=0, step=5, n_steps=100)
+    session.clip_states[0] = ClipStatus("training", 0.05)
+    pilot.draw(2)
+    assert "training.next" not in pilot.rects
+    pilot.click("training.pause")
+    pilot.click("training.stop")
+    pilot.key(key.T)
+    assert len(pilot.sent(PauseTraining)) == 2
+    assert len(pilot.sent(StopTraining)) == 1
+
+
+def test_train_key_does_nothing_when_nothing_can_be_trained(pilot: Pilot) -> None:
+    pilot.session.training = dataclasses.replace(pilot.session.training, can_train_next=False, next_clip_index=None)
+    pilot.key(key.T)
+    pilot.click("training.next")
+    assert pilot.sent(TrainNextClip) == []
+
+
+def test_arrow_home_end_and_clip_keys(pilot: Pilot) -> None:
+    timeline = pilot.session.timeline
+    visited = []
+    for symbol in (key.RIGHT, key.RIGHT, key.LEFT, key.DOWN, key.DOWN, key.UP, key.END, key.HOME):
+        pilot.key(symbol)
+        visited.append(timeline.frame_index)
+    assert visited == [1, 2, 1, 10, 20, 10, 29, 0]
+
+
+def test_compare_key_takes_the_nearest_camera_and_cycles(pilot: Pilot) -> None:
+    for _ in range(3):
+        pilot.key(key.G)
+    assert [command.mode for command in pilot.sent(SetCompare)] == ["wipe", "side", "off"]
+    assert len(pilot.sent(LookThrough)) == 1
+
+
+def test_wipe_line_follows_the_pointer_and_does_not_orbit(pilot: Pilot) -> None:
+    pilot.key(key.G)
+    camera = pilot.session.view.look_through
+    rect = pilot.rects["viewport.rendered"]
+    y = rect.center[1] - 40
+    pilot.drag((rect.x0 + rect.width * 0.5, y), (rect.x0 + rect.width * 0.25, y))
+    assert pilot.session.overlays.wipe_position == pytest.approx(0.25, abs=0.01)  # a pixel of a 700 px picture
+    assert pilot.session.view.look_through == camera
+
+
+def test_bracket_keys_walk_the_cameras_around(pilot: Pilot) -> None:
+    pilot.session.view.look(0)
+    pilot.key(key.BRACKETLEFT)
+    assert pilot.session.view.look_through == len(pilot.session.rig) - 1
+    pilot.key(key.BRACKETRIGHT)
+    assert pilot.session.view.look_through == 0
+
+
+def test_tab_shows_all_marks_then_hides_them(pilot: Pilot) -> None:
+    overlays = pilot.session.overlays
+    pilot.key(key.TAB)
+    assert (overlays.show_frusta, overlays.show_inherited, overlays.show_residual) == (True, True, True)
+    pilot.key(key.TAB)
+    assert (overlays.show_frusta, overlays.show_inherited, overlays.show_residual) == (False, False, False)
+    assert {command.name for command in pilot.sent(ToggleOverlay)} == {"show_frusta", "show_inherited", "show_residual"}
+
+
+def test_escape_closes_neither_the_window_nor_the_loop(pilot: Pilot) -> None:
+    closed = []
+    pilot.studio.window.push_handlers(on_close=lambda: closed.append(True))
+    pilot.key(key.F1)
+    assert pilot.studio.frame.ui.is_help_open
+    pilot.key(key.ESCAPE)
+    assert not pilot.studio.frame.ui.is_help_open
+    pilot.key(key.ESCAPE)
+    assert closed == []
+    assert not pilot.studio.window.has_exit
+    assert not pilot.studio.frame.ui.quit_requested
+
+
+def test_ctrl_key_pressed_and_released_between_two_frames_still_counts(pilot: Pilot) -> None:
+    for name, symbol in (("press", CTRL), ("press", key.Q), ("release", key.Q), ("release", CTRL)):
+        pilot.studio.window.dispatch_event(f"on_key_{name}", symbol, 0)
+    pilot.draw(3)
+    assert pilot.studio.frame.ui.quit_requested
+
+
+def test_typing_a_frame_number_is_no_shortcut(pilot: Pilot) -> None:
+    x, y = pilot.rects["timeline.frame"].center
+    pilot.move(x, y)
+    for _ in range(2):  # a double click selects the number
+        pilot.press()
+        pilot.release()
+    pilot.type("17")
+    pilot.key(key.T)
+    pilot.key(key.RETURN)
+    pilot.draw(2)
+    assert pilot.session.timeline.frame_index == 17
+    assert pilot.sent(TrainNextClip) == []
+
+
+def test_dropped_folder_and_dropped_file_open_the_capture(open_pilot: Callable[..., Pilot], tmp_path: Path) -> None:
+    pilot = open_pilot(FakeSession(has_capture=False))
+    assert "welcome.open" in pilot.rects
+    inside = tmp_path / "cameras.json"
+    inside.write_text("{}")
+    pilot.studio.window.dispatch_event("on_file_drop", 5, 5, [str(tmp_path)])
+    pilot.studio.window.dispatch_event("on_file_drop", 5, 5, [str(inside)])
+    assert pilot.sent(OpenCapture) == [OpenCapture(tmp_path), OpenCapture(tmp_path)]
+
+
+def test_path_box_opens_a_typed_folder(
+    open_pilot: Callable[..., Pilot], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ui.dialogs.has_native_dialog", lambda: False)
+    pilot = open_pilot(FakeSession(has_capture=False))
+    pilot.key(key.O, modifiers=(CTRL,))
+    pilot.draw(3)
+    pilot.key(key.A, modifiers=(CTRL,))
+    pilot.type(str(tmp_path))
+    pilot.key(key.RETURN)
+    pilot.draw(2)
+    assert pilot.sent(OpenCapture) == [OpenCapture(tmp_path)]
+
+
+def test_a_panel_that_raises_becomes_one_notice_and_the_others_go_on(
+    pilot: Pilot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        from imgui_bundle import imgui
+
+        imgui.begin_child("left open by the failure")
+        raise RuntimeError("broken on purpose")
+
+    panels = pilot.studio.frame._panels
+    monkeypatch.setattr(
+        pilot.studio.frame, "_panels", tuple((title, fail if title == "Training" else f, p) for title, f, p in panels)
+    )
+    pilot.draw(5)
+    assert [(notice.kind, notice.detail) for notice in pilot.session.notices] == [
+        ("error", "RuntimeError: broken on purpose")
+    ]
+    assert "timeline.track" in pilot.rects
+    assert "viewport.canvas" in pilot.rects
+
+
+def test_dismissing_a_notice_takes_its_index(pilot: Pilot) -> None:
+    pilot.session.notices.add("error", "This folder is no capture", "It holds no cameras.json.", "Choose another.")
+    pilot.session.notices.add("error", "Second")
+    pilot.draw(3)
+    pilot.click("notice1.close")
+    assert pilot.sent(DismissNotice) == [DismissNotice(1)]
+    assert [notice.title for notice in pilot.session.notices] == ["This folder is no capture"]
+
+
+def test_nothing_is_drawn_while_nothing_changes(pilot: Pilot) -> None:
+    pilot.studio.settle(4, until_idle_s=5.0)
+    drawn = [pilot.studio.frame.update(1 / 60) for _ in range(5)]
+    assert drawn == [False] * 5
+    pilot.studio.window.dispatch_event("on_mouse_motion", 200, 200, 1, 1)
+    assert pilot.studio.frame.update(1 / 60)
+
+
+def test_untrained_frames_show_the_cloud_not_black(pilot: Pilot) -> None:
+    pilot.draw(3)
+    image = read_window(pilot.studio.ctx, 1280, 800)
+    rect = pilot.rects["viewport.canvas"]
+    middle = image[int(rect.y0) + 60 : int(rect.y1) - 60, int(rect.x0) + 60 : int(rect.x1) - 60]
+    # the made-up cloud is a ball of 6000 coloured points around the pivot; the backdrop is darker than 30
+    assert (middle.max(axis=2) > 90).mean() > 0.01
+
+
+def test_screenshot_is_upright_and_written_whole(pilot: Pilot, tmp_path: Path) -> None:
+    from PIL import Image
+
+    pilot.draw(2)
+    path = write_png(read_window(pilot.studio.ctx, 1280, 800), tmp_path / "pictures" / "window.png")
+    with Image.open(path) as stored:
+        image = np.asarray(stored)
+    assert image.shape == (800, 1280, 3)
+    assert image[-4:].mean() > 180, "the light status bar is at the bottom"
+    assert image[:4].mean() < 60, "the dark menu bar is at the top"
+    assert [entry.name for entry in path.parent.iterdir()] == ["window.png"]
+
+
+def test_closing_closes_the_session_once(open_pilot: Callable[..., Pilot]) -> None:
+    pilot = open_pilot()
+    pilot.studio.close()
+    pilot.studio.close()
+    assert pilot.session.is_closed
