@@ -17,11 +17,7 @@ setup: ## make .venv from requirements.lock, add missing system libraries
 	@./setup.sh $(SETUP_FLAGS)
 
 run: setup ## start on the sample capture: the window, or the same job headless where there is no display
-	@if [ -n "$$DISPLAY$$WAYLAND_DISPLAY" ] || [ "$$(uname -s)" = Darwin ]; then \
-		$(BIN)/clipgstream $(SAMPLE); \
-	else \
-		$(BIN)/clipgstream demo $(SAMPLE); \
-	fi
+	@$(BIN)/clipgstream $(SAMPLE)
 
 test: SETUP_FLAGS := --tests
 test: setup lint types ## everything CI runs: linters, types, import contracts, tests
