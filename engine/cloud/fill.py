@@ -50,7 +50,7 @@ def fill_inverse_depth(
     solution, trust = data, data_weights
     for _ in range(2):
         system = (smoothness + sparse.diags(trust)).tocsc()
-        solution = spsolve(system, trust * data, permc_spec="MMD_AT_PLUS_A")
+        solution = np.asarray(spsolve(system, trust * data, permc_spec="MMD_AT_PLUS_A"))
         trust = data_weights / (1.0 + ((solution - data) / scale) ** 2)
     coarse = np.clip(solution, low, high).reshape(height // HALF, width // HALF)
     return _enlarge(coarse, height, width)
@@ -82,5 +82,5 @@ def _differences(
 
 def _enlarge(coarse: np.ndarray, height: int, width: int) -> np.ndarray:
     """Bilinear, aligned to pixel areas; an odd last row or column repeats its neighbour."""
-    fine = zoom(coarse, HALF, order=1, mode="nearest", grid_mode=True)
+    fine: np.ndarray = np.asarray(zoom(coarse, HALF, order=1, mode="nearest", grid_mode=True))
     return np.pad(fine, ((0, height - fine.shape[0]), (0, width - fine.shape[1])), mode="edge")

@@ -157,9 +157,14 @@ def _integral(mask):
 def _box_has_foreground(integral, x, y, radius):
     """Any mask pixel whose area the square around (x, y) touches, after cutting it to the picture."""
     height, width = integral.shape[0] - 1, integral.shape[1] - 1
-    x0, x1 = min(max(int(math.floor(x - radius)), 0), width), min(max(int(math.floor(x + radius)) + 1, 0), width)
-    y0, y1 = min(max(int(math.floor(y - radius)), 0), height), min(max(int(math.floor(y + radius)) + 1, 0), height)
+    x0, x1 = min(max(math.floor(x - radius), 0), width), min(max(math.floor(x + radius) + 1, 0), width)
+    y0, y1 = min(max(math.floor(y - radius), 0), height), min(max(math.floor(y + radius) + 1, 0), height)
     return integral[y1, x1] - integral[y0, x1] - integral[y1, x0] + integral[y0, x0] > 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _is_box_inside(x, y, radius, width, height):
+    return x - radius >= 0 and y - radius >= 0 and x + radius <= width and y + radius <= height
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -196,11 +201,10 @@ def _carve_blocks(blocks, integrals, projections, origin, size, near, n_misses, 
                 continue
             if _box_has_foreground(integrals[c], x, y, radius):
                 hits += 1
-            elif x - radius >= 0 and y - radius >= 0 and x + radius <= width and y + radius <= height:
-                if depth - ball > near:
-                    misses += 1
-                    if misses > n_misses:
-                        break
+            elif _is_box_inside(x, y, radius, width, height) and depth - ball > near:
+                misses += 1
+                if misses > n_misses:
+                    break
         is_kept[b] = misses <= n_misses and hits >= min_hits
     return is_kept
 

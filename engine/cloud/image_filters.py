@@ -62,10 +62,9 @@ def erode(mask: np.ndarray, radius_px: int) -> np.ndarray:
 
 def remove_small_blobs(mask: np.ndarray, min_px: int) -> np.ndarray:
     """Drop 8-connected components with fewer than min_px pixels. bool [H, W]"""
-    labels, n_labels = ndimage.label(mask, structure=np.ones((3, 3), dtype=np.int8))
-    if n_labels == 0:
-        return mask.copy()
-    is_kept = np.bincount(labels.ravel()) >= min_px
+    labels = np.zeros(mask.shape, dtype=np.int32)
+    ndimage.label(mask, structure=np.ones((3, 3), dtype=np.int8), output=labels)
+    is_kept: np.ndarray = np.bincount(labels.ravel()) >= min_px
     is_kept[0] = False
     return is_kept[labels]
 

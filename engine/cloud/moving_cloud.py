@@ -95,13 +95,13 @@ def build_moving_cloud(
     wanted = VOXEL_PX * _median_footprint(probe.centers(np.unique(occupied, axis=0)), rig, near)
     size = max(wanted, float((np.prod(high - low) / MAX_GRID_VOXELS) ** (1 / 3)))
     for _ in range(4):
-        grid = Grid.over(low, high, size)
         # a few frames tell how many points the union will have before all are carved
-        n_union = len(np.unique(np.concatenate([surface(m, grid) for m in _spread(n_frames, 3)]), axis=0))
-        n_expected = n_union * _union_growth(n_frames)
+        sampled = [surface(m, Grid.over(low, high, size)) for m in _spread(n_frames, 3)]
+        n_expected = len(np.unique(np.concatenate(sampled), axis=0)) * _union_growth(n_frames)
         if n_expected <= 1.15 * max_points:
             break
         size *= float(np.clip(np.sqrt(n_expected / max_points), 1.02, 4.0))
+    grid = Grid.over(low, high, size)
     surfaces = [surface(m, grid) for m in range(n_frames)]
     voxels, presence = _fuse(surfaces)
     report(

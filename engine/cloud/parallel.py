@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -31,4 +32,4 @@ def row_spans(n_rows: int, n_spans: int | None = None) -> list[tuple[int, int]]:
     """Cut range(n_rows) into contiguous spans, about four per core so that uneven rows balance."""
     n_spans = min(max(n_rows, 1), n_spans or 4 * n_workers())
     edges = [n_rows * i // n_spans for i in range(n_spans + 1)]
-    return list(zip(edges[:-1], edges[1:], strict=True))
+    return list(pairwise(edges))

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from engine.capture.rig import CameraRig
 from engine.cloud.consistency import Agreement, check_depths
@@ -111,12 +112,14 @@ def build_static_cloud(
         f"{shares[2]:.0%} filled and seen by one camera only (kept: holes cost more than soft walls)"
     )
     spacing = SPACING_PX * _median_footprint(maps) * maps.rig.image_sizes[0, 0] / rig.image_sizes[0, 0]
-    for _ in range(6):
-        points, _, colors = fuse_tiers(tiers, spacing)
-        is_kept = keep_inliers(points)
+    points, _, colors = fuse_tiers(tiers, spacing)
+    is_kept = keep_inliers(points)
+    for _ in range(5):
         if is_kept.sum() <= max_points:
             break
-        spacing *= 1.02 * np.sqrt(is_kept.sum() / max_points)  # points on surfaces fall with the square of the spacing
+        spacing *= 1.02 * float(np.sqrt(is_kept.sum() / max_points))  # surface points fall with the spacing squared
+        points, _, colors = fuse_tiers(tiers, spacing)
+        is_kept = keep_inliers(points)
     if not is_kept.any():
         raise PreparationError("No static surface was found: no pixel is agreed on by 2 cameras.")
     report(
@@ -125,11 +128,16 @@ def build_static_cloud(
     )
     points, colors = points[is_kept], colors[is_kept]
     gains, seen_colors = _balance(points, backgrounds, is_stable, rig, maps, first_gains)
-    is_colored = np.isfinite(seen_colors).all(1)
+    is_colored: np.ndarray = np.isfinite(seen_colors).all(axis=1)
     colors = np.where(is_colored[:, None], seen_colors, colors)
+    if is_colored.any() and not is_colored.all():
+        # what only unstable pixels saw may be a person's colour on the floor: take the surroundings instead
+        n_neighbors = min(4, int(is_colored.sum()))
+        neighbors = np.asarray(KDTree(points[is_colored]).query(points[~is_colored], n_neighbors)[1])
+        colors[~is_colored] = np.median(colors[is_colored][neighbors.reshape(len(neighbors), -1)], axis=1)
     report(
         f"White balance: gains {gains.min():.2f} to {gains.max():.2f}; {is_colored.sum()} of {len(points)} points "
-        f"coloured by the median of their cameras, the rest by the one that measured them"
+        f"coloured by the median of the cameras that see them, the rest by their neighbours"
     )
     return StaticCloud(
         points=points.astype(np.float32),
@@ -221,19 +229,24 @@ def _search_ranges(
     sparse_points: np.ndarray | None,
     report: Report,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Depth range per camera: from sparse points, else from a coarse first look over a wide range."""
+    """Depth range per camera: a coarse sweep over a wide range, stretched towards the sparse points if there are any.
+
+    Points alone are not enough: they lie on texture, and a few wrong ones near a camera would double the planes.
+    """
     near, far = depth_ranges(rig, sparse_points)
-    if sparse_points is not None and len(sparse_points) >= MIN_POINTS:
-        report(f"Depth range: {near.min():.3g} to {far.max():.3g} scene units from {len(sparse_points)} sparse points")
-        return near, far
-    greys, is_usable, small_rig, _ = _prepare(backgrounds, is_stable, rig, PROBE_PIXELS)
+    point_near, point_far = near.copy(), far.copy()
+    n_points = 0 if sparse_points is None else len(sparse_points)
+    has_points = n_points >= MIN_POINTS
     distances = focus_distances(rig)
     wide_near = np.maximum(PROBE_RANGE[0] * distances, near_plane(rig))
     wide_far = PROBE_RANGE[1] * distances
+    if has_points:
+        wide_near, wide_far = np.minimum(wide_near, near), np.maximum(wide_far, far)
+    greys, is_usable, small_rig, _ = _prepare(backgrounds, is_stable, rig, PROBE_PIXELS)
     sources = choose_sources(small_rig, wide_near, wide_far)
     inverse, _ = _sweep_all(greys, is_usable, small_rig, sources, wide_near, wide_far)
     depths = 1.0 / inverse
-    n_measured = 0
+    is_measured = np.zeros(len(rig), dtype=bool)
     for camera in range(len(rig)):
         check = check_depths(depths, small_rig, camera=camera, others=sources[camera], tolerance=0.03)
         seen = check.depths[(check.n_agree >= MIN_AGREE) & is_usable[camera]]
@@ -241,10 +254,14 @@ def _search_ranges(
             low, high = np.percentile(seen, [2.0, 98.0])
             near[camera] = max(0.8 * low, wide_near[camera])
             far[camera] = max(1.3 * high, 1.5 * near[camera])
-            n_measured += 1
+            is_measured[camera] = True
+    if has_points:
+        near = np.where(is_measured, np.minimum(near, np.maximum(point_near, 0.6 * near)), near)
+        far = np.where(is_measured, np.maximum(far, np.minimum(point_far, 1.6 * far)), far)
     report(
-        f"Depth range: {np.median(near):.3g} to {np.median(far):.3g} scene units (medians) from a coarse sweep in "
-        f"{n_measured} of {len(rig)} cameras, the others from the focus distance; no sparse points were given"
+        f"Depth range: {np.median(near):.3g} to {np.median(far):.3g} scene units (medians over cameras): coarse sweep "
+        f"in {is_measured.sum()} of {len(rig)}, the rest from "
+        + (f"{n_points} sparse points" if has_points else "the focus distance")
     )
     return near, far
 
@@ -303,8 +320,7 @@ def _balance(
     first_gains: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gains [C, 3] and median scene colours [P, 3] 0..255 of the points, by the cameras that see them unoccluded."""
-    height, width = backgrounds.shape[1:3]
-    factor = max(1, width // int(maps.rig.image_sizes[0, 0]))
+    factor = max(1, backgrounds.shape[2] // int(maps.rig.image_sizes[0, 0]))
     log_colors = np.full((len(rig), len(points), 3), np.nan, dtype=np.float32)
     for camera, projection in enumerate(projection_matrices(rig)):
         half = max(1, factor // 2)
