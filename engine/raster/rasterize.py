@@ -8,6 +8,7 @@ from typing import Literal
 import torch
 from torch import Tensor
 
+from engine.raster.cpu.backend import rasterize_cpu
 from engine.raster.gaussians import Gaussians
 from engine.raster.reference import rasterize_reference
 from engine.raster.rendering import Rendering
@@ -16,7 +17,7 @@ from engine.raster.view import PinholeView, pinhole_views
 BackendName = Literal["auto", "cpu", "reference"]
 Backend = Callable[[Gaussians, list[PinholeView], Tensor, bool], Rendering]
 
-BACKENDS: dict[str, Backend] = {"reference": rasterize_reference}
+BACKENDS: dict[str, Backend] = {"cpu": rasterize_cpu, "reference": rasterize_reference}
 """Name to implementation; arguments are checked Gaussians, views, background [3] and whether to make means2d."""
 
 
@@ -63,7 +64,7 @@ def rasterize(
     background = background.to(means)
     is_fast = means.dtype == torch.float32 and means.device.type == "cpu"
     if backend == "auto":
-        backend = "cpu" if is_fast and "cpu" in BACKENDS else "reference"
+        backend = "cpu" if is_fast else "reference"
     if backend not in BACKENDS:
         raise ValueError(f"backend must be auto or one of {', '.join(sorted(BACKENDS))}, got {backend!r}")
     if backend == "cpu" and not is_fast:

@@ -1,0 +1,141 @@
+"""Forward blending of tiles, front to back, one 4x4 block of pixels per vector."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from engine.conventions import ALPHA_MAX, TRANSMITTANCE_MIN
+from engine.raster.cpu import record as rec
+from engine.raster.cpu import tile as tl
+from engine.raster.cpu.lanes import LaneBuilder
+from engine.raster.cpu.record import f4
+from engine.raster.cpu.tile import take_next
+
+_TILE, _BLOCK, _BLOCKS, _BLOCKS_PER_ROW = rec.TILE, rec.BLOCK, rec.BLOCKS, rec.BLOCKS_PER_ROW
+_RECORD_BYTES = rec.RECORD_BYTES
+_T, _R, _G, _B = (plane // 4 for plane in (tl.TRANSMITTANCE, tl.PLANE_R, tl.PLANE_G, tl.PLANE_B))
+_RECHECK_EVERY = 16
+"""Records between two looks for finished blocks. Looking after every record would make each wait for the last."""
+
+
+@intrinsic
+def _blend_record(typing_context, scratch, record, tile_x, tile_y, open_blocks):
+    """Blend one record into the open blocks of a tile; returns the blocks in which some pixel changed."""
+    signature = types.int64(types.int64, types.int64, types.float32, types.float32, types.int64)
+
+    def generate(context, builder, signature, arguments):
+        scratch, record, tile_x, tile_y, open_blocks = arguments
+        build = LaneBuilder(builder)
+        fields = tl.load_record(build, record)
+        touched = tl.store_block_terms(build, scratch, fields, tile_x, tile_y, cull=True)
+        blocks = tl.BlockEvaluator(build, scratch, fields)
+        channels = [build.broadcast(fields[column]) for column in (rec.RED, rec.GREEN, rec.BLUE)]
+        changed_slot = cgutils.alloca_once_value(builder, build.int64(0))
+
+        def blend_block(block, next_block):
+            log_alphas = blocks.log_alphas(block)
+            plane_t = blocks.plane(block, tl.TRANSMITTANCE)
+            transmittance = build.load(plane_t)
+            is_hit = build.all_of(
+                [log_alphas.compare(">=", rec.LOG_ALPHA_MIN), transmittance.compare(">=", TRANSMITTANCE_MIN)]
+            )
+            build.skip_unless(is_hit, next_block)
+            bit = builder.shl(build.int64(1), block)
+            builder.store(builder.or_(builder.load(changed_slot), bit), changed_slot)
+            alpha = tl.exp2_eighth(log_alphas).min(ALPHA_MAX).where(is_hit)
+            weight = alpha * transmittance
+            build.store(transmittance - weight, plane_t)
+            for plane, channel in zip((tl.PLANE_R, tl.PLANE_G, tl.PLANE_B), channels, strict=True):
+                address = blocks.plane(block, plane)
+                build.store(build.load(address) + weight * channel, address)
+
+        build.for_each_bit(builder.and_(touched, open_blocks), blend_block)
+        return builder.load(changed_slot)
+
+    return signature, generate
+
+
+@intrinsic
+def _find_open_blocks(typing_context, scratch):
+    """One bit per block in which some pixel still lets light through."""
+    signature = types.int64(types.int64)
+
+    def generate(context, builder, signature, arguments):
+        build = LaneBuilder(builder)
+        result = build.int64(0)
+        for block in range(rec.BLOCKS):
+            transmittance = build.load(arguments[0], tl.TRANSMITTANCE + 64 * block)
+            bits = build.mask_bits(transmittance.compare(">=", TRANSMITTANCE_MIN))
+            some = builder.zext(builder.icmp_unsigned("!=", bits, build.int64(0)), build.int64(0).type)
+            result = builder.or_(result, builder.shl(some, build.int64(block)))
+        return result
+
+    return signature, generate
+
+
+@njit(parallel=True, **rec.KERNEL_OPTIONS)
+def blend_tiles(
+    records, tile_starts, pair_records, n_columns, background, image, transmittance, pair_blocks, scratch, counter
+):
+    """Render all tiles.
+
+    Args:
+        records: Sorted records. [R, 16] float32, 64-byte aligned
+        tile_starts, pair_records: Lists of `fill_pairs`.
+        n_columns: Tiles per image row.
+        background: [3] float32
+        image: Written. [H, W, 3] float32
+        transmittance: Behind the last Gaussian, written. [H, W] float32
+        pair_blocks: Blocks changed by each pair, written; the backward pass visits only these. [pairs] int64
+        scratch: One row per thread. [threads, SCRATCH_FLOATS] float32, 64-byte aligned
+        counter: [1] int64, zero: the next tile. Which thread renders a tile does not change its result.
+    """
+    height, width = transmittance.shape
+    n_tiles = len(tile_starts) - 1
+    for worker in prange(len(scratch)):
+        row = scratch[worker]
+        address = np.int64(row.ctypes.data)
+        records_address = np.int64(records.ctypes.data)
+        counter_address = np.int64(counter.ctypes.data)
+        tile = take_next(counter_address)
+        while tile < n_tiles:
+            tile_x = (tile % n_columns) * _TILE
+            tile_y = (tile // n_columns) * _TILE
+            for block in range(_BLOCKS):
+                block_x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
+                block_y = tile_y + _BLOCK * (block // _BLOCKS_PER_ROW)
+                for lane in range(16):
+                    inside = block_x + (lane & 3) < width and block_y + (lane >> 2) < height
+                    row[_T + block * 16 + lane] = f4(1.0) if inside else f4(0.0)
+            row[_R : _R + 3 * _BLOCKS * 16] = f4(0.0)
+            pair = tile_starts[tile]
+            end = tile_starts[tile + 1]
+            open_blocks = _find_open_blocks(address)
+            while pair < end and open_blocks != 0:
+                stop = min(end, pair + _RECHECK_EVERY)
+                while pair < stop:
+                    pair_blocks[pair] = _blend_record(
+                        address,
+                        records_address + np.int64(pair_records[pair]) * _RECORD_BYTES,
+                        f4(tile_x),
+                        f4(tile_y),
+                        open_blocks,
+                    )
+                    pair += 1
+                open_blocks = _find_open_blocks(address)
+            while pair < end:
+                pair_blocks[pair] = 0
+                pair += 1
+            for y in range(tile_y, min(tile_y + _TILE, height)):
+                for x in range(tile_x, min(tile_x + _TILE, width)):
+                    block = ((y - tile_y) >> 2) * _BLOCKS_PER_ROW + ((x - tile_x) >> 2)
+                    place = block * 16 + (y & 3) * 4 + (x & 3)
+                    left_over = row[_T + place]
+                    transmittance[y, x] = left_over
+                    image[y, x, 0] = row[_R + place] + left_over * background[0]
+                    image[y, x, 1] = row[_G + place] + left_over * background[1]
+                    image[y, x, 2] = row[_B + place] + left_over * background[2]
+            tile = take_next(counter_address)

@@ -1,0 +1,156 @@
+"""Backward blending: the tiles are replayed front to back, so that nothing per pixel and Gaussian is stored.
+
+With F the product of upstream gradient and finished pixel, and P what the Gaussians up to and including this one have
+contributed to it, the gradient of a Gaussian's alpha is T (color . gradient) - (F - P) / (1 - alpha). F - P is carried
+along per pixel (`REMAINDER`). Nine sums per (Gaussian, tile) go to a buffer row that no one else writes:
+
+    sum v, v u, v dy, v u^2, v u dy, v dy^2 and w gradient_rgb,   v = dL/d(log alpha), u = dx + slope dy, w = alpha T
+
+which is all the projection backward needs (moments of the Cholesky form: no cancellation for needles).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from engine.conventions import ALPHA_MAX, TRANSMITTANCE_MIN
+from engine.raster.cpu import record as rec
+from engine.raster.cpu import tile as tl
+from engine.raster.cpu.lanes import LaneBuilder, Lanes
+from engine.raster.cpu.record import f4
+from engine.raster.cpu.tile import take_next
+
+_TILE, _BLOCK, _BLOCKS, _BLOCKS_PER_ROW = rec.TILE, rec.BLOCK, rec.BLOCKS, rec.BLOCKS_PER_ROW
+_RECORD_BYTES, _PAIR_BYTES, _PAIR_FLOATS = rec.RECORD_BYTES, 4 * rec.PAIR_FLOATS, rec.PAIR_FLOATS
+_T, _R, _G, _B, _E = (p // 4 for p in (tl.TRANSMITTANCE, tl.PLANE_R, tl.PLANE_G, tl.PLANE_B, tl.REMAINDER))
+_N_SUMS = 9
+
+
+@intrinsic
+def _replay_record(typing_context, scratch, record, tile_x, tile_y, changed_blocks, sums_address):
+    """Replay one record in the blocks it changed and store its nine sums."""
+    signature = types.void(types.int64, types.int64, types.float32, types.float32, types.int64, types.int64)
+
+    def generate(context, builder, signature, arguments):
+        scratch, record, tile_x, tile_y, changed_blocks, sums_address = arguments
+        build = LaneBuilder(builder)
+        fields = tl.load_record(build, record)
+        tl.store_block_terms(build, scratch, fields, tile_x, tile_y, cull=False)
+        blocks = tl.BlockEvaluator(build, scratch, fields)
+        channels = [build.broadcast(fields[column]) for column in (rec.RED, rec.GREEN, rec.BLUE)]
+        sums = [cgutils.alloca_once_value(builder, build.constant(0.0).value) for _ in range(_N_SUMS)]
+        # offset of the tile's first pixel centre from the Gaussian's centre
+        to_left = builder.fsub(builder.fadd(tile_x, build.scalar(0.5)), fields[rec.CENTER_X])
+        to_top = builder.fsub(builder.fadd(tile_y, build.scalar(0.5)), fields[rec.CENTER_Y])
+
+        def add(index: int, value: Lanes) -> None:
+            builder.store((Lanes(build, builder.load(sums[index])) + value).value, sums[index])
+
+        def replay_block(block, next_block):
+            log_alphas = blocks.log_alphas(block)
+            plane_t, plane_e = blocks.plane(block, tl.TRANSMITTANCE), blocks.plane(block, tl.REMAINDER)
+            transmittance = build.load(plane_t)
+            is_hit = build.all_of(
+                [log_alphas.compare(">=", rec.LOG_ALPHA_MIN), transmittance.compare(">=", TRANSMITTANCE_MIN)]
+            )
+            unclamped = tl.exp2_eighth(log_alphas)
+            alpha = unclamped.min(ALPHA_MAX).where(is_hit)
+            weight = alpha * transmittance
+            build.store(transmittance - weight, plane_t)
+            gradients = [build.load(blocks.plane(block, plane)) for plane in (tl.PLANE_R, tl.PLANE_G, tl.PLANE_B)]
+            gain = channels[0] * gradients[0] + channels[1] * gradients[1] + channels[2] * gradients[2]
+            remainder = build.load(plane_e) - weight * gain
+            build.store(remainder, plane_e)
+            for index, gradient in enumerate(gradients):
+                add(6 + index, weight * gradient)
+            v = alpha * (transmittance * gain - remainder / (1.0 - alpha))
+            v = v.where(unclamped.compare("<", ALPHA_MAX))
+            column = builder.and_(block, build.int64(rec.BLOCKS_PER_ROW - 1))
+            row = builder.lshr(block, build.int64(rec.BLOCKS_PER_ROW.bit_length() - 1))
+            block_dx = builder.fadd(to_left, build.scalar_of(builder.mul(column, build.int64(rec.BLOCK))))
+            block_dy = builder.fadd(to_top, build.scalar_of(builder.mul(row, build.int64(rec.BLOCK))))
+            block_u = builder.fadd(block_dx, builder.fmul(fields[rec.SLOPE], block_dy))
+            dy = blocks.y + build.broadcast(block_dy)
+            u = blocks.u + build.broadcast(block_u)
+            vu, vy = v * u, v * dy
+            for index, value in enumerate((v, vu, vy, vu * u, vu * dy, vy * dy)):
+                add(index, value)
+
+        build.for_each_bit(changed_blocks, replay_block)
+        totals = build.sum_lanes([Lanes(build, builder.load(slot)) for slot in sums])
+        build.store_first(totals, rec.PAIR_FLOATS, sums_address)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@njit(parallel=True, **rec.KERNEL_OPTIONS)
+def replay_tiles(
+    records,
+    tile_starts,
+    pair_records,
+    n_columns,
+    image,
+    transmittance,
+    grad_image,
+    grad_transmittance,
+    pair_blocks,
+    pair_sums,
+    scratch,
+    counter,
+):
+    """Fill pair_sums [pairs, 12] float32 for all tiles.
+
+    Args:
+        image, transmittance: Results of `blend_tiles`.
+        grad_image: Upstream gradient. [H, W, 3] float32
+        grad_transmittance: Upstream gradient. [H, W] float32
+        Others: As in `blend_tiles`; `counter` is zero again.
+    """
+    height, width = transmittance.shape
+    n_tiles = len(tile_starts) - 1
+    for worker in prange(len(scratch)):
+        row = scratch[worker]
+        address = np.int64(row.ctypes.data)
+        records_address = np.int64(records.ctypes.data)
+        sums_address = np.int64(pair_sums.ctypes.data)
+        counter_address = np.int64(counter.ctypes.data)
+        tile = take_next(counter_address)
+        while tile < n_tiles:
+            tile_x = (tile % n_columns) * _TILE
+            tile_y = (tile // n_columns) * _TILE
+            if tile_x + _TILE > width or tile_y + _TILE > height:
+                row[: 5 * _BLOCKS * 16] = f4(0.0)
+            for y in range(tile_y, min(tile_y + _TILE, height)):
+                for x in range(tile_x, min(tile_x + _TILE, width)):
+                    block = ((y - tile_y) >> 2) * _BLOCKS_PER_ROW + ((x - tile_x) >> 2)
+                    place = block * 16 + (y & 3) * 4 + (x & 3)
+                    red, green, blue = grad_image[y, x, 0], grad_image[y, x, 1], grad_image[y, x, 2]
+                    row[_T + place] = f4(1.0)
+                    row[_R + place] = red
+                    row[_G + place] = green
+                    row[_B + place] = blue
+                    row[_E + place] = (
+                        red * image[y, x, 0]
+                        + green * image[y, x, 1]
+                        + blue * image[y, x, 2]
+                        + grad_transmittance[y, x] * transmittance[y, x]
+                    )
+            for pair in range(tile_starts[tile], tile_starts[tile + 1]):
+                changed = pair_blocks[pair]
+                if changed != 0:
+                    _replay_record(
+                        address,
+                        records_address + np.int64(pair_records[pair]) * _RECORD_BYTES,
+                        f4(tile_x),
+                        f4(tile_y),
+                        changed,
+                        sums_address + np.int64(pair) * _PAIR_BYTES,
+                    )
+                else:
+                    for index in range(_PAIR_FLOATS):
+                        pair_sums[pair, index] = f4(0.0)
+            tile = take_next(counter_address)

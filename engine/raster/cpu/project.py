@@ -1,0 +1,158 @@
+"""Gaussians to 64-byte records and depth keys, sixteen at a time. Decides which rows can be drawn."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, prange, types
+from numba.extending import intrinsic
+
+from engine.conventions import ALPHA_MIN, EPS2D_PX2
+from engine.raster.cpu import record as rec
+from engine.raster.cpu.camera_row import CameraLanes
+from engine.raster.cpu.lanes import INTS, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes
+from engine.raster.cpu.projection_math import Projection, dot, project_lanes
+from engine.raster.limits import EXTENT_MAX_PX, QUAT_NORM_SQUARED_MAX, QUAT_NORM_SQUARED_MIN, VALUE_MAX
+
+
+def gather_rows(build: LaneBuilder, base: Any, rows: Any, n_columns: int) -> tuple[Lanes, ...]:
+    """The columns of sixteen rows of a contiguous [N, n_columns] float32 array."""
+    return tuple(build.gather(base, rows, n_columns, column) for column in range(n_columns))
+
+
+@intrinsic
+def _project_sixteen(
+    typing_context, first, n_rows, means, quats, scales, opacities, colors, camera, record_address, key_address
+):
+    """Rows first..first+15 to records and keys; rows past the end repeat the last one."""
+    signature = types.void(*[types.int64] * 10)
+
+    def generate(context, builder, signature, arguments):
+        first, n_rows, means, quats, scales, opacities, colors, camera, records, keys = arguments
+        build = LaneBuilder(builder)
+        rows = _clamped_rows(build, first, n_rows)
+        lanes = CameraLanes(build, camera)
+        mean, quat, scale = (
+            gather_rows(build, *spec) for spec in ((means, rows, 3), (quats, rows, 4), (scales, rows, 3))
+        )
+        opacity = build.gather(opacities, rows, 1, 0)
+        color = gather_rows(build, colors, rows, 3)
+        projection = project_lanes(lanes, mean, quat, scale)
+        fields, depth_keys = _record_fields(build, lanes, projection, opacity, color)
+        for lane, record in enumerate(build.transpose(fields)):
+            build.store(record, records, lane * VECTOR_BYTES)
+        build.store(depth_keys, keys, align=4)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+def _clamped_rows(build: LaneBuilder, first: Any, n_rows: Any) -> Any:
+    """first + lane, at most n_rows - 1, as int32."""
+    builder = build.ir
+
+    def splat(value: Any) -> Any:
+        narrow = builder.trunc(value, ir.IntType(32))
+        undefined = ir.Constant(INTS, ir.Undefined)
+        vector = builder.insert_element(undefined, narrow, ir.Constant(ir.IntType(32), 0))
+        return builder.shuffle_vector(vector, undefined, ir.Constant(INTS, [0] * N_LANES))
+
+    rows = builder.add(splat(first), ir.Constant(INTS, list(range(N_LANES))))
+    last = splat(builder.sub(n_rows, build.int64(1)))
+    return builder.select(builder.icmp_signed("<", rows, last), rows, last)
+
+
+def _record_fields(
+    build: LaneBuilder, camera: CameraLanes, projection: Projection, opacity: Lanes, color: tuple[Lanes, ...]
+) -> tuple[list[Lanes], Lanes]:
+    """Sixteen record columns, and depth where the row can be drawn, else -1."""
+    p = projection
+    a, b = p.half_x, p.half_y
+    center_x = camera.fx * p.raw_slope_x + camera.cx
+    center_y = camera.fy * p.raw_slope_y + camera.cy
+    bare_xx, bare_yy, xy = dot(a, a), dot(b, b), dot(a, b)
+    # Cauchy-Binet: the determinant of half half^T is the sum of squared 2x2 minors; no difference of large numbers.
+    minors = (a[0] * b[1] - a[1] * b[0], a[0] * b[2] - a[2] * b[0], a[1] * b[2] - a[2] * b[1])
+    determinant = dot(minors, minors) + EPS2D_PX2 * (bare_xx + bare_yy) + EPS2D_PX2**2
+    xx, yy = bare_xx + EPS2D_PX2, bare_yy + EPS2D_PX2
+    precision_u, precision_y = yy / determinant, 1.0 / yy  # of dx + slope dy, and of dy given it
+    slope, tilt = -(xy * precision_y), xy / xx
+    log_opacity = opacity.log2() * 0.125
+    reach = log_opacity - rec.LOG_ALPHA_MIN
+    distance_squared = reach * (1.0 / rec.EIGHTH_LOG)  # squared Mahalanobis distance at which alpha is ALPHA_MIN
+    half_width, half_height = (distance_squared * xx).sqrt(), (distance_squared * yy).sqrt()
+
+    # first and last pixel whose centre lies in the bounding box, cut to the image; NaN becomes a border
+    first_x = (center_x - half_width - 0.5).ceil().max(0.0)
+    last_x = (center_x + half_width - 0.5).floor().min(camera.width - 1.0)
+    first_y = (center_y - half_height - 0.5).ceil().max(0.0)
+    last_y = (center_y + half_height - 0.5).floor().min(camera.height - 1.0)
+
+    norm_squared = p.norm_squared
+    can_be_drawn = build.all_of(
+        [
+            p.z.compare(">", camera.near_plane),
+            p.z.compare("<", VALUE_MAX),
+            opacity.compare(">", ALPHA_MIN),
+            opacity.compare("<", VALUE_MAX),
+            norm_squared.compare(">", QUAT_NORM_SQUARED_MIN),
+            norm_squared.compare("<", QUAT_NORM_SQUARED_MAX),
+            half_width.compare("<", EXTENT_MAX_PX),
+            half_height.compare("<", EXTENT_MAX_PX),
+            center_x.abs().compare("<", VALUE_MAX),
+            center_y.abs().compare("<", VALUE_MAX),
+            precision_u.compare(">", 0.0),
+            precision_u.compare("<", VALUE_MAX),
+            slope.abs().compare("<", VALUE_MAX),
+            first_x.compare("<=", last_x),
+            first_y.compare("<=", last_y),
+            *(channel.abs().compare("<", VALUE_MAX) for channel in color),
+        ]
+    )
+    columns = [
+        center_x,
+        center_y,
+        precision_u * rec.EIGHTH_LOG,
+        slope,
+        precision_y * rec.EIGHTH_LOG,
+        log_opacity,
+        *color,
+        reach,
+        tilt,
+        half_width,
+        half_height,
+        opacity,
+        _packed_tiles(build, first_x, last_x, camera.width),
+        _packed_tiles(build, first_y, last_y, camera.height),
+    ]
+    return columns, p.z.where(can_be_drawn, -1.0)
+
+
+def _packed_tiles(build: LaneBuilder, first: Lanes, last: Lanes, size: Lanes) -> Lanes:
+    """Tiles of the first and last pixel as first | last << 16, int32 bits. Always inside the image."""
+    ends = [pixel.max(0.0).min(size - 1.0) * (1.0 / rec.TILE) for pixel in (first, last)]
+    low, high = (end.floor().to_ints() for end in ends)
+    packed = build.ir.or_(low, build.ir.shl(high, ir.Constant(INTS, [16] * N_LANES)))
+    return Lanes(build, build.ir.bitcast(packed, build.constant(0.0).value.type))
+
+
+@njit(parallel=True, **rec.KERNEL_OPTIONS)
+def project(means, quats, scales, opacities, colors, camera, records, keys):
+    """Fill records [>= N rounded up to 16, 16] and keys [same]: camera depth, or -1 for rows that cannot be drawn."""
+    n_rows = len(means)
+    for group in prange((n_rows + 15) // 16):
+        first = np.int64(group) * 16
+        _project_sixteen(
+            first,
+            np.int64(n_rows),
+            np.int64(means.ctypes.data),
+            np.int64(quats.ctypes.data),
+            np.int64(scales.ctypes.data),
+            np.int64(opacities.ctypes.data),
+            np.int64(colors.ctypes.data),
+            np.int64(camera.ctypes.data),
+            np.int64(records.ctypes.data) + first * 64,
+            np.int64(keys.ctypes.data) + first * 4,
+        )

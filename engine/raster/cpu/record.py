@@ -1,0 +1,56 @@
+"""The 64-byte record of one projected Gaussian, and the numbers all kernels agree on.
+
+A record is one cache line of sixteen 4-byte fields, so that blending a Gaussian into a tile costs one memory access.
+The footprint is stored as a Cholesky form that cannot cancel: with dx, dy from the centre,
+
+    log2(alpha) / 8 = log_opacity - (major * (dx + slope * dy)^2 + minor * dy^2)
+
+which stays exact for needles, where the textbook conic a dx^2 + 2 b dx dy + c dy^2 loses every digit. The eighth of a
+binary logarithm is the argument of `exp2_eighth`: a polynomial on a unit interval, squared three times.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from engine.conventions import ALPHA_MIN
+
+CENTER_X, CENTER_Y, MAJOR, SLOPE, MINOR, LOG_OPACITY, RED = range(7)
+GREEN, BLUE, REACH, TILT, HALF_WIDTH, HALF_HEIGHT, OPACITY = range(7, 14)
+"""Columns of a record. Centre and half extents in pixels; REACH = log_opacity - LOG_ALPHA_MIN is the value of the
+quadratic form at the rim; TILT = cov_xy / cov_xx gives the height at which the ellipse is widest."""
+TILE_COLUMNS, TILE_ROWS = 14, 15
+"""int32 columns: first and last tile column (row) the bounding box touches, first | last << 16."""
+RECORD_FLOATS = 16
+RECORD_BYTES = 64
+
+TILE = 32
+"""Edge of a tile, pixels. Large tiles win because blocks inside them are culled (kernels.md, section 4)."""
+BLOCK = 4
+"""Edge of a block, pixels: one block is one vector."""
+BLOCKS_PER_ROW = TILE // BLOCK
+BLOCKS = BLOCKS_PER_ROW * BLOCKS_PER_ROW
+"""64, so that the blocks of a tile fit the bits of one integer."""
+
+EIGHTH_LOG = 0.5 / math.log(2.0) / 8.0
+"""Turns a squared Mahalanobis distance into an eighth of a binary logarithm."""
+LOG_ALPHA_MIN = math.log2(ALPHA_MIN) / 8.0
+
+EXP2_EIGHTH = (0.9999999251, 0.6931422525, 0.2401721884, 0.05527972023, 0.009188609153, 0.0009387873374)
+"""Minimax polynomial of 2^x on [-1, 0], constant term first; to the 8th power the relative error is 6e-7."""
+
+PAIR_FLOATS = 12
+"""Stride of a row of the pair buffer; nine sums are used."""
+
+KERNEL_OPTIONS = {
+    # NaN and infinity must keep their meaning: rows are dropped by comparisons that NaN fails.
+    "fastmath": {"nsz", "contract", "arcp", "afn", "reassoc"},
+    "nogil": True,
+    "cache": True,
+    "error_model": "numpy",
+}
+"""Options of every kernel, apart from `parallel`."""
+
+f4 = np.float32
