@@ -1,0 +1,89 @@
+"""What the window draws, as plain float32 numpy arrays with a key that says what they are."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GaussianArrays:
+    """Gaussians of one frame, for upload. float32, C-contiguous.
+
+    Attributes:
+        means: [N, 3] scene units.
+        quats: [N, 4] wxyz, not necessarily of unit length.
+        scales: [N, 3] standard deviations, scene units.
+        opacities: [N] in 0..1.
+        colors: [N, 3] in 0..1.
+        key: Changes when the content does.
+        near_plane: Nearest depth that should be drawn, scene units.
+        clip_index, frame_index: What it shows.
+    """
+
+    means: np.ndarray
+    quats: np.ndarray
+    scales: np.ndarray
+    opacities: np.ndarray
+    colors: np.ndarray
+    key: Hashable
+    near_plane: float = 0.01
+    clip_index: int = 0
+    frame_index: int = 0
+
+    def __len__(self) -> int:
+        return len(self.means)
+
+    @property
+    def n_bytes(self) -> int:
+        """Memory of the arrays."""
+        return sum(a.nbytes for a in (self.means, self.quats, self.scales, self.opacities, self.colors))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AnchorArrays:
+    """Anchor positions of one clip, scene units, float32.
+
+    Attributes:
+        inherited_positions: From the reference clip; empty in the reference clip itself. [A0, 3]
+        own_positions: Trained by this clip: all of the reference clip, the residual ones of a source clip. [A, 3]
+        key: Changes when the content does.
+    """
+
+    inherited_positions: np.ndarray
+    own_positions: np.ndarray
+    key: Hashable
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointArrays:
+    """A coloured cloud: points [P, 3] scene units and colors [P, 3] in 0..1, float32. Unpacks as points, colors, key.
+
+    Attributes:
+        is_hint: Captured pictures placed in space, because there is no cloud yet.
+    """
+
+    points: np.ndarray
+    colors: np.ndarray
+    key: Hashable
+    is_hint: bool = False
+
+    def __iter__(self):
+        return iter((self.points, self.colors, self.key))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A finished picture.
+
+    Attributes:
+        image: [H, W, 3] uint8 RGB.
+        key: What it shows; equal keys mean equal pictures.
+        is_stale: It is not what was asked for now, but the newest there is; the right one is on its way.
+    """
+
+    image: np.ndarray
+    key: Hashable
+    is_stale: bool = False

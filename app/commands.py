@@ -1,0 +1,131 @@
+"""Commands: what a user can ask of a Session, as frozen dataclasses in the imperative. Plain data, no behaviour.
+
+Orbiting, hovering and panel widths are not commands; they change the view or a widget directly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class OpenCapture:
+    """Open a capture folder, and the project that belongs to it. A project folder is opened as such."""
+
+    path: Path
+    scale: float | None = None
+    """Share of the original picture size to work at; None picks one that suits the size."""
+
+
+@dataclass(frozen=True, slots=True)
+class OpenProject:
+    """Open a project folder and the capture it names."""
+
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class TrainNextClip:
+    """Train the first clip that is not finished; the reference clip comes first."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrainClip:
+    """Train one clip, again if it is trained already."""
+
+    clip_index: int
+
+
+@dataclass(frozen=True, slots=True)
+class PauseTraining:
+    """Hold the running training where it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class ResumeTraining:
+    """Go on after a pause."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopTraining:
+    """End the running training, keep what was learned and empty the queue."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetFrame:
+    """Move the playhead; frames outside the capture are clamped."""
+
+    frame_index: int
+
+
+@dataclass(frozen=True, slots=True)
+class TogglePlay:
+    """Play or hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class LookThrough:
+    """Look through a capture camera, or freely again with None."""
+
+    camera_index: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class SetCompare:
+    """Compare with the captured picture: "off", "wipe" or "side"."""
+
+    mode: str
+
+
+@dataclass(frozen=True, slots=True)
+class ToggleOverlay:
+    """Switch one of the overlays: show_frusta, show_inherited, show_residual, show_points."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetHoldout:
+    """Camera indices that training never sees. Only before the first clip is trained."""
+
+    camera_indices: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SetClipLength:
+    """Frames per clip. Only before the first clip is trained."""
+
+    n_frames: int
+
+
+@dataclass(frozen=True, slots=True)
+class HomeView:
+    """Frame the point that the cameras look at."""
+
+
+@dataclass(frozen=True, slots=True)
+class DismissNotice:
+    """Remove the notice at this position."""
+
+    index: int
+
+
+Command = (
+    OpenCapture
+    | OpenProject
+    | TrainNextClip
+    | TrainClip
+    | PauseTraining
+    | ResumeTraining
+    | StopTraining
+    | SetFrame
+    | TogglePlay
+    | LookThrough
+    | SetCompare
+    | ToggleOverlay
+    | SetHoldout
+    | SetClipLength
+    | HomeView
+    | DismissNotice
+)

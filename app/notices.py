@@ -1,0 +1,70 @@
+"""Notices: what the user has to know, until it is dismissed. Draws nothing, logs nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from engine.errors import EngineError
+
+MAX_NOTICES = 50
+"""Older ones make room; the log keeps everything."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Notice:
+    """One message. Compared by identity: the same text may be told twice.
+
+    Attributes:
+        kind: "info", "warn" or "error".
+        title: One short sentence.
+        detail: Cause with numbers; may be empty.
+        hint: What the user can do; may be empty.
+    """
+
+    kind: str
+    title: str
+    detail: str = ""
+    hint: str = ""
+
+
+class Notices:
+    """A bounded list of notices, oldest first."""
+
+    def __init__(self) -> None:
+        self._notices: list[Notice] = []
+        self.revision = 0
+
+    def __len__(self) -> int:
+        return len(self._notices)
+
+    def __iter__(self) -> Iterator[Notice]:
+        return iter(tuple(self._notices))
+
+    def __getitem__(self, index: int) -> Notice:
+        return self._notices[index]
+
+    def add(self, kind: str, title: str, detail: str = "", hint: str = "") -> Notice:
+        """Append a notice; the oldest goes when there are too many.
+
+        Raises:
+            ValueError: The kind is unknown.
+        """
+        if kind not in ("info", "warn", "error"):
+            raise ValueError(f"a notice is info, warn or error, not {kind!r}")
+        notice = Notice(kind, title, detail, hint)
+        self._notices = [*self._notices, notice][-MAX_NOTICES:]
+        self.revision += 1
+        return notice
+
+    def add_error(self, title: str, error: EngineError) -> Notice:
+        """A failure the user can act on; every problem of a capture is listed."""
+        lines = [error.message if error.path is None else f"{error.message} - {error.path}"]
+        lines += [str(problem) for problem in getattr(error, "problems", ())]
+        return self.add("error", title, "\n".join(lines), error.hint)
+
+    def dismiss(self, index: int) -> None:
+        """Remove one notice; an index that is gone already is ignored."""
+        if 0 <= index < len(self._notices):
+            del self._notices[index]
+            self.revision += 1

@@ -1,0 +1,93 @@
+"""What opening means: a capture and the project that belongs to it. Runs on a job's thread; changes no state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.jobs import JobContext
+from app.project import (
+    PROJECT_FILE,
+    Project,
+    create_project,
+    default_project_dir,
+    default_settings,
+    open_project,
+    read_settings,
+)
+from engine.capture.capture import Capture, open_capture
+from engine.errors import ProjectError
+
+WINDOW_WIDTH_PX = 960
+"""Wider captures are worked on at a smaller scale unless one is asked for; training on a CPU goes with the pixels."""
+DEFAULT_CLIP_LENGTH = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A capture, and its project unless that is the one already open.
+
+    Attributes:
+        note: Title, detail and hint of something odd, or None.
+    """
+
+    capture: Capture
+    project: Project | None
+    note: tuple[str, str, str] | None = None
+
+
+def open_for_window(
+    path: Path, *, scale: float | None, project_dir: Path | None, current: Path | None, context: JobContext
+) -> Opened:
+    """Open a capture folder or a project folder.
+
+    Args:
+        path: A capture folder, or a project folder.
+        scale: Working size; None picks one.
+        project_dir: Where the capture's project goes; None for the user's data folder.
+        current: Project folder that this program has open already.
+        context: Receives progress.
+    Raises:
+        CaptureError, ProjectError: It cannot be opened.
+    """
+    context.report(0.0, path.name)
+    if (path / PROJECT_FILE).is_file():
+        return _open_project(path, current)
+    capture = open_capture(path, scale=1.0 if scale is None else scale)
+    widest = int(capture.rig.image_sizes[:, 0].max())
+    if scale is None and widest > WINDOW_WIDTH_PX:
+        capture = open_capture(path, scale=WINDOW_WIDTH_PX / widest)
+    context.report(0.7, f"{len(capture.rig)} cameras, {capture.n_frames} frames")
+    folder = default_project_dir(capture) if project_dir is None else project_dir
+    if (folder / PROJECT_FILE).is_file():
+        return _open_project(folder, current, capture if scale is None else None)
+    settings = default_settings(capture, clip_length=min(DEFAULT_CLIP_LENGTH, capture.n_frames))
+    return Opened(capture, create_project(folder, settings))
+
+
+def _open_project(folder: Path, current: Path | None, capture: Capture | None = None) -> Opened:
+    settings = read_settings(folder)
+    if capture is None or capture.scale != settings.scale:
+        capture = open_capture(settings.capture, scale=settings.scale)
+    check_capture(capture, settings.fingerprint, folder)
+    if current is not None and current.resolve() == folder.resolve():
+        return Opened(capture, None)
+    try:
+        return Opened(capture, open_project(folder))
+    except ProjectError as error:  # most likely locked; looking at it does no harm
+        note = ("The project is open for reading only", str(error), "Training is off until it is closed there.")
+        return Opened(capture, open_project(folder, is_writable=False), note)
+
+
+def check_capture(capture: Capture, fingerprint: str, folder: Path) -> None:
+    """See that the capture is the one the project was made for.
+
+    Raises:
+        ProjectError: It is another one.
+    """
+    if capture.fingerprint != fingerprint:
+        raise ProjectError(
+            f"The capture in {capture.path} is not the one this project was made for.",
+            hint="Put the original capture back, or make a new project.",
+            path=folder,
+        )

@@ -1,0 +1,218 @@
+"""Playback: a frame of a trained clip as arrays to draw. Loads states and decodes on one thread; keeps results by key.
+
+A key is (clip_index, revision, frame_index): a new revision of a live clip makes its older frames worthless.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.arrays import AnchorArrays, GaussianArrays, PointArrays
+from app.latest import LatestWorker
+from engine.capture.clip import Clip
+from engine.model.clip_state import ClipState, read_clip_state
+
+CACHE_BYTES = 384 << 20
+"""Decoded frames kept in memory."""
+MAX_MODELS = 3
+"""Loaded clips kept in memory: the shown one, its reference, and the one shown before."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRequest:
+    """A frame of one state of a clip.
+
+    Attributes:
+        revision: Names the state; with clip and frame it is the identity of the result.
+        path, reference_path: Files to load when the model is not loaded yet.
+        clip: For the conversion to clip time.
+    """
+
+    clip_index: int
+    revision: str
+    frame_index: int
+    path: Path = field(compare=False)
+    reference_path: Path | None = field(compare=False)
+    clip: Clip = field(compare=False)
+
+    @property
+    def key(self) -> tuple[int, str, int]:
+        """Identity of the result."""
+        return self.clip_index, self.revision, self.frame_index
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedClip:
+    """A model in memory and what is shown of it."""
+
+    model: Any
+    anchors: AnchorArrays
+    near_plane: float
+
+
+class ByteCache:
+    """Most recently used values up to a number of bytes. Safe to use from several threads."""
+
+    def __init__(self, max_bytes: int) -> None:
+        self._max_bytes = max_bytes
+        self._values: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
+        self._n_bytes = 0
+        self._lock = threading.Lock()
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    @property
+    def n_bytes(self) -> int:
+        """Bytes held."""
+        return self._n_bytes
+
+    def get(self, key: Hashable) -> Any | None:
+        """The value, which becomes the most recent one; None when it is not there."""
+        with self._lock:
+            if key not in self._values:
+                return None
+            self._values.move_to_end(key)
+            return self._values[key][0]
+
+    def put(self, key: Hashable, value: Any, n_bytes: int) -> None:
+        """Keep a value; the oldest ones go when there is no room. The newest always stays."""
+        with self._lock:
+            _, old_bytes = self._values.pop(key, (None, 0))
+            self._values[key] = (value, n_bytes)
+            self._n_bytes += n_bytes - old_bytes
+            while self._n_bytes > self._max_bytes and len(self._values) > 1:
+                self._n_bytes -= self._values.popitem(last=False)[1][1]
+
+    def drop(self, is_unwanted: Any) -> None:
+        """Forget every value whose key the predicate accepts."""
+        with self._lock:
+            for key in [key for key in self._values if is_unwanted(key)]:
+                self._n_bytes -= self._values.pop(key)[1]
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self.drop(lambda key: True)
+
+
+class Playback:
+    """Frames to arrays on one thread; the newest request wins. Methods are for one other thread."""
+
+    def __init__(self, *, cache_bytes: int = CACHE_BYTES) -> None:
+        self._cache = ByteCache(cache_bytes)
+        self._models: OrderedDict[tuple[int, str], LoadedClip] = OrderedDict()
+        self._reference: tuple[tuple[str, int], ClipState] | None = None
+        self._last: GaussianArrays | None = None
+        self.worker: LatestWorker[FrameRequest, GaussianArrays] = LatestWorker(
+            "playback", self._compute, prepare=use_one_thread
+        )
+
+    def gaussians(self, request: FrameRequest) -> GaussianArrays | None:
+        """The frame if it is ready; otherwise it is asked for and the newest finished one is returned."""
+        known = self._cache.get(request.key)
+        if known is not None:
+            self._last = known
+            return known
+        self.worker.request(request)
+        newest = self.worker.newest
+        if newest is not None:
+            self._last = newest[1]
+        return self._last
+
+    def anchors(self, clip_index: int, revision: str) -> AnchorArrays | None:
+        """Anchors of a state; None until it was loaded."""
+        loaded = self._models.get((clip_index, revision))
+        return None if loaded is None else loaded.anchors
+
+    def is_loaded(self, clip_index: int, revision: str) -> bool:
+        """Whether the file of this state is not needed any more."""
+        return (clip_index, revision) in self._models
+
+    def clear(self) -> None:
+        """Forget everything, as when another capture was opened."""
+        self.worker.forget()
+        self._cache.clear()
+        self._models = OrderedDict()
+        self._reference = self._last = None
+
+    def close(self) -> None:
+        """End the thread."""
+        self.worker.close()
+
+    # ---------------------------------------------------------------- on the thread
+
+    def _compute(self, request: FrameRequest) -> GaussianArrays:
+        import torch
+
+        loaded = self._load(request)
+        with torch.no_grad():
+            gaussians = loaded.model.decode(request.clip.clip_time(request.frame_index))
+        values = [np.ascontiguousarray(tensor.numpy(), np.float32) for tensor in gaussians.tensors()]
+        arrays = GaussianArrays(
+            *values,
+            key=request.key,
+            near_plane=loaded.near_plane,
+            clip_index=request.clip_index,
+            frame_index=request.frame_index,
+        )
+        self._cache.put(request.key, arrays, arrays.n_bytes)
+        return arrays
+
+    def _load(self, request: FrameRequest) -> LoadedClip:
+        identity = (request.clip_index, request.revision)
+        models = self._models
+        if identity in models:
+            models.move_to_end(identity)
+            return models[identity]
+        from engine.model.clip_model import load_clip_model
+
+        state = read_clip_state(request.path)
+        reference = None if state.is_reference else self._read_reference(request.reference_path)
+        model = load_clip_model(state, reference)
+        view = model.anchors()
+        anchors = AnchorArrays(
+            np.ascontiguousarray(view.inherited_positions, np.float32),
+            np.ascontiguousarray(view.own_positions, np.float32),
+            identity,
+        )
+        loaded = LoadedClip(model, anchors, float(state.header["near_plane"]))
+        self._cache.drop(lambda key: key[0] == request.clip_index and key[1] != request.revision)
+        kept = [(key, value) for key, value in models.items() if key[0] != request.clip_index]
+        # replaced as a whole, so that the other thread never sees it half changed
+        self._models = OrderedDict([*kept[-(MAX_MODELS - 1) :], (identity, loaded)])
+        return loaded
+
+    def _read_reference(self, path: Path | None) -> ClipState | None:
+        if path is None or not path.is_file():
+            return None
+        identity = (str(path), path.stat().st_mtime_ns)
+        if self._reference is None or self._reference[0] != identity:
+            self._reference = (identity, read_clip_state(path))
+        return self._reference[1]
+
+
+def use_one_thread() -> None:
+    """Keep this thread's torch work on one core; OpenMP's thread count belongs to the calling thread."""
+    import torch
+
+    torch.set_num_threads(1)
+
+
+def static_points(path: Path, revision: str) -> PointArrays:
+    """The still part of a reference clip as a coloured cloud.
+
+    Raises:
+        ProjectError: The file is missing or damaged.
+    """
+    state = read_clip_state(path)
+    points = state.arrays["sets.static.positions"].astype(np.float32, copy=False)
+    logits = state.arrays["sets.static.color_logits"].astype(np.float32, copy=False)
+    colors = 1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0)))
+    return PointArrays(np.ascontiguousarray(points), colors.astype(np.float32), ("cloud", revision))

@@ -1,0 +1,374 @@
+"""Project: the folder that keeps what was learned about one capture. Paths, settings and the lock; no training.
+
+project.json                 settings, see ProjectSettings
+clips/0000.safetensors       finished clips
+checkpoints/0000.safetensors unfinished clips: everything needed to go on
+live/                        snapshots of the running training; swept when the project is opened for writing
+prep/                        what clips share, such as backgrounds
+metrics/0000.jsonl           curves, one JSON object per line
+logs/                        one file per clip
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from safetensors import SafetensorError, safe_open
+
+from app.lock import ProcessLock
+from engine.capture.capture import Capture
+from engine.capture.clip import Clip, split_clips
+from engine.errors import ProjectError
+from engine.files import atomic_path
+from engine.training.config import TrainConfig
+
+logger = logging.getLogger(__name__)
+
+SCHEMA = 1
+PROJECT_FILE = "project.json"
+MIN_TRAINING_CAMERAS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class ProjectSettings:
+    """What every clip of a project has in common. A value; saved as project.json.
+
+    Attributes:
+        capture: Folder of the capture.
+        fingerprint: Of the capture, to notice another one in its place.
+        scale: Share of the original picture size, in (0, 1].
+        clip_length: M, frames per clip.
+        holdout: Names of the cameras that training never sees.
+        seed: Fixes initial values and the order of pictures.
+        overrides: Training settings that differ from the defaults.
+    """
+
+    capture: str
+    fingerprint: str
+    scale: float = 1.0
+    clip_length: int = 10
+    holdout: tuple[str, ...] = ()
+    seed: int = 0
+    overrides: dict[str, Any] = field(default_factory=dict)
+    schema: int = SCHEMA
+
+    def config(self) -> TrainConfig:
+        """The training settings. Raises ProjectError for a value outside its range."""
+        return TrainConfig(**self.overrides)
+
+
+class Project:
+    """An opened project folder. Use `create_project`, `open_project` or `open_or_create_project`."""
+
+    def __init__(self, folder: Path, settings: ProjectSettings, lock: ProcessLock | None) -> None:
+        self.folder = folder
+        self.settings = settings
+        self._lock = lock
+
+    @property
+    def is_writable(self) -> bool:
+        """Whether this process may train into the project."""
+        return self._lock is not None and self._lock.is_held
+
+    @property
+    def live_dir(self) -> Path:
+        """Snapshots of the running training."""
+        return self.folder / "live"
+
+    @property
+    def prep_dir(self) -> Path:
+        """What clips share."""
+        return self.folder / "prep"
+
+    def clip_path(self, clip_index: int) -> Path:
+        """A finished clip."""
+        return self.folder / "clips" / f"{clip_index:04d}.safetensors"
+
+    def checkpoint_path(self, clip_index: int) -> Path:
+        """An unfinished clip."""
+        return self.folder / "checkpoints" / f"{clip_index:04d}.safetensors"
+
+    def metrics_path(self, clip_index: int) -> Path:
+        """Curves of a clip."""
+        return self.folder / "metrics" / f"{clip_index:04d}.jsonl"
+
+    def log_path(self, clip_index: int) -> Path:
+        """Log of a clip's worker."""
+        return self.folder / "logs" / f"clip-{clip_index:04d}.log"
+
+    def is_trained(self, clip_index: int) -> bool:
+        """Whether the clip is finished."""
+        return self.clip_path(clip_index).is_file()
+
+    @property
+    def has_progress(self) -> bool:
+        """Whether anything was learned that a change of settings would make worthless."""
+        return any(any((self.folder / name).glob("*.safetensors")) for name in ("clips", "checkpoints"))
+
+    def clips(self, n_frames: int) -> list[Clip]:
+        """The clips of a capture of that many frames."""
+        return split_clips(n_frames, self.settings.clip_length)
+
+    def update(self, settings: ProjectSettings) -> None:
+        """Replace the settings, on disk first.
+
+        Raises:
+            ProjectError: The project is read-only, or the disk refused.
+        """
+        if not self.is_writable:
+            raise ProjectError("The project is open for reading only.", path=self.folder)
+        _write_settings(self.folder, settings)
+        self.settings = settings
+
+    def discard_progress(self, clip_index: int) -> None:
+        """Forget the unfinished training of a clip; a finished clip stays."""
+        for path in (self.checkpoint_path(clip_index), self.metrics_path(clip_index)):
+            with suppress(OSError):
+                path.unlink()
+
+    def close(self) -> None:
+        """Release the lock. The object can still be read from."""
+        if self._lock is not None:
+            self._lock.release()
+
+
+# ---------------------------------------------------------------- opening
+
+
+def default_settings(
+    capture: Capture,
+    *,
+    clip_length: int = 10,
+    holdout: tuple[str, ...] | None = None,
+    seed: int = 0,
+    overrides: dict[str, Any] | None = None,
+) -> ProjectSettings:
+    """Settings for a capture; without a hold-out the one that the capture suggests.
+
+    Raises:
+        ProjectError: A value lies outside its range, a camera does not exist, or too few are left for training.
+    """
+    chosen = capture.default_holdout if holdout is None else tuple(holdout)
+    settings = ProjectSettings(
+        capture=str(Path(capture.path).resolve()),
+        fingerprint=capture.fingerprint,
+        scale=capture.scale,
+        clip_length=clip_length,
+        holdout=tuple(chosen),
+        seed=seed,
+        overrides=dict(overrides or {}),
+    )
+    check_settings(settings, capture)
+    return settings
+
+
+def check_settings(settings: ProjectSettings, capture: Capture) -> None:
+    """See that the settings fit the capture.
+
+    Raises:
+        ProjectError: They do not; says which and what is allowed.
+    """
+    n_cameras = len(capture.rig)
+    if not 1 <= settings.clip_length <= capture.n_frames:
+        raise ProjectError(
+            f"The clip length is {settings.clip_length}; the capture allows 1 to {capture.n_frames} frames."
+        )
+    if not 0 <= settings.seed < 2**32:
+        raise ProjectError(f"The seed is {settings.seed}; it has to lie between 0 and {2**32 - 1}.")
+    unknown = [name for name in settings.holdout if name not in capture.rig.names]
+    if unknown:
+        raise ProjectError(
+            f"There is no camera called {', '.join(unknown)} to hold out.",
+            hint=f"Cameras are {', '.join(capture.rig.names[:8])}{' and more' if n_cameras > 8 else ''}.",
+        )
+    n_left = n_cameras - len(set(settings.holdout))
+    if n_left < MIN_TRAINING_CAMERAS:
+        raise ProjectError(
+            f"{len(set(settings.holdout))} of {n_cameras} cameras are held out, which leaves {n_left} for training; "
+            f"{MIN_TRAINING_CAMERAS} are needed.",
+            hint="Hold out fewer cameras.",
+        )
+    settings.config()
+
+
+def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
+    """Make a project folder and lock it.
+
+    Raises:
+        ProjectError: The folder holds a project or foreign files already, or cannot be written.
+    """
+    folder = Path(folder)
+    if (folder / PROJECT_FILE).exists():
+        raise ProjectError("There is a project already.", hint="Open it instead.", path=folder)
+    if folder.is_dir() and any(child.name != "lock" for child in folder.iterdir()):
+        raise ProjectError(
+            "The project folder holds other files.", hint="Choose an empty or a new folder.", path=folder
+        )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ProjectError(
+            f"The project folder cannot be made ({error.strerror}).", hint="Choose another place.", path=folder
+        ) from error
+    lock = ProcessLock(folder / "lock")
+    lock.acquire()
+    try:
+        _write_settings(folder, settings)
+    except ProjectError:
+        lock.release()
+        raise
+    return Project(folder, settings, lock)
+
+
+def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
+    """Open an existing project folder; for writing it is locked, and left-over snapshots are swept.
+
+    Raises:
+        ProjectError: The folder is no project, is damaged, of a newer schema, or open for writing elsewhere.
+    """
+    folder = Path(folder)
+    settings = read_settings(folder)
+    lock = None
+    if is_writable:
+        lock = ProcessLock(folder / "lock")
+        lock.acquire()
+    project = Project(folder, settings, lock)
+    if is_writable:
+        sweep(project)
+    return project
+
+
+def open_or_create_project(folder: Path | str, make_settings: Callable[[], ProjectSettings]) -> Project:
+    """Open the project in a folder, or make one there."""
+    if (Path(folder) / PROJECT_FILE).exists():
+        return open_project(folder)
+    return create_project(folder, make_settings())
+
+
+def sweep(project: Project) -> None:
+    """Remove what a killed program left behind: snapshots and half-written files. Finished files stay."""
+    leftovers = [*project.live_dir.glob("*"), *project.folder.rglob(".partial-*")]
+    for path in leftovers:
+        with suppress(OSError):
+            path.unlink()
+    if leftovers:
+        logger.info("removed %d left-over files from %s", len(leftovers), project.folder)
+
+
+def read_settings(folder: Path) -> ProjectSettings:
+    """Read project.json.
+
+    Raises:
+        ProjectError: It is missing, damaged, of a newer schema, or holds unknown or ill-typed values.
+    """
+    path = folder / PROJECT_FILE
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise ProjectError(
+            f"This folder is no project: it has no {PROJECT_FILE}.",
+            hint="Train a capture first, or open the folder that holds that file.",
+            path=folder,
+        ) from error
+    except (OSError, ValueError) as error:
+        raise ProjectError(
+            f"The project file cannot be read ({error}).", hint="Restore it from a copy.", path=path
+        ) from error
+    if not isinstance(content, dict) or "schema" not in content:
+        raise ProjectError("The project file is no project.", hint="Restore it from a copy.", path=path)
+    if content["schema"] != SCHEMA:
+        raise ProjectError(
+            f"The project has schema {content['schema']}, this version reads {SCHEMA}.",
+            hint="Use the version that wrote it.",
+            path=path,
+        )
+    known = {item.name for item in fields(ProjectSettings)}
+    unknown = sorted(set(content) - known)
+    if unknown:
+        raise ProjectError(f"The project file has unknown entries: {', '.join(unknown)}.", path=path)
+    try:
+        settings = ProjectSettings(
+            capture=str(content["capture"]),
+            fingerprint=str(content["fingerprint"]),
+            scale=float(content.get("scale", 1.0)),
+            clip_length=int(content.get("clip_length", 10)),
+            holdout=tuple(str(name) for name in content.get("holdout", ())),
+            seed=int(content.get("seed", 0)),
+            overrides=dict(content.get("overrides", {})),
+        )
+        settings.config()
+    except (KeyError, TypeError, ValueError) as error:
+        raise ProjectError(
+            f"The project file has a missing or ill-typed entry ({error}).", hint="Restore it from a copy.", path=path
+        ) from error
+    return settings
+
+
+def _write_settings(folder: Path, settings: ProjectSettings) -> None:
+    path = folder / PROJECT_FILE
+    try:
+        with atomic_path(path) as partial:
+            partial.write_text(json.dumps(asdict(settings), indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise ProjectError(
+            f"The project could not be saved ({error.strerror}).", hint="Free some space and try again.", path=path
+        ) from error
+
+
+def with_overrides(settings: ProjectSettings, overrides: dict[str, Any]) -> ProjectSettings:
+    """The same settings with training settings replaced. Raises ProjectError for a value outside its range."""
+    changed = replace(settings, overrides=settings.overrides | overrides)
+    changed.config()
+    return changed
+
+
+def read_clip_header(path: Path) -> dict[str, Any] | None:
+    """Header of a clip, checkpoint or snapshot without its arrays; None when there is none or it is damaged."""
+    try:
+        with safe_open(path, framework="numpy") as file:
+            header = json.loads((file.metadata() or {})["header"])
+    except (OSError, SafetensorError, KeyError, ValueError):
+        return None
+    return header if isinstance(header, dict) else None
+
+
+def read_metrics(path: Path) -> list[dict[str, Any]]:
+    """Rows of a metrics file; an unfinished last line is left out."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return []
+    rows = []
+    for line in lines:
+        with suppress(ValueError):
+            row = json.loads(line)
+            if isinstance(row, dict) and "step" in row:
+                rows.append(row)
+    return rows
+
+
+# ---------------------------------------------------------------- where projects lie
+
+
+def data_dir() -> Path:
+    """The user's folder for data of this program; need not exist."""
+    if sys.platform == "win32":
+        root = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        root = Path.home() / "Library" / "Application Support"
+    else:
+        root = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share")
+    return root / "ClipGStream"
+
+
+def default_project_dir(capture: Capture) -> Path:
+    """Where the window keeps the project of a capture."""
+    return data_dir() / "projects" / f"{Path(capture.path).resolve().name}-{capture.fingerprint}"

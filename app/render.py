@@ -1,0 +1,78 @@
+"""Renderer: the rasterizer's picture of Gaussians from a view, made on a thread of its own; the newest request wins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from app.arrays import GaussianArrays, Picture
+from app.latest import LatestWorker
+from app.playback import use_one_thread
+
+BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
+"""Behind everything; the same dark grey as the viewport's."""
+
+
+@dataclass(frozen=True, slots=True)
+class RenderRequest:
+    """Gaussians from a view at a size. Equal requests give equal pictures."""
+
+    gaussians_key: object
+    view_bytes: bytes
+    width: int
+    height: int
+    gaussians: GaussianArrays = field(compare=False)
+    world_to_camera: np.ndarray = field(compare=False)
+    K: np.ndarray = field(compare=False)
+
+
+class Renderer:
+    """Pictures on demand. Methods are for one thread, not the one it owns."""
+
+    def __init__(self) -> None:
+        self.worker: LatestWorker[RenderRequest, Picture] = LatestWorker("renderer", render, prepare=use_one_thread)
+
+    def picture(
+        self, gaussians: GaussianArrays, world_to_camera: np.ndarray, K: np.ndarray, width: int, height: int
+    ) -> Picture | None:
+        """The picture if it is ready; otherwise it is asked for, and the newest one is returned as stale."""
+        view_bytes = np.concatenate([world_to_camera.ravel(), K.ravel()]).astype(np.float64).tobytes()
+        request = RenderRequest(gaussians.key, view_bytes, width, height, gaussians, world_to_camera, K)
+        newest = self.worker.newest
+        if newest is not None and newest[0] == request:
+            return newest[1]
+        self.worker.request(request)
+        return None if newest is None else replace(newest[1], is_stale=True)
+
+    def clear(self) -> None:
+        """Forget the last picture."""
+        self.worker.forget()
+
+    def close(self) -> None:
+        """End the thread."""
+        self.worker.close()
+
+
+def render(request: RenderRequest) -> Picture:
+    """Rasterize one request over BACKGROUND. Runs on the renderer's thread, or wherever no window waits."""
+    import torch
+
+    from engine.raster import Gaussians, rasterize
+
+    arrays = request.gaussians
+    gaussians = Gaussians(
+        *(torch.from_numpy(a) for a in (arrays.means, arrays.quats, arrays.scales, arrays.opacities, arrays.colors))
+    )
+    with torch.no_grad():
+        rendering = rasterize(
+            gaussians,
+            torch.from_numpy(request.world_to_camera.astype(np.float32))[None],
+            torch.from_numpy(request.K.astype(np.float32))[None],
+            request.width,
+            request.height,
+            background=torch.tensor(BACKGROUND),
+            near_plane=arrays.near_plane,
+        )
+        image = (rendering.image[0].clamp(0.0, 1.0) * 255.0 + 0.5).to(torch.uint8).numpy()
+    return Picture(image, (arrays.key, request.view_bytes, request.width, request.height))

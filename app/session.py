@@ -1,0 +1,491 @@
+"""Session: the one owner of live state, and the one thing a window talks to. `dispatch` takes commands, `poll` lets
+finished work in. Belongs to one thread; nothing here blocks. Draws nothing.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from app import commands
+from app.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
+from app.jobs import JobContext, Jobs
+from app.latest import LatestWorker
+from app.notices import Notices
+from app.opening import Opened, open_for_window
+from app.pictures import CapturedPictures
+from app.playback import FrameRequest, Playback, static_points
+from app.preview import picture_hint
+from app.project import Project, check_settings
+from app.render import Renderer
+from app.settings import Settings
+from app.status import COMPARE_MODES, OVERLAY_NAMES, ClipStatus, JobStatus, Overlays, TrainingStatus
+from app.timeline import Timeline
+from app.training.messages import (
+    ClipTrained,
+    Event,
+    SnapshotWritten,
+    TrainingFailed,
+    TrainingStopped,
+    WarningRaised,
+    WorkerDied,
+)
+from app.training.process import ProcessWorker
+from app.training.service import ClipProgress, Launch, TrainingService
+from app.view import OrbitView
+from engine.capture.capture import Capture
+from engine.capture.clip import Clip
+from engine.capture.rig import CameraRig
+from engine.errors import EngineError
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class PointsRequest:
+    """A cloud to show where nothing is trained: of a reference state, or the hint made of pictures."""
+
+    kind: str
+    revision: str
+    path: Path | None = field(default=None, compare=False)
+    capture: Capture | None = field(default=None, compare=False)
+
+
+class Session:
+    """Everything the program knows while it runs.
+
+    Attributes:
+        capture, project: What is open; None before.
+        timeline, view, overlays: What the user looks at; the window may change them directly.
+        training, clip_states: Status values, remade by `poll` and `dispatch`.
+        notices: What the user has to know.
+        holdout: Camera indices that training never sees.
+
+    Args:
+        project_dir: Folder for the project of the next capture; the user's data folder when None.
+        launch: Starts a training worker; a process by default.
+        settings: Preferences; the user's own when None.
+        opener: Opens captures; tests bring their own.
+    """
+
+    def __init__(
+        self,
+        *,
+        project_dir: Path | None = None,
+        launch: Launch = ProcessWorker,
+        settings: Settings | None = None,
+        opener: Callable[..., Opened] = open_for_window,
+    ) -> None:
+        self.capture: Capture | None = None
+        self.project: Project | None = None
+        self.timeline = Timeline()
+        self.view = OrbitView()
+        self.overlays = Overlays()
+        self.notices = Notices()
+        self.settings = Settings() if settings is None else settings
+        self.training = TrainingStatus()
+        self.clip_states: list[ClipStatus] = []
+        self.holdout: tuple[int, ...] = ()
+        self._project_dir, self._launch, self._opener = project_dir, launch, opener
+        self._service: TrainingService | None = None
+        self._closing: list[tuple[TrainingService, Project]] = []
+        self._jobs = Jobs()
+        self._playback = Playback()
+        self._renderer = Renderer()
+        self._pictures = CapturedPictures()
+        self._points: LatestWorker[PointsRequest, PointArrays] = LatestWorker("points", _compute_points)
+        self._unread: SnapshotWritten | None = None
+        self._anchor_counts: dict[int, tuple[int, int]] = {}
+        self._seen: tuple[object, ...] = ()
+        self._is_closed = False
+
+    # ---------------------------------------------------------------- what is open
+
+    @property
+    def rig(self) -> CameraRig | None:
+        """Cameras of the open capture."""
+        return None if self.capture is None else self.capture.rig
+
+    @property
+    def clips(self) -> list[Clip]:
+        """Clips of the open capture."""
+        return self.timeline.clips
+
+    @property
+    def jobs(self) -> list[JobStatus]:
+        """Short jobs that run."""
+        return self._jobs.statuses
+
+    # ---------------------------------------------------------------- commands
+
+    def dispatch(self, command: commands.Command) -> None:
+        """Carry out a command. What the user could have known better becomes a notice.
+
+        Raises:
+            TypeError: The object is no command.
+        """
+        try:
+            self._obey(command)
+        except EngineError as error:
+            self.notices.add_error(_TITLES.get(type(command), "That did not work"), error)
+        self._refresh()
+
+    def _obey(self, command: commands.Command) -> None:
+        match command:
+            case commands.OpenCapture(path=path, scale=scale):
+                self._open(Path(path), scale)
+            case commands.OpenProject(path=path):
+                self._open(Path(path), None)
+            case commands.TrainNextClip():
+                self._train(None if self._service is None else self._service.next_clip_index)
+            case commands.TrainClip(clip_index=clip_index):
+                self._train(clip_index)
+            case commands.PauseTraining():
+                self._with_service(TrainingService.pause)
+            case commands.ResumeTraining():
+                self._with_service(TrainingService.resume)
+            case commands.StopTraining():
+                self._with_service(TrainingService.stop)
+            case commands.SetFrame(frame_index=frame_index):
+                self.timeline.seek(frame_index)
+            case commands.TogglePlay():
+                self.timeline.toggle_play()
+            case commands.LookThrough(camera_index=camera_index):
+                self.view.look(camera_index)
+            case commands.SetCompare(mode=mode):
+                if mode not in COMPARE_MODES:
+                    raise ValueError(f"compare is one of {', '.join(COMPARE_MODES)}, not {mode!r}")
+                self.overlays.compare = mode
+            case commands.ToggleOverlay(name=name):
+                if name not in OVERLAY_NAMES:
+                    raise ValueError(f"overlays are {', '.join(OVERLAY_NAMES)}, not {name!r}")
+                setattr(self.overlays, name, not getattr(self.overlays, name))
+            case commands.SetHoldout(camera_indices=camera_indices):
+                self._set_holdout(camera_indices)
+            case commands.SetClipLength(n_frames=n_frames):
+                self._change_settings(clip_length=int(n_frames))
+            case commands.HomeView():
+                self.view.home()
+            case commands.DismissNotice(index=index):
+                self.notices.dismiss(index)
+            case _:
+                raise TypeError(f"not a command: {command!r}")
+
+    def _with_service(self, act: Callable[[TrainingService], None]) -> None:
+        if self._service is not None:
+            act(self._service)
+
+    def _train(self, clip_index: int | None) -> None:
+        if self._service is None:
+            self.notices.add("warn", "There is nothing to train yet", "No capture is open.", "Open a capture folder.")
+        elif clip_index is None:
+            self.notices.add("info", "Every clip is trained")
+        else:
+            self._service.enqueue(clip_index)
+
+    def _set_holdout(self, camera_indices: tuple[int, ...]) -> None:
+        if self.capture is not None:
+            names = self.capture.rig.names
+            chosen = tuple(names[index] for index in sorted(set(camera_indices)) if 0 <= index < len(names))
+            self._change_settings(holdout=chosen)
+
+    def _change_settings(self, **changes: object) -> None:
+        """Replace settings that every clip shares; only while nothing was learned with the old ones."""
+        if self.capture is None or self.project is None or self._service is None:
+            return
+        if self.project.has_progress or self._service.worker is not None:
+            self.notices.add(
+                "warn",
+                "Clip length and held-out cameras are fixed once training has begun",
+                "What was learned with them would be worthless.",
+                "Use another project folder for other values.",
+            )
+            return
+        settings = self.project.settings
+        values = {"clip_length": settings.clip_length, "holdout": settings.holdout} | changes
+        changed = replace(settings, **values)  # type: ignore[arg-type]
+        check_settings(changed, self.capture)
+        self.project.update(changed)
+        self._take_clips(self.capture, self.project)
+
+    # ---------------------------------------------------------------- opening
+
+    def _open(self, path: Path, scale: float | None) -> None:
+        current = None if self.project is None else self.project.folder
+
+        def work(context: JobContext) -> Opened:
+            return self._opener(path, scale=scale, project_dir=self._project_dir, current=current, context=context)
+
+        def failed(error: Exception) -> None:
+            if isinstance(error, EngineError):
+                self.notices.add_error(f"{path.name or path} cannot be opened", error)
+            else:
+                self._report_fault(f"{path.name or path} cannot be opened", error)
+
+        self._jobs.start("Opening the capture", work, self._take_opened, failed)
+
+    def _take_opened(self, opened: Opened) -> None:
+        if opened.project is None:  # it is open already
+            self.view.home()
+            return
+        self._retire()
+        self.capture, self.project = opened.capture, opened.project
+        self.view = OrbitView(opened.capture.rig)
+        self._take_clips(opened.capture, opened.project)
+        self.settings.add_recent(opened.capture.path)
+        for sentence in opened.capture.warnings:
+            self.notices.add("warn", "The capture is odd but usable", sentence)
+        if opened.note is not None:
+            self.notices.add("warn", *opened.note)
+
+    def _take_clips(self, capture: Capture, project: Project) -> None:
+        frame_index = self.timeline.frame_index
+        self.timeline = Timeline(project.clips(capture.n_frames), fps=capture.fps)
+        self.timeline.seek(frame_index if self._service is not None else 0)
+        known = [name for name in project.settings.holdout if name in capture.rig.names]
+        self.holdout = tuple(capture.camera_indices(known))
+        self._service = TrainingService(project, self.timeline.clips, holdout=self.holdout, launch=self._launch)
+
+    def _retire(self) -> None:
+        """Let go of what was open; a training still running is ended on a thread, keeping what it learned."""
+        for store in (self._playback, self._renderer, self._pictures):
+            store.clear()
+        self._points.forget()
+        self._unread, self._anchor_counts = None, {}
+        service, project, self._service = self._service, self.project, None
+        if service is None or project is None:
+            return
+        if service.worker is None:
+            project.close()
+            return
+        self._closing.append((service, project))
+
+        def work(context: JobContext) -> None:
+            service.close()
+            project.close()
+
+        self._jobs.start("Keeping what was learned", work, lambda _: self._closing.clear(), self._forget_closing)
+
+    def _forget_closing(self, error: Exception) -> None:
+        self._closing.clear()
+        self._report_fault("A training could not be ended properly", error)
+
+    # ---------------------------------------------------------------- letting finished work in
+
+    def poll(self) -> bool:
+        """Take in what threads and workers finished. Whether something visible changed."""
+        has_changed = self._jobs.poll()
+        if self._service is not None:
+            for event in self._service.poll():
+                self._tell(event)
+                has_changed = True
+        self._release_snapshot()
+        self._collect_errors()
+        seen = self._finished_keys()
+        has_changed |= seen != self._seen
+        self._seen = seen
+        if has_changed:
+            self._refresh()
+        return has_changed
+
+    def _finished_keys(self) -> tuple[object, ...]:
+        workers = (self._playback.worker, self._renderer.worker, self._pictures.viewing, self._pictures.thumbnails)
+        newest = [worker.newest for worker in workers] + [self._points.newest]
+        statuses = [(job.name, job.done, job.message) for job in self.jobs]
+        return (*(None if found is None else found[0] for found in newest), *statuses, self.notices.revision)
+
+    def _tell(self, event: Event) -> None:
+        """Turn what the user should know into notices."""
+        match event:
+            case SnapshotWritten():
+                self._unread = event
+            case ClipTrained(path=path, held_out_psnr=psnr):
+                figure = "" if psnr is None else f"Held-out PSNR {psnr:.1f} dB."
+                self.notices.add("info", f"Clip {int(Path(path).stem)} is trained", figure)
+            case TrainingStopped(path=path, step=step):
+                detail = f"What was learned in {step} steps is kept." if path else "Nothing was learned yet."
+                self.notices.add("info", "Training stopped", detail)
+            case WarningRaised(title=title, detail=detail, hint=hint):
+                self.notices.add("warn", title, detail, hint)
+            case TrainingFailed(message=message, hint=hint):
+                self.notices.add("error", "Training failed", message, hint)
+            case WorkerDied(exit_code=exit_code, log_tail=log_tail):
+                last = log_tail.splitlines()[-1] if log_tail else "Its log is empty."
+                self.notices.add(
+                    "error",
+                    "The training process ended unexpectedly",
+                    f"{_exit_words(exit_code)} {last}",
+                    "Train the clip again; it goes on from what was kept.",
+                )
+            case _:
+                return
+        if isinstance(event, ClipTrained | TrainingStopped | TrainingFailed | WorkerDied):
+            self._unread = None
+
+    def _release_snapshot(self) -> None:
+        """Tell the worker that its snapshot was read, or that nobody looks at that clip."""
+        service, unread = self._service, self._unread
+        if service is None or unread is None or service.worker is None:
+            return
+        clip_index = service.worker.job.clip_index
+        shown = self.timeline.clip
+        is_shown = shown is not None and shown.clip_index == clip_index
+        if is_shown:
+            self.shown_gaussians()  # asks for it, should the window not have done so
+        if not is_shown or self._playback.is_loaded(clip_index, f"live-{unread.revision}"):
+            service.snapshot_consumed(clip_index, unread.revision)
+            self._unread = None
+
+    def _collect_errors(self) -> None:
+        sources = (
+            (self._playback.worker, "The clip cannot be shown"),
+            (self._renderer.worker, "The picture could not be drawn"),
+            (self._pictures.viewing, "A captured picture cannot be shown"),
+            (self._pictures.thumbnails, "A captured picture cannot be shown"),
+            (self._points, "The cloud cannot be shown"),
+        )
+        for worker, title in sources:
+            found = worker.take_error()
+            if found is None:
+                continue
+            request, error = found
+            is_live = getattr(request, "revision", "").startswith("live-")
+            if is_live:
+                if self._unread is not None:  # it may have been replaced meanwhile; the next one comes soon
+                    self._with_service(TrainingService.snapshot_now)
+                    self._drop_unread()
+                logger.info("a live state could not be read: %s", error)
+            elif isinstance(error, EngineError):
+                if not any(str(error.message) in notice.detail for notice in self.notices):
+                    self.notices.add_error(title, error)
+            else:
+                self._report_fault(title, error)
+
+    def _drop_unread(self) -> None:
+        if self._service is not None and self._service.worker is not None and self._unread is not None:
+            self._service.snapshot_consumed(self._service.worker.job.clip_index, self._unread.revision)
+        self._unread = None
+
+    def _report_fault(self, title: str, error: Exception) -> None:
+        logger.error("%s", title, exc_info=error)
+        self.notices.add(
+            "error", title, f"{type(error).__name__}: {error}", "This is a fault of the program; the log has more."
+        )
+
+    def _refresh(self) -> None:
+        """Remake the status values."""
+        if self._service is None:
+            self.training, self.clip_states = TrainingStatus(), []
+            return
+        clip = self.timeline.clip
+        if clip is not None:
+            known = self._service.progress[clip.clip_index]
+            anchors = self._playback.anchors(clip.clip_index, known.revision)
+            if anchors is not None:
+                counts = (len(anchors.inherited_positions), len(anchors.own_positions))
+                self._anchor_counts[clip.clip_index] = counts
+        self.training = self._service.status()
+        self.clip_states = self._service.clip_statuses(self._anchor_counts)
+
+    def close(self) -> None:
+        """End workers and threads, keeping what was learned. Blocks for a few seconds at most. May be called twice."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        if self._service is not None:
+            self._service.close()
+        if self.project is not None:
+            self.project.close()
+        self._jobs.close(timeout_s=6.0 if self._closing else 1.0)
+        for worker in (self._playback, self._renderer, self._pictures, self._points):
+            worker.close()
+        if self.capture is not None:
+            self.capture.close()
+
+    # ---------------------------------------------------------------- pictures and arrays
+
+    def _known(self, clip_index: int) -> ClipProgress | None:
+        return None if self._service is None else self._service.progress[clip_index]
+
+    def shown_gaussians(self) -> GaussianArrays | None:
+        """Gaussians of the shown frame; the newest ones there are until those are decoded; None where nothing is
+        trained."""
+        clip = self.timeline.clip
+        known = None if clip is None else self._known(clip.clip_index)
+        if clip is None or known is None or known.file is None or self.project is None:
+            return None
+        return self._playback.gaussians(
+            FrameRequest(
+                clip_index=clip.clip_index,
+                revision=known.revision,
+                frame_index=self.timeline.frame_index,
+                path=known.file,
+                reference_path=None if clip.clip_index == 0 else self.project.clip_path(0),
+                clip=clip,
+            )
+        )
+
+    def shown_anchors(self) -> AnchorArrays | None:
+        """Anchors of the shown clip; None until its state was loaded."""
+        clip = self.timeline.clip
+        known = None if clip is None else self._known(clip.clip_index)
+        if clip is None or known is None or not known.revision:
+            return None
+        return self._playback.anchors(clip.clip_index, known.revision)
+
+    def shown_points(self) -> PointArrays | None:
+        """A cloud for frames that are not trained: the still part of the reference clip, before that a hint.
+
+        None until it is made, and through a capture camera while there is only the hint: the captured picture itself
+        says more there.
+        """
+        if self.capture is None:
+            return None
+        reference = self._known(0)
+        if reference is not None and reference.file is not None:
+            request = PointsRequest("cloud", reference.revision, path=reference.file)
+        else:
+            request = PointsRequest("hint", self.capture.fingerprint, capture=self.capture)
+        newest = self._points.newest
+        if newest is None or newest[0] != request:
+            self._points.request(request)
+        if newest is None or (newest[1].is_hint and self.view.look_through is not None):
+            return None
+        return newest[1]
+
+    def request_render(self, width: int, height: int) -> Picture | None:
+        """The rasterizer's picture of the shown frame and view; None where nothing is trained or ready."""
+        gaussians = self.shown_gaussians()
+        if gaussians is None:
+            return None
+        K = self.view.K(width, height)
+        return self._renderer.picture(gaussians, self.view.world_to_camera(), K, width, height)
+
+    def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None:
+        """The captured picture, at most `max_width` pixels wide; None until it was decoded."""
+        if self.capture is None:
+            return None
+        return self._pictures.picture(self.capture, camera_index, frame_index, max_width)
+
+
+_TITLES: dict[type, str] = {
+    commands.TrainClip: "The clip cannot be trained",
+    commands.TrainNextClip: "The clip cannot be trained",
+    commands.SetHoldout: "These cameras cannot be held out",
+    commands.SetClipLength: "The clip length cannot be changed",
+}
+
+
+def _compute_points(request: PointsRequest) -> PointArrays:
+    if request.path is not None:
+        return static_points(request.path, request.revision)
+    assert request.capture is not None
+    return picture_hint(request.capture, 0)
+
+
+def _exit_words(exit_code: int | None) -> str:
+    if exit_code is not None and exit_code < 0:
+        return f"It was ended by signal {-exit_code}{' (often: not enough memory)' if exit_code == -9 else ''}."
+    return f"Its exit code was {exit_code}." if exit_code is not None else ""

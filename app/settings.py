@@ -1,0 +1,59 @@
+"""The user's preferences: recent folders. A small JSON file in the platform's configuration folder."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import sys
+from pathlib import Path
+
+from engine.files import atomic_path
+
+logger = logging.getLogger(__name__)
+
+MAX_RECENT = 12
+
+
+def config_dir() -> Path:
+    """The user's folder for this program's configuration; need not exist."""
+    if sys.platform == "win32":
+        root = Path(os.environ.get("APPDATA") or Path.home() / "AppData" / "Roaming")
+    elif sys.platform == "darwin":
+        root = Path.home() / "Library" / "Application Support"
+    else:
+        root = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
+    return root / "ClipGStream"
+
+
+class Settings:
+    """Preferences, saved at once when they change. A file that cannot be read counts as empty, never as a failure.
+
+    Args:
+        path: The file; the platform's place when None.
+    """
+
+    def __init__(self, path: Path | None = None) -> None:
+        self.path = config_dir() / "settings.json" if path is None else path
+        self.recent: list[str] = _read_recent(self.path)
+
+    def add_recent(self, folder: Path) -> None:
+        """Put a folder first in the list of recent ones."""
+        text = str(Path(folder).resolve())
+        self.recent = [text, *(known for known in self.recent if known != text)][:MAX_RECENT]
+        try:
+            with atomic_path(self.path) as partial:
+                partial.write_text(json.dumps({"schema": 1, "recent": self.recent}, indent=2), encoding="utf-8")
+        except OSError as error:
+            logger.warning("preferences could not be saved (%s) - %s", error.strerror, self.path)
+
+
+def _read_recent(path: Path) -> list[str]:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        return [str(folder) for folder in content["recent"]][:MAX_RECENT]
+    except FileNotFoundError:
+        return []
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        logger.warning("preferences could not be read (%s) - %s", error, path)
+        return []

@@ -1,0 +1,95 @@
+"""What the window shows of training, clips, jobs and overlays: plain values, remade when something changes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+OVERLAY_NAMES = ("show_frusta", "show_inherited", "show_residual", "show_points")
+COMPARE_MODES = ("off", "wipe", "side")
+
+
+@dataclass(slots=True)
+class Overlays:
+    """What is drawn over or beside the scene.
+
+    Attributes:
+        compare: "off", "wipe" or "side": the captured picture over or beside the rendered one.
+        wipe_position: Share of the width that shows the captured picture, 0..1.
+    """
+
+    show_frusta: bool = True
+    show_inherited: bool = False
+    show_residual: bool = False
+    show_points: bool = True
+    compare: str = "off"
+    wipe_position: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class TrainingStatus:
+    """The training as a whole, derived from queue, worker and last event.
+
+    Attributes:
+        state: idle, starting, preparing, running, paused, stopping or failed.
+        clip_index: Clip of the worker, or of the last one that failed; None when idle.
+        step, n_steps: Optimiser steps of that clip.
+        progress: Share of the current stage while preparing, of all steps later. 0..1
+        stage: What is done at the moment, as shown to the user.
+        message: One line with counts and reasons.
+        steps_per_s: Smoothed rate; 0 when unknown.
+        eta_s: Seconds until the clip is finished; None when unknown.
+        loss_history, psnr_history: (step, value) of the shown clip; PSNR is of held-out pictures, dB.
+        can_train_next: Whether TrainNextClip would start something.
+        next_clip_index: The clip that TrainNextClip would train; None when all are trained.
+        queue: Clips that wait.
+    """
+
+    state: str = "idle"
+    clip_index: int | None = None
+    step: int = 0
+    n_steps: int = 0
+    progress: float = 0.0
+    stage: str = ""
+    message: str = ""
+    steps_per_s: float = 0.0
+    eta_s: float | None = None
+    loss_history: Sequence[tuple[int, float]] = ()
+    psnr_history: Sequence[tuple[int, float]] = ()
+    can_train_next: bool = False
+    next_clip_index: int | None = None
+    queue: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ClipStatus:
+    """One clip of the project.
+
+    Attributes:
+        state: untrained, queued, preparing, training, paused, trained, failed, or stale (its reference was
+            trained again). A clip that was stopped before its end is paused: training it again goes on there.
+        progress: Share of its steps, 0..1.
+        held_out_psnr: Newest figure, dB; None when not measured.
+        n_inherited, n_own: Anchors of the shown model; 0 until it was loaded.
+    """
+
+    state: str = "untrained"
+    progress: float = 0.0
+    held_out_psnr: float | None = None
+    n_inherited: int = 0
+    n_own: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class JobStatus:
+    """A short job on a thread.
+
+    Attributes:
+        done: Share that is finished, 0..1; 0 when unknown.
+        eta_s: Seconds left; None when unknown.
+    """
+
+    name: str
+    done: float = 0.0
+    message: str = ""
+    eta_s: float | None = None

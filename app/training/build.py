@@ -1,0 +1,46 @@
+"""Builds the real training of a job from the project's files. Imports torch only when called."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from app.project import open_project
+from app.training.messages import TrainJob
+from app.training.run import Training
+from engine.capture.capture import open_capture
+from engine.errors import ProjectError
+from engine.model.clip_state import read_clip_state
+from engine.training.config import TrainConfig
+from engine.training.report import ReportProgress
+
+
+def build_training(job: TrainJob, report: ReportProgress) -> Training:
+    """Open the capture, read the reference clip where one is needed, and set the training up.
+
+    Raises:
+        CaptureError, ProjectError: Files are missing, damaged or do not fit together.
+    """
+    from engine.training.clip_training import ClipTraining  # torch takes a second to import
+
+    project = open_project(job.project, is_writable=False)
+    capture = open_capture(Path(job.capture), scale=job.scale)
+    if capture.fingerprint != project.settings.fingerprint:
+        raise ProjectError(
+            "The capture is not the one this project was made for.",
+            hint="Put the original capture back, or make a new project.",
+            path=job.capture,
+        )
+    clips = project.clips(capture.n_frames)
+    if not 0 <= job.clip_index < len(clips):
+        raise ProjectError(f"There is no clip {job.clip_index}; the capture has {len(clips)}.", path=job.project)
+    reference = None if job.clip_index == 0 else read_clip_state(project.clip_path(0))
+    return ClipTraining(
+        capture,
+        clips[job.clip_index],
+        config=TrainConfig(**job.overrides),
+        holdout=job.holdout,
+        reference=reference,
+        seed=job.seed,
+        prep_dir=project.prep_dir,
+        report=report,
+    )

@@ -1,0 +1,388 @@
+"""TrainingRun: the loop around one clip's training. Obeys commands, reports, snapshots, keeps checkpoints.
+
+It knows neither processes nor pipes: `worker` drives it in a process, `inline` inside poll().
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import os
+import time
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Protocol
+
+from app.project import Project, open_project
+from app.training.messages import (
+    ClipTrained,
+    Command,
+    Event,
+    HeldOutMeasured,
+    Pause,
+    Resume,
+    SnapshotConsumed,
+    SnapshotNow,
+    StageReported,
+    StepReported,
+    Stop,
+    TrainingFailed,
+    TrainingPaused,
+    TrainingResumed,
+    TrainingStopped,
+    TrainJob,
+    WarningRaised,
+    WorkerReady,
+)
+from app.training.rate import Rate
+from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
+from engine.errors import EngineError, NonFiniteLoss, ProjectError
+from engine.model.clip_state import ClipState
+from engine.training.report import Progress, ReportProgress, StepStats
+
+logger = logging.getLogger(__name__)
+
+REPORT_EVERY_S = 0.1
+SNAPSHOT_EVERY_S = 2.0
+SNAPSHOT_SHARE = 0.05
+"""Share of the time that snapshots may cost."""
+HELD_OUT_EVERY_S = 5.0
+HELD_OUT_SHARE = 0.03
+CHECKPOINT_EVERY_S = 30.0
+CHECKPOINT_SHARE = 0.03
+METRICS_EVERY_S = 0.5
+
+
+class Training(Protocol):
+    """What the loop needs of engine.training.ClipTraining; tests bring a small one."""
+
+    @property
+    def n_steps(self) -> int:
+        """Steps of the whole clip."""
+        ...
+
+    @property
+    def steps_done(self) -> int:
+        """Steps done."""
+        ...
+
+    def prepare(self) -> None:
+        """Build what the first step needs; may take a minute and report often."""
+        ...
+
+    def step(self) -> StepStats:
+        """One optimiser step."""
+        ...
+
+    def state(self) -> ClipState:
+        """A copy of the model."""
+        ...
+
+    def write_checkpoint(self, path: Path | str) -> None:
+        """Everything needed to go on."""
+        ...
+
+    def restore_checkpoint(self, path: Path | str) -> None:
+        """Instead of prepare."""
+        ...
+
+    def held_out_psnr(self) -> float:
+        """dB; NaN without held-out cameras."""
+        ...
+
+
+MakeTraining = Callable[[TrainJob, ReportProgress], Training]
+Receive = Callable[[float], Command | None]
+"""The next command, waiting at most this many seconds. Raises EOFError when nobody is left to send one."""
+Send = Callable[[Event], None]
+
+
+class StopRequested(Exception):
+    """Unwinds a preparation or a long step after Stop."""
+
+
+class TrainingRun:
+    """One clip, from the job to its end.
+
+    Args:
+        job: What to train.
+        receive: Source of commands.
+        send: Takes events.
+        make_training: Builds the training; its report function stays valid for the whole run.
+        can_wait: Whether to sit still while paused (a process) or to return at once (inline).
+        clock: Seconds; tests bring their own.
+    """
+
+    def __init__(
+        self,
+        job: TrainJob,
+        *,
+        receive: Receive,
+        send: Send,
+        make_training: MakeTraining,
+        can_wait: bool = True,
+        n_threads: int = 1,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._job, self._receive, self._send, self._make = job, receive, send, make_training
+        self._can_wait, self._n_threads, self._clock = can_wait, n_threads, clock
+        self._training: Training | None = None
+        self._project: Project | None = None
+        self._is_paused = False
+        self._stop: Stop | None = None
+        self._is_in_step = False
+        self._is_checkpointed_in_step = False
+        self._reported: tuple[str, str, float] = ("", "", -math.inf)
+        self._losses: list[float] = []
+        self._rate = Rate()
+        self._report_cadence = Cadence(REPORT_EVERY_S)
+        self._snapshot_cadence = Cadence(SNAPSHOT_EVERY_S, SNAPSHOT_SHARE)
+        self._checkpoint_cadence = Cadence(CHECKPOINT_EVERY_S, CHECKPOINT_SHARE)
+        self._held_out_cadence = Cadence(HELD_OUT_EVERY_S, HELD_OUT_SHARE)
+        self._metrics_cadence = Cadence(METRICS_EVERY_S)
+        self._is_snapshot_wanted = False
+        self._snapshots = SnapshotWriter(Path(job.project) / "live", job.clip_index)
+
+    # ---------------------------------------------------------------- the loop
+
+    def advance(self) -> bool:
+        """Prepare, or do one step and what is due after it. False when the run has ended and said so."""
+        try:
+            return self._advance()
+        except StopRequested:
+            self._end_stopped(can_write=not self._is_in_step)
+        except EngineError as error:
+            self._end_failed(error)
+        except Exception as error:  # noqa: BLE001 - the edge of the worker loop: reported, never lost
+            self._end_failed(error)
+        return False
+
+    def _advance(self) -> bool:
+        if self._training is None:
+            self._training = self._start()
+            return True
+        training = self._training
+        self._obey()
+        if self._is_paused:
+            return True
+        if training.steps_done >= training.n_steps:
+            self._finish(training)
+            return False
+        self._is_in_step, self._is_checkpointed_in_step = True, False
+        stats = training.step()
+        self._is_in_step = False
+        self._after_step(training, stats)
+        return True
+
+    def _start(self) -> Training:
+        job = self._job
+        self._project = open_project(job.project, is_writable=False)
+        checkpoint = self._project.checkpoint_path(job.clip_index)
+        self._send(WorkerReady(pid=os.getpid(), n_threads=self._n_threads))
+        training = self._make(job, self._report)
+        is_restored = False
+        if checkpoint.is_file():
+            try:
+                training.restore_checkpoint(checkpoint)
+                is_restored = True
+                logger.info("clip %d goes on at step %d", job.clip_index, training.steps_done)
+            except ProjectError as error:
+                self._send(WarningRaised(f"Clip {job.clip_index} starts from the beginning", str(error)))
+                training = self._make(job, self._report)
+        if not is_restored:
+            self._project.discard_progress(job.clip_index)
+            training.prepare()
+        self._send(
+            StepReported(
+                step=training.steps_done,
+                n_steps=training.n_steps,
+                loss=math.nan,
+                train_psnr=math.nan,
+                n_gaussians=0,
+                stage="",
+                steps_per_s=0.0,
+            )
+        )
+        self._write_snapshot(training)
+        self._rate.update(training.steps_done, self._clock())
+        return training
+
+    def _after_step(self, training: Training, stats: StepStats) -> None:
+        now_s = self._clock()
+        self._losses.append(stats.loss)
+        is_last = training.steps_done >= training.n_steps
+        if self._report_cadence.is_due(now_s) or is_last:
+            self._report_cadence.done(now_s, now_s)
+            self._rate.update(stats.step, now_s)
+            loss = sum(self._losses) / len(self._losses)
+            self._losses = []
+            self._send(
+                StepReported(
+                    step=stats.step,
+                    n_steps=stats.n_steps,
+                    loss=loss,
+                    train_psnr=stats.train_psnr,
+                    n_gaussians=stats.n_gaussians,
+                    stage=stats.stage,
+                    steps_per_s=self._rate.per_s,
+                )
+            )
+            if self._metrics_cadence.is_due(now_s) or is_last:
+                self._metrics_cadence.done(now_s, now_s)
+                self._note({"step": stats.step, "loss": loss, "train_psnr": stats.train_psnr})
+        is_wanted = self._is_snapshot_wanted or self._snapshot_cadence.is_due(now_s)
+        if is_wanted and self._snapshots.is_free and not is_last:
+            self._write_snapshot(training)
+        if self._held_out_cadence.is_due(now_s) and not is_last:
+            self._measure(training)
+        if self._checkpoint_cadence.is_due(now_s) and not is_last:
+            self._write_checkpoint(training)
+
+    def _finish(self, training: Training) -> None:
+        assert self._project is not None
+        value = self._measure(training)
+        state = training.state()
+        metrics = dict(state.header.get("metrics") or {})
+        if value is not None:
+            metrics["held_out_psnr"] = value
+        path = self._project.clip_path(self._job.clip_index)
+        keep_clip(ClipState(state.arrays, state.header | {"metrics": metrics}), path, self._project.live_dir)
+        with suppress(OSError):
+            self._project.checkpoint_path(self._job.clip_index).unlink(missing_ok=True)
+        self._snapshots.clear()
+        logger.info("clip %d is trained: %d steps", self._job.clip_index, training.steps_done)
+        self._send(ClipTrained(str(path), training.steps_done, value))
+
+    # ---------------------------------------------------------------- commands
+
+    def _obey(self) -> None:
+        """Take every command that waits; sit here while paused when that is allowed."""
+        wait_s = 0.0
+        while True:
+            try:
+                command = self._receive(wait_s)
+            except EOFError:  # the window is gone: keep what was learned and end
+                self._stop = Stop(keep=True)
+                raise StopRequested from None
+            match command:
+                case Stop():
+                    self._stop = command
+                    raise StopRequested
+                case Pause() if not self._is_paused:
+                    self._pause()
+                case Resume() if self._is_paused:
+                    self._is_paused = False
+                    self._send(TrainingResumed(self._steps_done))
+                case SnapshotNow():
+                    self._is_snapshot_wanted = True
+                case SnapshotConsumed(revision=revision):
+                    self._snapshots.consumed(revision)
+            if command is None and not (self._is_paused and self._can_wait):
+                return
+            wait_s = 1.0 if self._is_paused and self._can_wait else 0.0
+
+    def _pause(self) -> None:
+        self._is_paused = True
+        self._rate.pause()
+        if self._training is not None and not self._is_in_step:
+            self._write_checkpoint(self._training)  # a pause may last over night
+        self._send(TrainingPaused(self._steps_done))
+
+    @property
+    def _steps_done(self) -> int:
+        return 0 if self._training is None else self._training.steps_done
+
+    # ---------------------------------------------------------------- reporting and keeping
+
+    def _report(self, progress: Progress) -> None:
+        """Given to the training: passes progress on and obeys commands in between."""
+        if self._is_in_step and not self._is_checkpointed_in_step and self._training is not None:
+            # a step that reports is a change of phase: it takes long and is not done again for nothing
+            self._is_checkpointed_in_step = True
+            self._write_checkpoint(self._training)
+        now_s = self._clock()
+        stage, message, reported_s = self._reported
+        if (stage, message) != (progress.stage, progress.message) or now_s - reported_s >= REPORT_EVERY_S:
+            if progress.message and message != progress.message:
+                logger.info("%s: %s", progress.stage, progress.message)
+            self._reported = (progress.stage, progress.message, now_s)
+            self._send(StageReported(progress.stage, float(progress.done), progress.message))
+        self._obey()
+
+    def _write_snapshot(self, training: Training) -> None:
+        started_s = self._clock()
+        self._is_snapshot_wanted = False
+        try:
+            self._send(self._snapshots.write(training.state()))
+        except ProjectError as error:  # a full disk must not end the training; the next snapshot may fit again
+            self._send(WarningRaised("The live view could not be written", str(error), error.hint))
+        self._snapshot_cadence.done(started_s, self._clock())
+
+    def _write_checkpoint(self, training: Training) -> bool:
+        assert self._project is not None
+        started_s = self._clock()
+        is_written = True
+        try:
+            training.write_checkpoint(self._project.checkpoint_path(self._job.clip_index))
+        except ProjectError as error:
+            is_written = False
+            self._send(WarningRaised("What was learned so far could not be kept", str(error), error.hint))
+        self._checkpoint_cadence.done(started_s, self._clock())
+        return is_written
+
+    def _measure(self, training: Training) -> float | None:
+        started_s = self._clock()
+        value = float(training.held_out_psnr())
+        self._held_out_cadence.done(started_s, self._clock())
+        if not math.isfinite(value):
+            return None
+        self._send(HeldOutMeasured(training.steps_done, value))
+        self._note({"step": training.steps_done, "held_out_psnr": value})
+        return value
+
+    def _note(self, row: dict[str, Any]) -> None:
+        """Append one line to the metrics file, so that a restarted window has the whole curve."""
+        assert self._project is not None
+        path = self._project.metrics_path(self._job.clip_index)
+        row = {key: round(value, 6) if isinstance(value, float) else value for key, value in row.items()}
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+        except OSError as error:
+            logger.warning("a metrics row could not be written (%s) - %s", error.strerror, path)
+
+    # ---------------------------------------------------------------- ends
+
+    def _end_stopped(self, *, can_write: bool) -> None:
+        assert self._project is not None
+        checkpoint = self._project.checkpoint_path(self._job.clip_index)
+        if self._stop is not None and not self._stop.keep:
+            self._project.discard_progress(self._job.clip_index)
+        elif can_write and self._training is not None:
+            self._write_checkpoint(self._training)
+        self._snapshots.clear()
+        self._send(TrainingStopped(str(checkpoint) if checkpoint.is_file() else "", self._steps_done))
+
+    def _end_failed(self, error: Exception) -> None:
+        trace = "".join(traceback.format_exception(error))
+        logger.error("clip %d failed: %s", self._job.clip_index, trace)
+        if isinstance(error, NonFiniteLoss) and self._training is not None:
+            with suppress(EngineError):
+                if is_finite(self._training.state()):
+                    self._write_checkpoint(self._training)
+        message, hint = str(error), ""
+        if isinstance(error, EngineError):
+            message = error.message if error.path is None else f"{error.message} - {error.path}"
+            problems = getattr(error, "problems", ())
+            message, hint = "\n".join([message, *(str(problem) for problem in problems)]), error.hint
+        elif isinstance(error, MemoryError):
+            message, hint = "There is not enough memory.", "Use a smaller scale or fewer points."
+        else:
+            message = f"{type(error).__name__}: {error}"
+            hint = "This is a fault of the program; the log has the details."
+        self._snapshots.clear()
+        self._send(TrainingFailed(type(error).__name__, message, hint, trace))

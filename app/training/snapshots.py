@@ -1,0 +1,119 @@
+"""Model states as files: live snapshots with backpressure, the finished clip, and when it is time for the next one."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from app.training.messages import SnapshotWritten
+from engine.errors import NonFiniteLoss, ProjectError
+from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
+
+
+class Cadence:
+    """When something that costs time is due again: not more often than `every_s`, nor than its share of time allows.
+
+    Args:
+        every_s: Shortest time from one to the next, seconds.
+        max_share: Share of all time that it may take.
+    """
+
+    def __init__(self, every_s: float, max_share: float = 1.0) -> None:
+        self._every_s, self._max_share = every_s, max_share
+        self._next_s: float | None = None
+
+    def is_due(self, now_s: float) -> bool:
+        """Whether it is time; the first time is one interval after the first question."""
+        if self._next_s is None:
+            self._next_s = now_s + self._every_s
+        return now_s >= self._next_s
+
+    def done(self, started_s: float, now_s: float) -> None:
+        """Tell when it was done, from and until."""
+        self._next_s = now_s + max(self._every_s, (now_s - started_s) / self._max_share)
+
+
+class SnapshotWriter:
+    """Writes live snapshots of one clip; at most one is unconsumed at a time.
+
+    Args:
+        live_dir: Folder for them.
+        clip_index: Named in the files.
+    """
+
+    def __init__(self, live_dir: Path, clip_index: int) -> None:
+        self._live_dir, self._clip_index = live_dir, clip_index
+        self._paths: dict[int, Path] = {}
+        self.revision = 0
+        self._consumed = 0
+
+    @property
+    def is_free(self) -> bool:
+        """Whether the last snapshot was consumed."""
+        return self._consumed >= self.revision
+
+    def write(self, state: ClipState) -> SnapshotWritten:
+        """Write the next revision.
+
+        Raises:
+            ProjectError: The disk refused.
+        """
+        self.revision += 1
+        path = self._live_dir / f"clip-{self._clip_index:04d}-r{self.revision:04d}.safetensors"
+        write_clip_state(path, state)
+        self._paths[self.revision] = path
+        return SnapshotWritten(self.revision, int(state.header["step"]), str(path))
+
+    def consumed(self, revision: int) -> None:
+        """The reader is done with a revision: older ones are deleted."""
+        self._consumed = max(self._consumed, revision)
+        for old in [known for known in self._paths if known < self._consumed]:
+            with suppress(OSError):
+                self._paths.pop(old).unlink()
+
+    def clear(self) -> None:
+        """Delete every snapshot. A reader that comes late finds the finished clip instead."""
+        for path in self._paths.values():
+            with suppress(OSError):
+                path.unlink()
+        self._paths = {}
+
+
+def is_finite(state: ClipState) -> bool:
+    """Whether every number of the state is finite."""
+    return all(np.isfinite(a).all() for a in state.arrays.values() if np.issubdtype(a.dtype, np.floating))
+
+
+def keep_clip(state: ClipState, path: Path, live_dir: Path) -> None:
+    """Put a finished clip in its place, after it was written elsewhere, read back and found equal.
+
+    Raises:
+        NonFiniteLoss: The state holds numbers that are not finite.
+        ProjectError: The disk refused, or what was read back differs.
+    """
+    if not is_finite(state):
+        raise NonFiniteLoss(
+            "The trained clip holds numbers that are not finite; it was not saved.",
+            hint="Train it again with another seed or smaller learning rates.",
+        )
+    draft = live_dir / f"{path.stem}-final{path.suffix}"
+    write_clip_state(draft, state)
+    try:
+        if read_clip_state(draft).fingerprint != state.fingerprint:
+            raise ProjectError(
+                "The clip read back differs from the clip written; the disk may be damaged.",
+                hint="Check the disk, or move the project to another one.",
+                path=path,
+            )
+        path.parent.mkdir(parents=True, exist_ok=True)
+        os.replace(draft, path)
+    except OSError as error:
+        raise ProjectError(
+            f"The clip could not be put in its place ({error.strerror}).", hint="Free some space.", path=path
+        ) from error
+    finally:
+        with suppress(OSError):
+            draft.unlink(missing_ok=True)

@@ -1,0 +1,107 @@
+"""The worker process: entry point, thread counts and log file. The loop itself is `run.TrainingRun`.
+
+One process trains one clip and ends. Nothing imported here may draw anything.
+"""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
+from importlib.util import find_spec
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from app.logs import FORMAT
+from app.training.messages import Command, Event, TrainJob, decode, encode
+from app.training.run import MakeTraining, TrainingRun
+
+logger = logging.getLogger(__name__)
+
+NICENESS = 5
+"""On two cores the worker needs both; being nice lets the window go first."""
+
+
+def n_cores() -> int:
+    """Cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def n_training_threads(cores: int, *, is_window_open: bool) -> int:
+    """Threads to compute with: one core is left to the window where there are more than two."""
+    return cores - 1 if is_window_open and cores > 2 else cores
+
+
+def main(job_bytes: bytes, commands: Connection, events: Connection, log_path: str, make: MakeTraining) -> None:
+    """Runs in the child until the clip is finished, stopped or failed."""
+    _redirect_output(Path(log_path))
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C reaches the whole group; the parent decides what it means
+    # preparation may start a short process of its own, which daemons are not allowed to; this one ends with its pipe
+    multiprocessing.current_process().daemon = False
+    job = decode(job_bytes)
+    assert isinstance(job, TrainJob)
+    n_threads = _set_threads(is_window_open=job.is_window_open)
+    logger.info("worker %d trains clip %d with %d threads", os.getpid(), job.clip_index, n_threads)
+    run = TrainingRun(job, receive=_receiver(commands), send=_sender(events), make_training=make, n_threads=n_threads)
+    while run.advance():
+        pass
+    logger.info("worker %d ends", os.getpid())
+    logging.shutdown()
+
+
+def _redirect_output(path: Path) -> None:
+    """Everything printed, by us, by libraries or by a crash, goes to the log file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    descriptor = os.open(path, os.O_CREAT | os.O_WRONLY | os.O_APPEND, 0o644)
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os.dup2(descriptor, 1)
+    os.dup2(descriptor, 2)
+    os.close(descriptor)
+    logging.basicConfig(level=logging.INFO, format=FORMAT, stream=sys.stderr, force=True)
+
+
+def _set_threads(*, is_window_open: bool) -> int:
+    cores = n_cores()
+    n_threads = n_training_threads(cores, is_window_open=is_window_open)
+    if is_window_open and cores <= 2 and hasattr(os, "nice"):
+        with suppress(OSError):
+            os.nice(NICENESS)
+    os.environ["OMP_NUM_THREADS"] = str(n_threads)  # read when torch is imported, which it was not yet
+    import torch
+
+    torch.set_num_threads(n_threads)
+    if find_spec("engine.raster.cpu.threads") is not None:
+        configure: Callable[[int], object] | None = getattr(
+            import_module("engine.raster.cpu.threads"), "configure_threads", None
+        )
+        if configure is not None:
+            configure(n_threads)
+    return n_threads
+
+
+def _receiver(commands: Connection) -> Callable[[float], Command | None]:
+    def receive(wait_s: float) -> Command | None:
+        try:
+            if not commands.poll(wait_s):
+                return None
+            return decode(commands.recv_bytes())  # type: ignore[return-value]
+        except OSError as error:
+            raise EOFError from error
+
+    return receive
+
+
+def _sender(events: Connection) -> Callable[[Event], None]:
+    def send(event: Event) -> None:
+        with suppress(OSError):  # nobody listens any more; the command pipe says so too and ends the run
+            events.send_bytes(encode(event))
+
+    return send

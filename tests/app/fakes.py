@@ -1,0 +1,163 @@
+"""A tiny capture and a tiny training for tests of the application: real files, real messages, no torch, no clouds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from app.project import open_project
+from app.training.messages import TrainJob
+from engine.capture.capture import Capture, open_capture
+from engine.capture.clip import Clip
+from engine.errors import NonFiniteLoss, ProjectError
+from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
+from engine.training.report import Progress, StepStats
+
+N_STEPS = 6
+
+
+def look_at(eye: np.ndarray, target: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """World to camera, OpenCV axes. [4, 4]"""
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, up)
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(forward, right), forward])
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation, -rotation @ eye
+    return matrix
+
+
+def ring(n_cameras: int, *, radius: float = 3.0, height: float = 1.0) -> list[np.ndarray]:
+    """Cameras on a circle around the origin, z up, looking at it."""
+    angles = np.linspace(0, 2 * np.pi, n_cameras, endpoint=False)
+    eyes = [np.array([radius * np.cos(a), radius * np.sin(a), height]) for a in angles]
+    return [look_at(eye, np.zeros(3), np.array([0.0, 0.0, 1.0])) for eye in eyes]
+
+
+def write_capture(folder: Path, *, n_cameras: int = 4, n_frames: int = 6, size: tuple[int, int] = (32, 24)) -> Path:
+    """A capture in the panoptic layout: PNG-free, a few small JPEGs per camera."""
+    width, height = size
+    K = [[30.0, 0.0, width / 2], [0.0, 30.0, height / 2], [0.0, 0.0, 1.0]]
+    poses = ring(n_cameras)
+    rng = np.random.default_rng(0)
+    for camera in range(n_cameras):
+        (folder / "ims" / str(camera)).mkdir(parents=True, exist_ok=True)
+        base = rng.integers(0, 255, (height, width, 3), dtype=np.uint8)
+        for frame in range(n_frames):
+            Image.fromarray(np.roll(base, frame, axis=1)).save(folder / "ims" / str(camera) / f"{frame:06d}.jpg")
+    for name, cameras in (("train_meta.json", range(1, n_cameras)), ("test_meta.json", range(1))):
+        cameras = list(cameras)
+        meta = {
+            "w": width,
+            "h": height,
+            "k": [[K for _ in cameras] for _ in range(n_frames)],
+            "w2c": [[poses[c].tolist() for c in cameras] for _ in range(n_frames)],
+            "fn": [[f"{c}/{frame:06d}.jpg" for c in cameras] for frame in range(n_frames)],
+            "cam_id": [list(cameras) for _ in range(n_frames)],
+        }
+        (folder / name).write_text(json.dumps(meta))
+    return folder
+
+
+@dataclass
+class FakeTraining:
+    """Counts steps and keeps one number that depends on every step, so that resuming wrongly would show."""
+
+    capture: Capture
+    clip: Clip
+    reference: ClipState | None
+    report: Callable[[Progress], None]
+    n_steps: int = N_STEPS
+    fails_at: int | None = None
+    steps_done: int = 0
+    value: float = 0.0
+    prepared: bool = False
+    seen: list[int] = field(default_factory=list)
+
+    def prepare(self) -> None:
+        for share in (0.0, 0.5, 1.0):
+            self.report(Progress("Building the cloud", share, f"{share:.0%} of 12 points"))
+        self.prepared = True
+
+    def step(self) -> StepStats:
+        if self.fails_at is not None and self.steps_done == self.fails_at:
+            raise NonFiniteLoss(f"The loss became nan at step {self.steps_done + 1}.", hint="Lower the rates.")
+        self.steps_done += 1
+        self.value = self.value * 0.5 + self.steps_done
+        return StepStats(self.steps_done, self.n_steps, 1.0 / self.steps_done, 20.0, 12, "joint")
+
+    def state(self) -> ClipState:
+        header = {
+            "schema": 1,
+            "role": "reference" if self.reference is None else "source",
+            "clip_index": self.clip.clip_index,
+            "clip_length": self.clip.clip_length,
+            "n_frames": self.clip.n_frames,
+            "start": self.clip.start,
+            "step": self.steps_done,
+            "n_steps": self.n_steps,
+            "near_plane": 0.1,
+            "spacing": 0.1,
+            "metrics": {},
+        }
+        if self.reference is not None:
+            header["reference_fingerprint"] = self.reference.header["fingerprint"]
+        points = np.linspace(0, 1, 36, dtype=np.float32).reshape(12, 3)
+        arrays = {
+            "sets.static.positions": points,
+            "sets.static.color_logits": points - 0.5,
+            "value": np.array([self.value], np.float32),
+        }
+        state = ClipState(arrays, header)
+        header["fingerprint"] = state.fingerprint
+        return state
+
+    def write_checkpoint(self, path: Path | str) -> None:
+        write_clip_state(path, self.state())
+
+    def restore_checkpoint(self, path: Path | str) -> None:
+        kept = read_clip_state(path)
+        if kept.header["clip_index"] != self.clip.clip_index:
+            raise ProjectError("The checkpoint belongs to another clip.", path=path)
+        self.steps_done, self.value = kept.header["step"], float(kept.arrays["value"][0])
+
+    def held_out_psnr(self) -> float:
+        return 20.0 + self.steps_done
+
+
+def make_fake(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
+    """Builds a FakeTraining from a job as the real builder would. Overrides go unused but `joint_steps` sets n_steps
+    and `static_steps` the step that fails."""
+    project = open_project(job.project, is_writable=False)
+    capture = open_capture(job.capture, scale=job.scale)
+    clip = project.clips(capture.n_frames)[job.clip_index]
+    reference = None if job.clip_index == 0 else read_clip_state(project.clip_path(0))
+    return FakeTraining(
+        capture,
+        clip,
+        reference,
+        report,
+        n_steps=job.overrides.get("joint_steps") or N_STEPS,
+        fails_at=job.overrides.get("static_steps"),
+    )
+
+
+def make_slow(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
+    """Like make_fake, with more steps than any test waits for."""
+    training = make_fake(job, report)
+    training.n_steps = 10_000_000
+    return training
+
+
+def make_crashing(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
+    """Ends its process without a word."""
+    import os
+    import signal
+
+    os.kill(os.getpid(), signal.SIGKILL)
+    raise AssertionError("not reached")
