@@ -111,20 +111,22 @@ class Target:
             self._painter = ImagePainter(self._ctx)
         self._painter.draw(self, image, rect)
 
-    def resolve(self, background: tuple[float, float, float] = BLACK) -> moderngl.Texture:
+    def resolve(self, background: tuple[float, float, float] | None = BLACK) -> moderngl.Texture:
         """Put what was drawn over a background and round it to 8 bits.
 
         Args:
-            background: Display-encoded RGB in 0..1.
+            background: Display-encoded RGB in 0..1. None keeps the picture transparent, with colours not multiplied by
+                alpha, which is how ImGui blends: for overlays shown over another texture.
         Returns:
-            The opaque RGBA8 picture, also at `texture`.
+            The RGBA8 picture, also at `texture`; opaque unless background is None.
         """
         assert self._color is not None, "the target was released"
         assert self._resolved_framebuffer is not None, "the target was released"
         self._bind(self._resolved_framebuffer, moderngl.NOTHING)
         self._color.use(0)
         self._program["picture"] = 0
-        self._program["background"] = background
+        self._program["background"] = background or BLACK
+        self._program["is_transparent"] = background is None
         self._quad.render(moderngl.TRIANGLE_STRIP, vertices=4)
         return self.texture
 
@@ -135,7 +137,7 @@ class Target:
         return np.frombuffer(raw, dtype=np.float32).reshape(height, width, 4).copy()
 
     def read_resolved(self) -> np.ndarray:
-        """The picture of the last resolve(). [H, W, 3] uint8. Waits for the GPU."""
+        """The picture of the last resolve() without its alpha. [H, W, 3] uint8. Waits for the GPU."""
         assert self._resolved_framebuffer is not None, "the target was released"
         width, height = self._size
         raw = self._resolved_framebuffer.read(components=3, alignment=1)
