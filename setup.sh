@@ -113,13 +113,13 @@ install_packages() {
     version=$(sed -n 's/^torch==\([0-9.]*\).*/\1/p' requirements.lock)
     choose_torch "$version"
     say "installing the packages of requirements.lock (about 2.5 GB on disk)"
-    pip install --quiet --no-deps --retries 2 ${torch_options[@]+"${torch_options[@]}"} -r requirements.lock ||
+    pip install -qq --no-deps --retries 2 ${torch_options[@]+"${torch_options[@]}"} -r requirements.lock ||
         fail "pip could not install requirements.lock; its own message is above." \
             "Wheels exist for Linux x86-64 (glibc 2.35 or newer), macOS on Apple silicon and Windows, with Python 3.11 to 3.13."
     if [ "$torch_build" = default ]; then
-        pip install --quiet --retries 2 "torch==$version" # and the libraries, on Linux CUDA's, which that build asks for
+        pip install -qq --retries 2 "torch==$version" # and the libraries, on Linux CUDA's, which that build asks for
     fi
-    pip install --quiet --no-deps --no-build-isolation --editable .
+    pip install -qq --no-deps --no-build-isolation --editable .
 }
 
 fingerprint() { # what decides whether the environment is current; the folder counts because a venv cannot be moved
