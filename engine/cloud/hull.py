@@ -31,10 +31,11 @@ class Grid:
 
     @staticmethod
     def over(bounds_min: np.ndarray, bounds_max: np.ndarray, size: float) -> Grid:
-        """The grid that covers the bounds."""
-        extent = np.asarray(bounds_max, dtype=np.float64) - np.asarray(bounds_min, dtype=np.float64)
+        """The grid that covers the bounds. Its corners are multiples of `size`: two clips share one lattice."""
+        origin = np.floor(np.asarray(bounds_min, dtype=np.float64) / size) * size
+        extent = np.asarray(bounds_max, dtype=np.float64) - origin
         n_blocks = np.maximum(np.ceil(extent / (size * BLOCK)), 1).astype(np.int64)
-        return Grid(np.asarray(bounds_min, dtype=np.float64), float(size), n_blocks)
+        return Grid(origin, float(size), n_blocks)
 
     @property
     def shape(self) -> np.ndarray:

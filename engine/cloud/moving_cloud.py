@@ -59,6 +59,7 @@ def build_moving_cloud(
     bounds_min: np.ndarray,
     bounds_max: np.ndarray,
     max_points: int = 30_000,
+    voxel_size: float | None = None,
     report: Report,
 ) -> MovingCloud:
     """Hull surfaces of every frame of a clip, fused.
@@ -70,6 +71,7 @@ def build_moving_cloud(
         gains: camera_colour = gain * scene_colour. [C, 3]
         bounds_min, bounds_max: Box to search, scene units. [3]
         max_points: The voxel grows until about no more than this many points remain over the clip.
+        voxel_size: Voxel edge to use as it is, scene units; a source clip takes its reference's. None derives it.
         report: Gets one line per step with counts and the reason.
     Returns:
         MovingCloud; empty where nothing moves.
@@ -94,7 +96,8 @@ def build_moving_cloud(
     high = np.minimum(high, probe.centers(occupied.max(0)) + 1.5 * probe.size)
     wanted = VOXEL_PX * _median_footprint(probe.centers(np.unique(occupied, axis=0)), rig, near)
     size = max(wanted, float((np.prod(high - low) / MAX_GRID_VOXELS) ** (1 / 3)))
-    for _ in range(4):
+    size = voxel_size or size
+    for _ in range(0 if voxel_size else 4):
         # a few frames tell how many points the union will have before all are carved
         sampled = [surface(m, Grid.over(low, high, size)) for m in _spread(n_frames, 3)]
         n_expected = len(np.unique(np.concatenate(sampled), axis=0)) * _union_growth(n_frames)

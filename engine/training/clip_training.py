@@ -94,9 +94,7 @@ class ClipTraining:
             reference,
         )
         self.holdout = sorted(set(holdout))
-        self.camera_indices = [
-            c for c in range(len(capture.rig)) if c not in self.holdout
-        ]
+        self.camera_indices = [c for c in range(len(capture.rig)) if c not in self.holdout]
         if len(self.camera_indices) < 2:
             raise PreparationError(
                 f"Only {len(self.camera_indices)} of {len(capture.rig)} cameras are left for training; two are needed.",
@@ -106,11 +104,7 @@ class ClipTraining:
         self.seed, self.prep_dir, self.report = seed, Path(prep_dir), report
         self.width, self.height = shared_image_size(capture)
         self.rig = capture.rig.subset(self.camera_indices)
-        self.near_plane = (
-            float(near_plane(self.rig))
-            if reference is None
-            else reference.header["near_plane"]
-        )
+        self.near_plane = float(near_plane(self.rig)) if reference is None else reference.header["near_plane"]
         n_pictures = len(self.camera_indices) * clip.n_frames
         if reference is None:
             self.phases = [
@@ -120,6 +114,7 @@ class ClipTraining:
         else:
             self.phases = [("source", config.n_source_steps(n_pictures))]
         self.steps_done = 0
+        self.moving_spacing: float | None = None
         self._generator = torch.Generator().manual_seed(seed)
         self._views = [self._view(camera) for camera in range(len(capture.rig))]
         self._workspace = LossWorkspace(self.height, self.width)
@@ -184,9 +179,7 @@ class ClipTraining:
         }
 
     def _prepare_static(self) -> None:
-        self.backgrounds = estimate_backgrounds(
-            self.capture, self.camera_indices, self.config, self.report
-        )
+        self.backgrounds = estimate_backgrounds(self.capture, self.camera_indices, self.config, self.report)
         cloud = static_cloud(self.backgrounds, self.rig, self.config, self.report)
         if len(cloud.points) == 0:
             raise PreparationError(
@@ -243,27 +236,17 @@ class ClipTraining:
 
     def _add_moving(self) -> None:
         """Between the phases of a reference clip: corrected backgrounds, motion, moving anchors, field."""
-        self.backgrounds = correct_backgrounds(
-            self.backgrounds, self.pictures, self._render_static, self.report
-        )
-        write_backgrounds(
-            self.prep_dir, self.backgrounds, self._background_key(is_corrected=True)
-        )
-        cloud = self._find_motion(
-            static_points=self.model.anchor_set("static").positions.numpy()
-        )
+        self.backgrounds = correct_backgrounds(self.backgrounds, self.pictures, self._render_static, self.report)
+        write_backgrounds(self.prep_dir, self.backgrounds, self._background_key(is_corrected=True))
+        cloud = self._find_motion(static_points=self.model.anchor_set("static").positions.numpy())
         if len(cloud.points):
             self.model.add_set(
                 "moving",
-                self._anchors_on(
-                    cloud.points, cloud.colors, cloud.presence, cloud.spacing
-                ),
+                self._anchors_on(cloud.points, cloud.colors, cloud.presence, cloud.spacing),
             )
         self._ungate()
         self._attach_field(cloud.spacing)
-        self.report(
-            Progress("Carving what moves", 1.0, f"{len(cloud.points)} moving anchors")
-        )
+        self.report(Progress("Carving what moves", 1.0, f"{len(cloud.points)} moving anchors"))
 
     def _anchors_on(
         self,
@@ -285,9 +268,7 @@ class ClipTraining:
         if self.config.gate == "off":
             for role in self.model.roles():
                 anchors = self.model.anchor_set(role)
-                anchors.presence = torch.ones(
-                    len(anchors), self.clip.n_frames, dtype=torch.bool
-                )
+                anchors.presence = torch.ones(len(anchors), self.clip.n_frames, dtype=torch.bool)
 
     def _attach_field(self, spacing: float) -> None:
         """A fresh field over the dynamic anchors that are alive in this clip; none when nothing moves."""
@@ -335,9 +316,7 @@ class ClipTraining:
 
     def _prepare_source(self, reference: ClipState) -> None:
         self.spacing = reference.header["spacing"]
-        self.gains = nn.Parameter(
-            torch.from_numpy(reference.arrays["gains"].copy()), requires_grad=False
-        )
+        self.gains = nn.Parameter(torch.from_numpy(reference.arrays["gains"].copy()), requires_grad=False)
         if list(reference.header["camera_names"]) != list(self.rig.names):
             raise ProjectError(
                 "The training cameras differ from those of the reference clip.",
@@ -356,16 +335,10 @@ class ClipTraining:
         self.model = self._new_model(sets, decoder)
         known = read_backgrounds(self.prep_dir, self._background_key(is_corrected=True))
         if known is None:
-            raw = estimate_backgrounds(
-                self.capture, self.camera_indices, self.config, self.report
-            )
-            known = correct_backgrounds(
-                raw, self.pictures, self._render_static, self.report
-            )
+            raw = estimate_backgrounds(self.capture, self.camera_indices, self.config, self.report)
+            known = correct_backgrounds(raw, self.pictures, self._render_static, self.report)
         self.backgrounds = known
-        cloud = self._find_motion(
-            static_points=self.model.anchor_set("static").positions.numpy()
-        )
+        cloud = self._find_motion(static_points=self.model.anchor_set("static").positions.numpy())
         self._inherit_motion(cloud)
         self._ungate()
         self._attach_field(cloud.spacing)
@@ -376,16 +349,12 @@ class ClipTraining:
         if "moving" in self.model.roles() and len(cloud.points):
             moving = self.model.anchor_set("moving")
             centers = moving.positions.numpy()
-            is_new = residual_rows(
-                cloud.points, centers, mean_neighbor_distance(centers, k=3)
-            )
+            is_new = residual_rows(cloud.points, centers, mean_neighbor_distance(centers, k=3))
             presence = np.zeros((len(centers), self.clip.n_frames), bool)
             for frame in range(self.clip.n_frames):
                 surface = cloud.points[cloud.presence[:, frame]]
                 if len(surface):
-                    distance, _ = cKDTree(surface).query(
-                        centers, distance_upper_bound=_ALIVE_SPACINGS * cloud.spacing
-                    )
+                    distance, _ = cKDTree(surface).query(centers, distance_upper_bound=_ALIVE_SPACINGS * cloud.spacing)
                     presence[:, frame] = np.isfinite(distance)
             moving.presence = torch.from_numpy(presence)
         n_new, n_all = int(is_new.sum()), len(cloud.points)
@@ -425,16 +394,12 @@ class ClipTraining:
         name, n_steps = self.phases[index]
         self.gains.requires_grad_(self.reference is None)
         parameters = named_parameters(self.model, self.gains, self.config)
-        self._optimizer = PhaseOptimizer(
-            parameters, n_steps=n_steps, config=self.config
-        )
+        self._optimizer = PhaseOptimizer(parameters, n_steps=n_steps, config=self.config)
         self._optimizer.steps_done = steps_in_phase
         n_items = len(self.camera_indices) if name == "static" else len(self.pictures)
         self._order = ShuffledOrder(n_items, seed=self.seed + index)
         self._phase_index = index
-        if (
-            not parameters
-        ):  # nothing to learn, as in a source clip in which nothing moves
+        if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self.phases[index] = (name, steps_in_phase)
 
     def step(self) -> StepStats:
@@ -465,9 +430,7 @@ class ClipTraining:
                 image,
                 truth,
             )
-        loss = photometric_loss(
-            image, truth, ssim_weight=self.config.ssim_weight, workspace=self._workspace
-        )
+        loss = photometric_loss(image, truth, ssim_weight=self.config.ssim_weight, workspace=self._workspace)
         if self.config.volume_weight and len(gaussians):
             volume = (gaussians.scales / self.spacing).prod(1).mean()
             loss = loss + self.config.volume_weight * volume
@@ -483,9 +446,7 @@ class ClipTraining:
         try:
             self._optimizer.step()
         except NonFiniteLoss as error:
-            raise NonFiniteLoss(
-                f"{error.message} ({where})", hint="The last good state was kept."
-            ) from error
+            raise NonFiniteLoss(f"{error.message} ({where})", hint="The last good state was kept.") from error
         self.steps_done += 1
         mean_square = float(torch.mean((image.detach() - truth) ** 2))
         return StepStats(
@@ -543,18 +504,14 @@ class ClipTraining:
         """Mean PSNR of a few held-out pictures in raw colours, dB; NaN without held-out cameras."""
         values = []
         for i, camera in enumerate(self.holdout[:n_pictures]):
-            frame = self.clip.start + (i * self.clip.n_frames) // max(
-                len(self.holdout[:n_pictures]), 1
-            )
+            frame = self.clip.start + (i * self.clip.n_frames) // max(len(self.holdout[:n_pictures]), 1)
             image = render_model(
                 self.model,
                 self._views[camera],
                 self.clip.clip_time(frame),
                 reach=self._reach,
             )
-            values.append(
-                psnr(image.numpy(), self.capture.frame(camera, frame) / 255.0)
-            )
+            values.append(psnr(image.numpy(), self.capture.frame(camera, frame) / 255.0))
         return float(np.mean(values)) if values else float("nan")
 
     def state(self) -> ClipState:
@@ -574,10 +531,9 @@ class ClipTraining:
             "camera_names": list(self.rig.names),
             "near_plane": self.near_plane,
             "spacing": self.spacing,
+            "moving_spacing": self.moving_spacing,
             "decoder": decoder_sizes(self.model.decoder),
-            "field": None
-            if self.model.field is None
-            else self.model.field.shape.as_dict(),
+            "field": None if self.model.field is None else self.model.field.shape.as_dict(),
             "metrics": dict(self._metrics),
         }
         if self.reference is None:
@@ -594,9 +550,7 @@ class ClipTraining:
         index, in_phase = self._phase_at(self.steps_done)
         resume = {
             "phase_index": self._phase_index,
-            "steps_in_phase": in_phase
-            if index == self._phase_index
-            else self.phases[self._phase_index][1],
+            "steps_in_phase": in_phase if index == self._phase_index else self.phases[self._phase_index][1],
             "phases": self.phases,
             "order": self._order.state(),
             "generator": self._generator.get_state().numpy().tolist(),
@@ -605,9 +559,7 @@ class ClipTraining:
         arrays["resume.gains"] = self.gains.detach().numpy().copy()
         arrays["resume.backgrounds"] = self.backgrounds.images
         arrays["resume.is_stable"] = np.packbits(self.backgrounds.is_stable, axis=-1)
-        write_clip_state(
-            path, ClipState(arrays, state.header | {"resume": json.dumps(resume)})
-        )
+        write_clip_state(path, ClipState(arrays, state.header | {"resume": json.dumps(resume)}))
 
     def restore_checkpoint(self, path: Path | str) -> None:
         """Go on from a checkpoint instead of `prepare`.
@@ -630,13 +582,11 @@ class ClipTraining:
                 )
         self._load_pictures()
         resume = json.loads(kept.header["resume"])
-        self.spacing = kept.header["spacing"]
+        self.spacing, self.moving_spacing = kept.header["spacing"], kept.header["moving_spacing"]
         self.model = load_clip_model(kept, self.reference)
         self.gains = nn.Parameter(torch.from_numpy(kept.arrays["resume.gains"].copy()))
         images = kept.arrays["resume.backgrounds"]
-        stable = np.unpackbits(
-            kept.arrays["resume.is_stable"], axis=-1, count=images.shape[2]
-        ).astype(bool)
+        stable = np.unpackbits(kept.arrays["resume.is_stable"], axis=-1, count=images.shape[2]).astype(bool)
         self.backgrounds = Backgrounds(images, stable)
         self.phases = [(name, n) for name, n in resume["phases"]]
         self.steps_done = kept.header["step"]

@@ -88,20 +88,14 @@ class TrainConfig:
         for name, (low, high) in _RANGES.items():
             value = getattr(self, name)
             if not low <= value <= high:
-                raise ProjectError(
-                    f"{name} is {value}; it has to lie between {low} and {high}."
-                )
+                raise ProjectError(f"{name} is {value}; it has to lie between {low} and {high}.")
         if self.gate not in ("hull", "off"):
             raise ProjectError(f"gate is '{self.gate}'; it has to be 'hull' or 'off'.")
 
     def difference(self) -> dict[str, Any]:
         """Only the values that differ from the defaults."""
         default = TrainConfig()
-        return {
-            name: value
-            for name, value in asdict(self).items()
-            if value != getattr(default, name)
-        }
+        return {name: value for name, value in asdict(self).items() if value != getattr(default, name)}
 
     def n_static_steps(self, n_cameras: int) -> int:
         """Steps of the static phase for this many training cameras."""
@@ -155,17 +149,13 @@ def parse_overrides(assignments: Sequence[str]) -> dict[str, Any]:
     Raises:
         ProjectError: An assignment is malformed, a key is unknown or a value has the wrong type.
     """
-    kinds = {
-        f.name: type(f.default) for f in fields(TrainConfig) if f.default is not MISSING
-    }
+    kinds = {f.name: type(f.default) for f in fields(TrainConfig) if f.default is not MISSING}
     values: dict[str, Any] = {}
     for assignment in assignments:
         key, separator, text = assignment.partition("=")
         key = key.strip()
         if not separator:
-            raise ProjectError(
-                f"Setting '{assignment}' has no '='.", hint="Write it as key=value."
-            )
+            raise ProjectError(f"Setting '{assignment}' has no '='.", hint="Write it as key=value.")
         if key not in kinds:
             raise ProjectError(
                 f"Setting '{key}' does not exist.",
@@ -174,7 +164,5 @@ def parse_overrides(assignments: Sequence[str]) -> dict[str, Any]:
         try:
             values[key] = kinds[key](text.strip())
         except ValueError as error:
-            raise ProjectError(
-                f"Setting '{key}' is '{text}', which is no {kinds[key].__name__}."
-            ) from error
+            raise ProjectError(f"Setting '{key}' is '{text}', which is no {kinds[key].__name__}.") from error
     return values

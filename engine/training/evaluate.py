@@ -56,8 +56,7 @@ class EvalRow:
     def as_dict(self) -> dict[str, Any]:
         """JSON-able; NaN becomes None."""
         return {
-            key: None if isinstance(value, float) and np.isnan(value) else value
-            for key, value in asdict(self).items()
+            key: None if isinstance(value, float) and np.isnan(value) else value for key, value in asdict(self).items()
         }
 
 
@@ -107,10 +106,7 @@ def evaluate_clip(
         gain = camera_gain(reference, name)
         for frame in chosen:
             pixels = capture.frame(camera, frame)
-            image = (
-                render_model(model, view, clip.clip_time(frame), reach=reach).numpy()
-                * gain
-            )
+            image = render_model(model, view, clip.clip_time(frame), reach=reach).numpy() * gain
             row = compare(image, pixels, motion_mask(pixels, background))
             found = EvalRow(clip.clip_index, frame, name, camera in holdout, **row)
             rows.append(found)
@@ -119,9 +115,7 @@ def evaluate_clip(
     return rows
 
 
-def compare(
-    image: np.ndarray, pixels: np.ndarray, is_moving: np.ndarray
-) -> dict[str, float]:
+def compare(image: np.ndarray, pixels: np.ndarray, is_moving: np.ndarray) -> dict[str, float]:
     """All figures of one picture: image [H, W, 3] float, pixels [H, W, 3] uint8, is_moving [H, W] bool."""
     truth = pixels.astype(np.float32) / 255.0
     fitted = fit_colors(np.clip(image, 0.0, 1.0), truth)
@@ -140,11 +134,7 @@ def compare(
 
 def means(rows: Sequence[EvalRow]) -> dict[str, float | None]:
     """Mean of every figure over the rows that have it; None where none has."""
-    names = (
-        [name for name, value in asdict(rows[0]).items() if isinstance(value, float)]
-        if rows
-        else []
-    )
+    names = [name for name, value in asdict(rows[0]).items() if isinstance(value, float)] if rows else []
     result: dict[str, float | None] = {}
     for name in names:
         values = np.array([getattr(row, name) for row in rows], np.float64)

@@ -123,14 +123,8 @@ def _loss_kernel(image, truth, weight, moments, partials, gradient, row_sums):
             a, b = image[y, x], truth[y, x]
             difference = a - b
             total += abs(difference)
-            sign = (
-                l1_scale
-                if difference > _ZERO
-                else (-l1_scale if difference < _ZERO else _ZERO)
-            )
-            gradient[y, x] = sign + ssim_scale * (
-                mean[0, x] + _TWO * a * mean[1, x] + b * mean[2, x]
-            )
+            sign = l1_scale if difference > _ZERO else (-l1_scale if difference < _ZERO else _ZERO)
+            gradient[y, x] = sign + ssim_scale * (mean[0, x] + _TWO * a * mean[1, x] + b * mean[2, x])
         row_sums[y, 0] = total
 
 
@@ -145,9 +139,7 @@ class LossWorkspace:
 
 class _Photometric(torch.autograd.Function):
     @staticmethod
-    def forward(
-        ctx, image: Tensor, truth: Tensor, ssim_weight: float, workspace: LossWorkspace
-    ) -> Tensor:
+    def forward(ctx, image: Tensor, truth: Tensor, ssim_weight: float, workspace: LossWorkspace) -> Tensor:
         height = image.shape[0]
         image, truth = image.detach().contiguous(), truth.contiguous()
         gradient = torch.empty_like(image)
@@ -162,18 +154,14 @@ class _Photometric(torch.autograd.Function):
         )
         l1, ssim = workspace.row_sums.sum(0) / image.numel()
         ctx.gradient = gradient
-        return torch.tensor(
-            (1 - ssim_weight) * l1 + ssim_weight * (1 - ssim), dtype=image.dtype
-        )
+        return torch.tensor((1 - ssim_weight) * l1 + ssim_weight * (1 - ssim), dtype=image.dtype)
 
     @staticmethod
     def backward(ctx, loss_grad: Tensor):
         return ctx.gradient * loss_grad, None, None, None
 
 
-def photometric_loss(
-    image: Tensor, truth: Tensor, *, ssim_weight: float, workspace: LossWorkspace
-) -> Tensor:
+def photometric_loss(image: Tensor, truth: Tensor, *, ssim_weight: float, workspace: LossWorkspace) -> Tensor:
     """(1 - w) L1 + w (1 - SSIM) of one picture.
 
     Args:
@@ -190,12 +178,8 @@ def photometric_loss(
 def ssim_map(image: Tensor, truth: Tensor) -> Tensor:
     """SSIM of each pixel and channel, any float dtype, differentiable. [H, W, 3]"""
     window = torch.from_numpy(_window / _window.sum()).to(image.dtype)
-    stack = torch.stack(
-        [image, truth, image * image, truth * truth, image * truth]
-    )  # [5, H, W, 3]
-    planes = stack.permute(0, 3, 1, 2).reshape(
-        1, 15, *image.shape[:2]
-    )  # depthwise: channels stay channels
+    stack = torch.stack([image, truth, image * image, truth * truth, image * truth])  # [5, H, W, 3]
+    planes = stack.permute(0, 3, 1, 2).reshape(1, 15, *image.shape[:2])  # depthwise: channels stay channels
     planes = functional.conv2d(
         planes,
         window.view(1, 1, 1, -1).repeat(15, 1, 1, 1),
@@ -214,9 +198,7 @@ def ssim_map(image: Tensor, truth: Tensor) -> Tensor:
     return (numerator / denominator).permute(1, 2, 0)
 
 
-def photometric_loss_reference(
-    image: Tensor, truth: Tensor, *, ssim_weight: float
-) -> Tensor:
+def photometric_loss_reference(image: Tensor, truth: Tensor, *, ssim_weight: float) -> Tensor:
     """Slow truth of `photometric_loss`, any float dtype, by torch autograd."""
     l1 = (image - truth).abs().mean()
     return (1 - ssim_weight) * l1 + ssim_weight * (1 - ssim_map(image, truth).mean())

@@ -24,21 +24,13 @@ def psnr(image: np.ndarray, truth: np.ndarray, mask: np.ndarray | None = None) -
     if error.size == 0:
         return math.nan
     mean = float(error.mean())
-    return (
-        MAX_PSNR_DB if mean <= 10 ** (-MAX_PSNR_DB / 10) else -10.0 * math.log10(mean)
-    )
+    return MAX_PSNR_DB if mean <= 10 ** (-MAX_PSNR_DB / 10) else -10.0 * math.log10(mean)
 
 
 def ssim(image: np.ndarray, truth: np.ndarray) -> float:
     """Mean SSIM, 11 x 11 Gaussian window of sigma 1.5, zero padding, per channel, data range 1."""
-    clipped = torch.from_numpy(
-        np.ascontiguousarray(np.clip(image, 0.0, 1.0), dtype=np.float32)
-    )
-    return float(
-        ssim_map(
-            clipped, torch.from_numpy(np.ascontiguousarray(truth, dtype=np.float32))
-        ).mean()
-    )
+    clipped = torch.from_numpy(np.ascontiguousarray(np.clip(image, 0.0, 1.0), dtype=np.float32))
+    return float(ssim_map(clipped, torch.from_numpy(np.ascontiguousarray(truth, dtype=np.float32))).mean())
 
 
 def fit_colors(image: np.ndarray, truth: np.ndarray) -> np.ndarray:
@@ -54,10 +46,6 @@ def fit_colors(image: np.ndarray, truth: np.ndarray) -> np.ndarray:
             truth[..., channel].astype(np.float64).ravel(),
         )
         variance = float(x.var())
-        gain = (
-            float(((x - x.mean()) * (y - y.mean())).mean()) / variance
-            if variance > 1e-12
-            else 1.0
-        )
+        gain = float(((x - x.mean()) * (y - y.mean())).mean()) / variance if variance > 1e-12 else 1.0
         fitted[..., channel] = gain * (image[..., channel] - x.mean()) + y.mean()
     return fitted

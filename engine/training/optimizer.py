@@ -34,9 +34,7 @@ def named_parameters(
     for role in model.roles():
         anchors = model.anchor_set(role)
         add(f"sets.{role}.features", anchors.features, config.feature_lr)
-        add(
-            f"sets.{role}.log_offset_scales", anchors.log_offset_scales, config.scale_lr
-        )
+        add(f"sets.{role}.log_offset_scales", anchors.log_offset_scales, config.scale_lr)
         add(f"sets.{role}.log_base_scales", anchors.log_base_scales, config.scale_lr)
     for head, rate_name in _HEAD_RATES.items():
         for i, parameter in enumerate(model.decoder.head_parameters(head)):
@@ -60,18 +58,13 @@ class PhaseOptimizer:
         n_steps: int,
         config: TrainConfig,
     ) -> None:
-        self._parameters = {
-            name: parameter for name, (parameter, _) in parameters.items()
-        }
+        self._parameters = {name: parameter for name, (parameter, _) in parameters.items()}
         self._rates = {name: rate for name, (_, rate) in parameters.items()}
         self._final_ratio = config.final_lr_ratio
         self._max_norm = config.max_gradient_norm
         self.n_steps = n_steps
         self.steps_done = 0
-        groups = [
-            {"params": [p], "lr": self._rates[name], "name": name}
-            for name, p in self._parameters.items()
-        ]
+        groups = [{"params": [p], "lr": self._rates[name], "name": name} for name, p in self._parameters.items()]
         # eps far below any gradient: rarely seen anchors must not be slowed down by it
         self._adam = torch.optim.Adam(groups, eps=1e-15, fused=True) if groups else None
 
@@ -83,23 +76,13 @@ class PhaseOptimizer:
         """
         if self._adam is None:
             return
-        gradients = {
-            name: p.grad for name, p in self._parameters.items() if p.grad is not None
-        }
+        gradients = {name: p.grad for name, p in self._parameters.items() if p.grad is not None}
         norm = torch.nn.utils.get_total_norm(list(gradients.values()))
         if not torch.isfinite(norm):
-            bad = [
-                name
-                for name, gradient in gradients.items()
-                if not torch.isfinite(gradient).all()
-            ]
-            raise NonFiniteLoss(
-                f"The gradient of {', '.join(bad) or 'the sum'} is not finite."
-            )
+            bad = [name for name, gradient in gradients.items() if not torch.isfinite(gradient).all()]
+            raise NonFiniteLoss(f"The gradient of {', '.join(bad) or 'the sum'} is not finite.")
         if self._max_norm:
-            torch.nn.utils.clip_grads_with_norm_(
-                list(self._parameters.values()), self._max_norm, norm
-            )
+            torch.nn.utils.clip_grads_with_norm_(list(self._parameters.values()), self._max_norm, norm)
         decay = self._final_ratio ** (self.steps_done / max(self.n_steps, 1))
         for group in self._adam.param_groups:
             group["lr"] = self._rates[group["name"]] * decay
@@ -123,9 +106,7 @@ class PhaseOptimizer:
         for name, parameter in self._parameters.items():
             prefix = f"optimizer.{name}."
             found = {
-                k.removeprefix(prefix): torch.from_numpy(v.copy())
-                for k, v in arrays.items()
-                if k.startswith(prefix)
+                k.removeprefix(prefix): torch.from_numpy(v.copy()) for k, v in arrays.items() if k.startswith(prefix)
             }
             if found and self._adam is not None:
                 self._adam.state[parameter] = found

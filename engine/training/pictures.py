@@ -42,15 +42,11 @@ class TrainingPictures:
         camera_indices: Training cameras, in capture numbering; a row here is a position in this list.
     """
 
-    def __init__(
-        self, capture: Capture, clip: Clip, camera_indices: Sequence[int]
-    ) -> None:
+    def __init__(self, capture: Capture, clip: Clip, camera_indices: Sequence[int]) -> None:
         self.camera_indices = list(camera_indices)
         self.clip = clip
         frames = list(clip.frame_indices())
-        self._pixels = [
-            capture.frames_of(camera, frames) for camera in self.camera_indices
-        ]
+        self._pixels = [capture.frames_of(camera, frames) for camera in self.camera_indices]
 
     def __len__(self) -> int:
         return len(self.camera_indices) * self.clip.n_frames

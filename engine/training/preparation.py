@@ -20,7 +20,7 @@ from engine.capture.capture import Capture
 from engine.capture.rig import CameraRig
 from engine.cloud.background import estimate_background
 from engine.cloud.masks import motion_mask
-from engine.cloud.moving_cloud import MovingCloud, build_moving_cloud
+from engine.cloud.moving_cloud import MovingCloud, build_moving_cloud, motion_bounds
 from engine.cloud.recheck import recheck_background
 from engine.cloud.sparse import triangulate
 from engine.cloud.static_cloud import StaticCloud, build_static_cloud
@@ -64,9 +64,7 @@ def estimate_backgrounds(
         background = estimate_background(capture.frames_of(camera, frames))
         images.append(background.image)
         stable.append(background.is_stable)
-        report(
-            Progress("Looking for what stands still", (row + 1) / len(camera_indices))
-        )
+        report(Progress("Looking for what stands still", (row + 1) / len(camera_indices)))
     is_stable = np.stack(stable)
     share = 100 * is_stable.mean()
     report(
@@ -133,23 +131,15 @@ def correct_backgrounds(
     return Backgrounds(corrected, backgrounds.is_stable)
 
 
-def motion_masks(
-    pictures: TrainingPictures, backgrounds: Backgrounds, report: ReportProgress
-) -> np.ndarray:
+def motion_masks(pictures: TrainingPictures, backgrounds: Backgrounds, report: ReportProgress) -> np.ndarray:
     """What differs from the background, per frame and camera. [M, C, H, W] bool"""
     n_frames, n_cameras = pictures.clip.n_frames, len(pictures.camera_indices)
     masks = np.empty((n_frames, *backgrounds.is_stable.shape), bool)
     for row in range(n_cameras):
         for frame in range(n_frames):
-            masks[frame, row] = motion_mask(
-                pictures.raw(row, frame), backgrounds.images[row]
-            )
+            masks[frame, row] = motion_mask(pictures.raw(row, frame), backgrounds.images[row])
         report(Progress("Finding what moves", (row + 1) / n_cameras))
-    report(
-        Progress(
-            "Finding what moves", 1.0, f"{100 * masks.mean():.1f} % of pixels move"
-        )
-    )
+    report(Progress("Finding what moves", 1.0, f"{100 * masks.mean():.1f} % of pixels move"))
     return masks
 
 
@@ -161,8 +151,15 @@ def moving_cloud(
     static_points: np.ndarray,
     config: TrainConfig,
     report: ReportProgress,
+    *,
+    voxel_size: float | None,
 ) -> MovingCloud:
-    """Surface points of what moves, fused over the frames of the clip, with the frames each exists in."""
+    """Surface points of what moves, fused over the frames of the clip, with the frames each exists in.
+
+    Args:
+        voxel_size: The reference clip's for a source clip, so that the same place gives the same anchors; None
+            derives it from the pixel footprint.
+    """
 
     def say(line: str) -> None:
         report(Progress("Carving what moves", 0.5, line))
@@ -179,6 +176,7 @@ def moving_cloud(
         bounds_min=lower,
         bounds_max=upper,
         max_points=config.max_moving_points,
+        voxel_size=voxel_size,
         report=say,
     )
 
@@ -202,6 +200,4 @@ def read_backgrounds(prep_dir: Path, key: dict) -> Backgrounds | None:
             images, packed = file.get_tensor("images"), file.get_tensor("is_stable")
     except (OSError, SafetensorError, KeyError):
         return None  # a cache: estimated again by the caller
-    return Backgrounds(
-        images, np.unpackbits(packed, axis=-1, count=images.shape[2]).astype(bool)
-    )
+    return Backgrounds(images, np.unpackbits(packed, axis=-1, count=images.shape[2]).astype(bool))
