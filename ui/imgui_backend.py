@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pyglet
-from imgui_bundle import imgui, implot
+from imgui_bundle import ImVec2, imgui, implot
 from pyglet.event import EVENT_HANDLED
 from pyglet.window import key, mouse
 
@@ -185,8 +185,8 @@ class ImGuiBackend:
         io = imgui.get_io()
         width, height = self._window.get_size()
         pixel_width, pixel_height = self._window.get_framebuffer_size()
-        io.display_size = (float(max(width, 1)), float(max(height, 1)))
-        io.display_framebuffer_scale = (pixel_width / max(width, 1), pixel_height / max(height, 1))
+        io.display_size = ImVec2(max(width, 1), max(height, 1))
+        io.display_framebuffer_scale = ImVec2(pixel_width / max(width, 1), pixel_height / max(height, 1))
         now_s = time.perf_counter()
         measured_s = now_s - self._last_frame_s
         self._last_frame_s = now_s

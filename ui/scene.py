@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import moderngl
 import numpy as np
@@ -34,7 +34,13 @@ MOVING_SHARE = 0.5
 """Share of the full size that the CPU rasterizer draws while the view moves."""
 FRUSTUM_SHARE = 0.09
 """Length of a camera's pyramid as a share of the rig's radius."""
-CLOUD, CAPTURED, MARKS = "Point cloud", "Captured picture", "Cameras only"
+RENDERED, CLOUD, HINT, CAPTURED, MARKS = (
+    "Rendered",
+    "Point cloud",
+    "Captured pictures in space",
+    "Captured picture",
+    "Cameras only",
+)
 
 
 @dataclass(frozen=True)
@@ -70,10 +76,11 @@ class Composed:
 
 @dataclass(frozen=True)
 class AnchorCounts:
-    """Anchors held for the overlays, by origin."""
+    """Anchors held for the overlays, by origin. Those of the reference clip itself count as inherited."""
 
     n_inherited: int = 0
     n_residual: int = 0
+    is_reference: bool = False
 
 
 class Scene:
@@ -94,6 +101,9 @@ class Scene:
         self._drawn_key: Hashable = None
         self._asked_size: tuple[int, int] | None = None
         self._asked_capture: tuple[int, int, int] | None = None
+        self._near = NEAR
+        self._is_hint = False
+        self._hint_size = 1.0
         self._picture_key: Hashable = None
         self._captured_key: Hashable = None
 
@@ -167,14 +177,20 @@ class Scene:
         if gaussians is None:
             return None, False
         self._splats.upload(gaussians)
+        self._near = gaussians.near_plane
         return gaussians.key, False
 
     def _take_points(self, session: Any) -> Hashable:
-        points = session.shown_points() if session.overlays.show_points else None
-        if points is None or len(points[0]) == 0:
+        cloud = session.shown_points() if session.overlays.show_points else None
+        if cloud is None:
             return None
-        positions, colors, key = points
-        self._cloud.set(positions, colors, key=key)
+        points, colors, key = cloud
+        if len(points) == 0:
+            return None
+        self._cloud.set(points, colors, key=key)
+        self._is_hint = cloud.is_hint
+        if self._is_hint and len(points) > 1:  # pictures as grids: as large as the gap between neighbours
+            self._hint_size = 1.4 * float(np.linalg.norm(points[1] - points[0]))
         return key
 
     def _take_captured(self, session: Any, width_px: int) -> Hashable:
@@ -204,11 +220,15 @@ class Scene:
         if anchors is None:
             self.counts = AnchorCounts()
             return (frusta_key, session.view.look_through)
-        self.counts = AnchorCounts(len(anchors.inherited_positions), len(anchors.own_positions))
+        inherited, residual = anchors.inherited_positions, anchors.own_positions
+        is_reference = len(inherited) == 0
+        if is_reference:  # what the reference clip learns is what the others inherit
+            inherited, residual = residual, inherited
+        self.counts = AnchorCounts(len(inherited), len(residual), is_reference)
         if overlays.show_inherited:
-            self._inherited.set(anchors.inherited_positions, np.array(INHERITED_ANCHOR_COLOR), key=anchors.key)
+            self._inherited.set(inherited, np.array(INHERITED_ANCHOR_COLOR), key=anchors.key)
         if overlays.show_residual:
-            self._residual.set(anchors.own_positions, np.array(RESIDUAL_ANCHOR_COLOR), key=anchors.key)
+            self._residual.set(residual, np.array(RESIDUAL_ANCHOR_COLOR), key=anchors.key)
         return (
             frusta_key,
             session.view.look_through,
@@ -224,13 +244,16 @@ class Scene:
         target = self._target
         target.clear()
         if base_key is not None:
+            self.shows = RENDERED
             if self.is_software:
                 target.draw_image(self._picture)
             else:
-                self._splats.draw(target, *camera, NEAR)
+                self._splats.draw(target, *camera, self._near)
         elif points_key is not None:
-            self.shows = CLOUD
-            self._cloud.draw(target, *camera, shape="circle", size=self._cloud_point_px(view), is_depth_tested=True)
+            self.shows = HINT if self._is_hint else CLOUD
+            unit: Literal["px", "world"]
+            size, unit = (self._hint_size, "world") if self._is_hint else (self._cloud_point_px(view), "px")
+            self._cloud.draw(target, *camera, shape="circle", size=size, unit=unit, is_depth_tested=True)
         elif captured_key is not None:
             self.shows = CAPTURED
             target.draw_image(self._captured)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from app import commands
+from app.arrays import AnchorArrays, Picture, PointArrays
 from app.notices import Notices
 from app.status import ClipStatus, JobStatus, Overlays, TrainingStatus
 from app.timeline import Timeline
@@ -52,24 +53,6 @@ class FakeCapture:
     fps: float = 30.0
 
 
-@dataclass(frozen=True)
-class FakePicture:
-    """An image, what it shows, and whether something newer is on its way."""
-
-    image: np.ndarray
-    key: Any
-    is_stale: bool = False
-
-
-@dataclass(frozen=True)
-class FakeAnchors:
-    """Anchor positions by origin."""
-
-    inherited_positions: np.ndarray
-    own_positions: np.ndarray
-    key: Any
-
-
 class FakeSession:
     """See the module docstring. `has_capture=False` starts empty."""
 
@@ -85,7 +68,7 @@ class FakeSession:
         random = np.random.default_rng(seed)
         self._points = random.normal(0, 0.6, (6000, 3)).astype(np.float32)
         self._colors = (0.5 + 0.5 * np.sin(self._points * 3 + np.array([0, 2, 4]))).astype(np.float32)
-        self._anchors = FakeAnchors(self._points[:1500], self._points[1500:1800] * 0.4, key=("anchors", 0))
+        self._anchors = AnchorArrays(self._points[:1500], self._points[1500:1800] * 0.4, key=("anchors", 0))
         self.capture: FakeCapture | None = None
         self.rig: CameraRig | None = None
         self.clips: list[Any] = []
@@ -138,7 +121,7 @@ class FakeSession:
         clip = self.timeline.clip_of(self.timeline.frame_index)
         return clip is not None and self.clip_states[clip.clip_index].state == "trained"
 
-    def request_render(self, width: int, height: int) -> FakePicture | None:
+    def request_render(self, width: int, height: int) -> Picture | None:
         """A gradient that depends on the frame, for trained clips."""
         if not self._is_trained():
             return None
@@ -148,24 +131,24 @@ class FakeSession:
         tint = np.array([1.0, 0.8, 0.6], dtype=np.float32)
         image = ((x * 0.5 + y * 0.5) * tint).astype(np.uint8)
         matrix = np.asarray(self.view.world_to_camera())
-        return FakePicture(image, key=(self.timeline.frame_index, width, height, matrix.tobytes()))
+        return Picture(image, key=(self.timeline.frame_index, width, height, matrix.tobytes()))
 
     def shown_gaussians(self) -> None:
         """No Gaussians here."""
         return
 
-    def shown_anchors(self) -> FakeAnchors | None:
+    def shown_anchors(self) -> AnchorArrays | None:
         """Anchors of trained clips."""
         return self._anchors if self._is_trained() else None
 
-    def shown_points(self) -> tuple[np.ndarray, np.ndarray, Any] | None:
+    def shown_points(self) -> PointArrays:
         """A coloured ball of points."""
-        return self._points, self._colors, ("points", 0)
+        return PointArrays(self._points, self._colors, ("points", 0))
 
-    def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> FakePicture:
+    def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture:
         """Stripes that differ per camera."""
         height = max_width * 3 // 4
         x = np.arange(max_width)[None, :, None] * 255 // max_width
         image = np.broadcast_to(x, (height, max_width, 3)).astype(np.uint8).copy()
         image[:, :, camera_index % 3] = (camera_index * 37) % 255
-        return FakePicture(image, key=(camera_index, frame_index, max_width))
+        return Picture(image, key=(camera_index, frame_index, max_width))

@@ -41,7 +41,8 @@ def test_frame_under_the_pointer_is_inside_the_capture_and_its_cell(frames: int,
 def test_plot_arrays_are_contiguous_finite_and_short() -> None:
     history = [(step, float("nan") if step == 3 else 1.0 / (step + 1)) for step in range(5000)]
     steps, values = plot_arrays(history)
-    assert steps.flags.c_contiguous and values.flags.c_contiguous
+    assert steps.flags.c_contiguous
+    assert values.flags.c_contiguous
     assert len(steps) == len(values) == MAX_PLOT_POINTS
     assert np.isfinite(values).all()
     assert (steps[0], steps[-1]) == (0, 4999)

@@ -55,6 +55,19 @@ def test_left_drag_orbits_by_the_pointer_s_path(pilot: Pilot) -> None:
     assert view.pitch == pytest.approx(expected.pitch, abs=1e-6)
 
 
+def test_the_way_to_the_press_is_no_drag(pilot: Pilot) -> None:
+    view, (x, y) = pilot.session.view, pilot.rects["viewport.canvas"].center
+    pilot.move(*pilot.rects["timeline.track"].center)
+    yaw = view.yaw
+    up = pilot.studio.window.height - 1 - y
+    pilot.studio.window.dispatch_event("on_mouse_motion", x, up, 50, 300)
+    pilot.studio.window.dispatch_event("on_mouse_press", x, up, mouse.LEFT, 0)
+    pilot.draw(2)
+    assert view.yaw == yaw
+    pilot.studio.window.dispatch_event("on_mouse_release", x, up, mouse.LEFT, 0)
+    pilot.draw(2)
+
+
 def test_right_drag_pans_and_keeps_the_angles(pilot: Pilot) -> None:
     view, (x, y) = pilot.session.view, pilot.rects["viewport.canvas"].center
     yaw, pivot = view.yaw, np.array(view.pivot)

@@ -116,7 +116,16 @@ class CapturePanel:
             draw.add_rect_filled(box.low, box.high, theme.u32(theme.BACKDROP), 3)
             draw.add_text(ImVec2(box.x0 + 24, box.y0 + 12), theme.u32(theme.OUTLINE), Icon.CAMERA)
         else:
-            draw.add_image(imgui.ImTextureRef(texture.texture.glo), box.low, box.high)
+            low, high = crop_to(texture.size[0] / max(texture.size[1], 1), box.width / box.height)
+            draw.add_image_rounded(
+                imgui.ImTextureRef(texture.texture.glo),
+                box.low,
+                box.high,
+                low,
+                high,
+                theme.u32(theme.rgb(255, 255, 255)),
+                3,
+            )
         x = box.x1 + 10
         draw.add_text(ImVec2(x, row.y0 + 6), theme.u32(theme.TEXT), name)
         width, height = (int(v) for v in rig.image_sizes[index])
@@ -127,6 +136,13 @@ class CapturePanel:
             tag = Rect(row.x1 - text_width - 18, row.y0 + 6, row.x1 - 4, row.y0 + 25)
             draw.add_rect(tag.low, tag.high, theme.u32(theme.HELD_OUT), 4)
             draw.add_text(ImVec2(tag.x0 + 7, tag.y0 + 1), theme.u32(theme.HELD_OUT), label)
+
+
+def crop_to(image_aspect: float, box_aspect: float) -> tuple[ImVec2, ImVec2]:
+    """Texture corners of the largest centred part of an image that fills a box without stretching."""
+    share_x = min(box_aspect / image_aspect, 1.0)
+    share_y = min(image_aspect / box_aspect, 1.0)
+    return ImVec2(0.5 - share_x / 2, 0.5 - share_y / 2), ImVec2(0.5 + share_x / 2, 0.5 + share_y / 2)
 
 
 def held_out_cameras(session: Any) -> frozenset[int]:

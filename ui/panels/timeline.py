@@ -18,7 +18,7 @@ RULER_HEIGHT = 22.0
 BAND_GAP = 6.0
 MIN_TICK_SPACING_PX = 56.0
 
-STATE_WORDS = {
+STATE_WORDS: dict[str, str] = {
     "untrained": "not trained",
     "queued": "waiting",
     "preparing": "preparing",
@@ -200,7 +200,7 @@ def _draw_band_text(draw: Any, band: Rect, session: Any, clip: Any, status: Any,
     state = status.state
     icon = theme.CLIP_ICONS.get(state, "")
     title = _clip_title(clip.clip_index)
-    words = STATE_WORDS.get(state, state)
+    words: str = STATE_WORDS.get(state, str(state))
     if state in ("preparing", "training", "paused"):
         words = f"{words} {status.progress * 100:.0f} %"
     if status.held_out_psnr is not None:

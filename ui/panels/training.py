@@ -69,8 +69,8 @@ def _draw_buttons(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         imgui.set_item_tooltip("T")
         if index is not None and index < len(session.clips):
             clip = session.clips[index]
-            kind = "the reference: it sees the scene first" if index == 0 else "starts from the reference"
-            text_wrapped_dim(f"Next is clip {index}, frames {clip.start} to {clip.start + clip.n_frames - 1}; {kind}.")
+            kind = "the reference that the others start from" if index == 0 else "it starts from the reference"
+            text_wrapped_dim(f"Next: clip {index}, frames {clip.start} to {clip.stop - 1}, {kind}.")
         return
     half = (width - 8) / 2
     if status.state == "paused":
@@ -152,6 +152,8 @@ def _draw_curve(title: str, history: Any, color: theme.Color, height: float, *, 
     else:
         bare = axis | implot.AxisFlags_.no_decorations
         implot.setup_axes("", "", bare, bare)
+        implot.setup_axes_limits(0.0, 1.0, 0.0, 1.0, implot.Cond_.always)
+        implot.plot_text("appears while a clip trains", 0.5, 0.5)
     implot.end_plot()
 
 
@@ -170,7 +172,7 @@ def _draw_clips(session: Any) -> None:
         imgui.table_next_row()
         imgui.table_next_column()
         icon = theme.CLIP_ICONS.get(status.state, "")
-        words = STATE_WORDS.get(status.state, status.state)
+        words: str = STATE_WORDS.get(status.state, str(status.state))
         imgui.text(f"{clip.clip_index}")
         imgui.same_line(24)
         imgui.text_colored(ImVec4(*theme.status_color(status.state)), f"{icon}  {words}" if icon else words)

@@ -101,7 +101,10 @@ class ViewportPanel:
         imgui.invisible_button("canvas", size, flags)
         ui.mark_rect("viewport.canvas", area)
         shown = session.view.look_through
-        image_size = None if shown is None else tuple(int(v) for v in session.rig.image_sizes[shown])
+        image_size = None
+        if shown is not None:
+            width, height = session.rig.image_sizes[shown]
+            image_size = (int(width), int(height))
         panes = arrange(area, image_size, session.overlays.compare)
         self._navigate(session, dispatch, panes)
         # Looking through a camera may just have ended; the picture then fills the area from the next frame on.
@@ -168,6 +171,7 @@ class ViewportPanel:
             self.note_moved()
         if imgui.is_item_activated():
             self._drag = "wipe" if self._is_on_wipe(session, panes, io.mouse_pos) else "view"
+            return  # the pointer's way to where it was pressed is no drag
         if not imgui.is_item_active():
             self._drag = None
             if imgui.is_item_hovered() and self._is_on_wipe(session, panes, io.mouse_pos):
@@ -243,7 +247,7 @@ class ViewportPanel:
             if texture is not None:
                 draw.add_image(imgui.ImTextureRef(texture.glo), captured.low, captured.high)
             chip(draw, captured.x0 + 10, captured.y0 + 10, "Captured")
-            chip(draw, panes.rendered.x0 + 10, panes.rendered.y0 + 10, "Rendered")
+            chip(draw, panes.rendered.x0 + 10, panes.rendered.y0 + 10, self.scene.shows)
             return
         share = session.overlays.wipe_position
         x = captured.x0 + captured.width * share
@@ -261,7 +265,7 @@ class ViewportPanel:
         if share > 0.15:
             chip(draw, captured.x0 + 10, captured.y0 + 10, "Captured")
         if share < 0.85:
-            chip(draw, captured.x1 - 10, captured.y0 + 10, "Rendered", is_right=True)
+            chip(draw, captured.x1 - 10, captured.y0 + 10, self.scene.shows, is_right=True)
 
     # ---- HUD -------------------------------------------------------------------------------------------------
 
@@ -302,10 +306,12 @@ class ViewportPanel:
         counts = self.scene.counts
         rows = []
         if session.overlays.show_inherited and counts.n_inherited:
-            rows.append(("circle", theme.INHERITED, f"{grouped(counts.n_inherited)} inherited anchors"))
+            kind = "reference" if counts.is_reference else "inherited"
+            rows.append(("circle", theme.INHERITED, f"{grouped(counts.n_inherited)} {kind} anchors"))
         if session.overlays.show_residual and counts.n_residual:
             rows.append(("diamond", theme.RESIDUAL, f"{grouped(counts.n_residual)} residual anchors"))
-        y = area.y0 + 12
+        is_labelled = session.overlays.compare == "wipe" and session.view.look_through is not None
+        y = area.y0 + (44 if is_labelled else 12)
         for shape, color, text in rows:
             width = imgui.calc_text_size(text).x
             x = area.x1 - width - 46

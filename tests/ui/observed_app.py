@@ -1,0 +1,91 @@
+"""Starts the program exactly as `clipgstream ARGUMENTS` does, and writes what it shows and when into a file.
+
+    python observed_app.py STATE_FILE ARGUMENTS...
+
+STATE_FILE is replaced about ten times a second with JSON: rectangles, time, view, training, notices. STATE_FILE.log
+gets one JSON line per forwarded input event and per finished frame, with CLOCK_MONOTONIC seconds. Nothing is changed
+in how the program behaves.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+STATE_PERIOD_S = 0.1
+
+
+def describe(studio: Any) -> dict[str, Any]:
+    """What a test wants to know of the running window."""
+    session = studio.session
+    view, timeline, training = session.view, session.timeline, session.training
+    rects = {name: [r.x0, r.y0, r.x1, r.y1] for name, r in studio.frame.ui.rects.items()}
+    return {
+        "rects": rects,
+        "capture": None if session.capture is None else str(session.capture.path),
+        "frame_index": timeline.frame_index,
+        "n_frames": timeline.n_frames,
+        "is_playing": timeline.is_playing,
+        "yaw": view.yaw,
+        "pitch": view.pitch,
+        "distance": view.distance,
+        "look_through": view.look_through,
+        "compare": session.overlays.compare,
+        "training": {"state": training.state, "step": training.step, "n_steps": training.n_steps},
+        "clips": [clip.state for clip in session.clip_states],
+        "notices": [[notice.kind, notice.title, notice.detail, notice.hint] for notice in session.notices],
+        "jobs": [job.name for job in session.jobs],
+        "is_help_open": studio.frame.ui.is_help_open,
+        "shows": studio.frame.viewport.scene.shows,
+    }
+
+
+def watch(state_path: Path) -> None:
+    """Hook the window class so that each window reports into the file."""
+    import ui.window as window_module
+
+    class ObservedWindow(window_module.StudioWindow):
+        """The same window, reporting."""
+
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            super().__init__(*arguments, **options)
+            self._written_s = 0.0
+            self._log = Path(f"{state_path}.log").open("w", buffering=1)  # noqa: SIM115 - open as long as the window
+            for name in ("on_mouse_motion", "on_mouse_drag", "on_mouse_press", "on_key_press", "on_mouse_scroll"):
+                self.window.push_handlers(**{name: self._reporter(name)})
+
+        def _reporter(self, name: str) -> Any:
+            def report(*values: float) -> None:
+                self._log.write(json.dumps({"event": name, "values": values[:2], "at_s": time.monotonic()}) + "\n")
+
+            return report
+
+        def draw(self) -> None:
+            started_s = time.monotonic()
+            super().draw()
+            self.ctx.finish()  # so that the time is that of the finished picture
+            self._log.write(json.dumps({"frame_s": started_s, "at_s": time.monotonic()}) + "\n")
+
+        def tick(self, dt_s: float) -> None:
+            super().tick(dt_s)
+            if time.monotonic() - self._written_s > STATE_PERIOD_S:
+                self._written_s = time.monotonic()
+                temporary = Path(f"{state_path}.new")
+                temporary.write_text(json.dumps(describe(self)))
+                os.replace(temporary, state_path)
+
+    window_module.StudioWindow = ObservedWindow
+
+
+if __name__ == "__main__":  # the training worker imports this module again
+    import pyglet
+
+    pyglet.options.shadow_window = False
+    watch(Path(sys.argv[1]))
+    from ui.main import main
+
+    sys.exit(main(sys.argv[2:]))
