@@ -1,5 +1,6 @@
 """Shared fixtures: fixed seeds, few torch threads, a tiny capture with known truth, and the golden-picture switch."""
 
+import os
 import random
 import sys
 from pathlib import Path
@@ -9,6 +10,10 @@ import pytest
 
 SEED = 20_240
 TORCH_THREADS = 2  # what the smallest machine has; more would make sums, and so results, depend on the machine
+
+
+def pytest_configure() -> None:
+    os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the layer the program uses; set before numba is imported
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -45,9 +50,13 @@ def rng() -> np.random.Generator:
 
 @pytest.fixture(scope="session")
 def tiny_capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder of a small capture in the layout of the shipped sample, made once per session by our own generator."""
+    """Folder of a small capture in the layout of the shipped sample, made once per session by our own generator.
+
+    Eight cameras of 96x72, two clips of five frames; the second clip has the object that appears. About two seconds.
+    """
+    pytest.importorskip("open3d", reason="the generator needs Open3D and its system libraries", exc_type=ImportError)
     from engine.synthetic import write_capture
 
     folder = tmp_path_factory.mktemp("tiny_capture")
-    write_capture(folder)
+    write_capture(folder, size=(96, 72), n_cameras=8, n_frames=10, clip_length=5, supersampling=2)
     return folder
