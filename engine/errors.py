@@ -13,6 +13,7 @@ Programming mistakes are assertions or ValueError/TypeError, not these.
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 
 class EngineError(Exception):
@@ -34,7 +35,7 @@ class EngineError(Exception):
         text = " ".join(part for part in (self.message, self.hint) if part)
         return f"{text} - {self.path}" if self.path is not None else text
 
-    def __reduce__(self):  # keeps keyword-only arguments through a process boundary
+    def __reduce__(self) -> tuple[Any, ...]:  # keeps keyword-only arguments through a process boundary
         return (_rebuild, (type(self), self.message, self.hint, self.path))
 
 
@@ -57,7 +58,7 @@ class CaptureError(EngineError):
         self.problems = tuple(problems)
         super().__init__(message, hint=hint, path=path)
 
-    def __reduce__(self):  # the listed problems cross a process boundary too
+    def __reduce__(self) -> tuple[Any, ...]:  # the listed problems cross a process boundary too
         return (_rebuild_capture_error, (self.message, self.hint, self.path, self.problems))
 
     def __str__(self) -> str:
