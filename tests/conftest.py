@@ -52,7 +52,7 @@ def rng() -> np.random.Generator:
 def tiny_capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a small capture in the layout of the shipped sample, made once per session by our own generator.
 
-    Eight cameras of 96x72, two clips of five frames; the second clip has the object that appears. About two seconds.
+    Eight cameras of 96x72, two clips of five frames; the second clip has the object that appears. Takes a few seconds.
     """
     pytest.importorskip("open3d", reason="the generator needs Open3D and its system libraries", exc_type=ImportError)
     from engine.synthetic import write_capture

@@ -224,15 +224,12 @@ class ClipTraining:
     def _find_motion(self, *, static_points: np.ndarray) -> MovingCloud:
         masks = motion_masks(self.pictures, self.backgrounds, self.report)
         gains = self.gains.detach().numpy()
-        return moving_cloud(
-            self.pictures,
-            masks,
-            self.rig,
-            gains,
-            static_points,
-            self.config,
-            self.report,
+        voxel_size = None if self.reference is None else self.reference.header["moving_spacing"]
+        cloud = moving_cloud(
+            self.pictures, masks, self.rig, gains, static_points, self.config, self.report, voxel_size=voxel_size
         )
+        self.moving_spacing = float(cloud.spacing) if len(cloud.points) else voxel_size
+        return cloud
 
     def _add_moving(self) -> None:
         """Between the phases of a reference clip: corrected backgrounds, motion, moving anchors, field."""

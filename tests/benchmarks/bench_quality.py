@@ -1,0 +1,168 @@
+"""Quality against time: train the first clips of a capture and print the table of held-out figures.
+
+    python -m tests.benchmarks.bench_quality assets/sample
+    python -m tests.benchmarks.bench_quality PATH/panoptic_basketball --holdout 0,10,15,30 --pictures out/
+
+Held-out cameras are only looked at after a clip is finished. Seconds are wall clock on this machine, kernels compiled
+beforehand; preparation (clouds, masks) and training are told apart. `--pictures` writes truth, render and error side
+by side for every held-out camera at the middle of each clip.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from PIL import Image
+
+from engine.capture.capture import Capture, open_capture
+from engine.capture.clip import Clip, split_clips
+from engine.model.clip_model import load_clip_model
+from engine.model.clip_state import ClipState
+from engine.model.view import View, render_model
+from engine.raster.cpu.threads import configure_threads
+from engine.training.clip_training import ClipTraining
+from engine.training.config import TrainConfig, parse_overrides
+from engine.training.evaluate import evaluate_clip, means
+from engine.training.report import Progress
+
+COLUMNS = ("psnr", "psnr_fit", "psnr_moving", "psnr_rest", "psnr_fit_moving", "ssim", "ssim_fit", "moving_share")
+
+
+def train(
+    capture: Capture, clip: Clip, config: TrainConfig, holdout: list[int], reference: ClipState | None, prep_dir: Path
+) -> tuple[ClipState, dict]:
+    """Train one clip; returns its state and the seconds spent."""
+    started = time.perf_counter()
+    said: list[str] = []
+    stage_starts: list[tuple[float, str]] = []
+
+    def report(progress: Progress) -> None:
+        if not stage_starts or stage_starts[-1][1] != progress.stage:
+            stage_starts.append((time.perf_counter(), progress.stage))
+        if progress.message and progress.message not in said:
+            said.append(progress.message)
+            print(f"  {time.perf_counter() - started:6.1f} s  {progress.stage}: {progress.message}", flush=True)
+
+    training = ClipTraining(
+        capture,
+        clip,
+        config=config,
+        holdout=holdout,
+        reference=reference,
+        seed=0,
+        prep_dir=prep_dir,
+        report=report,
+    )
+    training.prepare()
+    preparation_s = time.perf_counter() - started
+    durations_ms: dict[str, list[float]] = {}
+    losses = []
+    while not training.is_finished:
+        begun = time.perf_counter()
+        before = len(stage_starts)
+        stats = training.step()
+        elapsed = time.perf_counter() - begun
+        if len(stage_starts) > before:  # this step prepared the next phase
+            preparation_s += elapsed
+        else:
+            durations_ms.setdefault(stats.stage, []).append(1e3 * elapsed)
+        losses.append(stats.loss)
+        if stats.step % 300 == 0:
+            line = f"step {stats.step}/{stats.n_steps} {stats.stage} loss {np.mean(losses[-100:]):.4f}"
+            print(f"  {time.perf_counter() - started:6.1f} s  {line} {stats.n_gaussians} Gaussians", flush=True)
+    total_s = time.perf_counter() - started
+    timing = {
+        "preparation_s": preparation_s,
+        "training_s": total_s - preparation_s,
+        "median_step_ms": {stage: float(np.median(values)) for stage, values in durations_ms.items()},
+        "steps": training.n_steps,
+    }
+    return training.state(), timing
+
+
+def write_pictures(
+    folder: Path, capture: Capture, clip: Clip, state: ClipState, reference: ClipState, cameras: list[int]
+) -> None:
+    """Truth, render and four times the error, one row per camera."""
+    model = load_clip_model(state, reference)
+    frame = clip.start + clip.n_frames // 2
+    near, reach = reference.header["near_plane"], 4.0 * reference.header["spacing"]
+    rows = []
+    for camera in cameras:
+        width, height = (int(v) for v in capture.rig.image_sizes[camera])
+        matrices = (capture.rig.world_to_camera[camera], capture.rig.Ks[camera])
+        view = View.from_arrays(*matrices, width=width, height=height, near_plane=near)
+        truth = capture.frame(camera, frame) / 255.0
+        image = render_model(model, view, clip.clip_time(frame), reach=reach).numpy().clip(0, 1)
+        rows.append(np.concatenate([truth, image, np.clip(4 * np.abs(image - truth), 0, 1)], axis=1))
+    folder.mkdir(parents=True, exist_ok=True)
+    sheet = (np.concatenate(rows) * 255).astype(np.uint8)
+    Image.fromarray(sheet).save(folder / f"clip{clip.clip_index}.png")
+
+
+def main() -> None:
+    """Command line; see the module docstring."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("capture", type=Path)
+    parser.add_argument("--holdout", default="", help="camera names, comma separated; the capture's own by default")
+    parser.add_argument("--clips", type=int, default=2, help="how many clips, from the first")
+    parser.add_argument("--clip-length", type=int, default=10)
+    parser.add_argument("--scale", type=float, default=1.0)
+    parser.add_argument("--set", nargs="*", default=[], help="key=value settings")
+    parser.add_argument("--frames-every", type=int, default=1, help="evaluate every n-th frame of a clip")
+    parser.add_argument("--pictures", type=Path)
+    parser.add_argument("--json", type=Path)
+    args = parser.parse_args()
+    configure_threads()
+    capture = open_capture(args.capture, scale=args.scale)
+    names = args.holdout.split(",") if args.holdout else list(capture.default_holdout)
+    holdout = capture.camera_indices(names)
+    config = TrainConfig(**parse_overrides(args.set))
+    clips = split_clips(capture.n_frames, args.clip_length)[: args.clips]
+    versions = f"torch {torch.__version__}, Python {platform.python_version()}, {torch.get_num_threads()} threads"
+    print(f"{capture.path.name}: {len(capture.rig)} cameras, held out {', '.join(names)}; {versions}")
+    reference: ClipState | None = None
+    table = []
+    with tempfile.TemporaryDirectory() as prep_dir:
+        for clip in clips:
+            print(f"clip {clip.clip_index}")
+            state, timing = train(capture, clip, config, holdout, reference, Path(prep_dir))
+            reference = reference or state
+            frames = list(clip.frame_indices())[:: args.frames_every]
+            rows = evaluate_clip(
+                capture,
+                clip,
+                load_clip_model(state, reference),
+                reference=reference,
+                cameras=holdout,
+                holdout=holdout,
+                frames=frames,
+            )
+            figures = means(rows)
+            by_camera = {n: means([row for row in rows if row.camera == n])["psnr"] for n in names}
+            size_mb = sum(array.nbytes for array in state.arrays.values()) / 1e6
+            table.append({"clip": clip.clip_index, **timing, **figures, "by_camera": by_camera, "size_mb": size_mb})
+            if args.pictures:
+                write_pictures(args.pictures, capture, clip, state, reference, holdout)
+    print("clip  prep s  train s  steps  " + "  ".join(f"{c:>15}" for c in COLUMNS) + "  MB")
+    for row in table:
+        cells = "  ".join("              -" if row[c] is None else f"{row[c]:15.3f}" for c in COLUMNS)
+        seconds = f"{row['preparation_s']:6.1f}  {row['training_s']:7.1f}  {row['steps']:5d}"
+        print(f"{row['clip']:4d}  {seconds}  {cells}  {row['size_mb']:.1f}")
+    for row in table:
+        steps = {k: round(v, 1) for k, v in row["median_step_ms"].items()}
+        cameras = {k: round(v, 2) for k, v in row["by_camera"].items()}
+        print(f"clip {row['clip']}: ms per step {steps}; PSNR by held-out camera {cameras}")
+    if args.json:
+        args.json.write_text(json.dumps(table, indent=1))
+
+
+if __name__ == "__main__":
+    main()
