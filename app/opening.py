@@ -20,7 +20,6 @@ from engine.errors import ProjectError
 
 WINDOW_WIDTH_PX = 960
 """Wider captures are worked on at a smaller scale unless one is asked for; training on a CPU goes with the pixels."""
-DEFAULT_CLIP_LENGTH = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +60,7 @@ def open_for_window(
     folder = default_project_dir(capture) if project_dir is None else project_dir
     if (folder / PROJECT_FILE).is_file():
         return _open_project(folder, current, capture if scale is None else None)
-    settings = default_settings(capture, clip_length=min(DEFAULT_CLIP_LENGTH, capture.n_frames))
-    return Opened(capture, create_project(folder, settings))
+    return Opened(capture, create_project(folder, default_settings(capture)))
 
 
 def _open_project(folder: Path, current: Path | None, capture: Capture | None = None) -> Opened:

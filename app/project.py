@@ -35,6 +35,7 @@ logger = logging.getLogger(__name__)
 SCHEMA = 1
 PROJECT_FILE = "project.json"
 MIN_TRAINING_CAMERAS = 2
+DEFAULT_CLIP_LENGTH = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,12 +147,12 @@ class Project:
 def default_settings(
     capture: Capture,
     *,
-    clip_length: int = 10,
+    clip_length: int | None = None,
     holdout: tuple[str, ...] | None = None,
     seed: int = 0,
     overrides: dict[str, Any] | None = None,
 ) -> ProjectSettings:
-    """Settings for a capture; without a hold-out the one that the capture suggests.
+    """Settings for a capture. Without a hold-out the one that the capture suggests; clips of 10 frames, or of all.
 
     Raises:
         ProjectError: A value lies outside its range, a camera does not exist, or too few are left for training.
@@ -161,7 +162,7 @@ def default_settings(
         capture=str(Path(capture.path).resolve()),
         fingerprint=capture.fingerprint,
         scale=capture.scale,
-        clip_length=clip_length,
+        clip_length=min(DEFAULT_CLIP_LENGTH, capture.n_frames) if clip_length is None else clip_length,
         holdout=tuple(chosen),
         seed=seed,
         overrides=dict(overrides or {}),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +40,7 @@ def ring(n_cameras: int, *, radius: float = 3.0, height: float = 1.0) -> list[np
 
 
 def write_capture(folder: Path, *, n_cameras: int = 4, n_frames: int = 6, size: tuple[int, int] = (32, 24)) -> Path:
-    """A capture in the panoptic layout: PNG-free, a few small JPEGs per camera."""
+    """A capture in the panoptic layout: a few small JPEGs per camera; camera 0 is its own hold-out."""
     width, height = size
     K = [[30.0, 0.0, width / 2], [0.0, 30.0, height / 2], [0.0, 0.0, 1.0]]
     poses = ring(n_cameras)
@@ -76,13 +76,10 @@ class FakeTraining:
     fails_at: int | None = None
     steps_done: int = 0
     value: float = 0.0
-    prepared: bool = False
-    seen: list[int] = field(default_factory=list)
 
     def prepare(self) -> None:
         for share in (0.0, 0.5, 1.0):
             self.report(Progress("Building the cloud", share, f"{share:.0%} of 12 points"))
-        self.prepared = True
 
     def step(self) -> StepStats:
         if self.fails_at is not None and self.steps_done == self.fails_at:

@@ -1,0 +1,70 @@
+"""Fixtures of the application tests: a tiny capture, and a session that trains inline."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from app.commands import OpenCapture
+from app.project import Project
+from app.session import Session
+from app.settings import Settings
+from app.training.inline import InlineWorker
+from app.training.messages import TrainJob
+from app.training.run import MakeTraining
+from tests.app.fakes import make_fake, write_capture
+
+DEADLINE_S = 30.0
+
+
+@pytest.fixture(scope="session")
+def capture_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four cameras, six frames."""
+    return write_capture(tmp_path_factory.mktemp("capture") / "ring")
+
+
+@pytest.fixture(autouse=True)
+def own_user_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing of a test reaches the user's own data."""
+    for name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME"):
+        monkeypatch.setenv(name, str(tmp_path / name.lower()))
+
+
+def inline(job: TrainJob, project: Project, make_training: MakeTraining = make_fake) -> InlineWorker:
+    """A launch function for sessions and services."""
+    return InlineWorker(job, make_training)
+
+
+def poll_until(session: Session, is_done: Callable[[], bool], *, what: str = "the condition") -> None:
+    """Poll until something holds; fails after a deadline that only a hang reaches."""
+    until_s = time.monotonic() + DEADLINE_S
+    while not is_done():
+        assert time.monotonic() < until_s, f"{what} did not come; {session.training} {list(session.notices)}"
+        session.poll()
+        time.sleep(0)  # lets threads run; nothing is awaited by it
+
+
+@pytest.fixture
+def make_session(tmp_path: Path, capture_folder: Path) -> Iterator[Callable[..., Session]]:
+    """Makes sessions with the tiny capture open in clips of three frames; closes them in the end."""
+    made: list[Session] = []
+
+    def make(*, make_training: MakeTraining = make_fake, launch=None, is_open: bool = True, name: str = "p") -> Session:
+        session = Session(
+            project_dir=tmp_path / name,
+            launch=launch or partial(inline, make_training=make_training),
+            settings=Settings(tmp_path / "settings.json"),
+        )
+        made.append(session)
+        if is_open:
+            session.dispatch(OpenCapture(capture_folder))
+            poll_until(session, lambda: session.capture is not None, what="the capture")
+        return session
+
+    yield make
+    for session in made:
+        session.close()
