@@ -3,7 +3,7 @@
 # libraries it needs. Running it again costs a second: a stamp in .venv remembers what was installed.
 #
 #   ./setup.sh              everything `make run` needs
-#   ./setup.sh --tests      the same, and what the end-to-end test of the window needs (Xvfb, xdotool)
+#   ./setup.sh --tests      the same, and what the end-to-end test of the window needs (Xvfb, xdotool, xwd)
 #
 #   PYTHON=/path/to/python           take this interpreter (3.11, 3.12 or 3.13)
 #   CLIPGSTREAM_TORCH_INDEX=URL      take the CPU build of torch from this package index
@@ -165,6 +165,7 @@ check_system() {
     if [ "$WITH_TESTS" = yes ] && [ "$(uname -s)" = Linux ]; then
         command -v Xvfb >/dev/null || missing="$missing xvfb"
         command -v xdotool >/dev/null || missing="$missing xdotool"
+        command -v xwd >/dev/null || missing="$missing x11-apps"
     fi
     missing=$(echo $missing) # trims
     [ -n "$missing" ] || return 0
@@ -174,7 +175,7 @@ check_system() {
         say "installed them with apt-get"
     else
         say "this line installs them:  sudo apt-get install -y --no-install-recommends $missing"
-        say "going on without: training and metrics need none of the GL libraries, the window and its tests do"
+        say "going on without: the window and its tests need them, training and metrics do not"
     fi
 }
 
