@@ -95,50 +95,45 @@ def surface_rows(voxels: np.ndarray, grid: Grid) -> np.ndarray:
     return is_surface
 
 
-def hull_colors(
-    points: np.ndarray,
-    size: float,
-    pictures: np.ndarray,
-    masks: np.ndarray,
-    projections: np.ndarray,
-    gains: np.ndarray,
-    *,
-    near: float,
+def hull_visibility(
+    points: np.ndarray, size: float, masks: np.ndarray, projections: np.ndarray, *, near: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Median white-balanced colour of surface voxels over the cameras that see them.
-
-    Cameras for which the hull itself hides the voxel are left out unless no other is left.
+    """Where surface voxels fall in each picture, and whether the hull itself hides them there.
 
     Args:
-        points: Centres of surface voxels. [P, 3]
+        points: Centres of all surface voxels of one frame. [P, 3]
         size: Voxel edge, scene units.
+        masks: Motion masks of that frame. [C, H, W] bool
+    Returns:
+        pixel: Flat pixel index inside the camera's mask, -1 if not seen. [C, P] int64
+        is_visible: Seen, and not more than COLOR_SLACK_VOXELS behind the hull's nearest surface. [C, P] bool
+    """
+
+    def see(camera: int) -> tuple[np.ndarray, np.ndarray]:
+        return _see_points(points, size, masks[camera], projections[camera], near)
+
+    seen = map_ordered(see, range(len(masks)))
+    return np.stack([pixel for pixel, _ in seen]), np.stack([is_visible for _, is_visible in seen])
+
+
+def hull_colors(pictures: np.ndarray, pixel: np.ndarray, is_visible: np.ndarray, gains: np.ndarray) -> np.ndarray:
+    """Median white-balanced colour of surface voxels over the cameras that see them.
+
+    Cameras for which the hull hides the voxel are left out unless no other is left.
+
+    Args:
         pictures: One frame of every camera. [C, H, W, 3] uint8
-        masks: [C, H, W] bool
+        pixel, is_visible: From hull_visibility. [C, P]
         gains: camera_colour = gain * scene_colour. [C, 3]
     Returns:
-        colours 0..255 [P, 3] float32, NaN where no mask contains the voxel; number of unhidden cameras [P].
+        0..255, NaN where no mask contains the voxel. [P, 3] float32
     """
-    n_cameras = len(pictures)
-    samples = np.full((n_cameras, len(points), 3), np.nan, dtype=np.float32)
-    is_visible = np.zeros((n_cameras, len(points)), dtype=bool)
-
-    def sample(camera: int) -> None:
-        _sample_camera(
-            points,
-            size,
-            pictures[camera],
-            masks[camera],
-            projections[camera],
-            near,
-            samples[camera],
-            is_visible[camera],
-        )
-
-    map_ordered(sample, range(n_cameras))
-    samples /= gains[:, None, :].astype(np.float32)
-    n_visible = is_visible.sum(0)
-    samples[~is_visible & (n_visible > 0)] = np.nan
-    return _nan_medians(samples), n_visible
+    is_used = (pixel >= 0) & (is_visible | ~is_visible.any(axis=0))
+    samples = np.full((*pixel.shape, 3), np.nan, dtype=np.float32)
+    for camera, picture in enumerate(pictures):
+        rows = is_used[camera]
+        samples[camera, rows] = picture.reshape(-1, 3)[pixel[camera, rows]] / gains[camera]
+    return _nan_medians(samples)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -247,29 +242,30 @@ def _carve_voxels(blocks, integrals, projections, origin, size, near, n_misses, 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _sample_camera(points, size, picture, mask, projection, near, samples, is_visible):
-    """Nearest colours inside the mask and a depth test against the splatted hull (buffer at a quarter of the size)."""
+def _see_points(points, size, mask, projection, near):
+    """Pixels inside the mask and a depth test against the splatted hull (buffer about 160 wide)."""
     height, width = mask.shape
-    shrink = 4
+    shrink = max(1, width // 160)
     small_h, small_w = (height + shrink - 1) // shrink, (width + shrink - 1) // shrink
     nearest = np.full((small_h, small_w), np.inf)
     row = projection[0, :3]
     third = projection[2, :3]
-    focal = math.sqrt(max((row * row).sum() - (row * third).sum() ** 2, 1e-12))  # |K R row 0| minus its cx part
+    focal = math.sqrt(max((row * row).sum() - (row * third).sum() ** 2, 1e-12))  # |K R row 0| without its cx part
     n_points = len(points)
-    pixels = np.empty((n_points, 3))
+    depths = np.empty(n_points)
+    pixel = np.full(n_points, -1, np.int64)
+    is_visible = np.zeros(n_points, np.bool_)
     for i in range(n_points):
         a, b, c = points[i, 0], points[i, 1], points[i, 2]
         depth = projection[2, 0] * a + projection[2, 1] * b + projection[2, 2] * c + projection[2, 3]
-        pixels[i, 2] = depth
+        depths[i] = depth
         if depth < near:
             continue
         x = (projection[0, 0] * a + projection[0, 1] * b + projection[0, 2] * c + projection[0, 3]) / depth
         y = (projection[1, 0] * a + projection[1, 1] * b + projection[1, 2] * c + projection[1, 3]) / depth
-        pixels[i, 0], pixels[i, 1] = x, y
         if x < 0 or y < 0 or x >= width or y >= height:
-            pixels[i, 2] = -1.0
             continue
+        pixel[i] = int(y) * width + int(x)
         radius = 0.5 * size * focal / depth
         x0, x1 = max(int((x - radius) / shrink), 0), min(int((x + radius) / shrink), small_w - 1)
         y0, y1 = max(int((y - radius) / shrink), 0), min(int((y + radius) / shrink), small_h - 1)
@@ -278,15 +274,15 @@ def _sample_camera(points, size, picture, mask, projection, near, samples, is_vi
                 if depth < nearest[v, u]:
                     nearest[v, u] = depth
     for i in range(n_points):
-        depth = pixels[i, 2]
-        if depth < near:
+        if pixel[i] < 0:
             continue
-        ix, iy = int(pixels[i, 0]), int(pixels[i, 1])
-        if not mask[iy, ix]:
+        y, x = pixel[i] // width, pixel[i] % width
+        if not mask[y, x]:
+            pixel[i] = -1
             continue
-        for channel in range(3):
-            samples[i, channel] = picture[iy, ix, channel]
-        is_visible[i] = depth <= nearest[iy // shrink, ix // shrink] + COLOR_SLACK_VOXELS * size
+        slack = COLOR_SLACK_VOXELS * size + shrink * depths[i] / focal  # one buffer cell of a 45 degree slope
+        is_visible[i] = depths[i] <= nearest[y // shrink, x // shrink] + slack
+    return pixel, is_visible
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -14,7 +14,7 @@ import numpy as np
 
 from engine.capture.rig import CameraRig
 from engine.cloud.fusion import keep_inliers
-from engine.cloud.hull import Grid, carve, hull_colors, surface_rows
+from engine.cloud.hull import Grid, carve, hull_colors, hull_visibility, surface_rows
 from engine.cloud.projection import project, projection_matrices
 from engine.cloud.range import near_plane
 
@@ -25,10 +25,15 @@ VOXEL_PX = 2.5
 MIN_HITS_SHARE = 0.25
 """Share of the cameras that must see a voxel inside their mask (at least MIN_HITS)."""
 MIN_HITS = 3
+MIN_VISIBLE = 2
+"""Cameras that must see a surface voxel unhidden by the hull itself; others cannot be learned. Hulls also fill the
+space behind what they show (under a shadow on the floor): half of the surface on the dome, and this removes it."""
 MISSES_FROM_CAMERAS = 8
 """One camera may disagree in rigs of at least this many; in smaller ones every view is needed."""
 MAX_GRID_VOXELS = 400_000_000
 """Coarse blocks are 1 / 512 of this; bounds far beyond what the cameras see only cost time."""
+MAX_CARVES = 3
+"""Times the clip is carved to meet max_points; the count is known only afterwards."""
 N_PROBE_VOXELS = 96
 """The first, coarse hull that finds size and depth of what moves has this many voxels along the longest edge."""
 
@@ -81,36 +86,45 @@ def build_moving_cloud(
     projections, near = projection_matrices(rig), 0.5 * near_plane(rig)
     min_hits = min(max(MIN_HITS, int(np.ceil(MIN_HITS_SHARE * n_cameras))), n_cameras)
     n_misses = 1 if n_cameras >= MISSES_FROM_CAMERAS else 0
+    min_visible = MIN_VISIBLE if n_cameras >= MISSES_FROM_CAMERAS else 1
+    n_hidden = 0
 
     def surface(frame_in_clip: int, grid: Grid) -> np.ndarray:
-        voxels = carve(masks[frame_in_clip], projections, grid, near=near, n_misses=n_misses, min_hits=min_hits)
-        return voxels[surface_rows(voxels, grid)]
+        nonlocal n_hidden
+        frame_masks = masks[frame_in_clip]
+        voxels = carve(frame_masks, projections, grid, near=near, n_misses=n_misses, min_hits=min_hits)
+        voxels = voxels[surface_rows(voxels, grid)]
+        _, is_visible = hull_visibility(grid.centers(voxels), grid.size, frame_masks, projections, near=near)
+        is_kept = is_visible.sum(axis=0) >= min_visible
+        n_hidden += int((~is_kept).sum())
+        return voxels[is_kept]
 
     low, high = np.asarray(bounds_min, dtype=np.float64), np.asarray(bounds_max, dtype=np.float64)
     probe = Grid.over(low, high, float((high - low).max()) / N_PROBE_VOXELS)
-    occupied = np.concatenate([surface(m, probe) for m in range(n_frames)])
+    coarse = [surface(m, probe) for m in range(n_frames)]
+    occupied = np.concatenate(coarse)
     if len(occupied) == 0:
         report(f"Moving cloud: nothing moves where {min_hits} of {n_cameras} cameras agree; no points")
         return _empty(n_frames, probe.size)
     low = np.maximum(low, probe.centers(occupied.min(0)) - 1.5 * probe.size)
     high = np.minimum(high, probe.centers(occupied.max(0)) + 1.5 * probe.size)
     wanted = VOXEL_PX * _median_footprint(probe.centers(np.unique(occupied, axis=0)), rig, near)
-    size = max(wanted, float((np.prod(high - low) / MAX_GRID_VOXELS) ** (1 / 3)))
-    size = voxel_size or size
-    for _ in range(0 if voxel_size else 4):
-        # a few frames tell how many points the union will have before all are carved
-        sampled = [surface(m, Grid.over(low, high, size)) for m in _spread(n_frames, 3)]
-        n_expected = len(np.unique(np.concatenate(sampled), axis=0)) * _union_growth(n_frames)
-        if n_expected <= 1.15 * max_points:
+    # start from what the probe promises: surface counts fall with the square of the voxel
+    promised = probe.size * float(np.sqrt(_n_union(coarse) / max_points))
+    size = max(wanted, promised, float((np.prod(high - low) / MAX_GRID_VOXELS) ** (1 / 3)))
+    for attempt in range(MAX_CARVES):
+        n_hidden, grid = 0, Grid.over(low, high, size)
+        surfaces = [surface(m, grid) for m in range(n_frames)]
+        n_union = _n_union(surfaces)
+        if n_union <= 1.05 * max_points or attempt == MAX_CARVES - 1:
             break
-        size *= float(np.clip(np.sqrt(n_expected / max_points), 1.02, 4.0))
-    grid = Grid.over(low, high, size)
-    surfaces = [surface(m, grid) for m in range(n_frames)]
+        size *= float(np.clip(np.sqrt(n_union / max_points), 1.03, 4.0))
     voxels, presence = _fuse(surfaces)
     report(
         f"Visual hulls: {np.mean([len(s) for s in surfaces]):.0f} surface points a frame, {len(voxels)} over "
         f"{n_frames} frames at {size:.4g} scene units (asked {wanted:.4g} = {VOXEL_PX} px, limit {max_points}); "
-        f"{min_hits} of {n_cameras} cameras must agree, {n_misses} may not ({time.perf_counter() - started:.1f} s)"
+        f"{min_hits} of {n_cameras} cameras must agree, {n_misses} may not; {n_hidden / n_frames:.0f} a frame dropped "
+        f"that fewer than {min_visible} cameras can see ({time.perf_counter() - started:.1f} s)"
     )
     if len(voxels) == 0:
         return _empty(n_frames, size)
@@ -118,10 +132,10 @@ def build_moving_cloud(
     is_kept = keep_inliers(points)
     points, presence = points[is_kept], presence[is_kept]
     started = time.perf_counter()
-    colors, n_hidden = _colors(points, presence, frames, masks, projections, gains, size=size, near=near)
+    colors = _colors(points, presence, frames, masks, projections, gains, size=size, near=near)
     report(
-        f"Moving cloud: {len(points)} points, {(~is_kept).sum()} statistical outliers removed; {n_hidden} points are "
-        f"hidden by the hull in every camera and took any colour in the masks ({time.perf_counter() - started:.1f} s)"
+        f"Moving cloud: {len(points)} points, {(~is_kept).sum()} statistical outliers removed; coloured by the median "
+        f"of the cameras that see them ({time.perf_counter() - started:.1f} s)"
     )
     return MovingCloud(points.astype(np.float32), colors, presence, float(size))
 
@@ -150,13 +164,9 @@ def _median_footprint(points: np.ndarray, rig: CameraRig, near: float) -> float:
     return float(np.median(np.concatenate(ratios)))
 
 
-def _spread(n_frames: int, n: int) -> list[int]:
-    return sorted({round(i * (n_frames - 1) / max(n - 1, 1)) for i in range(n)})
-
-
-def _union_growth(n_frames: int) -> float:
-    """Union over all frames against the union of three spread ones; measured 1.5 to 1.7 at 10 frames of play."""
-    return 1.0 if n_frames <= 3 else min(1.6, 1.0 + 0.08 * (n_frames - 3))
+def _n_union(surfaces: list[np.ndarray]) -> int:
+    """Different voxels over some frames, at least 1."""
+    return max(1, len(np.unique(np.concatenate(surfaces), axis=0)))
 
 
 def _fuse(surfaces: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -179,23 +189,18 @@ def _colors(
     *,
     size: float,
     near: float,
-) -> tuple[np.ndarray, int]:
-    """Mean over frames of each point's median colour [P, 3] in 0..1, and how many points were never unhidden."""
+) -> np.ndarray:
+    """Mean over the frames of each point's median colour, 0..1. [P, 3] float32"""
     sums, counts = np.zeros((len(points), 3)), np.zeros(len(points))
-    is_seen = np.zeros(len(points), dtype=bool)
     n_frames, n_cameras = masks.shape[:2]
     for frame_in_clip in range(n_frames):
         rows = np.flatnonzero(presence[:, frame_in_clip])
         pictures = np.stack([frames(row, frame_in_clip) for row in range(n_cameras)])
-        colors, n_visible = hull_colors(
-            points[rows], size, pictures, masks[frame_in_clip], projections, gains, near=near
-        )
+        pixel, is_visible = hull_visibility(points[rows], size, masks[frame_in_clip], projections, near=near)
+        colors = hull_colors(pictures, pixel, is_visible, gains)
         is_known = np.isfinite(colors[:, 0])
-        # frames in which some camera really sees the point count in full, the others only if there are none
-        weights = np.where(n_visible > 0, 1.0, 1e-3) * is_known
-        sums[rows] += weights[:, None] * np.where(is_known[:, None], colors, 0.0)
-        counts[rows] += weights
-        is_seen[rows] |= n_visible > 0
-    average = sums.sum(0) / max(counts.sum(), 1e-9)  # for the few points that no mask pixel centre contains
-    means = np.where(counts[:, None] > 0, sums / np.maximum(counts, 1e-9)[:, None], average)
-    return np.clip(means / 255.0, 0.0, 1.0).astype(np.float32), int((~is_seen).sum())
+        sums[rows[is_known]] += colors[is_known]
+        counts[rows[is_known]] += 1
+    average = sums.sum(0) / max(counts.sum(), 1.0)  # for points whose every camera was outvoted
+    means = np.where(counts[:, None] > 0, sums / np.maximum(counts, 1.0)[:, None], average)
+    return np.clip(means / 255.0, 0.0, 1.0).astype(np.float32)

@@ -18,6 +18,9 @@ UNSTABLE_LIMIT = 30.0
 SUPPORT_LIMIT = 36.0
 """A frame supports the render where their blurred difference is below this."""
 MIN_SUPPORT_SHARE = 0.15
+REACH_PX = 16.0
+"""A stable pixel can only be a ghost this near to unstable ones, at REFERENCE_WIDTH: someone who stands still has a
+swaying outline. Everywhere else a difference is the render's own error (lamps, thin things, shine)."""
 
 
 def recheck_background(
@@ -33,12 +36,13 @@ def recheck_background(
     Returns:
         [H, W, 3] uint8. Pixels of the render that are not finite change nothing.
     """
-    is_finite: np.ndarray = np.isfinite(static_render).all(axis=-1)
+    is_finite = np.asarray(np.isfinite(static_render).all(axis=-1))
     render = np.where(is_finite[..., None], np.clip(static_render, 0.0, 1.0) * 255.0, background).astype(np.float32)
     scale = background.shape[1] / REFERENCE_WIDTH
     sigma_px = max(0.8, 2.0 * scale)
     difference = blurred_difference(background, render, sigma_px)
     is_ghost = difference > np.where(is_stable, STABLE_LIMIT, UNSTABLE_LIMIT)
+    is_ghost &= dilate(~is_stable, max(2, round(REACH_PX * scale)))
     radius = max(1, round(scale))
     is_ghost = dilate(erode(is_ghost, radius), radius)  # renders are soft: thin edges always differ
     is_ghost = remove_small_blobs(is_ghost, max(6, round(80 * scale * scale)))

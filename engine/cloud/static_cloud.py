@@ -128,7 +128,7 @@ def build_static_cloud(
     )
     points, colors = points[is_kept], colors[is_kept]
     gains, seen_colors = _balance(points, backgrounds, is_stable, rig, maps, first_gains)
-    is_colored: np.ndarray = np.isfinite(seen_colors).all(axis=1)
+    is_colored = np.asarray(np.isfinite(seen_colors).all(axis=1))
     colors = np.where(is_colored[:, None], seen_colors, colors)
     if is_colored.any() and not is_colored.all():
         # what only unstable pixels saw may be a person's colour on the floor: take the surroundings instead
