@@ -1,0 +1,150 @@
+"""The worker process: trains, stops, dies, and holds nothing of the window."""
+
+import json
+import os
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from app import commands as c
+from app.training.process import ProcessWorker
+from app.training.worker import n_training_threads
+from engine.model.clip_state import read_clip_state
+from tests.app.conftest import poll_until
+from tests.app.fakes import N_STEPS, make_crashing, make_fake, make_slow
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def process(job, project, make_training):
+    return ProcessWorker(job, project, make_training)
+
+
+def launch(make_training):
+    return partial(process, make_training=make_training)
+
+
+def test_a_process_trains_a_clip(make_session):
+    session = make_session(launch=launch(make_fake))
+    session.dispatch(c.TrainNextClip())
+    assert session.training.state == "starting"
+    poll_until(session, lambda: session.training.state in ("idle", "failed"))
+    assert session.clip_states[0].state == "trained", list(session.notices)
+    assert read_clip_state(session.project.clip_path(0)).header["step"] == N_STEPS
+    assert "trains clip 0" in session.project.log_path(0).read_text()
+
+
+def test_a_killed_worker_is_told_and_training_goes_on_from_what_was_kept(make_session):
+    session = make_session(launch=launch(make_slow))
+    session.dispatch(c.TrainNextClip())
+    poll_until(session, lambda: session.training.step >= 1)
+    session.dispatch(c.PauseTraining())  # writes a checkpoint
+    kept = session.project.checkpoint_path(0)
+    poll_until(session, kept.is_file, what="the checkpoint")
+    step = read_clip_state(kept).header["step"]
+    session._service.worker.process.kill()
+    poll_until(session, lambda: session.training.state == "failed")
+    assert "signal 9" in session.notices[-1].detail
+    assert session.clip_states[0].state == "failed"
+    assert session.training.can_train_next
+    session.dispatch(c.TrainNextClip())
+    poll_until(session, lambda: session.training.state == "running")
+    assert session.training.step >= step
+
+
+def test_a_worker_that_dies_while_starting_is_told(make_session):
+    session = make_session(launch=launch(make_crashing))
+    session.dispatch(c.TrainNextClip())
+    poll_until(session, lambda: session.training.state == "failed")
+    assert session.notices[-1].title == "The training process ended unexpectedly"
+    session.dispatch(c.SetFrame(2))  # the session goes on
+    assert session.timeline.frame_index == 2
+
+
+def test_closing_ends_the_process_and_keeps_what_it_learned(make_session):
+    session = make_session(launch=launch(make_slow))
+    session.dispatch(c.TrainNextClip())
+    poll_until(session, lambda: session.training.step >= 1)
+    child = session._service.worker.process
+    project = session.project
+    session.close()
+    assert not child.is_alive()
+    assert child.exitcode == 0
+    assert read_clip_state(project.checkpoint_path(0)).header["step"] >= 1
+
+
+PARENT = """
+import os, sys
+from pathlib import Path
+from app.project import create_project, default_settings
+from app.training.messages import StepReported, TrainJob
+from app.training.process import ProcessWorker
+from engine.capture.capture import open_capture
+from tests.app.fakes import make_slow
+
+if __name__ == "__main__":
+    capture, folder = Path(sys.argv[1]), Path(sys.argv[2])
+    settings = default_settings(open_capture(capture))
+    project = create_project(folder, settings)
+    job = TrainJob(str(folder), str(capture), 1.0, settings.clip_length, 0)
+    worker = ProcessWorker(job, project, make_slow)
+    while not any(isinstance(event, StepReported) and event.step > 0 for event in worker.poll()):
+        pass
+    print(worker.process.pid, flush=True)
+    os._exit(9)  # no goodbye, as when the window is killed
+"""
+
+
+def test_a_worker_whose_window_was_killed_keeps_what_it_learned_and_ends(tmp_path, capture_folder):
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT)
+    # the worker inherits stdout only until it redirects it; its log is read to see its end
+    done = subprocess.run(
+        [sys.executable, str(script), str(capture_folder), str(tmp_path / "p")],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        cwd=tmp_path,
+    )
+    assert done.returncode == 9, done.stderr
+    log = tmp_path / "p" / "logs" / "clip-0000.log"
+    deadline = subprocess.run(  # waits for the end of a process that is not our child
+        [sys.executable, "-c", WAIT_FOR_TEXT, str(log), "ends"], timeout=60, check=False
+    )
+    assert deadline.returncode == 0, log.read_text()
+    assert read_clip_state(tmp_path / "p" / "checkpoints" / "0000.safetensors").header["step"] > 0
+
+
+WAIT_FOR_TEXT = """
+import sys, time
+from pathlib import Path
+until = time.monotonic() + 30
+while not (Path(sys.argv[1]).is_file() and sys.argv[2] in Path(sys.argv[1]).read_text()):
+    if time.monotonic() > until:
+        sys.exit(1)
+    time.sleep(0.05)
+"""
+
+
+def test_the_worker_loads_nothing_that_draws():
+    code = "import json, sys, app.training.worker, app.training.build, engine.training.clip_training\n"
+    code += "print(json.dumps(sorted(sys.modules)))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    loaded = {name.partition(".")[0] for name in json.loads(done.stdout.splitlines()[-1])}
+    assert "torch" in loaded  # so that the list is of the right process
+    assert loaded.isdisjoint({"pyglet", "moderngl", "imgui_bundle", "ui", "glcontext"})
+
+
+@pytest.mark.parametrize(
+    ("cores", "is_window_open", "expected"), [(1, True, 1), (2, True, 2), (3, True, 2), (16, True, 15), (16, False, 16)]
+)
+def test_a_core_is_left_to_the_window_where_there_are_more_than_two(cores, is_window_open, expected):
+    assert n_training_threads(cores, is_window_open=is_window_open) == expected
