@@ -16,7 +16,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from ui import theme
 from ui.dialogs import OpenFolderDialog, draw_help
-from ui.gl import ImageTexture
+from ui.gl import ImageTexture, free_dropped
 from ui.imgui_backend import ImGuiBackend
 from ui.panels.capture import CapturePanel
 from ui.panels.notices import NoticesPanel
@@ -37,20 +37,6 @@ TRAINING_REFRESH_S = 0.1
 MAX_TICK_S = 0.25
 STATUS_BAR_HEIGHT = 28.0
 VIEWPORT, TIMELINE, TRAINING, CAPTURE = "Viewport", "Timeline", "Training", "Capture"
-
-
-def free_dropped(ctx: moderngl.Context) -> int:
-    """Release GL objects that were dropped without `release()`, on this thread; returns how many.
-
-    ctx.gc() of moderngl 5.13 fails on objects that were released by hand before they were dropped.
-    """
-    n_released = 0
-    while ctx.objects:
-        dropped = ctx.objects.popleft()
-        if hasattr(dropped, "release"):
-            dropped.release()
-            n_released += 1
-    return n_released
 
 
 def _recover(stack: Any) -> None:

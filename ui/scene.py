@@ -34,6 +34,8 @@ MOVING_SHARE = 0.5
 """Share of the full size that the CPU rasterizer draws while the view moves."""
 FRUSTUM_SHARE = 0.09
 """Length of a camera's pyramid as a share of the rig's radius."""
+HINT_NEAR_SHARE = 0.4
+"""Pictures in space nearer than this share of the way to the pivot are left out."""
 RENDERED, CLOUD, HINT, CAPTURED, MARKS = (
     "Rendered",
     "Point cloud",
@@ -190,7 +192,7 @@ class Scene:
         self._cloud.set(points, colors, key=key)
         self._is_hint = cloud.is_hint
         if self._is_hint and len(points) > 1:  # pictures as grids: as large as the gap between neighbours
-            self._hint_size = 1.4 * float(np.linalg.norm(points[1] - points[0]))
+            self._hint_size = 1.8 * float(np.linalg.norm(points[1] - points[0]))
         return key
 
     def _take_captured(self, session: Any, width_px: int) -> Hashable:
@@ -253,7 +255,9 @@ class Scene:
             self.shows = HINT if self._is_hint else CLOUD
             unit: Literal["px", "world"]
             size, unit = (self._hint_size, "world") if self._is_hint else (self._cloud_point_px(view), "px")
-            self._cloud.draw(target, *camera, shape="circle", size=size, unit=unit, is_depth_tested=True)
+            # A picture that stands right before the eye would hide all the others.
+            near = HINT_NEAR_SHARE * session.view.distance if self._is_hint else NEAR
+            self._cloud.draw(target, *camera, near, shape="circle", size=size, unit=unit, is_depth_tested=True)
         elif captured_key is not None:
             self.shows = CAPTURED
             target.draw_image(self._captured)

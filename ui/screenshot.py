@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 
 import moderngl
 import numpy as np
 from PIL import Image
+
+from engine.files import atomic_path
 
 
 def read_window(ctx: moderngl.Context, width: int, height: int) -> np.ndarray:
@@ -24,15 +24,7 @@ def read_window(ctx: moderngl.Context, width: int, height: int) -> np.ndarray:
 
 
 def write_png(image: np.ndarray, path: Path) -> Path:
-    """Write [H, W, 3] uint8 as PNG through a temporary file in the same folder."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".png.tmp")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            Image.fromarray(image).save(stream, format="PNG")
-        os.chmod(temporary, 0o644)  # mkstemp makes private files; a picture is meant to be looked at
-        os.replace(temporary, path)
-    except OSError:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    """Write [H, W, 3] uint8 as PNG; the file appears whole or not at all. Makes the folder."""
+    with atomic_path(path) as partial:
+        Image.fromarray(image).save(partial, format="PNG")
     return path

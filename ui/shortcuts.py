@@ -139,8 +139,13 @@ def set_compare(session: Any, dispatch: Dispatch, mode: str) -> None:
     dispatch(SetCompare(mode))
 
 
+def shown_compare(session: Any) -> str:
+    """The comparison on screen: none from a free view, where no camera took a picture."""
+    return "off" if session.view.look_through is None else session.overlays.compare
+
+
 def _cycle_compare(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    shown = COMPARE_MODES.index(session.overlays.compare)
+    shown = COMPARE_MODES.index(shown_compare(session))
     set_compare(session, dispatch, COMPARE_MODES[(shown + 1) % len(COMPARE_MODES)])
 
 

@@ -15,7 +15,8 @@ import moderngl
 import pyglet
 from pyglet.event import EVENT_HANDLED
 
-from ui.frame import Frame, free_dropped
+from ui.frame import Frame
+from ui.gl import free_dropped
 
 logger = logging.getLogger(__name__)
 

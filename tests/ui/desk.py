@@ -153,6 +153,8 @@ class Desk:
 
     def close(self) -> int | None:
         """Ask the program to end, then end the rest. Returns the program's exit code."""
+        if self._pointer.stdin is not None:
+            self._pointer.stdin.close()
         for child in (self.program, *reversed(self._children)):
             if child.poll() is None:
                 child.terminate()

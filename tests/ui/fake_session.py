@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -61,6 +62,7 @@ class FakeSession:
         self.notices = Notices()
         self.jobs: list[JobStatus] = []
         self.overlays = Overlays()
+        self.settings = SimpleNamespace(recent=["/captures/kitchen", "/captures/dance_floor"])
         self.training = TrainingStatus(can_train_next=True, next_clip_index=0)
         self.holdout: tuple[int, ...] = (0, 3)
         self.is_closed = False

@@ -16,7 +16,7 @@ from app.status import COMPARE_MODES
 from ui import theme
 from ui.panels.welcome import draw_welcome
 from ui.scene import Scene, SceneView
-from ui.shortcuts import set_compare
+from ui.shortcuts import set_compare, shown_compare
 from ui.state import Dispatch, Rect, UiState
 from ui.theme import Icon
 from ui.widgets import chip, grouped
@@ -134,7 +134,7 @@ class ViewportPanel:
         imgui.text_disabled("Compare")
         for mode in COMPARE_MODES:
             imgui.same_line(0, 8 if mode == "off" else 2)
-            if _segment(COMPARE_WORDS[mode], session.overlays.compare == mode):
+            if _segment(COMPARE_WORDS[mode], shown_compare(session) == mode):
                 set_compare(session, dispatch, mode)
             ui.mark(f"viewport.compare.{mode}")
             imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")

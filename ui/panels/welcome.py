@@ -14,7 +14,8 @@ from ui.theme import Icon
 from ui.widgets import pop_bold, primary_button, push_bold, text_wrapped_dim
 
 SAMPLE_PATH = Path(__file__).resolve().parents[2] / "assets" / "sample"
-CARD_SIZE = (520.0, 316.0)
+CARD_SIZE = (520.0, 380.0)
+MAX_RECENT = 3
 
 
 def draw_welcome(session: Any, dispatch: Dispatch, ui: UiState, area: Rect) -> None:
@@ -48,7 +49,17 @@ def draw_welcome(session: Any, dispatch: Dispatch, ui: UiState, area: Rect) -> N
         imgui.text(f"{job.name}  {job.message}")
         imgui.progress_bar(min(max(job.done, 0.0), 1.0), ImVec2(-1, 6), "")
     else:
+        _draw_recent(session, dispatch, ui)
         imgui.text_disabled(f"{Icon.DROP}  or drop a folder on this window")
         imgui.text_disabled(f"{Icon.HELP}  F1 shows every key")
     imgui.end_child()
     imgui.pop_style_color()
+
+
+def _draw_recent(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    recent = [Path(folder) for folder in session.settings.recent if Path(folder) != SAMPLE_PATH][:MAX_RECENT]
+    for i, folder in enumerate(recent):
+        if imgui.selectable(f"{Icon.CLOCK}  {folder.name}##recent{i}", False)[0]:
+            dispatch(OpenCapture(folder))
+        ui.mark(f"welcome.recent{i}")
+        imgui.set_item_tooltip(str(folder))

@@ -1,0 +1,142 @@
+"""The real program on a virtual screen, driven by real pointer and key events; pictures are taken through X.
+
+    python tests/ui/test_window_xvfb.py CAPTURE FOLDER
+
+runs the same journey on a capture of choice, trains the next clip as well, and leaves its pictures in FOLDER.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+if __name__ == "__main__":  # run as a program: the repository root is not on the path then
+    sys.path.insert(0, str(ROOT))
+
+from tests.ui.desk import Desk, missing_programs  # noqa: E402
+
+ORBIT_RADIANS_PER_PX = 0.006
+
+
+def journey(desk: Desk, pictures: Path) -> None:
+    """Open, look through a camera, compare, scrub, orbit, dolly, play; asserts what each must do."""
+    state = desk.wait_for("an open capture", lambda s: s["capture"] is not None and "timeline.track" in s["rects"], 60)
+    desk.focus()
+    desk.wait_for("something to look at", lambda s: s["shows"] != "Cameras only", 30)
+    n_frames = state["n_frames"]
+    desk.screenshot(pictures / "1_open.png")
+
+    x0, y0, x1, _ = state["rects"]["timeline.track"]
+    desk.drag((x0 + 4, y0 + 10), (x1 - 4, y0 + 10))
+    desk.wait_for("the last frame after scrubbing", lambda s: s["frame_index"] == n_frames - 1)
+    desk.screenshot(pictures / "2_scrubbed.png")
+
+    desk.key("Home")
+    desk.wait_for("the first frame", lambda s: s["frame_index"] == 0)
+    yaw = state["yaw"]
+    x, y = desk.center("viewport.canvas")
+    desk.drag((x, y), (x + 100, y))
+    # the view wraps at half a turn; the drag is far below that
+    expected = 100 * ORBIT_RADIANS_PER_PX
+    desk.wait_for(
+        "the orbit that was dragged",
+        lambda s: abs((s["yaw"] - yaw - expected + np.pi) % (2 * np.pi) - np.pi) < 2 * ORBIT_RADIANS_PER_PX,
+    )
+    distance = desk.state["distance"]
+    desk.do("click 4", "click 4")
+    desk.wait_for("two wheel ticks nearer", lambda s: abs(s["distance"] / distance - 0.81) < 1e-6)
+    desk.screenshot(pictures / "3_orbited.png")
+
+    desk.key("g")
+    desk.wait_for("the wipe", lambda s: s["compare"] == "wipe" and s["look_through"] is not None)
+    desk.screenshot(pictures / "4_wipe.png")
+    desk.key("bracketright")
+    desk.key("f")
+    desk.wait_for("the home view", lambda s: s["look_through"] is None)
+
+    desk.click("timeline.play")
+    desk.wait_for("playing", lambda s: s["is_playing"] and s["frame_index"] > 0)
+    desk.key("space")
+    desk.wait_for("a pause", lambda s: not s["is_playing"])
+
+    desk.key("F1")
+    desk.wait_for("the help sheet", lambda s: s["is_help_open"])
+    desk.screenshot(pictures / "5_help.png")
+    desk.key("Escape")
+    desk.wait_for("the sheet to close", lambda s: not s["is_help_open"])
+    assert desk.program.poll() is None, "Escape must not end the program"
+
+
+def train(desk: Desk, pictures: Path, *, wait_s: float) -> None:
+    """Press the button and watch until the first clip is trained, still scrubbing meanwhile."""
+    desk.click("training.next")
+    desk.wait_for("training to begin", lambda s: s["training"]["state"] in ("starting", "preparing", "running"), 20)
+    desk.screenshot(pictures / "6_training_begins.png")
+    desk.wait_for("steps", lambda s: s["training"]["step"] > 20, wait_s)
+    desk.screenshot(pictures / "7_training_runs.png")
+    desk.key("Tab")
+    desk.wait_for("clip 0 to be trained", lambda s: s["clips"][0] == "trained", wait_s)
+    desk.screenshot(pictures / "8_trained.png")
+
+
+@pytest.fixture
+def desk(tiny_capture: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
+    """The program with the tiny capture, its user folders inside the test's own."""
+    missing = missing_programs()
+    if missing:
+        pytest.skip(f"not installed: {', '.join(missing)} (apt-get install xvfb xdotool x11-apps libgl1-mesa-dri)")
+    for name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME", "XDG_STATE_HOME", "XDG_CACHE_HOME"):
+        monkeypatch.setenv(name, str(tmp_path / name.lower()))
+    opened = Desk(tmp_path, [str(tiny_capture)])
+    yield opened
+    opened.close()
+
+
+@pytest.mark.e2e
+@pytest.mark.gl
+def test_the_window_obeys_a_real_pointer_and_keyboard(desk: Desk, tmp_path: Path) -> None:
+    journey(desk, tmp_path / "pictures")
+    assert desk.state["notices"] == []
+    assert desk.close() == 0, "SIGTERM ends the program cleanly"
+
+
+@pytest.mark.e2e
+@pytest.mark.gl
+def test_a_folder_that_is_no_capture_becomes_a_notice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    missing = missing_programs()
+    if missing:
+        pytest.skip(f"not installed: {', '.join(missing)}")
+    for name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME"):
+        monkeypatch.setenv(name, str(tmp_path / name.lower()))
+    empty = tmp_path / "holiday"
+    empty.mkdir()
+    desk = Desk(tmp_path, [str(empty)])
+    try:
+        state = desk.wait_for("an error notice", lambda s: bool(s["notices"]), 40)
+        kind, title, detail, _ = state["notices"][0]
+        assert kind == "error"
+        assert "holiday" in title
+        assert str(empty) in detail
+        assert state["capture"] is None
+    finally:
+        desk.close()
+    assert list(empty.iterdir()) == []
+
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[2]).resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME"):
+        os.environ[name] = str(folder / "user")
+    running = Desk(folder, [str(Path(sys.argv[1]).resolve())])
+    try:
+        journey(running, folder)
+        train(running, folder, wait_s=600)
+    finally:
+        running.close()
