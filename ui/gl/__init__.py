@@ -4,7 +4,7 @@ Whoever makes one of these objects releases it, on the thread of its context.
 """
 
 from ui.gl.camera import NEAR, clip_matrix, resized_K
-from ui.gl.context import ContextError, is_software, make_headless_context, renderer_name
+from ui.gl.context import ContextError, free_dropped, is_software, make_headless_context, renderer_name
 from ui.gl.image import ImagePainter, ImageTexture, Rect, fit_rect
 from ui.gl.lines import LineRenderer, frusta_lines
 from ui.gl.points import INHERITED_ANCHOR_COLOR, RESIDUAL_ANCHOR_COLOR, PointRenderer
@@ -25,6 +25,7 @@ __all__ = [
     "Target",
     "clip_matrix",
     "fit_rect",
+    "free_dropped",
     "frusta_lines",
     "is_software",
     "make_headless_context",
