@@ -222,7 +222,11 @@ def inspect_video(path: Path) -> tuple[int, tuple[int, int], float]:
     try:
         with av.open(str(path)) as container:
             if not container.streams.video:
-                raise CaptureError("The file has no video stream.", hint="Export it as a video file.", path=path)
+                raise CaptureError(
+                    "The file has no video stream, so it is truncated or no video.",
+                    hint="Copy or export it again.",
+                    path=path,
+                )
             stream = container.streams.video[0]
             size = (stream.codec_context.width, stream.codec_context.height)
             rate = float(stream.average_rate or 0)

@@ -157,20 +157,29 @@ class VideoFrames:
         )
 
     def _open(self) -> None:
-        container = av.open(str(self.path))
-        stream = container.streams.video[0]
-        if not self._pts:  # packets are read but not decoded; needed because a video's frame times need not be even
+        if not self._pts:
+            self._read_index()
+        self._container = av.open(str(self.path))
+        self._decoder = self._container.decode(self._container.streams.video[0])
+        self._next_index = 0
+
+    def _read_index(self) -> None:
+        """Collect frame times; packets are read, not decoded. Needed because frame times need not be even."""
+        with av.open(str(self.path)) as container:
             packets = [
                 (pts, packet.is_keyframe)
-                for packet in container.demux(stream)
+                for packet in container.demux(container.streams.video[0])
                 if (pts := shown_pts(packet)) is not None
             ]
-            self._pts = sorted(pts for pts, _ in packets)
-            self._key_indices = sorted(bisect_left(self._pts, pts) for pts, is_key in packets if is_key)
-            container.seek(self._pts[0] if self._pts else 0, stream=stream, backward=True)
-        self._container = container
-        self._decoder = container.decode(stream)
-        self._next_index = 0
+        times = sorted(pts for pts, _ in packets)
+        if len(times) != self._n_frames:
+            raise CaptureError(
+                f"The container promises {self._n_frames} frames, {len(times)} are in it.",
+                hint="Copy or export this video again.",
+                path=self.path,
+            )
+        self._key_indices = sorted({0, *(bisect_left(times, pts) for pts, is_key in packets if is_key)})
+        self._pts = times
 
     def _must_seek(self, frame_index: int) -> bool:
         ahead = frame_index - self._next_index
