@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from app.arrays import AnchorArrays, GaussianArrays, PointArrays
+from app.kernels import prepare_drawing
 from app.latest import LatestWorker
 from engine.capture.clip import Clip
 from engine.model.clip_state import ClipState, read_clip_state
@@ -111,7 +112,7 @@ class Playback:
         self._reference: tuple[tuple[str, int], ClipState] | None = None
         self._last: GaussianArrays | None = None
         self.worker: LatestWorker[FrameRequest, GaussianArrays] = LatestWorker(
-            "playback", self._compute, prepare=use_one_thread
+            "playback", self._compute, prepare=prepare_drawing
         )
 
     def gaussians(self, request: FrameRequest) -> GaussianArrays | None:
@@ -196,13 +197,6 @@ class Playback:
         if self._reference is None or self._reference[0] != identity:
             self._reference = (identity, read_clip_state(path))
         return self._reference[1]
-
-
-def use_one_thread() -> None:
-    """Keep this thread's torch work on one core; OpenMP's thread count belongs to the calling thread."""
-    import torch
-
-    torch.set_num_threads(1)
 
 
 def static_points(path: Path, revision: str) -> PointArrays:

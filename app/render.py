@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from app.arrays import GaussianArrays, Picture
+from app.kernels import prepare_drawing
 from app.latest import LatestWorker
-from app.playback import use_one_thread
 
 BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
 """Behind everything; the same dark grey as the viewport's."""
@@ -31,7 +31,7 @@ class Renderer:
     """Pictures on demand. Methods are for one thread, not the one it owns."""
 
     def __init__(self) -> None:
-        self.worker: LatestWorker[RenderRequest, Picture] = LatestWorker("renderer", render, prepare=use_one_thread)
+        self.worker: LatestWorker[RenderRequest, Picture] = LatestWorker("renderer", render, prepare=prepare_drawing)
 
     def picture(
         self, gaussians: GaussianArrays, world_to_camera: np.ndarray, K: np.ndarray, width: int, height: int

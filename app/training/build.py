@@ -11,17 +11,20 @@ from engine.capture.capture import open_capture
 from engine.errors import ProjectError
 from engine.model.clip_state import read_clip_state
 from engine.training.config import TrainConfig
-from engine.training.report import ReportProgress
+from engine.training.report import Progress, ReportProgress
 
 
 def build_training(job: TrainJob, report: ReportProgress) -> Training:
-    """Open the capture, read the reference clip where one is needed, and set the training up.
+    """Compile what is not compiled yet, open the capture, read the reference clip if needed, set the training up.
 
     Raises:
         CaptureError, ProjectError: Files are missing, damaged or do not fit together.
     """
+    from engine.raster.cpu.warm import warm_up
     from engine.training.clip_training import ClipTraining  # torch takes a second to import
 
+    report(Progress("Starting", 0.0))
+    warm_up()  # compiles on the very first start, which takes longer
     project = open_project(job.project, is_writable=False)
     capture = open_capture(Path(job.capture), scale=job.scale)
     if capture.fingerprint != project.settings.fingerprint:

@@ -206,6 +206,7 @@ class TrainingRun:
                 steps_per_s=0.0,
             )
         )
+        self._measure(training)  # renders, so that every kernel is compiled before a window does the same
         self._write_snapshot(training)
         self._rate.update(training.steps_done, self._clock())
         return training

@@ -6,14 +6,11 @@ One process trains one clip and ends. Nothing imported here may draw anything.
 from __future__ import annotations
 
 import logging
-import multiprocessing
 import os
 import signal
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from importlib import import_module
-from importlib.util import find_spec
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -43,8 +40,6 @@ def main(job_bytes: bytes, commands: Connection, events: Connection, log_path: s
     """Runs in the child until the clip is finished, stopped or failed."""
     _redirect_output(Path(log_path))
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C reaches the whole group; the parent decides what it means
-    # preparation may start a short process of its own, which daemons are not allowed to; this one ends with its pipe
-    multiprocessing.current_process().daemon = False
     job = decode(job_bytes)
     assert isinstance(job, TrainJob)
     n_threads = _set_threads(is_window_open=job.is_window_open)
@@ -74,17 +69,12 @@ def _set_threads(*, is_window_open: bool) -> int:
     if is_window_open and cores <= 2 and hasattr(os, "nice"):
         with suppress(OSError):
             os.nice(NICENESS)
-    os.environ["OMP_NUM_THREADS"] = str(n_threads)  # read when torch is imported, which it was not yet
-    import torch
+    # OpenMP reads these when it is loaded, which importing torch does; the spin count is that of the kernels
+    os.environ["OMP_NUM_THREADS"] = str(n_threads)
+    os.environ.setdefault("GOMP_SPINCOUNT", "20000")
+    from engine.raster.cpu.threads import configure_threads
 
-    torch.set_num_threads(n_threads)
-    if find_spec("engine.raster.cpu.threads") is not None:
-        configure: Callable[[int], object] | None = getattr(
-            import_module("engine.raster.cpu.threads"), "configure_threads", None
-        )
-        if configure is not None:
-            configure(n_threads)
-    return n_threads
+    return configure_threads(n_threads)
 
 
 def _receiver(commands: Connection) -> Callable[[float], Command | None]:
