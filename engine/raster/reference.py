@@ -86,6 +86,7 @@ def drawable_rows(gaussians: Gaussians, view: PinholeView) -> Tensor:
     centers, covariances, depths = project(gaussians, view)
     norms_squared = gaussians.quats.square().sum(-1)
     opacities = gaussians.opacities
+    size = torch.tensor([view.width, view.height]).to(centers)
     half_extents = torch.sqrt(
         2 * torch.log(opacities / ALPHA_MIN)[:, None] * covariances.diagonal(dim1=-2, dim2=-1)
     )  # where alpha falls to ALPHA_MIN; NaN below that opacity
@@ -100,6 +101,9 @@ def drawable_rows(gaussians: Gaussians, view: PinholeView) -> Tensor:
         & (centers.abs() < VALUE_MAX).all(-1)
         & (gaussians.colors.abs() < VALUE_MAX).all(-1)
     )
+    first_pixels = torch.ceil(centers - half_extents - 0.5).clamp_min(0)  # whose centres lie in the bounding box
+    last_pixels = torch.minimum(torch.floor(centers + half_extents - 0.5), size - 1)
+    keep &= (first_pixels <= last_pixels).all(-1)
     rows = torch.nonzero(keep)[:, 0]
     return rows[torch.argsort(depths[rows].float(), stable=True)]
 

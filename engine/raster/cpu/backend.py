@@ -18,6 +18,7 @@ from torch import Tensor
 from engine.raster.cpu import binning, blend, blend_backward, project, project_backward, sort
 from engine.raster.cpu.camera_row import camera_row
 from engine.raster.cpu.record import PAIR_FLOATS, RECORD_FLOATS, TILE
+from engine.raster.cpu.threads import parallel_guard
 from engine.raster.cpu.tile import SCRATCH_FLOATS
 from engine.raster.cpu.workspace import Workspace, WorkspacePool
 from engine.raster.gaussians import Gaussians
@@ -64,7 +65,8 @@ def rasterize_cpu(gaussians: Gaussians, views: list[PinholeView], background: Te
             centers = None if means2d is None else means2d[index]
             image, alpha = _Rasterize.apply(view, centers, background, *parameters)  # pyright: ignore
         else:
-            image, transmittance, drawing = _draw(view, background, parameters)
+            with parallel_guard():
+                image, transmittance, drawing = _draw(view, background, parameters)
             if means2d is not None:
                 _write_centers(drawing, means2d[index])
             POOL.give_back(drawing.workspace)
@@ -81,7 +83,8 @@ class _Rasterize(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, view: PinholeView, centers: Tensor | None, background: Tensor, *parameters: Tensor):
-        image, transmittance, drawing = _draw(view, background, parameters)
+        with parallel_guard():
+            image, transmittance, drawing = _draw(view, background, parameters)
         if centers is not None:
             _write_centers(drawing, centers)
         ctx.drawing = drawing
@@ -92,9 +95,10 @@ class _Rasterize(torch.autograd.Function):
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, grad_image: Tensor, grad_alpha: Tensor):
         _lease, image, transmittance, *parameters = ctx.saved_tensors
-        grads, grad_centers = _differentiate(
-            ctx.drawing, parameters, image, transmittance, grad_image.contiguous(), -grad_alpha[..., 0]
-        )
+        with parallel_guard():
+            grads, grad_centers = _differentiate(
+                ctx.drawing, parameters, image, transmittance, grad_image.contiguous(), -grad_alpha[..., 0]
+            )
         grad_background = None
         if ctx.needs_input_grad[2]:
             grad_background = (grad_image * transmittance[..., None]).sum(dim=(0, 1))

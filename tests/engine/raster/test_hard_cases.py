@@ -1,0 +1,232 @@
+"""Scenes that break rasterizers: the fast back end against the float64 reference, forward and gradient."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from engine.raster import Gaussians, rasterize
+from tests.raster_scenes import Scene, camera, gaussians_of, layered_scene, simple_scene
+
+NAMES = ("means", "quats", "scales", "opacities", "colors")
+NAN, INF = math.nan, math.inf
+
+
+def _spread(n_rows: int, near: float = 2.0, far: float = 6.0, seed: int = 0) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return np.stack([rng.uniform(-1, 1, n_rows), rng.uniform(-0.8, 0.8, n_rows), rng.uniform(near, far, n_rows)], 1)
+
+
+def _needles() -> Scene:
+    long = 10 ** np.random.default_rng(2).uniform(0, 1.2, 50)
+    return simple_scene(gaussians_of(_spread(50), np.stack([long, np.full(50, 1e-3), np.full(50, 1e-3)], 1)))
+
+
+def _huge() -> Scene:
+    opacities = np.random.default_rng(2).uniform(0.01, 0.3, 20)
+    return simple_scene(gaussians_of(_spread(20), np.full((20, 3), 50.0), opacities=opacities))
+
+
+def _near_plane() -> Scene:
+    means = np.concatenate([_spread(20), _spread(20, -5, -0.1), _spread(19, -0.02, 0.05), np.zeros((1, 3))])
+    return simple_scene(gaussians_of(means, np.full((60, 3), 0.05)))
+
+
+def _opaque_stack() -> Scene:
+    means = np.stack([np.zeros(200), np.zeros(200), np.linspace(2, 6, 200)], 1)
+    return simple_scene(gaussians_of(means, np.full((200, 3), 0.5), opacities=np.full(200, 0.9995)))
+
+
+def _opacity_edges() -> Scene:
+    opacities = np.repeat([0.0, 1 / 256, 1.0, 0.5], 10)
+    return simple_scene(gaussians_of(_spread(40), np.full((40, 3), 0.1), opacities=opacities))
+
+
+def _sub_pixel() -> Scene:
+    return simple_scene(gaussians_of(_spread(500), np.full((500, 3), 1e-6)))
+
+
+def _one_pixel() -> Scene:
+    means = np.stack([np.full(10_000, 0.01), np.full(10_000, 0.01), np.linspace(2, 2.5, 10_000)], 1)
+    opacities = np.full(10_000, 0.01)
+    scene = gaussians_of(means, np.full((10_000, 3), 1e-4), opacities=opacities)
+    return simple_scene(scene, width=24, height=16)
+
+
+def _flat() -> Scene:
+    scales = np.stack([np.full(50, 0.1), np.zeros(50), np.full(50, 0.1)], 1)
+    scales[40:] = 0.0
+    return simple_scene(gaussians_of(_spread(50), scales))
+
+
+def _off_screen() -> Scene:
+    means = np.stack([np.full(10, 8.0), np.zeros(10), np.full(10, 2.0)], 1)
+    return simple_scene(gaussians_of(means, np.full((10, 3), 3.0)))
+
+
+def _center_outside() -> Scene:
+    scene = gaussians_of(_spread(60) + np.array([1.2, 1.0, 0.0]), np.full((60, 3), 0.1))
+    return simple_scene(scene, Ks=camera(160, 120, center=(-90.0, -60.0)))
+
+
+def _scaled(factor: float) -> Scene:
+    scene = gaussians_of(_spread(60) * factor, np.full((60, 3), 0.1) * factor * [1.0, 0.5, 0.2])
+    return simple_scene(scene, near_plane=0.01 * factor)
+
+
+def _long_quats() -> Scene:
+    quats = np.random.default_rng(4).normal(size=(40, 4)) * np.repeat([1e-6, 1e-3, 1e3, 1e6], 10)[:, None]
+    return simple_scene(gaussians_of(_spread(40), np.full((40, 3), 0.1) * [1.0, 0.5, 0.2], quats=quats))
+
+
+CASES = {
+    # name: (scene, pixel tolerance, gradient tolerance). A float32 pixel position near 160 is off by up to 8e-6 px and a
+    # small splat's alpha changes by up to 1 per px, hence 4e-6; needles multiply that by their slope.
+    "needles": (_needles, 5e-5, 2e-3),
+    "huge": (_huge, 4e-6, 1e-5),
+    "near plane": (_near_plane, 4e-6, 1e-5),
+    "opaque stack": (_opaque_stack, 4e-6, 1e-5),
+    "opacity edges": (_opacity_edges, 4e-6, 1e-5),
+    "sub-pixel": (_sub_pixel, 1e-5, 2e-5),
+    "10,000 on one pixel": (_one_pixel, 1e-5, 2e-5),
+    "zero scales": (_flat, 4e-6, 1e-5),
+    "off-screen": (_off_screen, 4e-6, 1e-5),
+    "principal point outside": (_center_outside, 4e-6, 1e-5),
+    "scene scale 1e-4": (lambda: _scaled(1e-4), 4e-6, 1e-5),
+    "scene scale 1e4": (lambda: _scaled(1e4), 4e-6, 1e-5),
+    "quaternions of any length": (_long_quats, 4e-6, 1e-5),
+}
+
+
+def _outcome(scene: Scene, gaussians: Gaussians, backend: str) -> tuple[torch.Tensor, torch.Tensor, Gaussians]:
+    dtype = torch.float32 if backend == "cpu" else torch.float64
+    parameters = Gaussians(*(t.detach().to(dtype).clone().requires_grad_() for t in gaussians.tensors()))
+    rendering = rasterize(
+        parameters,
+        *scene.arguments,
+        background=scene.background.to(dtype),
+        near_plane=scene.near_plane,
+        backend=backend,
+    )
+    generator = torch.Generator().manual_seed(0)
+    weights = torch.randn(rendering.image.shape, generator=generator, dtype=torch.float64)
+    ((rendering.image * weights.to(dtype)).sum() + (rendering.alpha * weights[..., :1].to(dtype)).sum()).backward()
+    grads = Gaussians(*(tensor.grad for tensor in parameters.tensors()))
+    return rendering.image.detach(), rendering.alpha.detach(), grads
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_fast_matches_reference(case):
+    make_scene, pixel_tolerance, gradient_tolerance = CASES[case]
+    scene = make_scene()
+    expected, expected_alpha, expected_grads = _outcome(scene, scene.gaussians, "reference")
+    actual, actual_alpha, grads = _outcome(scene, scene.gaussians, "cpu")
+    assert (actual - expected).abs().max() <= pixel_tolerance
+    assert (actual_alpha - expected_alpha).abs().max() <= pixel_tolerance
+    # a gradient that is zero in truth (rotation of a sphere) can only be compared with what else flows
+    floor = 1e-6 * expected_grads.scales.norm() * scene.gaussians.scales.abs().max()
+    for name in NAMES:
+        want, got = getattr(expected_grads, name), getattr(grads, name).double()
+        assert got.isfinite().all(), name
+        assert (got - want).norm() <= gradient_tolerance * want.norm() + floor * 10, name
+
+
+@pytest.mark.parametrize("backend", ["cpu", "reference"])
+@pytest.mark.parametrize("value", [NAN, INF, -INF, 1e38, -1e38])
+@pytest.mark.parametrize("name", NAMES)
+def test_a_bad_row_is_dropped_and_poisons_nothing(backend, value, name):
+    clean = gaussians_of(_spread(30), np.full((30, 3), 0.1) * [1.0, 0.6, 0.3])
+    dirty = Gaussians(*(tensor.clone() for tensor in clean.tensors()))
+    bad = torch.arange(0, 12)
+    flat = getattr(dirty, name).view(30, -1)
+    flat[bad, bad % flat.shape[1]] = value
+    scene = simple_scene(clean, width=80, height=60, Ks=camera(80, 60))
+    keep = torch.arange(12, 30)
+    expected, _, expected_grads = _outcome(scene, clean[keep], backend)
+    actual, _, grads = _outcome(scene, dirty, backend)
+    assert torch.equal(actual, expected)
+    for field in NAMES:
+        got = getattr(grads, field)
+        assert torch.equal(got[keep], getattr(expected_grads, field)), field
+        assert not got[bad].any(), f"{field}: a dropped row has a gradient"
+
+
+@pytest.mark.parametrize("backend", ["cpu", "reference"])
+def test_zero_and_denormal_quaternions_are_dropped(backend):
+    clean = gaussians_of(_spread(10), np.full((10, 3), 0.1))
+    quats = clean.quats.clone()
+    quats[0] = 0.0
+    quats[1] = torch.tensor([1e-40, -1e-40, 0.0, 1e-42])
+    scene = simple_scene(clean, width=40, height=30, Ks=camera(40, 30))
+    dirty = Gaussians(clean.means, quats, clean.scales, clean.opacities, clean.colors)
+    expected, _, _ = _outcome(scene, clean[2:], backend)
+    actual, _, grads = _outcome(scene, dirty, backend)
+    assert torch.equal(actual, expected)
+    for field in NAMES:
+        assert not getattr(grads, field)[:2].any(), field
+
+
+@pytest.mark.parametrize("backend", ["cpu", "reference"])
+def test_equal_depths_keep_their_order(backend):
+    means = np.tile([[0.0, 0.0, 3.0]], (3, 1))
+    colors = np.eye(3)
+    scene = simple_scene(
+        gaussians_of(means, np.full((3, 3), 2.0), opacities=np.full(3, 0.99), colors=colors), width=8, height=8
+    )
+    image, _, _ = _outcome(scene, scene.gaussians, backend)
+    center = image[0, 4, 4]
+    assert center[0] > 0.9 > center[1] > center[2], "the first of equals is in front"
+
+
+def _image(scene: Scene, gaussians: Gaussians) -> tuple[torch.Tensor, torch.Tensor]:
+    rendering = rasterize(gaussians, *scene.arguments, backend="cpu")
+    return rendering.image, rendering.alpha
+
+
+small_scenes = st.builds(
+    lambda n, size, seed, faint: layered_scene(n, 50, 37, size, faint=faint, seed=seed),
+    n=st.integers(1, 60),
+    size=st.floats(0.3, 20.0),
+    seed=st.integers(0, 10_000),
+    faint=st.booleans(),
+)
+
+
+@settings(max_examples=25, deadline=None)
+@given(scene=small_scenes, seed=st.integers(0, 1000))
+def test_order_of_rows_does_not_matter(scene, seed):
+    gaussians = Gaussians(*(tensor.float() for tensor in scene.gaussians.tensors()))
+    order = torch.from_numpy(np.random.default_rng(seed).permutation(len(gaussians)))
+    for a, b in zip(_image(scene, gaussians), _image(scene, gaussians[order]), strict=True):
+        assert torch.equal(a, b)  # depths differ, so the sorted lists are the same
+
+
+@settings(max_examples=25, deadline=None)
+@given(scene=small_scenes)
+def test_what_lies_behind_finished_pixels_changes_nothing(scene):
+    walls = gaussians_of(
+        np.array([[0.0, 0.0, z] for z in (0.5, 0.51, 0.52)]), np.full((3, 3), 90.0), opacities=np.ones(3)
+    )
+    pose = scene.viewmats[0]
+    walls = Gaussians((walls.means - pose[:3, 3]) @ pose[:3, :3], *walls.tensors()[1:])
+    front = Gaussians(*(tensor.float() for tensor in walls.tensors()))
+    hidden = Gaussians(*(tensor.float() for tensor in scene.gaussians.tensors()))
+    behind = hidden[(hidden.means.double() @ pose[:3, :3].T + pose[:3, 3])[:, 2] > 0.6]
+    for a, b in zip(_image(scene, front), _image(scene, Gaussians.concatenate([behind, front])), strict=True):
+        assert torch.equal(a, b)
+
+
+@settings(max_examples=25, deadline=None)
+@given(scene=small_scenes)
+def test_weights_and_transmittance_add_up_to_one(scene):
+    gaussians = Gaussians(*(tensor.float() for tensor in scene.gaussians.tensors()))
+    white = Gaussians(*gaussians.tensors()[:4], torch.ones_like(gaussians.colors))
+    image, alpha = _image(scene, white)
+    assert (image - alpha).abs().max() <= 1e-6  # sums of up to 60 float32 weights
+    assert alpha.min() >= 0
+    assert alpha.max() <= 1
