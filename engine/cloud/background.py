@@ -21,6 +21,9 @@ CLUSTER_SHARE = 0.3
 STABLE_SHARE = 0.5
 """A pixel is stable when at least this share of frames lies within the noise of its background: a clear majority. In
 short captures a larger share would also give up places that people merely cross often."""
+TIE_SCORE = 2.0
+"""Clusters whose variance is below this many noise variances are equally still. Among those the earliest wins: what
+appears later and stays can be added to a clip, but what the reference clip's background shows cannot be taken away."""
 N_BRIGHTNESS_BINS = 16
 
 
@@ -56,11 +59,11 @@ def estimate_background(frames: np.ndarray) -> Background:
     window = max(3, int(np.ceil(CLUSTER_SHARE * n_frames)))
     flat = np.ones(N_BRIGHTNESS_BINS, dtype=np.float32)
     sampled = np.ascontiguousarray(frames[:, ::4, ::4])  # every 16th pixel is plenty for a median noise per brightness
-    colors, variances, _ = _cluster_rows(sampled, window, flat)
+    colors, variances, _ = _cluster_rows(sampled, window, flat, 0.0)
     noise = _noise_by_brightness(colors, variances)
 
     def rows(span: tuple[int, int]):
-        return _cluster_rows(frames[:, span[0] : span[1]], window, noise)
+        return _cluster_rows(frames[:, span[0] : span[1]], window, noise, TIE_SCORE)
 
     parts = map_ordered(rows, row_spans(height))
     colors = np.concatenate([part[0] for part in parts])
@@ -90,7 +93,7 @@ def _noise_by_brightness(colors: np.ndarray, variances: np.ndarray) -> np.ndarra
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _cluster_rows(frames, window, noise):
+def _cluster_rows(frames, window, noise, tie_score):
     """Best window per pixel: mean colour [H, W, 3] f32, variance summed over RGB [H, W], share of agreeing frames."""
     n_frames, height, width, _ = frames.shape
     colors = np.empty((height, width, 3), np.float32)
@@ -119,6 +122,7 @@ def _cluster_rows(frames, window, noise):
                     squares += value * value
                 sums[i + 1, 3] = sums[i, 3] + squares
             best_score = np.inf
+            best_time = np.inf
             best_start = 0
             best_variance = 0.0
             for start in range(n_frames - window + 1):
@@ -131,8 +135,14 @@ def _cluster_rows(frames, window, noise):
                     brightness += mean
                 variance = max((sums[stop, 3] - sums[start, 3]) / window - mean_square, 0.0)
                 score = variance / noise[min(int(brightness * n_bins / 765.0), n_bins - 1)]
-                if score < best_score:
+                times = 0.0
+                if score < tie_score:
+                    score = tie_score
+                    for i in range(start, stop):
+                        times += order[i]
+                if score < best_score or (score == best_score and times < best_time):
                     best_score = score
+                    best_time = times
                     best_start = start
                     best_variance = variance
             mean_r = (sums[best_start + window, 0] - sums[best_start, 0]) / window

@@ -25,9 +25,10 @@ VOXEL_PX = 2.5
 MIN_HITS_SHARE = 0.25
 """Share of the cameras that must see a voxel inside their mask (at least MIN_HITS)."""
 MIN_HITS = 3
-MIN_VISIBLE = 2
-"""Cameras that must see a surface voxel unhidden by the hull itself; others cannot be learned. Hulls also fill the
-space behind what they show (under a shadow on the floor): half of the surface on the dome, and this removes it."""
+MIN_VISIBLE = 1
+"""Cameras that must see a surface voxel unhidden by the hull itself. Hulls also fill the space behind what they show
+(under a shadow on the floor): half of the surface on the dome, and this removes it. Asking for 2 tears holes, because
+what only one camera sees still hides what lies behind it."""
 MISSES_FROM_CAMERAS = 8
 """One camera may disagree in rigs of at least this many; in smaller ones every view is needed."""
 MAX_GRID_VOXELS = 400_000_000
@@ -86,7 +87,6 @@ def build_moving_cloud(
     projections, near = projection_matrices(rig), 0.5 * near_plane(rig)
     min_hits = min(max(MIN_HITS, int(np.ceil(MIN_HITS_SHARE * n_cameras))), n_cameras)
     n_misses = 1 if n_cameras >= MISSES_FROM_CAMERAS else 0
-    min_visible = MIN_VISIBLE if n_cameras >= MISSES_FROM_CAMERAS else 1
     n_hidden = 0
 
     def surface(frame_in_clip: int, grid: Grid) -> np.ndarray:
@@ -95,7 +95,7 @@ def build_moving_cloud(
         voxels = carve(frame_masks, projections, grid, near=near, n_misses=n_misses, min_hits=min_hits)
         voxels = voxels[surface_rows(voxels, grid)]
         _, is_visible = hull_visibility(grid.centers(voxels), grid.size, frame_masks, projections, near=near)
-        is_kept = is_visible.sum(axis=0) >= min_visible
+        is_kept = is_visible.sum(axis=0) >= MIN_VISIBLE
         n_hidden += int((~is_kept).sum())
         return voxels[is_kept]
 
@@ -124,7 +124,7 @@ def build_moving_cloud(
         f"Visual hulls: {np.mean([len(s) for s in surfaces]):.0f} surface points a frame, {len(voxels)} over "
         f"{n_frames} frames at {size:.4g} scene units (asked {wanted:.4g} = {VOXEL_PX} px, limit {max_points}); "
         f"{min_hits} of {n_cameras} cameras must agree, {n_misses} may not; {n_hidden / n_frames:.0f} a frame dropped "
-        f"that fewer than {min_visible} cameras can see ({time.perf_counter() - started:.1f} s)"
+        f"that no camera can see ({time.perf_counter() - started:.1f} s)"
     )
     if len(voxels) == 0:
         return _empty(n_frames, size)
