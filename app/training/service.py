@@ -43,6 +43,11 @@ from engine.errors import ProjectError
 logger = logging.getLogger(__name__)
 
 Launch = Callable[[TrainJob, Project], Worker]
+STAGE_WORDS = {
+    "static": "Learning what stands still",
+    "joint": "Learning what moves",
+    "source": "Learning what is new",
+}
 MAX_HISTORY = 4000
 """Points of a curve; beyond that every second one goes."""
 CLOSE_TIMEOUT_S = 5.0
@@ -261,6 +266,8 @@ class TrainingService:
             case StepReported():
                 self._step = event
                 known.step, known.n_steps = event.step, event.n_steps
+                if event.stage:  # takes the place of the preparation that went before
+                    self._stage = StageReported(STAGE_WORDS.get(event.stage, event.stage), 1.0)
                 if math.isfinite(event.loss):
                     append_thinned(known.loss_history, (event.step, event.loss))
             case HeldOutMeasured():
@@ -314,14 +321,13 @@ class TrainingService:
         state, step = self.state, self._step
         rate = step.steps_per_s if step is not None else 0.0
         left = 0 if step is None else step.n_steps - step.step
-        stage = self._stage.stage if step is None or not step.stage else step.stage
         return TrainingStatus(
             state=state,
             clip_index=clip_index,
             step=0 if known is None else known.step,
             n_steps=0 if known is None else known.n_steps,
             progress=self._stage.done if step is None else step.step / max(step.n_steps, 1),
-            stage=stage,
+            stage=self._stage.stage,
             message=self._message(state),
             steps_per_s=rate if state == "running" else 0.0,
             eta_s=left / rate if rate > 0 and state == "running" else None,

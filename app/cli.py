@@ -1,0 +1,457 @@
+"""The command line without a window: train, eval, render, inspect, doctor. The only place that prints.
+
+Exit codes: 0 done, 1 failed, 2 bad input, 130 interrupted. One plain message each, details in the log file. Results
+go to standard output, progress and messages to standard error.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import logging
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NoReturn
+
+from app.headless import (
+    ClipOutcome,
+    evaluate_project,
+    open_trained,
+    render_frames,
+    train_clips,
+    train_document,
+)
+from app.logs import start_logging
+from app.progress import ProgressLine, duration_text
+from app.project import (
+    PROJECT_FILE,
+    Project,
+    check_settings,
+    create_project,
+    default_settings,
+    open_project,
+    read_settings,
+)
+from app.status import TrainingStatus
+from app.training.messages import Event, StageReported, WarningRaised
+from app.training.process import ProcessWorker
+from app.training.rate import Rate
+from app.training.service import Launch, TrainingService
+from engine.capture.capture import Capture, open_capture
+from engine.errors import CaptureError, EngineError, ProjectError
+from engine.files import atomic_path
+
+logger = logging.getLogger(__name__)
+
+EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
+VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov")
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line and how to get help."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(EXIT_BAD_INPUT, f"{self.prog}: {message}. See `{self.prog} --help`.\n")
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Arguments of every subcommand."""
+    parser = _Parser(prog="clipgstream", description="Train, measure and render dynamic captures without a window.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    train = commands.add_parser("train", help="train clips of a capture", description="Train clips of a capture.")
+    train.add_argument("capture", type=Path, help="capture folder")
+    train.add_argument("--project", type=Path, required=True, help="project folder; made when it is not there")
+    train.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
+    train.add_argument("--holdout", metavar="NAMES", help="cameras to leave out, or 'none' (default: the capture's)")
+    train.add_argument("--scale", type=float, help="working size, share of the original in (0, 1] (default: 1)")
+    train.add_argument("--clip-length", type=int, metavar="M", help="frames per clip (default: 10)")
+    train.add_argument("--seed", type=int, help="fixes initial values and order of pictures (default: 0)")
+    train.add_argument(
+        "--set",
+        dest="assignments",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a training setting; may be given several times",
+    )
+    train.add_argument("--json", action="store_true", help="print the outcome as JSON on standard output")
+    train.add_argument("--quiet", action="store_true", help="no progress")
+
+    evaluate = commands.add_parser("eval", help="measure trained clips", description="Measure trained clips.")
+    evaluate.add_argument("project", type=Path, help="project folder")
+    evaluate.add_argument("--json", required=True, metavar="OUT", help="file for all rows and means; - prints them")
+    evaluate.add_argument("--clips", default=":", metavar="A:B", help="clips to measure (default: all trained)")
+    evaluate.add_argument("--quiet", action="store_true", help="no progress")
+
+    render = commands.add_parser("render", help="render a camera", description="Render a camera of trained clips.")
+    render.add_argument("project", type=Path, help="project folder")
+    render.add_argument("--camera", required=True, metavar="NAME", help="camera of the capture")
+    render.add_argument("--frames", default=":", metavar="A:B", help="frames A up to B, B not included (default: all)")
+    render.add_argument("--out", type=Path, required=True, metavar="FILE.mp4|DIR", help="video, or folder for PNGs")
+    render.add_argument("--quiet", action="store_true", help="no progress")
+
+    inspect = commands.add_parser("inspect", help="describe a capture", description="Describe a capture.")
+    inspect.add_argument("capture", type=Path, help="capture folder")
+    inspect.add_argument("--json", action="store_true", help="print everything as JSON")
+
+    doctor = commands.add_parser("doctor", help="look at this machine", description="Look at this machine.")
+    doctor.add_argument("--json", action="store_true", help="print the findings as JSON")
+    return parser
+
+
+def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -> int:
+    """Run one subcommand.
+
+    Args:
+        argv: Arguments after the program's name; those of the process when None.
+        launch: Starts a training worker; a process by default.
+    Returns:
+        The exit code.
+    """
+    try:
+        options = build_parser().parse_args(argv)
+    except SystemExit as error:  # argparse has said what is wrong
+        return int(error.code or 0)
+    log_file = start_logging()
+    try:
+        with _terminating_like_ctrl_c():
+            return _COMMANDS[options.command](options, launch)
+    except (CaptureError, ProjectError) as error:
+        return _fail(EXIT_BAD_INPUT, str(error))
+    except EngineError as error:
+        return _fail(EXIT_FAILED, str(error))
+    except KeyboardInterrupt:
+        return _fail(EXIT_INTERRUPTED, "Interrupted. What was learned is kept; the same command goes on from there.")
+    except BrokenPipeError:  # whoever read our output has left
+        return EXIT_FAILED
+    except Exception as error:  # the edge of the command line: one line, no traceback
+        logger.exception("%s failed", options.command)
+        where = f" Details are in {log_file}." if log_file else ""
+        return _fail(EXIT_FAILED, f"{type(error).__name__}: {error}. This is a fault of the program.{where}")
+
+
+def _fail(code: int, message: str) -> int:
+    logger.error("exit %d: %s", code, message)
+    print(f"clipgstream: {message}", file=sys.stderr)
+    return code
+
+
+@contextlib.contextmanager
+def _terminating_like_ctrl_c() -> Iterator[None]:
+    """SIGTERM stops as cleanly as Ctrl+C does."""
+
+    def interrupt(signum: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, interrupt)
+    except ValueError:  # not the main thread
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+# ---------------------------------------------------------------- arguments
+
+
+def parse_range(text: str, n: int, *, option: str, what: str) -> range:
+    """ "A:B", "A:", ":B", ":" or "A" as a range inside range(n).
+
+    Raises:
+        ProjectError: It is malformed, empty or reaches outside; names what is allowed.
+    """
+    first, colon, last = text.partition(":")
+    allowed = f"The capture has {what} 0 to {n - 1}; write {option} 0:{n} for all of them."
+    try:
+        start = int(first) if first.strip() else 0
+        stop = (int(last) if last.strip() else n) if colon else start + 1
+        if not colon and not first.strip():
+            raise ValueError
+    except ValueError as error:
+        raise ProjectError(f"{option} is '{text}', which is no range A:B.", hint=allowed) from error
+    if not 0 <= start < stop <= n:
+        raise ProjectError(f"{option} is '{text}', which is empty or reaches outside.", hint=allowed)
+    return range(start, stop)
+
+
+def parse_cameras(text: str, capture: Capture) -> tuple[str, ...]:
+    """Camera names separated by commas; numbers that are no names count cameras from 0. "none" is an empty choice.
+
+    Raises:
+        ProjectError: There is no such camera.
+    """
+    names = capture.rig.names
+    chosen = []
+    for part in (part.strip() for part in text.split(",")):
+        if part in names:
+            chosen.append(part)
+        elif part.isdigit() and int(part) < len(names):
+            chosen.append(names[int(part)])
+        elif part and part.lower() != "none":
+            shown = f"{', '.join(names[:6])}, ... {names[-1]}" if len(names) > 7 else ", ".join(names)
+            raise ProjectError(
+                f"There is no camera '{part}'.", hint=f"Cameras are {shown}, or numbers from 0 to {len(names) - 1}."
+            )
+    return tuple(dict.fromkeys(chosen))
+
+
+def _open_for_training(options: argparse.Namespace) -> tuple[Project, Capture]:
+    """The project of the arguments, made or opened; what was given has to agree with what is there."""
+    from engine.training.config import parse_overrides
+
+    overrides = parse_overrides(options.assignments)
+    exists = (options.project / PROJECT_FILE).is_file()
+    stored = read_settings(options.project) if exists else None
+    scale = options.scale if options.scale is not None else 1.0 if stored is None else stored.scale
+    capture = open_capture(options.capture, scale=scale)
+    holdout = None if options.holdout is None else parse_cameras(options.holdout, capture)
+    if stored is None:
+        settings = default_settings(
+            capture,
+            clip_length=options.clip_length,
+            holdout=holdout,
+            seed=options.seed or 0,
+            overrides=overrides,
+        )
+        parse_range(
+            options.clips, len(_clips(capture, settings.clip_length)), option="--clips", what="clips"
+        )  # said before the folder is made
+        return create_project(options.project, settings), capture
+    given = {"scale": options.scale, "clip_length": options.clip_length, "seed": options.seed, "holdout": holdout}
+    changes: dict[str, Any] = {
+        name: value for name, value in given.items() if value is not None and value != getattr(stored, name)
+    }
+    if stored.overrides | overrides != stored.overrides:
+        changes["overrides"] = stored.overrides | overrides
+    if capture.fingerprint != stored.fingerprint:
+        raise ProjectError(
+            "The project was made for another capture.", hint="Choose another --project folder.", path=options.project
+        )
+    changed = replace(stored, **changes)
+    check_settings(changed, capture)
+    project = open_project(options.project)
+    if changes and project.has_progress:
+        project.close()
+        listed = ", ".join(f"{name} {getattr(stored, name)!r}" for name in changes)
+        raise ProjectError(
+            f"The project was trained with {listed}; that cannot change any more.",
+            hint="Leave the option out, or choose another --project folder.",
+            path=options.project,
+        )
+    if changes or stored.capture != str(Path(capture.path).resolve()):  # the capture may have moved
+        project.update(replace(changed, capture=str(Path(capture.path).resolve())))
+    return project, capture
+
+
+def _clips(capture: Capture, clip_length: int) -> list[Any]:
+    from engine.capture.clip import split_clips
+
+    return split_clips(capture.n_frames, clip_length)
+
+
+# ---------------------------------------------------------------- commands
+
+
+def _train(options: argparse.Namespace, launch: Launch) -> int:
+    project, capture = _open_for_training(options)
+    line = ProgressLine(is_quiet=options.quiet)
+    service: TrainingService | None = None
+    try:
+        clips = project.clips(capture.n_frames)
+        chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
+        holdout = capture.camera_indices(project.settings.holdout)
+        service = TrainingService(project, clips, holdout=holdout, launch=launch, is_window_open=False)
+        names = ", ".join(project.settings.holdout) or "none"
+        line.say(
+            f"{capture.path}: {len(capture.rig)} cameras (held out: {names}), {capture.n_frames} frames, "
+            f"clips {chosen.start} to {chosen.stop - 1} of {len(clips)}"
+        )
+        outcomes = train_clips(
+            service,
+            chosen,
+            on_status=lambda status: _show_status(line, status),
+            on_event=lambda event: _show_event(line, event),
+            on_outcome=lambda outcome: _show_outcome(line, outcome),
+        )
+        line.finish()
+        if options.json:
+            print(json.dumps(train_document(project, capture, outcomes), indent=2))
+    finally:
+        line.finish()
+        if service is not None:
+            service.close()
+        project.close()
+    last = outcomes[-1]
+    if last.state == "failed":
+        code = EXIT_BAD_INPUT if last.kind in ("CaptureError", "ProjectError") else EXIT_FAILED
+        return _fail(code, " ".join(part for part in (last.message, last.hint) if part))
+    return EXIT_OK
+
+
+def _show_status(line: ProgressLine, status: TrainingStatus) -> None:
+    if status.state == "running":
+        parts = [f"step {status.step}/{status.n_steps}"]
+        if status.steps_per_s:
+            parts += [f"{status.steps_per_s:.1f} steps/s", f"{duration_text(status.eta_s)} left"]
+        if status.loss_history:
+            parts.append(f"loss {status.loss_history[-1][1]:.4f}")
+        if status.psnr_history:
+            parts.append(f"held-out PSNR {status.psnr_history[-1][1]:.2f} dB")
+        line.update(f"Clip {status.clip_index}: training", status.progress, ", ".join(parts))
+    elif status.state in ("starting", "preparing"):
+        stage = status.stage.lower() if status.stage else "starting"
+        line.update(f"Clip {status.clip_index}: {stage}", status.progress, "")
+
+
+def _show_event(line: ProgressLine, event: Event) -> None:
+    match event:
+        case StageReported(message=message) if message:
+            line.say(f"  {message}")
+        case WarningRaised(title=title, detail=detail, hint=hint):
+            line.say(". ".join(part for part in (title, detail, hint) if part))
+        case _:
+            pass
+
+
+def _show_outcome(line: ProgressLine, outcome: ClipOutcome) -> None:
+    figure = "" if outcome.held_out_psnr is None else f", held-out PSNR {outcome.held_out_psnr:.2f} dB"
+    if outcome.state == "skipped":
+        line.say(f"Clip {outcome.clip_index} is trained already: {outcome.step} steps{figure}")
+    elif outcome.state == "trained":
+        took = duration_text(outcome.seconds)
+        line.say(f"Clip {outcome.clip_index} is trained: {outcome.step} steps in {took}{figure}")
+
+
+def _evaluate(options: argparse.Namespace, launch: Launch) -> int:
+    opened = open_trained(open_project(options.project, is_writable=False))
+    chosen = list(parse_range(options.clips, len(opened.clips), option="--clips", what="clips"))
+    if options.clips.strip() == ":":
+        chosen = opened.trained
+    line = ProgressLine(is_quiet=options.quiet)
+    progress = _row_progress(line, "Measuring")
+    document = evaluate_project(opened, clip_indices=chosen, on_progress=progress)
+    line.finish()
+    text = json.dumps(document, indent=1, allow_nan=False)
+    if options.json == "-":
+        print(text)
+        return EXIT_OK
+    _write_text(Path(options.json), text + "\n")
+    for clip, summary in document["means"]["clips"].items():
+        for group, words in (("held_out", "held out"), ("trained_on", "trained on")):
+            found = summary[group]
+            if found:
+                line.say(
+                    f"Clip {clip}, {words}: PSNR {found['psnr']:.2f} dB, after colour fit {found['psnr_fit']:.2f} dB, "
+                    f"SSIM {found['ssim']:.4f}"
+                )
+    line.say(f"{len(document['rows'])} rows in {options.json}")
+    return EXIT_OK
+
+
+def _write_text(path: Path, text: str) -> None:
+    try:
+        with atomic_path(path) as partial:
+            partial.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ProjectError(
+            f"The file could not be written ({error.strerror}).", hint="Choose another place.", path=path
+        ) from error
+
+
+def _row_progress(line: ProgressLine, stage: str) -> Callable[[int, int, Any], None]:
+    import time
+
+    rate = Rate()
+
+    def show(done: int, n: int, _row: Any) -> None:
+        rate.update(done, time.monotonic())
+        line.update(stage, done / max(n, 1), f"{done}/{n}, {duration_text(rate.eta_s(n - done))} left")
+
+    return show
+
+
+def _render(options: argparse.Namespace, launch: Launch) -> int:
+    from app.video import write_pictures, write_video
+
+    opened = open_trained(open_project(options.project, is_writable=False))
+    capture = opened.capture
+    chosen = parse_cameras(options.camera, capture)
+    if len(chosen) != 1:
+        raise ProjectError(f"--camera is '{options.camera}'; one camera can be rendered at a time.")
+    camera_index = capture.rig.names.index(chosen[0])
+    frames = parse_range(options.frames, capture.n_frames, option="--frames", what="frames")
+    if options.frames.strip() == ":":
+        frames = [f for i in opened.trained for f in opened.clips[i].frame_indices()]
+    line = ProgressLine(is_quiet=options.quiet)
+    progress = _row_progress(line, "Rendering")
+
+    def images() -> Iterator[tuple[int, Any]]:
+        rendered = render_frames(opened, camera_index=camera_index, frame_indices=frames)
+        for done, item in enumerate(rendered, start=1):
+            yield item
+            progress(done, len(frames), None)
+
+    out: Path = options.out
+    if out.suffix.lower() in VIDEO_SUFFIXES:
+        n_images = write_video(out, (image for _, image in images()), fps=capture.fps)
+    elif out.suffix and not out.is_dir():
+        raise ProjectError(
+            f"--out ends in '{out.suffix}', which is no known video.", hint="Write FILE.mp4 or a folder.", path=out
+        )
+    else:
+        n_images = write_pictures(out, images())
+    line.say(f"{n_images} frames of camera {chosen[0]} in {out}")
+    return EXIT_OK
+
+
+def _inspect(options: argparse.Namespace, launch: Launch) -> int:
+    from engine.capture.inspect import describe
+
+    found = describe(open_capture(options.capture))
+    if options.json:
+        print(json.dumps(found, indent=2))
+        return EXIT_OK
+    print(
+        f"{found['path']}: {found['format']} layout, {found['n_cameras']} cameras, {found['n_frames']} frames at "
+        f"{found['fps']:g} per second ({found['duration_s']:.1f} s)"
+    )
+    for camera in found["cameras"]:
+        held_out = "  suggested as hold-out" if camera["is_default_holdout"] else ""
+        print(
+            f"  {camera['name']:>8}  {camera['width']}x{camera['height']}  view {camera['fov_x_deg']:.0f} x "
+            f"{camera['fov_y_deg']:.0f} degrees{held_out}"
+        )
+    print(f"The cameras are up to {found['rig_extent']:.3g} scene units apart.")
+    for warning in found["warnings"]:
+        print(f"Note: {warning}")
+    return EXIT_OK
+
+
+def _doctor(options: argparse.Namespace, launch: Launch) -> int:
+    from app.doctor import examine
+
+    findings = examine()
+    if options.json:
+        rows = [{"subject": f.subject, "text": f.text, "is_fine": f.is_fine} for f in findings]
+        print(json.dumps({"schema": 1, "findings": rows}, indent=2))
+    else:
+        for finding in findings:
+            print(f"{'ok ' if finding.is_fine else '!! '} {finding.subject:<9} {finding.text}")
+    return EXIT_OK
+
+
+_COMMANDS: dict[str, Callable[[argparse.Namespace, Launch], int]] = {
+    "train": _train,
+    "eval": _evaluate,
+    "render": _render,
+    "inspect": _inspect,
+    "doctor": _doctor,
+}

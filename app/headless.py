@@ -1,0 +1,295 @@
+"""The jobs without a window: train clips, evaluate a project, render a camera. Prints nothing; progress by callback."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from app.opening import check_capture
+from app.project import Project
+from app.status import TrainingStatus
+from app.training.messages import ClipTrained, Event, TrainingFailed, TrainingStopped, WorkerDied
+from app.training.service import TrainingService
+from engine.capture.capture import Capture, open_capture
+from engine.capture.clip import Clip
+from engine.errors import ProjectError
+from engine.model.clip_state import ClipState, read_clip_state
+
+if TYPE_CHECKING:
+    from engine.model.clip_model import ClipModel
+
+EVAL_SCHEMA = 1
+TRAIN_SCHEMA = 1
+POLL_EVERY_S = 0.05
+STOP_TIMEOUT_S = 60.0
+"""A step that changes the phase can take some seconds, and so can writing; nothing is thrown away for impatience."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClipOutcome:
+    """How the training of one clip ended.
+
+    Attributes:
+        state: trained, skipped (it was trained before), stopped or failed.
+        step: Steps done.
+        held_out_psnr: dB; None when not measured.
+        seconds: Wall time of this run, preparation included.
+        message, hint, kind: Of a failure.
+    """
+
+    clip_index: int
+    state: str
+    step: int = 0
+    held_out_psnr: float | None = None
+    seconds: float = 0.0
+    message: str = ""
+    hint: str = ""
+    kind: str = ""
+
+
+def train_clips(
+    service: TrainingService,
+    clip_indices: Sequence[int],
+    *,
+    on_status: Callable[[TrainingStatus], None],
+    on_event: Callable[[Event], None],
+    on_outcome: Callable[[ClipOutcome], None],
+    sleep: Callable[[float], None] = time.sleep,
+) -> list[ClipOutcome]:
+    """Train clips one after another; a failure ends it. KeyboardInterrupt stops, keeps and is raised again.
+
+    Raises:
+        ProjectError: A clip cannot be trained, for instance because its reference is not.
+        KeyboardInterrupt: After the worker has ended and its checkpoint is written.
+    """
+    outcomes: list[ClipOutcome] = []
+    for clip_index in clip_indices:
+        known = service.progress[clip_index]
+        if known.state == "trained":
+            outcome = ClipOutcome(clip_index, "skipped", known.step, known.held_out_psnr)
+        else:
+            outcome = _train_clip(service, clip_index, on_status, on_event, sleep)
+        outcomes.append(outcome)
+        on_outcome(outcome)
+        if outcome.state == "failed":
+            break
+    return outcomes
+
+
+def _train_clip(
+    service: TrainingService,
+    clip_index: int,
+    on_status: Callable[[TrainingStatus], None],
+    on_event: Callable[[Event], None],
+    sleep: Callable[[float], None],
+) -> ClipOutcome:
+    started_s = time.monotonic()
+    service.enqueue(clip_index)
+    ending: Event | None = None
+    try:
+        while service.worker is not None:
+            for event in service.poll():
+                on_event(event)
+                if isinstance(event, ClipTrained | TrainingStopped | TrainingFailed | WorkerDied):
+                    ending = event
+            on_status(service.status())
+            sleep(POLL_EVERY_S)
+    except KeyboardInterrupt:
+        service.close(timeout_s=STOP_TIMEOUT_S)
+        raise
+    seconds = time.monotonic() - started_s
+    known = service.progress[clip_index]
+    match ending:
+        case ClipTrained():
+            return ClipOutcome(clip_index, "trained", ending.step, ending.held_out_psnr, seconds)
+        case TrainingFailed():
+            return ClipOutcome(
+                clip_index,
+                "failed",
+                known.step,
+                seconds=seconds,
+                message=ending.message,
+                hint=ending.hint,
+                kind=ending.kind,
+            )
+        case WorkerDied():
+            message = f"The training process ended with code {ending.exit_code}."
+            hint = f"Train again; it goes on from what was kept. Its log is {service.project.log_path(clip_index)}."
+            return ClipOutcome(clip_index, "failed", known.step, seconds=seconds, message=message, hint=hint)
+        case _:
+            return ClipOutcome(clip_index, "stopped", known.step, seconds=seconds)
+
+
+# ---------------------------------------------------------------- trained clips
+
+
+@dataclass(frozen=True, slots=True)
+class TrainedProject:
+    """A project opened for reading, with its capture and its reference clip."""
+
+    project: Project
+    capture: Capture
+    clips: list[Clip]
+    reference: ClipState
+
+    @property
+    def trained(self) -> list[int]:
+        """Indices of the finished clips."""
+        return [clip.clip_index for clip in self.clips if self.project.is_trained(clip.clip_index)]
+
+    def model(self, clip_index: int) -> ClipModel:
+        """Load a finished clip.
+
+        Raises:
+            ProjectError: It is not trained, damaged, or was trained on another reference.
+        """
+        from engine.model.clip_model import load_clip_model
+
+        if clip_index not in self.trained:
+            raise ProjectError(
+                f"Clip {clip_index} is not trained; trained are {self.trained or 'none'}.",
+                hint="Train it first.",
+                path=self.project.folder,
+            )
+        state = read_clip_state(self.project.clip_path(clip_index))
+        return load_clip_model(state, None if state.is_reference else self.reference)
+
+
+def open_trained(project: Project) -> TrainedProject:
+    """Open what a project was trained on.
+
+    Raises:
+        CaptureError: The capture is gone or damaged.
+        ProjectError: It is another one, or nothing is trained yet.
+    """
+    settings = project.settings
+    capture = open_capture(settings.capture, scale=settings.scale)
+    check_capture(capture, settings.fingerprint, project.folder)
+    if not project.is_trained(0):
+        raise ProjectError(
+            "Nothing is trained in this project yet.", hint="Run `clipgstream train` first.", path=project.folder
+        )
+    reference = read_clip_state(project.clip_path(0))
+    return TrainedProject(project, capture, project.clips(capture.n_frames), reference)
+
+
+def evaluate_project(
+    opened: TrainedProject, *, clip_indices: Sequence[int], on_progress: Callable[[int, int, Any], None]
+) -> dict[str, Any]:
+    """Compare every frame of the clips with what every camera took.
+
+    Args:
+        on_progress: Gets rows done, rows in all, and the newest row.
+    Returns:
+        JSON-able: schema, project, capture, scale, holdout (names), clips, rows (EvalRow.as_dict: one per clip, frame
+        and camera) and means with keys all, held_out, trained_on and clips (the same two per clip index). A mean
+        leaves out rows without the figure; it is null where no row has it.
+    Raises:
+        ProjectError: A clip is not trained or does not fit.
+    """
+    from engine.training.evaluate import evaluate_clip, means
+
+    project, capture = opened.project, opened.capture
+    models = {clip_index: opened.model(clip_index) for clip_index in clip_indices}
+    holdout = capture.camera_indices(project.settings.holdout)
+    cameras = range(len(capture.rig))
+    n_rows = sum(opened.clips[i].n_frames for i in clip_indices) * len(cameras)
+    rows: list[Any] = []
+
+    def take(row: Any) -> None:
+        rows.append(row)
+        on_progress(len(rows), n_rows, row)
+
+    for clip_index, model in models.items():
+        evaluate_clip(
+            capture,
+            opened.clips[clip_index],
+            model,
+            reference=opened.reference,
+            cameras=cameras,
+            holdout=holdout,
+            on_row=take,
+        )
+
+    def summary(chosen: list[Any]) -> dict[str, Any]:
+        return {
+            "held_out": means([row for row in chosen if row.is_held_out]),
+            "trained_on": means([row for row in chosen if not row.is_held_out]),
+        }
+
+    per_clip = {str(i): summary([row for row in rows if row.clip_index == i]) for i in clip_indices}
+    return {
+        "schema": EVAL_SCHEMA,
+        "project": str(project.folder),
+        "capture": str(capture.path),
+        "scale": capture.scale,
+        "holdout": list(project.settings.holdout),
+        "clips": list(clip_indices),
+        "rows": [row.as_dict() for row in rows],
+        "means": {"all": means(rows), **summary(rows), "clips": per_clip},
+    }
+
+
+def render_frames(
+    opened: TrainedProject, *, camera_index: int, frame_indices: Sequence[int]
+) -> Iterator[tuple[int, np.ndarray]]:
+    """Frames as a capture camera would see them, in that camera's colours. Yields (frame_index, [H, W, 3] uint8).
+
+    Raises:
+        ProjectError: A frame lies in a clip that is not trained; said before the first picture.
+    """
+    from engine.model.view import View, render_model
+    from engine.training.evaluate import camera_gain
+
+    capture, header = opened.capture, opened.reference.header
+    clip_of = {frame: clip for clip in opened.clips for frame in clip.frame_indices()}
+    needed = list(dict.fromkeys(clip_of[frame].clip_index for frame in frame_indices))
+    missing = [clip_index for clip_index in needed if clip_index not in opened.trained]
+    if missing:
+        raise ProjectError(
+            f"Frames {frame_indices[0]} to {frame_indices[-1]} need clips {missing}, which are not trained.",
+            hint=f"Trained are {opened.trained}.",
+            path=opened.project.folder,
+        )
+    width, height = (int(v) for v in capture.rig.image_sizes[camera_index])
+    view = View.from_arrays(
+        capture.rig.world_to_camera[camera_index],
+        capture.rig.Ks[camera_index],
+        width=width,
+        height=height,
+        near_plane=header["near_plane"],
+    )
+    gain = camera_gain(opened.reference, capture.rig.names[camera_index])
+    loaded: tuple[int, ClipModel] | None = None
+    for frame_index in frame_indices:
+        clip = clip_of[frame_index]
+        if loaded is None or loaded[0] != clip.clip_index:
+            loaded = (clip.clip_index, opened.model(clip.clip_index))
+        image = render_model(loaded[1], view, clip.clip_time(frame_index), reach=4.0 * header["spacing"]).numpy() * gain
+        yield frame_index, (np.clip(image, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+
+
+def train_document(project: Project, capture: Capture, outcomes: Sequence[ClipOutcome]) -> dict[str, Any]:
+    """What `train --json` prints: schema, project, capture, holdout, and per clip its index, state, steps, held-out
+    PSNR (dB or null) and seconds."""
+    return {
+        "schema": TRAIN_SCHEMA,
+        "project": str(project.folder),
+        "capture": str(Path(capture.path)),
+        "holdout": list(project.settings.holdout),
+        "clips": [
+            {
+                "clip_index": outcome.clip_index,
+                "state": outcome.state,
+                "steps": outcome.step,
+                "held_out_psnr": outcome.held_out_psnr,
+                "seconds": round(outcome.seconds, 2),
+            }
+            for outcome in outcomes
+        ],
+    }

@@ -1,0 +1,81 @@
+"""ProgressLine: how far a long job is, on a terminal as one line that redraws itself, elsewhere as plain lines."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import time
+from collections.abc import Callable
+from typing import TextIO
+
+BAR_WIDTH = 24
+REDRAW_EVERY_S = 0.1
+PLAIN_EVERY_S = 10.0
+
+
+def duration_text(seconds: float | None) -> str:
+    """Minutes and seconds as people read them; "?" when unknown."""
+    if seconds is None or not 0 <= seconds < 1e7:
+        return "?"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+class ProgressLine:
+    """One line about one job after another.
+
+    Args:
+        stream: Where to write; standard error when None, so that results on standard output stay clean.
+        is_quiet: Write nothing.
+        clock: Seconds; tests bring their own.
+    """
+
+    def __init__(
+        self, stream: TextIO | None = None, *, is_quiet: bool = False, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._stream = sys.stderr if stream is None else stream
+        self._is_quiet, self._clock = is_quiet, clock
+        self._is_terminal = self._stream.isatty()
+        self._written_s = -1e9
+        self._stage = ""
+        self._is_line_open = False
+
+    def update(self, stage: str, done: float, detail: str = "") -> None:
+        """Show a stage, its share 0..1, and what else is known (rate, time left, figures)."""
+        now_s = self._clock()
+        is_new = stage != self._stage
+        every_s = REDRAW_EVERY_S if self._is_terminal else PLAIN_EVERY_S
+        if self._is_quiet or (not is_new and now_s - self._written_s < every_s):
+            return
+        if is_new:
+            self._close_line()
+        self._stage, self._written_s = stage, now_s
+        done = min(max(done, 0.0), 1.0)
+        if not self._is_terminal:
+            self._write(f"{stage} {done * 100:3.0f} %  {detail}".rstrip() + "\n")
+            return
+        filled = round(done * BAR_WIDTH)
+        text = f"{stage} [{'#' * filled}{'.' * (BAR_WIDTH - filled)}] {done * 100:3.0f} %  {detail}"
+        columns = shutil.get_terminal_size().columns
+        self._write("\r" + text[: columns - 1].ljust(columns - 1))
+        self._is_line_open = True
+
+    def say(self, text: str) -> None:
+        """A line that stays."""
+        if not self._is_quiet:
+            self._close_line()
+            self._write(text + "\n")
+
+    def finish(self) -> None:
+        """Leave the last line standing."""
+        self._close_line()
+        self._stage = ""
+
+    def _close_line(self) -> None:
+        if self._is_line_open:
+            self._write("\n")
+            self._is_line_open = False
+
+    def _write(self, text: str) -> None:
+        print(text, end="", file=self._stream, flush=True)
