@@ -21,7 +21,7 @@ CLUSTER_SHARE = 0.3
 STABLE_SHARE = 0.5
 """A pixel is stable when at least this share of frames lies within the noise of its background: a clear majority. In
 short captures a larger share would also give up places that people merely cross often."""
-TIE_SCORE = 2.0
+TIE_SCORE = 4.0
 """Clusters whose variance is below this many noise variances are equally still. Among those the earliest wins: what
 appears later and stays can be added to a clip, but what the reference clip's background shows cannot be taken away."""
 N_BRIGHTNESS_BINS = 16

@@ -1,0 +1,93 @@
+"""White balance recovery, near planes and depth ranges, voxel means."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from engine.capture.rig import CameraRig
+from engine.cloud.gains import gains_from_observations, gains_from_pictures
+from engine.cloud.range import depth_ranges, near_plane
+from engine.cloud.voxel import voxel_keys, voxel_means
+
+
+def ring_rig(n_cameras: int = 8, radius: float = 3.0) -> CameraRig:
+    """Cameras on a circle that all look at the origin."""
+    poses = []
+    for angle in np.linspace(0.0, 2 * np.pi, n_cameras, endpoint=False):
+        center = radius * np.array([np.cos(angle), 0.0, np.sin(angle)])
+        forward = -center / radius
+        down = np.array([0.0, 1.0, 0.0])
+        rotation = np.stack([np.cross(down, forward), down, forward])
+        pose = np.eye(4)
+        pose[:3, :3], pose[:3, 3] = rotation, -rotation @ center
+        poses.append(pose)
+    K = np.array([[100.0, 0.0, 80.0], [0.0, 100.0, 60.0], [0.0, 0.0, 1.0]])
+    return CameraRig(
+        names=tuple(f"cam{i}" for i in range(n_cameras)),
+        world_to_camera=np.stack(poses),
+        Ks=np.repeat(K[None], n_cameras, axis=0),
+        image_sizes=np.repeat([[160, 120]], n_cameras, axis=0),
+    )
+
+
+def test_near_plane_scales_with_the_rig() -> None:
+    small, large = near_plane(ring_rig(radius=3.0)), near_plane(ring_rig(radius=30.0))
+    assert small == pytest.approx(0.6, rel=0.02)  # a fifth of the distance; the focus point is damped by 0.1 %
+    assert large == pytest.approx(10 * small, rel=1e-6)
+
+
+def test_depth_ranges_without_points_follow_the_focus_distance() -> None:
+    near, far = depth_ranges(ring_rig(), None)
+    assert np.allclose(near, 2.1, rtol=0.02)
+    assert np.allclose(far, 9.0, rtol=0.02)
+
+
+def test_depth_ranges_enclose_sparse_points_but_not_the_near_plane() -> None:
+    rig = ring_rig()
+    points = np.random.default_rng(0).uniform(-0.5, 0.5, (400, 3))
+    near, far = depth_ranges(rig, points)
+    assert ((near > 1.5) & (near < 2.6)).all()
+    assert ((far > 3.4) & (far < 5.0)).all()
+    at_the_lens = rig.centers[0] + 1e-3 * np.random.default_rng(1).normal(size=(400, 3)) + 0.05 * rig.forwards[0]
+    assert depth_ranges(rig, at_the_lens)[0][0] >= near_plane(rig)
+
+
+def test_gains_are_recovered_from_points_seen_by_some_cameras() -> None:
+    rng = np.random.default_rng(0)
+    scene = rng.uniform(20.0, 200.0, (600, 3))
+    gains = np.exp(rng.normal(0.0, 0.15, (6, 3)))
+    gains /= np.exp(np.log(gains).mean(0))
+    seen = np.log(gains[:, None] * scene[None] + 1.0)
+    seen[rng.random((6, 600)) < 0.5] = np.nan
+    wrong = rng.random((6, 600)) < 0.1
+    seen[wrong] = np.log(rng.uniform(1.0, 255.0, (int(wrong.sum()), 3)))  # occlusions
+    found, colors = gains_from_observations(seen, np.ones((6, 3)))
+    # log(c + 1) bends a pure gain by up to (gain - 1) / 21 for the darkest points; medians over 300 points
+    assert np.abs(found / gains - 1.0).max() < 0.02
+    assert np.allclose(np.log(found).mean(0), 0.0, atol=1e-9)
+    is_known = np.isfinite(colors[:, 0])
+    assert np.median(np.abs(colors[is_known] / scene[is_known] - 1.0)) < 0.02
+
+
+def test_picture_gains_have_geometric_mean_one() -> None:
+    pictures = (
+        np.random.default_rng(0).uniform(10, 200, (4, 6, 8, 3)) * np.array([1.0, 1.2, 0.8, 1.1])[:, None, None, None]
+    )
+    gains = gains_from_pictures(pictures, np.ones((4, 6, 8), bool))
+    assert np.allclose(np.exp(np.log(gains).mean(0)), 1.0)
+    assert gains[1, 1] > gains[0, 1] > gains[2, 1]
+
+
+def test_voxel_means_average_per_cell_and_conserve_weight() -> None:
+    points = np.array([[0.1, 0.1, 0.1], [0.3, 0.1, 0.1], [-0.2, 0.1, 0.1]])
+    weights = np.array([1.0, 3.0, 2.0])
+    means, (column,), totals = voxel_means(points, 0.5, [np.array([[0.0], [4.0], [7.0]])], weights)
+    assert np.allclose(means, [[-0.2, 0.1, 0.1], [0.25, 0.1, 0.1]])
+    assert column.ravel().tolist() == [7.0, 3.0]
+    assert totals.tolist() == [2.0, 4.0]
+
+
+def test_voxel_keys_refuse_a_hopeless_grid() -> None:
+    with pytest.raises(ValueError, match="voxels"):
+        voxel_keys(np.array([[0.0, 0.0, 0.0], [1e9, 0.0, 0.0]]), 0.1)
