@@ -85,8 +85,8 @@ def _long_quats() -> Scene:
 
 
 CASES = {
-    # name: (scene, pixel tolerance, gradient tolerance). A float32 pixel position near 160 is off by up to 8e-6 px and a
-    # small splat's alpha changes by up to 1 per px, hence 4e-6; needles multiply that by their slope.
+    # name: (scene, pixel tolerance, gradient tolerance). A float32 pixel position near 160 is off by up to 8e-6 px,
+    # and the alpha of a small splat changes by up to 1 per px, hence 4e-6; needles multiply that by their slope.
     "needles": (_needles, 5e-5, 2e-3),
     "huge": (_huge, 4e-6, 1e-5),
     "near plane": (_near_plane, 4e-6, 1e-5),
