@@ -56,6 +56,10 @@ def use_one_thread() -> None:
 
 
 def prepare_drawing() -> None:
-    """Once on a thread that draws: compiled kernels, one core."""
+    """Once on a thread that draws: compiled kernels, one core, and everything loaded that a first picture needs."""
     warm_cache()
     use_one_thread()
+    if is_cache_warm():
+        from engine.raster.cpu.warm import warm_up
+
+        warm_up()

@@ -52,10 +52,19 @@ class LatestWorker(Generic[Request, Result]):
             if not self._pending and request in self._running:
                 return
             self._pending = [request]
-            if self._thread is None:
-                self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
-                self._thread.start()
+            self._start_thread()
             self._condition.notify_all()
+
+    def start(self) -> None:
+        """Start the thread and prepare it now, rather than with the first request."""
+        with self._condition:
+            if not self._is_closed:
+                self._start_thread()
+
+    def _start_thread(self) -> None:
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._run, name=self._name, daemon=True)
+            self._thread.start()
 
     @property
     def newest(self) -> tuple[Request, Result] | None:
@@ -95,8 +104,16 @@ class LatestWorker(Generic[Request, Result]):
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(timeout_s)
 
+    def _prepare_thread(self) -> None:
+        if self._prepare is None:
+            return
+        try:
+            self._prepare()
+        except Exception:  # the edge of a job: requests will fail by themselves and say why
+            logger.warning("%s could not be prepared", self._name, exc_info=True)
+
     def _run(self) -> None:
-        is_prepared = False
+        self._prepare_thread()
         while True:
             with self._condition:
                 self._condition.wait_for(lambda: self._pending or self._is_closed)
@@ -105,9 +122,6 @@ class LatestWorker(Generic[Request, Result]):
                 self._running, self._pending = self._pending, []
             request = self._running[0]
             try:
-                if not is_prepared and self._prepare is not None:
-                    self._prepare()
-                is_prepared = True
                 outcome = (request, self._compute(request))
                 error = None
             except Exception as raised:

@@ -68,6 +68,8 @@ class Session:
         launch: Starts a training worker; a process by default.
         settings: Preferences; the user's own when None.
         opener: Opens captures; tests bring their own.
+        is_preloading: Load what draws right away. It takes a second or two and holds the window up a little, which
+            nobody notices at the start but everybody would in the middle of a drag.
     """
 
     def __init__(
@@ -77,6 +79,7 @@ class Session:
         launch: Launch = ProcessWorker,
         settings: Settings | None = None,
         opener: Callable[..., Opened] = open_for_window,
+        is_preloading: bool = True,
     ) -> None:
         self.capture: Capture | None = None
         self.project: Project | None = None
@@ -100,6 +103,8 @@ class Session:
         self._anchor_counts: dict[int, tuple[int, int]] = {}
         self._seen: tuple[object, ...] = ()
         self._is_closed = False
+        if is_preloading:
+            self._renderer.worker.start()
 
     # ---------------------------------------------------------------- what is open
 

@@ -37,7 +37,8 @@ def write_video(path: Path, images: Iterable[np.ndarray], *, fps: float) -> int:
             stream.options = {"crf": CRF, "preset": "medium"}
             for image in images:
                 padded = np.pad(image, ((0, image.shape[0] % 2), (0, image.shape[1] % 2), (0, 0)), mode="edge")
-                stream.width, stream.height = padded.shape[1], padded.shape[0]
+                if n_images == 0:
+                    stream.width, stream.height = padded.shape[1], padded.shape[0]
                 for packet in stream.encode(av.VideoFrame.from_ndarray(padded, format="rgb24")):
                     container.mux(packet)
                 n_images += 1

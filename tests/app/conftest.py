@@ -58,6 +58,7 @@ def make_session(tmp_path: Path, capture_folder: Path) -> Iterator[Callable[...,
             project_dir=tmp_path / name,
             launch=launch or partial(inline, make_training=make_training),
             settings=Settings(tmp_path / "settings.json"),
+            is_preloading=False,
         )
         made.append(session)
         if is_open:

@@ -1,0 +1,352 @@
+"""The command line: exit codes, messages, outputs; training inline."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.cli import main, parse_range
+from app.progress import ProgressLine, duration_text
+from app.project import open_project
+from app.video import write_pictures, write_video
+from engine.errors import ProjectError
+from engine.model.clip_state import read_clip_state
+from tests.app.conftest import inline
+from tests.app.fakes import N_STEPS, make_crashing, make_fake, write_capture
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]):
+    """Runs a command; gives exit code, standard output and standard error."""
+
+    def run_command(*arguments: object, make_training=make_fake) -> tuple[int, str, str]:
+        code = main([str(part) for part in arguments], launch=partial(inline, make_training=make_training))
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run_command
+
+
+def test_training_writes_clips_and_a_document(run, capture_folder, tmp_path):
+    code, out, err = run("train", capture_folder, "--project", tmp_path / "p", "--clip-length", 3, "--json")
+    assert code == 0, err
+    document = json.loads(out)
+    assert document["schema"] == 1
+    assert document["holdout"] == ["0"]
+    assert [(clip["clip_index"], clip["state"], clip["steps"]) for clip in document["clips"]] == [
+        (0, "trained", N_STEPS),
+        (1, "trained", N_STEPS),
+    ]
+    assert read_clip_state(tmp_path / "p" / "clips" / "0001.safetensors").header["role"] == "source"
+    assert "held-out PSNR 26.00 dB" in err
+    open_project(tmp_path / "p").close()  # the lock was given back
+
+
+def test_trained_clips_are_not_trained_again(run, capture_folder, tmp_path):
+    arguments = ("train", capture_folder, "--project", tmp_path / "p", "--clip-length", 3)
+    assert run(*arguments, "--clips", "0:1")[0] == 0
+    before = (tmp_path / "p" / "clips" / "0000.safetensors").stat().st_mtime_ns
+    code, out, _ = run(*arguments, "--json")
+    assert code == 0
+    assert [clip["state"] for clip in json.loads(out)["clips"]] == ["skipped", "trained"]
+    assert (tmp_path / "p" / "clips" / "0000.safetensors").stat().st_mtime_ns == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--clips", "0:9"], "clips 0 to 0"),
+        (["--clips", "x"], "no range A:B"),
+        (["--clips", "1:1"], "empty or reaches outside"),
+        (["--holdout", "0,99"], "no camera '99'"),
+        (["--holdout", "0,1,2"], "leaves 1 for training"),
+        (["--scale", "0"], "scale is 0"),
+        (["--scale", "2"], "scale is 2"),
+        (["--scale", "nan"], "scale is nan"),
+        (["--scale", "wide"], "invalid float value"),
+        (["--clip-length", "0"], "allows 1 to 6"),
+        (["--clip-length", "70"], "allows 1 to 6"),
+        (["--seed", "-4"], "seed is -4"),
+        (["--set", "joint_steps"], "no '='"),
+        (["--set", "nonsense=1"], "does not exist"),
+        (["--set", "ssim_weight=5"], "between 0.0 and 1.0"),
+        (["--set", "joint_steps=many"], "no int"),
+    ],
+)
+def test_bad_arguments_end_with_2_and_leave_nothing_behind(run, capture_folder, tmp_path, arguments, expected):
+    code, out, err = run("train", capture_folder, "--project", tmp_path / "p", *arguments)
+    assert code == 2
+    assert expected in err
+    assert "Traceback" not in err
+    assert out == ""
+    assert not (tmp_path / "p").exists()
+
+
+def test_a_folder_that_is_no_capture(run, tmp_path):
+    (tmp_path / "holiday").mkdir()
+    for command in (["inspect", tmp_path / "holiday"], ["train", tmp_path / "holiday", "--project", tmp_path / "p"]):
+        code, _, err = run(*command)
+        assert code == 2
+        assert "no capture" in err
+        assert str(tmp_path / "holiday") in err
+    assert not (tmp_path / "p").exists()
+
+
+def test_a_damaged_picture_found_while_training_is_bad_input(run, tmp_path):
+    folder = write_capture(tmp_path / "c")
+    code, _, err = run("train", folder, "--project", tmp_path / "p", make_training=_reads_pictures)
+    assert code == 0, err
+    bad = folder / "ims" / "2" / "000003.jpg"
+    bad.write_bytes(bad.read_bytes()[:200])
+    code, _, err = run("train", folder, "--project", tmp_path / "q", make_training=_reads_pictures)
+    assert code == 2
+    assert "000003.jpg" in err
+    assert "Traceback" not in err
+    assert not list((tmp_path / "q" / "clips").glob("*"))
+
+
+def _reads_pictures(job, report):
+    training = make_fake(job, report)
+    training.prepare = lambda: [training.capture.frames_of(c, range(6)) for c in range(4)]
+    return training
+
+
+def test_a_failure_ends_with_1_and_keeps_what_was_learned(run, capture_folder, tmp_path):
+    code, _, err = run("train", capture_folder, "--project", tmp_path / "p", "--set", "static_steps=4")
+    assert code == 1
+    assert "nan at step 5" in err
+    assert "Lower the rates." in err
+    assert (tmp_path / "p" / "checkpoints" / "0000.safetensors").is_file()
+
+
+def test_a_fault_of_the_program_is_one_line_and_in_the_log(run, capture_folder, tmp_path, monkeypatch):
+    monkeypatch.setattr("app.cli.open_capture", lambda *_args, **_kwargs: 1 / 0)
+    code, _, err = run("train", capture_folder, "--project", tmp_path / "p")
+    assert code == 1
+    assert err.count("\n") == 1
+    assert "fault of the program" in err
+    log = Path(err.rpartition("Details are in ")[2].strip().rstrip("."))
+    assert "ZeroDivisionError" in log.read_text()
+
+
+def test_options_that_contradict_a_trained_project_are_refused(run, capture_folder, tmp_path):
+    arguments = ("train", capture_folder, "--project", tmp_path / "p")
+    assert run(*arguments, "--clip-length", 3, "--clips", "0")[0] == 0
+    code, _, err = run(*arguments, "--clip-length", 2)
+    assert code == 2
+    assert "clip_length 3" in err
+    assert run(*arguments, "--clip-length", 3)[0] == 0  # the same value is no contradiction
+
+
+def test_a_source_clip_alone_is_refused(run, capture_folder, tmp_path):
+    code, _, err = run("train", capture_folder, "--project", tmp_path / "p", "--clip-length", 3, "--clips", "1:2")
+    assert code == 2
+    assert "needs the reference clip 0" in err
+
+
+@pytest.mark.parametrize("command", ["eval", "render"])
+def test_measuring_needs_something_trained(run, capture_folder, tmp_path, command):
+    extra = ["--json", tmp_path / "o.json"] if command == "eval" else ["--camera", "1", "--out", tmp_path / "o.mp4"]
+    code, _, err = run(command, tmp_path / "nowhere", *extra)
+    assert code == 2
+    assert "no project" in err
+    run("train", capture_folder, "--project", tmp_path / "p", "--set", "static_steps=1")  # fails early
+    code, _, err = run(command, tmp_path / "p", *extra)
+    assert code == 2
+    assert "Nothing is trained" in err
+    assert not list(tmp_path.glob("o.*"))
+
+
+def test_rendering_names_what_is_wrong_with_its_arguments(run, capture_folder, tmp_path):
+    run("train", capture_folder, "--project", tmp_path / "p", "--clip-length", 3, "--clips", "0")
+    render = ("render", tmp_path / "p", "--out", tmp_path / "o.mp4")
+    for extra, expected in (
+        (("--camera", "9"), "no camera '9'"),
+        (("--camera", "0,1"), "one camera"),
+        (("--camera", "1", "--frames", "4:99"), "frames 0 to 5"),
+        (("--camera", "1", "--frames", "0:6"), "need clips [1]"),
+        (("--camera", "1", "--frames", "0:2", "--out", tmp_path / "o.gif"), "no known video"),
+    ):
+        code, _, err = run(*render, *extra)
+        assert (code, expected in err) == (2, True), err
+    assert not list(tmp_path.glob("o.*"))
+
+
+def test_inspecting_prints_stable_json(run, capture_folder):
+    code, out, _ = run("inspect", capture_folder, "--json")
+    assert code == 0
+    document = json.loads(out)
+    assert (document["schema"], document["n_cameras"], document["n_frames"]) == (1, 4, 6)
+    code, out, _ = run("inspect", capture_folder)
+    assert code == 0
+    assert "4 cameras, 6 frames" in out
+
+
+def test_help_and_nonsense(run):
+    assert run("--help")[0] == 0
+    code, _, err = run("frobnicate")
+    assert code == 2
+    assert "invalid choice" in err
+    assert run("train")[0] == 2
+
+
+INTERRUPTED = """
+import os, signal, sys
+from functools import partial
+from app.cli import main
+from app.training.process import ProcessWorker
+from tests.app.fakes import make_slow
+
+class Interrupting(ProcessWorker):
+    def poll(self):
+        events = super().poll()
+        if any(getattr(event, "step", 0) > 0 for event in events):
+            os.kill(os.getpid(), getattr(signal, sys.argv[3]))
+        return events
+
+if __name__ == "__main__":
+    launch = lambda job, project: Interrupting(job, project, make_slow)
+    sys.exit(main(["train", sys.argv[1], "--project", sys.argv[2], "--quiet"], launch=launch))
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_interrupting_stops_cleanly_and_keeps_what_was_learned(tmp_path, capture_folder, name):
+    assert hasattr(signal, name)
+    script = tmp_path / "interrupted.py"
+    script.write_text(INTERRUPTED)
+    done = subprocess.run(
+        [sys.executable, str(script), str(capture_folder), str(tmp_path / "p"), name],
+        capture_output=True,
+        text=True,
+        timeout=90,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        cwd=tmp_path,
+    )
+    assert done.returncode == 130, done.stderr
+    assert "What was learned is kept" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert read_clip_state(tmp_path / "p" / "checkpoints" / "0000.safetensors").header["step"] > 0
+    open_project(tmp_path / "p").close()
+
+
+def test_a_dead_worker_ends_with_1(capture_folder, tmp_path, capsys):
+    from app.training.process import ProcessWorker
+
+    code = main(
+        ["train", str(capture_folder), "--project", str(tmp_path / "p"), "--quiet"],
+        launch=lambda job, project: ProcessWorker(job, project, make_crashing),
+    )
+    err = capsys.readouterr().err
+    assert code == 1
+    assert "ended with code -9" in err
+    assert "clip-0000.log" in err
+
+
+# ---------------------------------------------------------------- parts
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [(":", range(0, 7)), ("2:5", range(2, 5)), ("3", range(3, 4)), ("4:", range(4, 7)), (":2", range(2))],
+)
+def test_ranges(text, expected):
+    assert parse_range(text, 7, option="--frames", what="frames") == expected
+
+
+@pytest.mark.parametrize("text", ["", "a:b", "-1:3", "3:2", "0:8", "7", "1:2:3"])
+def test_ranges_that_are_none(text):
+    with pytest.raises(ProjectError, match="frames 0 to 6"):
+        parse_range(text, 7, option="--frames", what="frames")
+
+
+class Stream:
+    """Collects what is written."""
+
+    def __init__(self, is_terminal: bool) -> None:
+        self.text, self._is_terminal = "", is_terminal
+
+    def isatty(self) -> bool:
+        return self._is_terminal
+
+    def write(self, text: str) -> int:
+        self.text += text
+        return len(text)
+
+    def flush(self) -> None:
+        pass
+
+
+def test_a_terminal_gets_one_line_that_redraws_itself():
+    stream, now = Stream(True), iter(range(100))
+    line = ProgressLine(stream, clock=lambda: float(next(now)))
+    for share in (0.0, 0.5, 1.0):
+        line.update("Training", share, "2:00 left")
+    line.say("done")
+    assert stream.text.count("\r") == 3
+    assert stream.text.count("\n") == 2
+    assert "[############............]  50 %" in stream.text
+
+
+def test_elsewhere_there_are_plain_lines_not_too_many():
+    stream = Stream(False)
+    seconds = iter(range(100))
+    line = ProgressLine(stream, clock=lambda: float(next(seconds)))
+    for i in range(30):
+        line.update("Training", i / 30, "")
+    assert "\r" not in stream.text
+    assert stream.text.count("\n") == 3  # one per ten seconds
+
+
+def test_quiet_writes_nothing():
+    stream = Stream(True)
+    line = ProgressLine(stream, is_quiet=True)
+    line.update("Training", 0.5)
+    line.say("done")
+    line.finish()
+    assert stream.text == ""
+
+
+@pytest.mark.parametrize(
+    ("seconds", "expected"),
+    [(0, "0:00"), (61.4, "1:01"), (3725, "1:02:05"), (None, "?"), (float("nan"), "?"), (1e9, "?")],
+)
+def test_durations(seconds, expected):
+    assert duration_text(seconds) == expected
+
+
+def test_a_video_holds_every_picture_and_odd_sizes_fit(tmp_path):
+    import av
+
+    images = [np.full((35, 47, 3), 20 * i, np.uint8) for i in range(5)]
+    assert write_video(tmp_path / "v.mp4", iter(images), fps=25.0) == 5
+    with av.open(str(tmp_path / "v.mp4")) as container:
+        frames = [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+        assert float(container.streams.video[0].average_rate or 0) == 25.0
+    assert [frame.shape for frame in frames] == [(36, 48, 3)] * 5
+    # H.264 in limited range with chroma at half size: grey comes back within a few levels
+    assert max(abs(int(frame.mean()) - 20 * i) for i, frame in enumerate(frames)) <= 3
+
+
+def test_a_video_that_fails_half_way_leaves_nothing(tmp_path):
+    def images():
+        yield np.zeros((16, 16, 3), np.uint8)
+        raise ProjectError("The clip is damaged.")
+
+    with pytest.raises(ProjectError, match="damaged"):
+        write_video(tmp_path / "v.mp4", images(), fps=25.0)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_pictures_are_numbered_by_frame(tmp_path):
+    assert write_pictures(tmp_path / "out", ((i, np.zeros((4, 4, 3), np.uint8)) for i in (7, 12))) == 2
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["frame_000007.png", "frame_000012.png"]
