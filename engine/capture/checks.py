@@ -231,7 +231,7 @@ def inspect_video(path: Path) -> tuple[int, tuple[int, int], float]:
             size = (stream.codec_context.width, stream.codec_context.height)
             rate = float(stream.average_rate or 0)
             entries = [entry for entry in stream.index_entries if not entry.is_discard]
-            if len(entries) < stream.frames or not entries:  # containers whose index lists key frames only
+            if len(entries) != stream.frames or not entries:  # the index lists key frames only, or frames not shown
                 return sum(shown_pts(packet) is not None for packet in container.demux(stream)), size, rate
             n_whole = sum(entry.pos + entry.size <= n_bytes for entry in entries)
     except av.error.FFmpegError as error:

@@ -45,6 +45,9 @@ class Truth:
 
     def mask(self, *names: str) -> np.ndarray:
         """Pixels whose centre shows one of these parts. [H, W] bool. Raises ValueError for an unknown name."""
+        unknown = [name for name in names if name not in self.part_names]
+        if unknown:
+            raise ValueError(f"no part called {', '.join(unknown)}; there are {', '.join(self.part_names)}")
         rows = [self.part_names.index(name) for name in names]
         return np.isin(self.part_indices, rows)
 

@@ -1,0 +1,198 @@
+"""The sample generator: truth that agrees with itself, motion as promised, video that matches what was rendered."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from engine.capture.capture import open_capture
+from engine.synthetic import meshes, textures
+from engine.synthetic.scene import SyntheticScene, make_scene
+from engine.synthetic.writing import cameras_document, to_yuv444, write_capture
+
+pytest.importorskip("open3d", reason="the ray caster needs Open3D and its system libraries", exc_type=ImportError)
+
+from engine.synthetic.raycast import SceneCamera, make_truth
+
+SAMPLE = Path(__file__).parents[2] / "assets" / "sample"
+SHIPPED = make_scene()
+
+
+def small_scene() -> SyntheticScene:
+    return make_scene(size=(96, 72), n_cameras=12)
+
+
+def psnr(a: np.ndarray, b: np.ndarray) -> float:
+    return float(10 * np.log10(255**2 / np.mean((a.astype(float) - b.astype(float)) ** 2)))
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [meshes.box((1.0, 2.0, 3.0)), meshes.sphere(0.5), meshes.cylinder(0.4, 1.0), meshes.torus(0.5, 0.1)],
+)
+def test_meshes_are_wound_outwards_with_unit_normals(mesh: meshes.Mesh) -> None:
+    a, b, c = np.moveaxis(mesh.vertices[mesh.triangles], 1, 0)
+    facing = np.cross(b - a, c - a)
+    is_flat = np.linalg.norm(facing, axis=-1) < 1e-12  # triangles that touch a pole
+    agreement = np.einsum("fd,fcd->fc", facing, mesh.corner_normals)[~is_flat]
+    assert (agreement > 0).all()
+    assert np.allclose(np.linalg.norm(mesh.corner_normals, axis=-1), 1.0)
+    volume = np.einsum("fd,fd->f", a, np.cross(b, c)).sum() / 6
+    assert volume > 0  # closed and outward
+
+
+def test_textures_are_colours_for_every_part() -> None:
+    generator = np.random.default_rng(3)
+    normals = generator.normal(size=(500, 3))
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    for part in SHIPPED.parts:
+        albedo = part.texture(generator.uniform(-3, 3, (500, 3)), normals)
+        assert albedo.shape == (500, 3)
+        assert np.isfinite(albedo).all()
+        assert albedo.min() > -0.05  # the renderer clips; a texture far outside would be a mistake
+        assert albedo.max() < 1.35
+
+
+def test_noise_is_smooth_and_the_same_each_time() -> None:
+    line = np.stack([np.linspace(-3, 3, 2001), np.zeros(2001)], axis=-1)
+    values = textures.noise(line, 7)
+    assert np.array_equal(values, textures.noise(line, 7))
+    assert 0 <= values.min() < 0.3 < 0.7 < values.max() <= 1
+    assert np.abs(np.diff(values)).max() < 1.5 * 6 / 2000 + 1e-6  # slope of the blend is at most 1.5 per unit
+
+
+def test_cameras_stand_in_the_room_at_two_heights_with_their_own_intrinsics() -> None:
+    rig = SHIPPED.rig
+    assert len(rig) == 12
+    assert (np.abs(rig.centers[:, :2]) < 3.0).all()
+    assert set(np.round(rig.centers[:, 2], 6)) == {1.05, 1.85}
+    fov = np.degrees(2 * np.arctan(160 / rig.Ks[:, 0, 0]))
+    assert fov.min() > 60
+    assert fov.max() < 70
+    assert len(set(rig.Ks[:, 0, 0])) == 12
+    offset = np.abs(rig.Ks[:, :2, 2] - [160, 120])
+    assert 2 < offset.max() < 8  # off centre by a few pixels
+    assert SHIPPED.default_holdout == ("cam03", "cam08")
+
+
+def test_the_ball_crosses_a_quarter_of_the_view_within_each_clip() -> None:
+    rig = SHIPPED.rig
+    ball = SHIPPED.parts[SHIPPED.part_index("ball")]
+    poses = [ball.pose(frame) for frame in range(30)]
+    centers = np.array([pose[:3, 3] for pose in poses if pose is not None])
+    assert len(centers) == 30
+    in_camera = np.einsum("cij,tj->cti", rig.world_to_camera[:, :3, :3], centers)
+    in_camera += rig.world_to_camera[:, None, :3, 3]
+    pixels = np.einsum("cij,ctj->cti", rig.Ks, in_camera)
+    pixels = pixels[..., :2] / pixels[..., 2:]
+    for start in (0, 10, 20):
+        run = pixels[:, start : start + 10]
+        crossed = run[..., 0].max(1) - run[..., 0].min(1)
+        assert (crossed >= 80).sum() >= 3  # a quarter of 320; less where it flies towards or from the camera
+
+
+def test_truth_depth_agrees_with_the_known_room() -> None:
+    scene = small_scene()
+    truth = make_truth(scene, 0, 0)
+    width, height = 96, 72
+    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    K, pose = scene.rig.Ks[0], scene.rig.world_to_camera[0]
+    in_camera = np.stack([(x - K[0, 2]) / K[0, 0], (y - K[1, 2]) / K[1, 1], np.ones_like(x)], -1)
+    in_camera *= truth.depths[..., None]
+    world = (in_camera - pose[:3, 3]) @ pose[:3, :3]
+    room = world[truth.mask("room")]
+    to_shell = np.minimum((3.0 - np.abs(room[:, :2])).min(-1), np.minimum(room[:, 2], 2.8 - room[:, 2]))
+    assert np.abs(to_shell).max() < 1e-4  # float32 rays over 6 units
+    ball_pose = scene.parts[scene.part_index("ball")].pose(0)
+    assert ball_pose is not None
+    ball = world[truth.mask("ball")]
+    assert len(ball) > 20
+    radius = np.linalg.norm(ball - ball_pose[:3, 3], axis=-1)
+    assert radius.min() > 0.168  # flat facets of a sphere of 0.17 lie up to 0.2 % inside
+    assert radius.max() < 0.1701
+
+
+def test_masks_tell_moving_standing_and_appearing_parts() -> None:
+    scene = small_scene()
+    seen_by = 0
+    for camera_index in range(12):
+        before, after = make_truth(scene, camera_index, 9), make_truth(scene, camera_index, 10)
+        assert not before.mask("gift").any()
+        seen_by += int(after.mask("gift").sum() > 40)  # of 6912 pixels; about 450 at 320x240
+        assert np.array_equal(after.is_moving, after.mask("ball", "sculpture"))
+        assert (after.part_indices >= 0).all()  # the room is closed
+    assert seen_by >= 9
+    with pytest.raises(ValueError, match="teapot"):
+        make_truth(scene, 0, 0).mask("teapot")
+
+
+def test_only_what_moves_or_appears_changes_the_picture() -> None:
+    scene = small_scene()
+    camera = SceneCamera(scene, 3, supersampling=2)
+    first, later, with_gift = camera.image(0), camera.image(7), camera.image(12)
+    covered = camera.coverage(0, "ball", "sculpture") + camera.coverage(7, "ball", "sculpture")
+    assert np.array_equal(first[covered == 0], later[covered == 0])
+    assert (first[covered > 0.9] != later[covered > 0.9]).any()
+    appears = camera.coverage(12, "gift") > 0.9
+    assert np.abs(with_gift[appears].astype(int) - first[appears]).mean() > 20  # of 255 levels
+    assert np.array_equal(camera.image(0), first)  # going back in time finds the scene as it was
+
+
+def test_coverage_agrees_with_the_masks_of_pixel_centres() -> None:
+    scene = small_scene()
+    share = SceneCamera(scene, 5, supersampling=3).coverage(12, "gift", "ball")
+    mask = make_truth(scene, 5, 12).mask("gift", "ball")
+    assert mask[share == 1].all()
+    assert not mask[share == 0].any()
+
+
+def test_a_small_capture_is_written_and_matches_what_was_rendered(tmp_path: Path) -> None:
+    truth_dir = tmp_path / "truth"
+    shape = {"size": (96, 72), "n_cameras": 4, "n_frames": 4, "clip_length": 2, "supersampling": 2}
+    scene = write_capture(tmp_path / "capture", truth_dir=truth_dir, report=lambda line: None, **shape)
+    capture = open_capture(tmp_path / "capture")
+    assert capture.default_holdout == ("cam01", "cam02")
+    assert np.allclose(capture.rig.world_to_camera, scene.rig.world_to_camera)
+    for camera_index in (0, 3):
+        camera = SceneCamera(scene, camera_index, supersampling=2)
+        for frame_index in (0, 3):
+            # 40 and more here; full-resolution chroma, so the encoder is all that is between the two
+            assert psnr(capture.frame(camera_index, frame_index), camera.image(frame_index)) > 38
+    stored = np.load(truth_dir / "cam03" / "000003.npz")
+    assert np.array_equal(stored["depths"], make_truth(scene, 3, 3).depths)
+    names = json.loads((truth_dir / "cam03" / "parts.json").read_text())["parts"]
+    assert names.index("gift") in stored["part_indices"]
+    assert sorted(path.name for path in (tmp_path / "capture").iterdir()) == [
+        "cam00.mp4",
+        "cam01.mp4",
+        "cam02.mp4",
+        "cam03.mp4",
+        "cameras.json",
+    ]
+
+
+def test_writing_twice_gives_the_same_bytes(tmp_path: Path) -> None:
+    shape = {"size": (64, 48), "n_cameras": 2, "n_frames": 3, "clip_length": 2, "supersampling": 2}
+    for name in ("a", "b"):
+        write_capture(tmp_path / name, report=lambda line: None, **shape)
+    for path in (tmp_path / "a").iterdir():
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes(), path.name
+
+
+def test_yuv_of_known_colours() -> None:
+    colors = np.array([[[255, 255, 255], [0, 0, 0], [255, 0, 0]]], np.uint8)
+    # BT.601 limited range, as in the standard's colour bars
+    assert to_yuv444(colors)[:, 0].T.tolist() == [[235, 128, 128], [16, 128, 128], [81, 90, 240]]
+
+
+def test_shipped_sample_is_what_the_generator_makes() -> None:
+    document = json.loads((SAMPLE / "cameras.json").read_text())
+    assert document == json.loads(json.dumps(cameras_document(SHIPPED)))
+    capture = open_capture(SAMPLE)
+    assert (capture.n_frames, capture.fps, len(capture.rig)) == (30, 30.0, 12)
+    assert sum(path.stat().st_size for path in SAMPLE.iterdir()) < 6_000_000
+    frame = SceneCamera(SHIPPED, 3).image(12)
+    assert psnr(capture.frame(3, 12), frame) > 42  # 44 to 46 on the machine that made it
