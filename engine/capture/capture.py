@@ -124,7 +124,14 @@ def open_capture(path: Path | str, *, scale: float = 1.0, cache_bytes: int = DEF
         CaptureError: The folder is no capture or cannot be used; lists every problem found.
     """
     folder = Path(path)
-    layout = _read_layout(folder)
+    try:
+        layout = _read_layout(folder)
+    except OSError as error:  # rights, a drive that went away, a path too long
+        raise CaptureError(
+            f"The capture cannot be read ({error.strerror or error}).",
+            hint="Check that you may read all its files.",
+            path=error.filename or folder,
+        ) from error
     native_rig = layout.rig()
     rig = native_rig.resized(working_sizes(native_rig.image_sizes, scale, folder))
     store = FrameStore(

@@ -136,7 +136,7 @@ class VideoFrames:
             if self._must_seek(frame_index):
                 self._seek(frame_index)
             for frame in self._decoder:
-                index = bisect_left(self._pts, frame.pts)
+                index = bisect_left(self._pts, frame.pts) if frame.pts is not None else self._next_index
                 self._next_index = index + 1
                 if index < frame_index:
                     continue
@@ -175,7 +175,7 @@ class VideoFrames:
         if len(times) != self._n_frames:
             raise CaptureError(
                 f"The container promises {self._n_frames} frames, {len(times)} are in it.",
-                hint="Copy or export this video again.",
+                hint="Copy or export this video again, for example as H.264 in mp4.",
                 path=self.path,
             )
         self._key_indices = sorted({0, *(bisect_left(times, pts) for pts, is_key in packets if is_key)})

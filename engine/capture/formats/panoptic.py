@@ -105,8 +105,10 @@ def _read_meta(path: Path, problems: list[CaptureError]) -> list[_MetaCamera]:
         key, shape = ("k", "3x3") if Ks is None else ("w2c", "4x4") if poses is None else ("cam_id", "number")
         found = f"{key} must hold one {shape} for each of {n_frames} frames and {n_cameras} cameras, as fn does."
         raise CaptureError(found, hint=hint, path=path)
-    if not (np.isfinite(camera_ids).all() and (camera_ids == camera_ids[0]).all()):
-        raise CaptureError("cam_id must list the same cameras in the same order in each frame.", hint=hint, path=path)
+    is_whole = np.isfinite(camera_ids).all() and (camera_ids == np.round(camera_ids)).all()
+    if not is_whole or (camera_ids != camera_ids[0]).any():
+        found = "cam_id must list the same whole numbers in the same order in each frame."
+        raise CaptureError(found, hint=hint, path=path)
 
     cameras = []
     for i in range(n_cameras):

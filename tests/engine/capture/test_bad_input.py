@@ -223,7 +223,8 @@ def test_panoptic_one_later_image_of_another_size_is_found_when_decoding(make_pa
         (lambda d: d["train_meta.json"].update(fn=[]), "at least one frame"),
         (lambda d: d["train_meta.json"]["k"].pop(), "k must hold one 3x3 for each of 3 frames and 3 cameras"),
         (lambda d: d["train_meta.json"]["w2c"][1].pop(), "w2c must hold one 4x4"),
-        (lambda d: d["train_meta.json"]["cam_id"][1].reverse(), "same cameras in the same order"),
+        (lambda d: d["train_meta.json"]["cam_id"][1].reverse(), "same whole numbers in the same order"),
+        (lambda d: d["test_meta.json"].update(cam_id=[[0.5]] * 3), "same whole numbers in the same order"),
         (
             lambda d: d["train_meta.json"]["cam_id"].__setitem__(slice(None), [[1, 10, 1]] * 3),
             '2 cameras are called "1"',
@@ -252,6 +253,22 @@ def test_panoptic_frames_listed_differently_in_the_two_files(make_panoptic: Make
 
     message = str(problem_of(make_panoptic(edit=edit)))
     assert 'Camera "0" has 2 frames, 3 other cameras have 3' in message
+
+
+def test_a_file_that_may_not_be_read(make_panoptic: MakeCapture, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = make_panoptic()  # a mode of 000 would not stop root, so the refusal is played
+    secret = folder / "ims" / "2" / "000001.jpg"
+    real_open = Path.open
+
+    def refuse(path: Path, *args: Any, **kwargs: Any) -> Any:
+        if path == secret:
+            raise PermissionError(13, "Permission denied", str(path))
+        return real_open(path, *args, **kwargs)
+
+    monkeypatch.setattr(Path, "open", refuse)
+    error = problem_of(folder)
+    assert "cannot be read (Permission denied)" in str(error)
+    assert error.path == secret
 
 
 def test_nothing_is_written_when_opening_fails(make_sample: MakeCapture) -> None:
