@@ -1,5 +1,5 @@
 #version 330 core
-// One point sprite per point, a pixel larger than the mark for its smooth edge.
+// One point sprite per point, a little larger than the mark for its smooth edge.
 
 uniform mat4 world_to_clip;
 uniform float size;
@@ -17,7 +17,7 @@ void main() {
     gl_Position = world_to_clip * vec4(position, 1.0);
     point_color = color;
     float wanted_px = px_per_unit > 0.0 ? size * px_per_unit / max(gl_Position.w, 1e-12) : size;
-    mark_px = clamp(wanted_px, 1.0, max_size_px - 1.0);
-    sprite_px = ceil(mark_px) + 1.0;
+    mark_px = clamp(wanted_px, 1.0, max_size_px - 3.0);
+    sprite_px = ceil(mark_px) + 2.0; // a diamond's tips fade over 0.7 px
     gl_PointSize = sprite_px;
 }

@@ -3,6 +3,7 @@
 // ALPHA_MIN, EPS2D_PX2 and FRUSTUM_MARGIN come from engine.conventions.
 
 const int SPLATS_PER_ROW = 1024; // as in ui/gl/splat_renderer.py
+const float SNAP_PX = 1.0 / 16.0; // drivers may round corners that much, and must not round a pixel away
 const vec4 OUTSIDE = vec4(2.0, 2.0, 2.0, 1.0);
 
 uniform sampler2D splats; // four texels each: mean, opacity | quat wxyz | scale | color
@@ -79,8 +80,10 @@ void main() {
     }
 
     vec2 corner = 2.0 * vec2(gl_VertexID & 1, gl_VertexID >> 1) - 1.0;
-    offset_sigma = reach_sigma * corner;
-    vec2 offset_px = offset_sigma.x * sqrt(major) * axis + offset_sigma.y * sqrt(minor) * vec2(-axis.y, axis.x);
+    vec2 sigma_px = sqrt(vec2(major, minor));
+    offset_sigma = corner * (reach_sigma + SNAP_PX / sigma_px);
+    vec2 offset_px = offset_sigma * sigma_px;
+    offset_px = offset_px.x * axis + offset_px.y * vec2(-axis.y, axis.x);
     color_opacity = vec4(texelFetch(splats, texel + ivec2(3, 0), 0).rgb, opacity);
     gl_Position = vec4(2.0 * (mean_px + offset_px) / size_px - 1.0, 0.0, 1.0);
 }

@@ -159,6 +159,9 @@ class Target:
         self._ctx.enable_only(flags)
 
     def _release_pictures(self) -> None:
+        if self._framebuffer is not None:
+            # moderngl remembers the framebuffer in use and binds it again later: a GL error once it is deleted.
+            self._ctx.detect_framebuffer(0).use()
         owned = (self._framebuffer, self._color, self._depth, self._resolved_framebuffer, self._resolved)
         for thing in owned:
             if thing is not None:

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Protocol, TypeVar
+from collections.abc import Iterator
 
 import moderngl
 import pytest
 
+from tests.ui.gl.keep import Keep, Releasable, Thing
 from ui.gl.context import ContextError, free_dropped, make_headless_context
-
-
-class Releasable(Protocol):
-    def release(self) -> None: ...
-
-
-Thing = TypeVar("Thing", bound=Releasable)
-Keep = Callable[[Thing], Thing]
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +35,7 @@ def ctx(module_context: moderngl.Context) -> Iterator[moderngl.Context]:
 
 
 @pytest.fixture
-def keep(ctx: moderngl.Context) -> Iterator[Callable[[Thing], Thing]]:
+def keep(ctx: moderngl.Context) -> Iterator[Keep]:
     """Hands its argument back and releases it after the test, newest first."""
     kept: list[Releasable] = []
 
