@@ -123,6 +123,7 @@ def test_cameras_with_different_frame_counts(make_sample: MakeCapture) -> None:
         (lambda path: path.write_bytes(b"this is text, not a video" * 50), "cannot be opened"),
         (lambda path: path.write_bytes(path.read_bytes()[:200]), "truncated"),
         (lambda path: path.write_bytes(path.read_bytes()[:-300]), "truncated: its index lists 6 frames"),
+        (lambda path: path.write_bytes(path.read_bytes()[:-1]), "only 5 lie within"),
     ],
 )
 def test_a_camera_without_a_whole_video(make_sample: MakeCapture, damage: Callable[[Path], Any], found: str) -> None:
