@@ -34,6 +34,8 @@ logger = logging.getLogger(__name__)
 FRAMES_AFTER_INPUT = 3
 """ImGui spreads a press and its release over frames, so input asks for a few."""
 TRAINING_REFRESH_S = 0.1
+ATTENDED_S = 0.5
+"""For this long after an input, every picture that arrives is shown at once."""
 MAX_TICK_S = 0.25
 STATUS_BAR_HEIGHT = 28.0
 VIEWPORT, TIMELINE, TRAINING, CAPTURE = "Viewport", "Timeline", "Training", "Capture"
@@ -73,6 +75,8 @@ class Frame:
         self.dialog = OpenFolderDialog()
         self._frames_wanted = FRAMES_AFTER_INPUT
         self._drawn_s = -1e9
+        self._input_s = -1e9
+        self._has_news = False
         self._is_laid_out = False
         self._failed_panels: set[str] = set()
         self._panels: tuple[tuple[str, Callable[[Any, Dispatch, UiState], None], bool], ...] = (
@@ -85,25 +89,27 @@ class Frame:
     # ---- the redraw plan -------------------------------------------------------------------------------------
 
     def request_redraw(self, frames: int = FRAMES_AFTER_INPUT) -> None:
-        """Draw at least this many frames from now on."""
+        """Draw at least this many frames from now on: the user did something."""
+        self._input_s = time.perf_counter()
         self._frames_wanted = max(self._frames_wanted, frames)
 
     def update(self, dt_s: float) -> bool:
         """Drain the session and move time on. True when a frame has to be drawn."""
         session = self.session
-        shown_frame = session.timeline.frame_index
-        if session.poll():
-            self.request_redraw(1)
-        session.timeline.tick(min(dt_s, MAX_TICK_S))
-        if session.timeline.frame_index != shown_frame or self.viewport.has_news(session):
-            self.request_redraw(1)
+        has_news = session.poll()
+        has_news |= session.timeline.tick(min(dt_s, MAX_TICK_S))
+        self._has_news |= has_news or self.viewport.has_news(session)
         if self._frames_wanted > 0 or self.backend.needs_follow_up:
             return True
         since_s = time.perf_counter() - self._drawn_s
         if self.ui.redraw_in_s is not None and since_s >= self.ui.redraw_in_s:
             return True
+        # Drawing takes cores that the training needs too: news wait a little unless the user is looking for them.
+        is_attended = session.timeline.is_playing or time.perf_counter() - self._input_s < ATTENDED_S
         is_busy = session.training.state not in ("idle", "failed", "paused") or bool(session.jobs)
-        return is_busy and since_s >= TRAINING_REFRESH_S
+        if self._has_news and (is_attended or not is_busy):
+            return True
+        return (self._has_news or is_busy) and since_s >= TRAINING_REFRESH_S
 
     # ---- one frame -------------------------------------------------------------------------------------------
 
@@ -111,6 +117,7 @@ class Frame:
         """Draw one frame into the window's framebuffer."""
         started_s = time.perf_counter()
         self._frames_wanted = max(self._frames_wanted - 1, 0)
+        self._has_news = False
         self.ui.redraw_in_s = None
         self.ui.rects.clear()
         self.backend.new_frame()

@@ -92,6 +92,7 @@ class Scene:
         self.is_software = is_software(ctx)
         self.counts = AnchorCounts()
         self.shows = MARKS
+        self.is_stale = False
         self._target = Target(ctx)
         self._picture = ImageTexture(ctx)
         self._captured = ImageTexture(ctx)
@@ -155,8 +156,8 @@ class Scene:
         if key != self._drawn_key or self._splats.is_order_stale:
             self._drawn_key = key
             self._draw(view, base_key, points_key, captured_key, session)
-        is_stale = is_stale or self._splats.is_order_stale
-        return Composed(self._target.texture, is_stale)
+        self.is_stale = is_stale or self._splats.is_order_stale
+        return Composed(self._target.texture, self.is_stale)
 
     def captured(self, session: Any, width_px: int) -> moderngl.Texture | None:
         """The captured picture of the camera looked through, at the session's frame; None until it was decoded."""

@@ -68,6 +68,22 @@ def test_the_way_to_the_press_is_no_drag(pilot: Pilot) -> None:
     pilot.draw(2)
 
 
+def test_a_drag_that_ends_between_two_frames_counts_in_full(pilot: Pilot) -> None:
+    view, (x, y) = pilot.session.view, pilot.rects["viewport.canvas"].center
+    track = pilot.rects["timeline.track"]
+    up = pilot.studio.window.height - 1
+    for start, stop in (((x, y), (x + 50, y)), ((track.x0 + 3, track.y0 + 9), (track.x1 - 3, track.y0 + 9))):
+        yaw = view.yaw
+        pilot.move(*start)
+        pilot.press()
+        pilot.studio.window.dispatch_event("on_mouse_drag", stop[0], up - stop[1], 50, 0, mouse.LEFT, 0)
+        pilot.studio.window.dispatch_event("on_mouse_release", stop[0], up - stop[1], mouse.LEFT, 0)
+        pilot.draw(3)
+        if start == (x, y):
+            assert view.yaw - yaw == pytest.approx(0.3, abs=1e-6)  # 0.006 radians per pixel
+    assert pilot.session.timeline.frame_index == pilot.session.timeline.n_frames - 1
+
+
 def test_right_drag_pans_and_keeps_the_angles(pilot: Pilot) -> None:
     view, (x, y) = pilot.session.view, pilot.rects["viewport.canvas"].center
     yaw, pivot = view.yaw, np.array(view.pivot)

@@ -126,7 +126,8 @@ def _draw_track(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     imgui.invisible_button("track", size)
     track = Rect(origin.x, origin.y, origin.x + size.x, origin.y + size.y)
     ui.mark_rect("timeline.track", track)
-    if imgui.is_item_active():
+    # A quick drag's last stretch arrives in the same frame as the release, when the item is active no more.
+    if imgui.is_item_active() or imgui.is_item_deactivated():
         frame_index = frame_at(imgui.get_io().mouse_pos.x, track, timeline.n_frames)
         if frame_index != timeline.frame_index:
             dispatch(SetFrame(frame_index))

@@ -62,6 +62,7 @@ class ViewportPanel:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self._drag: str | None = None
+        self._button: int = 0
         self._moved_s = -1e9
         self._stale_since_s: float | None = None
         self._fps = 0.0
@@ -170,9 +171,13 @@ class ViewportPanel:
             view.dolly(0.9**io.mouse_wheel)
             self.note_moved()
         if imgui.is_item_activated():
+            buttons = (imgui.MouseButton_.left, imgui.MouseButton_.right, imgui.MouseButton_.middle)
+            self._button = next((button for button in buttons if imgui.is_mouse_down(button)), buttons[0])
             self._drag = "wipe" if self._is_on_wipe(session, panes, io.mouse_pos) else "view"
             return  # the pointer's way to where it was pressed is no drag
-        if not imgui.is_item_active():
+        # The last stretch of a quick drag arrives in the same frame as the release, when the item is active no more.
+        is_dragged = imgui.is_item_active() or (imgui.is_item_deactivated() and self._drag is not None)
+        if not is_dragged:
             self._drag = None
             if imgui.is_item_hovered() and self._is_on_wipe(session, panes, io.mouse_pos):
                 imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
@@ -186,8 +191,8 @@ class ViewportPanel:
         if dx == 0.0 and dy == 0.0:
             return
         self._leave_camera(session, dispatch)
-        is_middle = imgui.is_mouse_down(imgui.MouseButton_.middle)
-        if imgui.is_mouse_down(imgui.MouseButton_.right) or (is_middle and io.key_shift):
+        is_middle = self._button == imgui.MouseButton_.middle
+        if self._button == imgui.MouseButton_.right or (is_middle and io.key_shift):
             view.pan(dx, dy)
         elif is_middle and io.key_ctrl:
             view.dolly(1.01**dy)

@@ -12,6 +12,9 @@ from engine.capture.rig import CameraRig
 from engine.raster import Gaussians, rasterize
 
 
+FIELDS = ("means", "quats", "scales", "opacities", "colors")
+
+
 @dataclass(frozen=True)
 class Splats:
     """Arrays as ui.gl.SplatRenderer takes them."""
@@ -28,8 +31,7 @@ class Splats:
 
     def rows(self, index: np.ndarray | slice) -> Splats:
         """Some rows, in the given order."""
-        parts = {name: getattr(self, name)[index] for name in ("means", "quats", "scales", "opacities", "colors")}
-        return replace(self, **parts)
+        return replace(self, **{name: getattr(self, name)[index] for name in FIELDS})
 
 
 @dataclass(frozen=True)
@@ -106,14 +108,12 @@ def ball(position: tuple[float, float, float], color: tuple[float, float, float]
 
 def joined(*parts: Splats) -> Splats:
     """All rows one after another."""
-    names = ("means", "quats", "scales", "opacities", "colors")
-    return Splats(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    return Splats(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in FIELDS})
 
 
 def rasterized(splats: Splats, camera: Camera, *, near: float = 0.01) -> np.ndarray:
     """Premultiplied RGBA over nothing, from engine.raster's float64 reference. [H, W, 4]"""
-    fields = (splats.means, splats.quats, splats.scales, splats.opacities, splats.colors)
-    gaussians = Gaussians(*(torch.from_numpy(np.asarray(field, dtype=np.float64)) for field in fields))
+    gaussians = Gaussians(**{name: torch.from_numpy(getattr(splats, name)).double() for name in FIELDS})
     rendering = rasterize(
         gaussians,
         torch.from_numpy(camera.world_to_camera)[None],

@@ -11,6 +11,7 @@ import pytest
 from engine.conventions import ALPHA_MAX, ALPHA_MIN, EPS2D_PX2, TRANSMITTANCE_MIN
 from tests.ui.gl.keep import Keep
 from tests.ui.gl.scenes import (
+    FIELDS,
     Camera,
     Splats,
     ball,
@@ -251,7 +252,7 @@ def test_wrong_shapes_are_named(ctx: moderngl.Context, keep: Keep) -> None:
 
 def test_float64_arrays_are_taken(ctx: moderngl.Context, keep: Keep) -> None:
     splats, camera = make_splats(20), make_camera()
-    wide = Splats(*(np.asarray(getattr(splats, f), dtype=np.float64) for f in list(Splats.__annotations__)[:5]))
+    wide = Splats(**{name: getattr(splats, name).astype(np.float64) for name in FIELDS})
     np.testing.assert_array_equal(drawn(ctx, keep, wide, camera), drawn(ctx, keep, splats, camera))
 
 
