@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -58,9 +59,9 @@ def gaussians_of(
     return Gaussians(*(torch.from_numpy(np.asarray(column, np.float32).copy()).double() for column in columns))
 
 
-def simple_scene(gaussians: Gaussians, *, width: int = 160, height: int = 120, **changes: object) -> Scene:
+def simple_scene(gaussians: Gaussians, *, width: int = 160, height: int = 120, **changes: Any) -> Scene:
     """The Gaussians seen by a camera at the origin."""
-    values: dict = {
+    values: dict[str, Any] = {
         "viewmats": torch.eye(4, dtype=torch.float64)[None],
         "Ks": camera(width, height),
         "background": torch.tensor([0.1, 0.2, 0.3], dtype=torch.float64),
@@ -92,3 +93,15 @@ def layered_scene(n_rows: int, width: int, height: int, size_px: float, *, faint
         means, sizes * z[:, None] / focal, quats=quats, opacities=opacities, colors=rng.uniform(0, 1, (n_rows, 3))
     )
     return simple_scene(gaussians, width=width, height=height, viewmats=torch.from_numpy(pose)[None])
+
+
+def gradient(tensor: Tensor | None) -> Tensor:
+    """The gradient of a tensor that must have one."""
+    assert tensor is not None
+    assert tensor.grad is not None
+    return tensor.grad
+
+
+def gradients(gaussians: Gaussians) -> list[Tensor]:
+    """Copies of the gradients of all five parameters."""
+    return [gradient(tensor).clone() for tensor in gaussians.tensors()]

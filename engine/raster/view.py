@@ -84,12 +84,15 @@ def pinhole_views(viewmats: Tensor, Ks: Tensor, width: int, height: int, near_pl
             raise ValueError(f"Ks[{row}] has skew {K[0, 1]:g}, {K[1, 0]:g}; only skew-free cameras are supported")
         views.append(
             PinholeView(
-                pose[:3, :3].copy(),
-                pose[:3, 3].copy(),
-                *(float(value) for value in (K[0, 0], K[1, 1], K[0, 2], K[1, 2])),
-                width,
-                height,
-                float(near_plane),
+                rotation=pose[:3, :3].copy(),
+                translation=pose[:3, 3].copy(),
+                fx=float(K[0, 0]),
+                fy=float(K[1, 1]),
+                cx=float(K[0, 2]),
+                cy=float(K[1, 2]),
+                width=width,
+                height=height,
+                near_plane=float(near_plane),
             )
         )
     return views

@@ -93,7 +93,7 @@ class _Rasterize(torch.autograd.Function):
 
     @staticmethod
     @torch.autograd.function.once_differentiable
-    def backward(ctx: Any, grad_image: Tensor, grad_alpha: Tensor):
+    def backward(ctx: Any, grad_image: Tensor, grad_alpha: Tensor):  # pyright: ignore[reportIncompatibleMethodOverride]
         _lease, image, transmittance, *parameters = ctx.saved_tensors
         with parallel_guard():
             grads, grad_centers = _differentiate(
@@ -206,6 +206,7 @@ def _differentiate(
     )
     means, quats, scales, *_ = (tensor.detach().numpy() for tensor in parameters)
     grads = [torch.zeros_like(tensor) for tensor in parameters]
+    grad_means, grad_quats, grad_scales, grad_opacities, grad_colors = (grad.numpy() for grad in grads)
     grad_centers = torch.zeros(len(means), 2)
     project_backward.project_backward(
         drawing.records,
@@ -220,7 +221,11 @@ def _differentiate(
         drawing.camera,
         scratch,
         workspace.array("lane_rows", (n_threads, 16), np.int32),
-        *(grad.numpy() for grad in grads),
+        grad_means,
+        grad_quats,
+        grad_scales,
+        grad_opacities,
+        grad_colors,
         grad_centers.numpy(),
     )
     return grads, grad_centers

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange, types
 from numba.core import cgutils
-from numba.extending import intrinsic
 
 from engine.conventions import ALPHA_MAX, TRANSMITTANCE_MIN
 from engine.raster.cpu import record as rec
 from engine.raster.cpu import tile as tl
-from engine.raster.cpu.lanes import LaneBuilder
+from engine.raster.cpu.lanes import LaneBuilder, kernel_intrinsic
 from engine.raster.cpu.record import f4
 from engine.raster.cpu.tile import take_next
 
@@ -21,7 +20,7 @@ _RECHECK_EVERY = 16
 """Records between two looks for finished blocks. Looking after every record would make each wait for the last."""
 
 
-@intrinsic
+@kernel_intrinsic
 def _blend_record(typing_context, scratch, record, tile_x, tile_y, open_blocks):
     """Blend one record into the open blocks of a tile; returns the blocks in which some pixel changed."""
     signature = types.int64(types.int64, types.int64, types.float32, types.float32, types.int64)
@@ -58,7 +57,7 @@ def _blend_record(typing_context, scratch, record, tile_x, tile_y, open_blocks):
     return signature, generate
 
 
-@intrinsic
+@kernel_intrinsic
 def _find_open_blocks(typing_context, scratch):
     """One bit per block in which some pixel still lets light through."""
     signature = types.int64(types.int64)

@@ -14,12 +14,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange, types
 from numba.core import cgutils
-from numba.extending import intrinsic
 
 from engine.conventions import ALPHA_MAX, TRANSMITTANCE_MIN
 from engine.raster.cpu import record as rec
 from engine.raster.cpu import tile as tl
-from engine.raster.cpu.lanes import LaneBuilder, Lanes
+from engine.raster.cpu.lanes import LaneBuilder, Lanes, kernel_intrinsic
 from engine.raster.cpu.record import f4
 from engine.raster.cpu.tile import take_next
 
@@ -29,7 +28,7 @@ _T, _R, _G, _B, _E = (p // 4 for p in (tl.TRANSMITTANCE, tl.PLANE_R, tl.PLANE_G,
 _N_SUMS = 9
 
 
-@intrinsic
+@kernel_intrinsic
 def _replay_record(typing_context, scratch, record, tile_x, tile_y, changed_blocks, sums_address):
     """Replay one record in the blocks it changed and store its nine sums."""
     signature = types.void(types.int64, types.int64, types.float32, types.float32, types.int64, types.int64)

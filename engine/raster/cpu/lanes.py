@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils
+from numba.extending import intrinsic
 
 N_LANES = 16
 VECTOR_BYTES = 4 * N_LANES
@@ -28,6 +29,11 @@ _BOOLS = ir.VectorType(_BOOL, N_LANES)
 
 # Rounding may be tightened (one rounding instead of two), infinities and NaN keep their meaning.
 _FLAGS = ("contract", "nsz", "arcp")
+
+
+def kernel_intrinsic(function: Callable[..., Any]) -> Any:
+    """numba's `intrinsic`, typed by what it makes: kernels call the result without the leading typing context."""
+    return intrinsic(function)
 
 
 class LaneBuilder:

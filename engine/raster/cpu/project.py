@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import njit, prange, types
-from numba.extending import intrinsic
 
 from engine.conventions import ALPHA_MIN, EPS2D_PX2
 from engine.raster.cpu import record as rec
 from engine.raster.cpu.camera_row import CameraLanes
-from engine.raster.cpu.lanes import INTS, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes
+from engine.raster.cpu.lanes import INTS, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 from engine.raster.cpu.projection_math import Projection, dot, project_lanes
 from engine.raster.limits import EXTENT_MAX_PX, QUAT_NORM_SQUARED_MAX, QUAT_NORM_SQUARED_MIN, VALUE_MAX
 
@@ -22,7 +21,7 @@ def gather_rows(build: LaneBuilder, base: Any, rows: Any, n_columns: int) -> tup
     return tuple(build.gather(base, rows, n_columns, column) for column in range(n_columns))
 
 
-@intrinsic
+@kernel_intrinsic
 def _project_sixteen(
     typing_context, first, n_rows, means, quats, scales, opacities, colors, camera, record_address, key_address
 ):

@@ -10,18 +10,17 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange, types
 from numba.core import cgutils
-from numba.extending import intrinsic
 
 from engine.raster.cpu import record as rec
 from engine.raster.cpu.camera_row import CameraLanes
-from engine.raster.cpu.lanes import INT32, INT64, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes
+from engine.raster.cpu.lanes import INT32, INT64, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 from engine.raster.cpu.project import gather_rows
 from engine.raster.cpu.projection_math import Projection, Row, dot, project_lanes
 
 _RECORD_BYTES, _PAIR_BYTES = rec.RECORD_BYTES, 4 * rec.PAIR_FLOATS
 
 
-@intrinsic
+@kernel_intrinsic
 def _sum_pairs(typing_context, pair_sums, pairs, n_pairs, destination):
     """Add up the buffer rows listed in `pairs` [n_pairs] int32 into sixteen floats (the last seven mean nothing)."""
     signature = types.void(*[types.int64] * 4)
@@ -42,7 +41,7 @@ def _sum_pairs(typing_context, pair_sums, pairs, n_pairs, destination):
     return signature, generate
 
 
-@intrinsic
+@kernel_intrinsic
 def _backward_sixteen(typing_context, sums, records, rows, means, quats, scales, camera):
     """Gradients of sixteen Gaussians.
 
@@ -100,7 +99,7 @@ def _gradients(
 
 
 def _combine(weight_a: Lanes, a: Row, weight_b: Lanes, b: Row) -> Row:
-    return tuple(weight_a * a[k] + weight_b * b[k] for k in range(3))  # pyright: ignore[reportReturnType]
+    return tuple(weight_a * a[k] + weight_b * b[k] for k in range(3))
 
 
 def _quat_gradient(p: Projection, grad_unit_x: Row, grad_unit_y: Row) -> list[Lanes]:

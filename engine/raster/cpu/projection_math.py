@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from engine.raster.cpu.camera_row import CameraLanes
 from engine.raster.cpu.lanes import Lanes
 
-Row = tuple[Lanes, Lanes, Lanes]
+Row = tuple[Lanes, ...]
+"""Three values, a row of a matrix or a vector."""
 
 
 @dataclass(slots=True)
@@ -48,7 +49,7 @@ class Projection:
     qz: Lanes
     norm_squared: Lanes
     inverse_norm: Lanes
-    rotation: tuple[Row, Row, Row]
+    rotation: tuple[Row, ...]
     unit_x: Row
     unit_y: Row
     half_x: Row
@@ -60,7 +61,7 @@ def dot(left: Row, right: Row) -> Lanes:
     return left[0] * right[0] + left[1] * right[1] + left[2] * right[2]
 
 
-def project_lanes(camera: CameraLanes, mean: Row, quat: tuple[Lanes, Lanes, Lanes, Lanes], scale: Row) -> Projection:
+def project_lanes(camera: CameraLanes, mean: Row, quat: tuple[Lanes, ...], scale: Row) -> Projection:
     """Project sixteen Gaussians. NaN and infinities pass through lane by lane."""
     x = dot((camera.r00, camera.r01, camera.r02), mean) + camera.t0
     y = dot((camera.r10, camera.r11, camera.r12), mean) + camera.t1

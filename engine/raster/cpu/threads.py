@@ -11,11 +11,16 @@ from __future__ import annotations
 import logging
 import os
 from contextlib import AbstractContextManager, nullcontext
+from importlib import import_module
 from threading import RLock
+from typing import Any
 
 import numba
 import torch
+from numba.core import config as _numba_config
+from numba.np.ufunc.parallel import threading_layer
 
+_config: Any = _numba_config  # its attributes are made at run time
 _log = logging.getLogger(__name__)
 
 SPIN_COUNT = 20_000
@@ -37,13 +42,13 @@ def configure_threads(n_threads: int | None = None) -> int:
     """
     os.environ.setdefault("GOMP_SPINCOUNT", str(SPIN_COUNT))
     try:
-        numba.threading_layer()
+        threading_layer()
     except ValueError:  # not started yet: still ours to choose
         if _has_openmp():
-            numba.config.THREADING_LAYER = "omp"
+            _config.THREADING_LAYER = "omp"
         else:
             _log.warning("numba finds no OpenMP runtime (libgomp); kernels run one call at a time")
-    most = int(numba.config.NUMBA_NUM_THREADS)
+    most = int(_config.NUMBA_NUM_THREADS)
     n_threads = most if n_threads is None else min(max(1, n_threads), most)
     numba.set_num_threads(n_threads)
     torch.set_num_threads(n_threads)
@@ -53,12 +58,12 @@ def configure_threads(n_threads: int | None = None) -> int:
 def parallel_guard() -> AbstractContextManager[object]:
     """To be held around parallel kernels. Free where numba's threads may be shared, a lock where they may not."""
     numba.get_num_threads()  # starts the threads, so that the layer is known
-    return _one_at_a_time if numba.threading_layer() == "workqueue" else nullcontext()
+    return _one_at_a_time if threading_layer() == "workqueue" else nullcontext()
 
 
 def _has_openmp() -> bool:
     try:
-        from numba.np.ufunc import omppool  # noqa: F401
+        import_module("numba.np.ufunc.omppool")
     except ImportError:
         return False
     return True

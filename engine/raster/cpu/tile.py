@@ -14,10 +14,9 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 
 from engine.raster.cpu import record as rec
-from engine.raster.cpu.lanes import INT64, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes
+from engine.raster.cpu.lanes import INT64, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 
 LANE_X = [float(lane % rec.BLOCK) for lane in range(N_LANES)]
 LANE_Y = [float(lane // rec.BLOCK) for lane in range(N_LANES)]
@@ -122,7 +121,7 @@ def exp2_eighth(log_alphas: Lanes) -> Lanes:
     return value
 
 
-@intrinsic
+@kernel_intrinsic
 def take_next(typing_context, counter_address):
     """Atomically add one to the int64 at an address and return its old value: tiles for whichever thread is free."""
     signature = types.int64(types.int64)

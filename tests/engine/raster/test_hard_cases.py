@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from engine.raster import Gaussians, rasterize
-from tests.raster_scenes import Scene, camera, gaussians_of, layered_scene, simple_scene
+from engine.raster.rasterize import BackendName
+from tests.raster_scenes import Scene, camera, gaussians_of, gradients, layered_scene, simple_scene
 
 NAMES = ("means", "quats", "scales", "opacities", "colors")
 NAN, INF = math.nan, math.inf
@@ -103,7 +104,7 @@ CASES = {
 }
 
 
-def _outcome(scene: Scene, gaussians: Gaussians, backend: str) -> tuple[torch.Tensor, torch.Tensor, Gaussians]:
+def _outcome(scene: Scene, gaussians: Gaussians, backend: BackendName) -> tuple[torch.Tensor, torch.Tensor, Gaussians]:
     dtype = torch.float32 if backend == "cpu" else torch.float64
     parameters = Gaussians(*(t.detach().to(dtype).clone().requires_grad_() for t in gaussians.tensors()))
     rendering = rasterize(
@@ -116,7 +117,7 @@ def _outcome(scene: Scene, gaussians: Gaussians, backend: str) -> tuple[torch.Te
     generator = torch.Generator().manual_seed(0)
     weights = torch.randn(rendering.image.shape, generator=generator, dtype=torch.float64)
     ((rendering.image * weights.to(dtype)).sum() + (rendering.alpha * weights[..., :1].to(dtype)).sum()).backward()
-    grads = Gaussians(*(tensor.grad for tensor in parameters.tensors()))
+    grads = Gaussians(*gradients(parameters))
     return rendering.image.detach(), rendering.alpha.detach(), grads
 
 
