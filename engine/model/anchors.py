@@ -39,15 +39,9 @@ class AnchorSet(nn.Module):
         self.register_buffer("positions", positions.float().contiguous())
         self.register_buffer("color_logits", color_logits.float().contiguous())
         self.register_buffer("presence", presence)
-        self.features = nn.Parameter(
-            features.float().contiguous(), requires_grad=is_trainable
-        )
-        self.log_offset_scales = nn.Parameter(
-            log_offset_scales.float().contiguous(), requires_grad=is_trainable
-        )
-        self.log_base_scales = nn.Parameter(
-            log_base_scales.float().contiguous(), requires_grad=is_trainable
-        )
+        self.features = nn.Parameter(features.float().contiguous(), requires_grad=is_trainable)
+        self.log_offset_scales = nn.Parameter(log_offset_scales.float().contiguous(), requires_grad=is_trainable)
+        self.log_base_scales = nn.Parameter(log_base_scales.float().contiguous(), requires_grad=is_trainable)
         self.is_trainable = is_trainable
 
     def __len__(self) -> int:
@@ -77,14 +71,10 @@ class AnchorSet(nn.Module):
             feature_dim: Width of the static feature.
             presence: Frames of the clip in which each anchor exists, or None for a static set. [A, M] bool
         """
-        log_scales = torch.full(
-            (len(points), 3), float(torch.log(torch.tensor(spacing)))
-        )
+        log_scales = torch.full((len(points), 3), float(torch.log(torch.tensor(spacing))))
         return cls(
             positions=points,
-            color_logits=torch.logit(
-                colors.float().clamp(_COLOR_EDGE, 1 - _COLOR_EDGE)
-            ),
+            color_logits=torch.logit(colors.float().clamp(_COLOR_EDGE, 1 - _COLOR_EDGE)),
             features=torch.zeros(len(points), feature_dim),
             log_offset_scales=log_scales,
             # the shape head halves this at the start (sigmoid of about 0), so 1.2 spacings give 0.6: neighbours overlap

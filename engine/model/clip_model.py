@@ -96,9 +96,7 @@ class ClipModel(nn.Module):
         """Set the field and compute the interpolation constants of every dynamic set."""
         self.field = field
         dynamic = (role for role in self.roles() if self.anchor_set(role).is_dynamic)
-        self._corners = {
-            role: field.corners(self.anchor_set(role).positions) for role in dynamic
-        }
+        self._corners = {role: field.corners(self.anchor_set(role).positions) for role in dynamic}
 
     def is_constant(self, role: str) -> bool:
         """Whether the set's Gaussians never change: static anchors under a frozen decoder."""
@@ -110,9 +108,7 @@ class ClipModel(nn.Module):
         """Frames of the clip around this time and their weights."""
         if self.field is not None:
             return self.field.knots(clip_time, self.clip_length)
-        return [
-            (min(max(round(clip_time * self.clip_length), 0), self.n_frames - 1), 1.0)
-        ]
+        return [(min(max(round(clip_time * self.clip_length), 0), self.n_frames - 1), 1.0)]
 
     def alive(self, role: str, clip_time: float) -> Tensor:
         """Rows of a set that exist at this time: at a frame of its knots. [n] int64"""
@@ -122,9 +118,7 @@ class ClipModel(nn.Module):
         frames = [knot for knot, _ in self.knots(clip_time)]
         return anchors.presence[:, frames].any(1).nonzero()[:, 0]
 
-    def decode(
-        self, clip_time: float, rows: dict[str, Tensor] | None = None
-    ) -> Gaussians:
+    def decode(self, clip_time: float, rows: dict[str, Tensor] | None = None) -> Gaussians:
         """Gaussians at a time of the clip, in [0, 1).
 
         Args:
@@ -142,21 +136,15 @@ class ClipModel(nn.Module):
                 parts.append(self._decode_set(role, chosen, knots))
         if not parts:
             zeros = torch.zeros
-            return Gaussians(
-                zeros(0, 3), zeros(0, 4), zeros(0, 3), zeros(0), zeros(0, 3)
-            )
+            return Gaussians(zeros(0, 3), zeros(0, 4), zeros(0, 3), zeros(0), zeros(0, 3))
         return Gaussians.concatenate(parts)
 
-    def _decode_set(
-        self, role: str, rows: Tensor, knots: list[tuple[int, float]]
-    ) -> Gaussians:
+    def _decode_set(self, role: str, rows: Tensor, knots: list[tuple[int, float]]) -> Gaussians:
         anchors = self.anchor_set(role)
         if self.is_constant(role):
             if role not in self._frozen:
                 with torch.no_grad():
-                    self._frozen[role] = self._decode_rows(
-                        anchors, torch.arange(len(anchors)), None
-                    )
+                    self._frozen[role] = self._decode_rows(anchors, torch.arange(len(anchors)), None)
             k = self.decoder.gaussians_per_anchor
             return self._frozen[role][(rows[:, None] * k + torch.arange(k)).reshape(-1)]
         dynamic_features = None
@@ -164,9 +152,7 @@ class ClipModel(nn.Module):
             dynamic_features = self.field(rows.numpy(), self._corners[role], knots)
         return self._decode_rows(anchors, rows, dynamic_features)
 
-    def _decode_rows(
-        self, anchors: AnchorSet, rows: Tensor, dynamic_features: Tensor | None
-    ) -> Gaussians:
+    def _decode_rows(self, anchors: AnchorSet, rows: Tensor, dynamic_features: Tensor | None) -> Gaussians:
         return self.decoder(
             positions=anchors.positions[rows],
             color_logits=anchors.color_logits[rows],
@@ -184,18 +170,12 @@ class ClipModel(nn.Module):
             (own if anchors.is_trainable else inherited).append(anchors)
 
         def positions(sets: list[AnchorSet]) -> np.ndarray:
-            return np.concatenate(
-                [np.zeros((0, 3), np.float32), *(s.positions.numpy() for s in sets)]
-            )
+            return np.concatenate([np.zeros((0, 3), np.float32), *(s.positions.numpy() for s in sets)])
 
         def dynamic(sets: list[AnchorSet]) -> np.ndarray:
-            return np.concatenate(
-                [np.zeros(0, bool), *(np.full(len(s), s.is_dynamic) for s in sets)]
-            )
+            return np.concatenate([np.zeros(0, bool), *(np.full(len(s), s.is_dynamic) for s in sets)])
 
-        return AnchorView(
-            positions(inherited), positions(own), dynamic(own), dynamic(inherited)
-        )
+        return AnchorView(positions(inherited), positions(own), dynamic(own), dynamic(inherited))
 
     def own_arrays(self) -> dict[str, np.ndarray]:
         """Everything this clip must store; inherited sets leave only their presence in this clip. Copies."""
@@ -204,24 +184,16 @@ class ClipModel(nn.Module):
             anchors = self.anchor_set(role)
             if not anchors.is_trainable:
                 if anchors.presence is not None:
-                    arrays[f"inherited.{role}.presence"] = (
-                        anchors.presence.numpy().copy()
-                    )
+                    arrays[f"inherited.{role}.presence"] = anchors.presence.numpy().copy()
                 continue
             for name in _ANCHOR_ARRAYS:
                 value = getattr(anchors, name)
                 if value is not None:
                     arrays[f"sets.{role}.{name}"] = value.detach().numpy().copy()
         if any(p.requires_grad for p in self.decoder.parameters()):
-            arrays |= {
-                f"decoder.{k}": v.detach().numpy().copy()
-                for k, v in self.decoder.state_dict().items()
-            }
+            arrays |= {f"decoder.{k}": v.detach().numpy().copy() for k, v in self.decoder.state_dict().items()}
         if self.field is not None:
-            arrays |= {
-                f"field.{k}": v.detach().numpy().copy()
-                for k, v in self.field.state_dict().items()
-            }
+            arrays |= {f"field.{k}": v.detach().numpy().copy() for k, v in self.field.state_dict().items()}
         return arrays
 
 
@@ -235,9 +207,7 @@ def decoder_sizes(decoder: Decoder) -> dict[str, int]:
     }
 
 
-def inherit(
-    reference: ClipState, presence: dict[str, Tensor]
-) -> tuple[dict[str, AnchorSet], Decoder]:
+def inherit(reference: ClipState, presence: dict[str, Tensor]) -> tuple[dict[str, AnchorSet], Decoder]:
     """Frozen anchor sets and frozen decoder of a reference clip.
 
     Args:
@@ -247,9 +217,7 @@ def inherit(
     decoder = _read_decoder(reference)
     decoder.requires_grad_(requires_grad=False)
     roles = _roles(reference.arrays)
-    sets = {
-        role: _read_set(reference.arrays, role, is_trainable=False) for role in roles
-    }
+    sets = {role: _read_set(reference.arrays, role, is_trainable=False) for role in roles}
     for role, anchors in sets.items():
         if anchors.presence is not None:
             anchors.presence = presence[role]
@@ -268,15 +236,11 @@ def load_clip_model(state: ClipState, reference: ClipState | None) -> ClipModel:
     header = state.header
     if state.is_reference:
         roles = _roles(state.arrays)
-        sets = {
-            role: _read_set(state.arrays, role, is_trainable=True) for role in roles
-        }
+        sets = {role: _read_set(state.arrays, role, is_trainable=True) for role in roles}
         decoder = _read_decoder(state)
     else:
         if reference is None:
-            raise ProjectError(
-                f"Clip {header['clip_index']} inherits from a reference clip that is not there."
-            )
+            raise ProjectError(f"Clip {header['clip_index']} inherits from a reference clip that is not there.")
         if reference.header["fingerprint"] != header["reference_fingerprint"]:
             raise ProjectError(
                 f"Clip {header['clip_index']} was trained on reference {header['reference_fingerprint']}, "
@@ -290,10 +254,7 @@ def load_clip_model(state: ClipState, reference: ClipState | None) -> ClipModel:
             if name.startswith(prefix)
         }
         sets, decoder = inherit(reference, presence)
-        sets |= {
-            role: _read_set(state.arrays, role, is_trainable=True)
-            for role in _roles(state.arrays)
-        }
+        sets |= {role: _read_set(state.arrays, role, is_trainable=True) for role in _roles(state.arrays)}
     field = None
     if header.get("field"):
         field = SpatioTemporalField(FieldShape.from_dict(header["field"]))
@@ -317,16 +278,9 @@ def _roles(arrays: dict[str, np.ndarray]) -> list[str]:
 _ROLE_ORDER = ["static", "moving", "residual"]
 
 
-def _read_set(
-    arrays: dict[str, np.ndarray], role: str, *, is_trainable: bool
-) -> AnchorSet:
-    values: dict[str, Any] = {
-        name: arrays.get(f"sets.{role}.{name}") for name in _ANCHOR_ARRAYS
-    }
-    tensors = {
-        name: None if value is None else torch.from_numpy(value)
-        for name, value in values.items()
-    }
+def _read_set(arrays: dict[str, np.ndarray], role: str, *, is_trainable: bool) -> AnchorSet:
+    values: dict[str, Any] = {name: arrays.get(f"sets.{role}.{name}") for name in _ANCHOR_ARRAYS}
+    tensors = {name: None if value is None else torch.from_numpy(value) for name, value in values.items()}
     return AnchorSet(**tensors, is_trainable=is_trainable)  # type: ignore[arg-type]
 
 
@@ -337,8 +291,4 @@ def _read_decoder(state: ClipState) -> Decoder:
 
 
 def _strip(arrays: dict[str, np.ndarray], prefix: str) -> dict[str, Tensor]:
-    return {
-        k.removeprefix(prefix): torch.from_numpy(v.copy())
-        for k, v in arrays.items()
-        if k.startswith(prefix)
-    }
+    return {k.removeprefix(prefix): torch.from_numpy(v.copy()) for k, v in arrays.items() if k.startswith(prefix)}

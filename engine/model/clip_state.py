@@ -82,9 +82,7 @@ def read_clip_state(path: Path | str) -> ClipState:
             header = json.loads(metadata["header"])
             arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
     except FileNotFoundError as error:
-        raise ProjectError(
-            "The clip file does not exist.", hint="Train the clip first.", path=path
-        ) from error
+        raise ProjectError("The clip file does not exist.", hint="Train the clip first.", path=path) from error
     except (OSError, SafetensorError, KeyError, ValueError) as error:
         raise ProjectError(
             f"The clip file is damaged or no clip file ({error}).",

@@ -53,19 +53,13 @@ class Decoder(nn.Module):
         for head, width in HEADS.items():
             self.first[head] = uniform(n_in, hidden, fan_in=n_in)
             self.first_bias[head] = uniform(hidden, fan_in=n_in)
-            self.second[head] = uniform(
-                hidden, gaussians_per_anchor * width, fan_in=hidden
-            )
-            self.second_bias[head] = uniform(
-                gaussians_per_anchor * width, fan_in=hidden
-            )
+            self.second[head] = uniform(hidden, gaussians_per_anchor * width, fan_in=hidden)
+            self.second_bias[head] = uniform(gaussians_per_anchor * width, fan_in=hidden)
         with torch.no_grad():
             shape_bias = self.second_bias["shape"].view(gaussians_per_anchor, 7)
             shape_bias[:, 3:] = torch.tensor([1.0, 0.0, 0.0, 0.0])  # start unrotated
             offset = torch.rand(gaussians_per_anchor * 3, generator=generator) - 0.5
-            self.second_bias["offset"].copy_(
-                offset
-            )  # start spread over the anchor's cell, half a spacing each way
+            self.second_bias["offset"].copy_(offset)  # start spread over the anchor's cell, half a spacing each way
 
     def head_parameters(self, head: str) -> list[nn.Parameter]:
         """All parameters of one head."""
@@ -83,21 +77,14 @@ class Decoder(nn.Module):
             static_features: [n, static_dim]
             dynamic_features: [n, dynamic_dim], or None for f_d = 0.
         """
-        weight = torch.cat(
-            [self.first[head] for head in HEADS], dim=1
-        )  # [F, 4 * hidden]
+        weight = torch.cat([self.first[head] for head in HEADS], dim=1)  # [F, 4 * hidden]
         bias = torch.cat([self.first_bias[head] for head in HEADS])
         if dynamic_features is None:
             hidden = torch.addmm(bias, static_features, weight[: self.static_dim])
         else:
-            hidden = torch.addmm(
-                bias, torch.cat([static_features, dynamic_features], dim=1), weight
-            )
+            hidden = torch.addmm(bias, torch.cat([static_features, dynamic_features], dim=1), weight)
         hidden = torch.relu(hidden).split(self.hidden, dim=1)
-        blocks = [
-            torch.addmm(self.second_bias[head], hidden[i], self.second[head])
-            for i, head in enumerate(HEADS)
-        ]
+        blocks = [torch.addmm(self.second_bias[head], hidden[i], self.second[head]) for i, head in enumerate(HEADS)]
         return torch.cat(blocks, dim=1)
 
     def forward(

@@ -60,9 +60,7 @@ class FieldShape:
         )
 
 
-def derive_cells(
-    *, side: float, spacing: float, base: int, growth: float, max_levels: int
-) -> tuple[int, ...]:
+def derive_cells(*, side: float, spacing: float, base: int, growth: float, max_levels: int) -> tuple[int, ...]:
     """Cells per level: base * growth^l until a cell is at most 1.5 anchor spacings; finer would be hash noise."""
     cells = [base]
     while len(cells) < max_levels and side / cells[-1] > 1.5 * spacing:
@@ -78,16 +76,13 @@ def derive_log2_entries(n_alive: int) -> int:
 class SpatioTemporalField(nn.Module):
     """(anchor rows, clip time) to f_d. Owns its tables and network; corner constants belong to the caller."""
 
-    def __init__(
-        self, shape: FieldShape, generator: torch.Generator | None = None
-    ) -> None:
+    def __init__(self, shape: FieldShape, generator: torch.Generator | None = None) -> None:
         super().__init__()
         self.shape = shape
         size = (len(shape.cells), shape.n_entries, shape.channels)
         # One parameter per knot: knots without gradient are left alone by the optimiser, which makes it lazy for free.
         self.tables = nn.ParameterList(
-            nn.Parameter((torch.rand(size, generator=generator) * 2 - 1) * _TABLE_INIT)
-            for _ in range(shape.n_knots)
+            nn.Parameter((torch.rand(size, generator=generator) * 2 - 1) * _TABLE_INIT) for _ in range(shape.n_knots)
         )
         n_in = len(shape.cells) * shape.channels
         self.hidden = nn.Linear(n_in, shape.hidden, bias=False)
@@ -95,17 +90,12 @@ class SpatioTemporalField(nn.Module):
         for layer in (self.hidden, self.out):
             bound = 1.0 / math.sqrt(layer.in_features)
             with torch.no_grad():
-                layer.weight.copy_(
-                    (torch.rand(layer.weight.shape, generator=generator) * 2 - 1)
-                    * bound
-                )
+                layer.weight.copy_((torch.rand(layer.weight.shape, generator=generator) * 2 - 1) * bound)
 
     def corners(self, positions: Tensor) -> CornerTable:
         """Interpolation constants of fixed positions, scene units. [A, 3]"""
         lower = np.asarray(self.shape.bounds_min)
-        unit = (
-            positions.detach().cpu().numpy().astype(np.float64) - lower
-        ) / self.shape.side
+        unit = (positions.detach().cpu().numpy().astype(np.float64) - lower) / self.shape.side
         return corner_table(unit, self.shape.cells, self.shape.n_entries)
 
     def knots(self, clip_time: float, clip_length: int) -> list[tuple[int, float]]:
@@ -117,9 +107,7 @@ class SpatioTemporalField(nn.Module):
             return [(lower, 1.0)]
         return [(lower, 1.0 - fraction), (lower + 1, fraction)]
 
-    def forward(
-        self, rows: np.ndarray, corners: CornerTable, knots: list[tuple[int, float]]
-    ) -> Tensor:
+    def forward(self, rows: np.ndarray, corners: CornerTable, knots: list[tuple[int, float]]) -> Tensor:
         """Dynamic features of the chosen anchors. [n, feature_dim]
 
         Args:
@@ -127,7 +115,5 @@ class SpatioTemporalField(nn.Module):
             corners: From `corners`.
             knots: From `knots`.
         """
-        encoded = sum(
-            weight * encode(self.tables[knot], rows, corners) for knot, weight in knots
-        )
+        encoded = sum(weight * encode(self.tables[knot], rows, corners) for knot, weight in knots)
         return self.out(torch.relu(self.hidden(encoded)))

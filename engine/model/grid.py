@@ -37,9 +37,7 @@ class CornerTable:
     weights: np.ndarray
 
 
-def corner_table(
-    unit_positions: np.ndarray, cells: tuple[int, ...], n_entries: int
-) -> CornerTable:
+def corner_table(unit_positions: np.ndarray, cells: tuple[int, ...], n_entries: int) -> CornerTable:
     """Corners and weights of positions in the unit cube.
 
     Args:
@@ -63,18 +61,14 @@ def corner_table(
             offset = np.array([bits & 1, bits >> 1 & 1, bits >> 2 & 1])
             knot = (corner + offset).astype(np.uint64)  # [A, 3]
             if is_dense:
-                index = knot[:, 0] + np.uint64(n_knots) * (
-                    knot[:, 1] + np.uint64(n_knots) * knot[:, 2]
-                )
+                index = knot[:, 0] + np.uint64(n_knots) * (knot[:, 1] + np.uint64(n_knots) * knot[:, 2])
             else:
                 mixed = knot[:, 0] * np.uint64(_PRIMES[0])
                 mixed ^= knot[:, 1] * np.uint64(_PRIMES[1])
                 mixed ^= knot[:, 2] * np.uint64(_PRIMES[2])
                 index = mixed & np.uint64(n_entries - 1)
             indices[:, level, bits] = index.astype(np.int32)
-            weights[:, level, bits] = np.where(offset, fraction, 1.0 - fraction).prod(
-                axis=1
-            )
+            weights[:, level, bits] = np.where(offset, fraction, 1.0 - fraction).prod(axis=1)
     return CornerTable(indices, weights)
 
 
@@ -90,9 +84,7 @@ def _gather(rows, indices, weights, table, out):
                 entry = indices[row, level, corner]
                 weight = weights[row, level, corner]
                 for channel in range(n_channels):
-                    out[i, level * n_channels + channel] += (
-                        weight * table[level, entry, channel]
-                    )
+                    out[i, level * n_channels + channel] += weight * table[level, entry, channel]
 
 
 @njit(parallel=True, cache=True, nogil=True, error_model="numpy")
@@ -107,18 +99,14 @@ def _scatter(rows, indices, weights, out_grad, table_grad):
                 entry = indices[row, level, corner]
                 weight = weights[row, level, corner]
                 for channel in range(n_channels):
-                    table_grad[level, entry, channel] += (
-                        weight * out_grad[i, level * n_channels + channel]
-                    )
+                    table_grad[level, entry, channel] += weight * out_grad[i, level * n_channels + channel]
 
 
 class _Encode(torch.autograd.Function):
     @staticmethod
     def forward(ctx, table: Tensor, rows: np.ndarray, corners: CornerTable) -> Tensor:
         out = torch.empty(len(rows), table.shape[0] * table.shape[2])
-        _gather(
-            rows, corners.indices, corners.weights, table.detach().numpy(), out.numpy()
-        )
+        _gather(rows, corners.indices, corners.weights, table.detach().numpy(), out.numpy())
         ctx.rows, ctx.corners, ctx.table_shape = rows, corners, table.shape
         return out
 

@@ -56,9 +56,7 @@ class View:
 
     def sees(self, positions: Tensor, *, reach: float) -> Tensor:
         """Whether something within `reach` scene units of each position may touch a pixel. [A] bool"""
-        p_camera = (
-            positions @ self.world_to_camera[:3, :3].T + self.world_to_camera[:3, 3]
-        )
+        p_camera = positions @ self.world_to_camera[:3, :3].T + self.world_to_camera[:3, 3]
         x, y, z = p_camera.unbind(1)
         depth = z.clamp_min(self.near_plane)
         fx, fy, cx, cy = self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]
@@ -67,18 +65,11 @@ class View:
             fx * reach / depth + 2.0,
             fy * reach / depth + 2.0,
         )  # +2 px for the low-pass filter
-        is_inside = (
-            (u > -reach_x)
-            & (u < self.width + reach_x)
-            & (v > -reach_y)
-            & (v < self.height + reach_y)
-        )
+        is_inside = (u > -reach_x) & (u < self.width + reach_x) & (v > -reach_y) & (v < self.height + reach_y)
         return is_inside & (z > self.near_plane - reach)
 
 
-def visible_rows(
-    model: ClipModel, view: View, clip_time: float, *, reach: float
-) -> dict[str, Tensor]:
+def visible_rows(model: ClipModel, view: View, clip_time: float, *, reach: float) -> dict[str, Tensor]:
     """Rows per role that exist at this time and that the view may see."""
     rows = {}
     for role in model.roles():
@@ -88,9 +79,7 @@ def visible_rows(
     return rows
 
 
-def render_gaussians(
-    gaussians: Gaussians, view: View, *, background: Tensor | None = None
-) -> Rendering:
+def render_gaussians(gaussians: Gaussians, view: View, *, background: Tensor | None = None) -> Rendering:
     """Rasterize through one view; tensors of the rendering have a leading camera axis of 1."""
     return rasterize(
         gaussians,
@@ -103,9 +92,7 @@ def render_gaussians(
     )
 
 
-def render_model(
-    model: ClipModel, view: View, clip_time: float, *, reach: float
-) -> Tensor:
+def render_model(model: ClipModel, view: View, clip_time: float, *, reach: float) -> Tensor:
     """Picture of a clip at a time, scene colours over black, without gradient. [H, W, 3]"""
     with torch.no_grad():
         rows = visible_rows(model, view, clip_time, reach=reach)
