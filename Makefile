@@ -36,7 +36,9 @@ fmt: setup ## format and apply the safe fixes
 	@$(BIN)/ruff format .
 
 bench: setup ## measure the figures of the README and print them as a table
-	@$(BIN)/python -m tests.benchmarks
+	@$(BIN)/python -m tests.benchmarks.bench_quality $(SAMPLE)
+	@$(BIN)/python -m tests.benchmarks.bench_raster
+	@$(BIN)/python -m tests.benchmarks.bench_window $(SAMPLE)
 
 golden: setup ## draw the golden pictures anew; look at each before committing it
 	@$(BIN)/python -m pytest tests --update-golden -k golden
