@@ -11,6 +11,8 @@ from engine.capture.rig import CameraRig
 
 SEE_THROUGH_SHARE = 0.06
 """A camera contradicts a point when its own depth lies this share beyond it: it looks through the point."""
+EDGE_SHARE = 0.1
+"""Neighbouring depths that differ by more belong to different surfaces."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +55,19 @@ def check_depths(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _depth_at(depths, x, y):
+    """Bilinear on one surface, nearest across a depth edge. On a floor at a grazing angle one pixel is 2 % of depth."""
+    height, width = depths.shape
+    nearest = depths[int(y), int(x)]
+    x0, y0 = min(max(int(x - 0.5), 0), width - 2), min(max(int(y - 0.5), 0), height - 2)
+    fx, fy = min(max(x - 0.5 - x0, 0.0), 1.0), min(max(y - 0.5 - y0, 0.0), 1.0)
+    a, b, c, d = depths[y0, x0], depths[y0, x0 + 1], depths[y0 + 1, x0], depths[y0 + 1, x0 + 1]
+    if max(max(a, b), max(c, d)) > (1.0 + EDGE_SHARE) * min(min(a, b), min(c, d)):
+        return nearest
+    return (a * (1 - fx) + b * fx) * (1 - fy) + (c * (1 - fx) + d * fx) * fy
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _check(depth_maps, inverse_Ks, Ks, world_to_camera, camera, others, tolerance, see_through):
     _, height, width = depth_maps.shape
     n_agree = np.zeros((height, width), np.int32)
@@ -81,11 +96,11 @@ def _check(depth_maps, inverse_Ks, Ks, world_to_camera, camera, others, toleranc
                 if cz <= 1e-9:
                     continue
                 K = Ks[other]
-                ix = int(np.floor((K[0, 0] * cx + K[0, 1] * cy) / cz + K[0, 2]))
-                iy = int(np.floor(K[1, 1] * cy / cz + K[1, 2]))
-                if ix < 0 or iy < 0 or ix >= width or iy >= height:
+                a = (K[0, 0] * cx + K[0, 1] * cy) / cz + K[0, 2]
+                b = K[1, 1] * cy / cz + K[1, 2]
+                if a < 0 or b < 0 or a >= width or b >= height:
                     continue
-                theirs = depth_maps[other, iy, ix]
+                theirs = _depth_at(depth_maps[other], a, b)
                 relative = (theirs - cz) / cz
                 if relative > see_through:
                     n_through[y, x] += 1
@@ -93,7 +108,6 @@ def _check(depth_maps, inverse_Ks, Ks, world_to_camera, camera, others, toleranc
                     n_agree[y, x] += 1
                     # their surface point, along their own pixel ray, seen from here
                     inverse = inverse_Ks[other]
-                    a, b = ix + 0.5, iy + 0.5
                     tx = (inverse[0, 0] * a + inverse[0, 1] * b + inverse[0, 2]) * theirs - pose[0, 3]
                     ty = (inverse[1, 1] * b + inverse[1, 2]) * theirs - pose[1, 3]
                     tz = theirs - pose[2, 3]
