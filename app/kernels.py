@@ -63,3 +63,10 @@ def prepare_drawing() -> None:
         from engine.raster.cpu.warm import warm_up
 
         warm_up()
+
+
+def prepare_decoding() -> None:
+    """Once on a thread that decodes: one core, and everything loaded that a first frame needs."""
+    import engine.model.clip_model  # noqa: F401
+
+    use_one_thread()

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from app.arrays import AnchorArrays, GaussianArrays, PointArrays
-from app.kernels import use_one_thread
+from app.kernels import prepare_decoding
 from app.latest import LatestWorker
 from engine.capture.clip import Clip
 from engine.model.clip_state import ClipState, read_clip_state
@@ -112,7 +112,7 @@ class Playback:
         self._reference: tuple[tuple[str, int], ClipState] | None = None
         self._last: GaussianArrays | None = None
         self.worker: LatestWorker[FrameRequest, GaussianArrays] = LatestWorker(
-            "playback", self._compute, prepare=use_one_thread
+            "playback", self._compute, prepare=prepare_decoding
         )
 
     def gaussians(self, request: FrameRequest) -> GaussianArrays | None:

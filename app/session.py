@@ -105,6 +105,7 @@ class Session:
         self._is_closed = False
         if is_preloading:
             self._renderer.worker.start()
+            self._playback.worker.start()
 
     # ---------------------------------------------------------------- what is open
 
