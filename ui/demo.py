@@ -25,6 +25,7 @@ logger = logging.getLogger(__name__)
 PICTURE_SIZE = (1280, 800)
 OPEN_TIMEOUT_S = 120.0
 PICTURE_TIMEOUT_S = 60.0
+THUMBNAILS_TIMEOUT_S = 10.0
 POLL_S = 0.02
 EXIT_BAD_INPUT = 2
 QUICK_OVERRIDES = (
@@ -42,7 +43,8 @@ def run_demo(capture_path: Path, out_dir: Path, quick: bool = False) -> int:
 
     Args:
         capture_path: Capture folder.
-        out_dir: Gets project/ (project_quick/), metrics.json, window.png and held_out.mp4. A second run goes on from the first.
+        out_dir: Gets project/ or project_quick/, metrics.json, window.png and held_out.mp4. A second run goes on
+            from the first.
         quick: Train a few steps only.
     Returns:
         0 when training, measuring and video worked; otherwise the exit code of what did not, 2 for a bad capture.
@@ -136,7 +138,13 @@ def _draw_window(
 
     if not _wait(session, is_complete, PICTURE_TIMEOUT_S):
         line.say("The trained picture was not ready in time; the window is shown as it is.")
-    studio.settle(4, until_idle_s=3.0)  # thumbnails arrive one by one
+
+    def has_thumbnails() -> bool:
+        studio.settle(1)
+        return not studio.frame.capture.is_waiting
+
+    _wait(session, has_thumbnails, THUMBNAILS_TIMEOUT_S)
+    studio.settle(2)
     return write_png(read_window(studio.ctx, *PICTURE_SIZE), path)
 
 

@@ -31,8 +31,8 @@ from ui.theme import Icon
 
 logger = logging.getLogger(__name__)
 
-FRAMES_AFTER_INPUT = 3
-"""ImGui spreads a press and its release over frames, so input asks for a few."""
+FRAMES_AFTER_INPUT = 2
+"""ImGui takes in a press and its release in two frames."""
 TRAINING_REFRESH_S = 0.1
 ATTENDED_S = 0.5
 """For this long after an input, every picture that arrives is shown at once."""
@@ -121,7 +121,7 @@ class Frame:
         self.ui.redraw_in_s = None
         self.ui.rects.clear()
         self.backend.new_frame()
-        self._compose()
+        self._guard("Window", self._compose)
         self._ctx.screen.use()
         self._ctx.viewport = (0, 0, *self._window.get_framebuffer_size())
         self._ctx.clear(*theme.VOID)
@@ -167,6 +167,8 @@ class Frame:
         flags = imgui.WindowFlags_.no_collapse
         if title in (VIEWPORT, TIMELINE):
             flags |= imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
+        if title == VIEWPORT:  # its picture and toolbar cover all of it
+            flags |= imgui.WindowFlags_.no_background
         is_visible, _ = imgui.begin(title, None, flags)
         if not has_padding:
             imgui.pop_style_var()

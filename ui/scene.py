@@ -152,6 +152,10 @@ class Scene:
         needs_capture = base_key is None and points_key is None and session.view.look_through is not None
         captured_key = self._take_captured(session, view.width) if needs_capture else None
         marks_key = self._take_marks(session)
+        if self.is_software and base_key is not None and not self._has_marks(session):
+            # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
+            self.shows, self.is_stale, self._drawn_key = RENDERED, is_stale, None
+            return Composed(self._picture.texture, is_stale)
         key = (view.key, base_key, points_key, captured_key, marks_key)
         if key != self._drawn_key or self._splats.is_order_stale:
             self._drawn_key = key
@@ -240,6 +244,12 @@ class Scene:
             overlays.show_residual,
         )
 
+    def _has_marks(self, session: Any) -> bool:
+        overlays = session.overlays
+        has_frusta = overlays.show_frusta and session.view.look_through is None
+        has_inherited = overlays.show_inherited and self.counts.n_inherited > 0
+        return has_frusta or has_inherited or (overlays.show_residual and self.counts.n_residual > 0)
+
     def _draw(
         self, view: SceneView, base_key: Hashable, points_key: Hashable, captured_key: Hashable, session: Any
     ) -> None:
@@ -268,12 +278,19 @@ class Scene:
         if session.overlays.show_frusta and is_free:  # from inside a camera the others are only in the way
             self._frusta.draw(target, *camera, width_px=1.5, opacity=0.8)
         if self.counts.n_inherited and session.overlays.show_inherited:
-            self._inherited.draw(target, *camera, shape="ring", size=5.0, opacity=0.75)
+            self._inherited.draw(target, *camera, shape="ring", size=_mark_px(self.counts.n_inherited), opacity=0.7)
         if self.counts.n_residual and session.overlays.show_residual:
-            self._residual.draw(target, *camera, shape="diamond", size=7.0, outline_px=1.0)
+            self._residual.draw(
+                target, *camera, shape="diamond", size=_mark_px(self.counts.n_residual) + 1.5, outline_px=1.0
+            )
         target.resolve(BACKGROUND)
 
     def _cloud_point_px(self, view: SceneView) -> float:
         """Fewer points are drawn larger, so that a thin cloud still reads as surfaces."""
         per_point_px2 = view.width * view.height / max(len(self._cloud), 1)
         return float(np.clip(0.45 * np.sqrt(per_point_px2), 2.0, 5.0))
+
+
+def _mark_px(n_marks: int) -> float:
+    """Many marks are drawn smaller, so that the picture under them stays visible."""
+    return float(np.clip(6.5 - np.log10(max(n_marks, 1)) * 0.8, 2.5, 5.5))

@@ -30,6 +30,8 @@ class CapturePanel:
         self._capture_path: Any = None
         self._filter = ""
         self._shown_camera: int | None = None
+        self.is_waiting = False
+        """Is a thumbnail of a visible row still to come?"""
 
     def release(self) -> None:
         """Free the thumbnails. GL thread only."""
@@ -76,6 +78,7 @@ class CapturePanel:
         held_out = held_out_cameras(session)
         shown = session.view.look_through
         has_asked = False
+        self.is_waiting = False
         for index, name in enumerate(rig.names):
             imgui.push_id(index)
             top_left = imgui.get_cursor_screen_pos()
@@ -101,6 +104,7 @@ class CapturePanel:
         if index in self._thumbnails or has_asked:
             return has_asked
         picture = session.ground_truth(index, 0, THUMBNAIL_WIDTH_PX)
+        self.is_waiting = True
         if picture is not None:
             texture = self._make_texture()
             texture.set(picture.image)

@@ -24,6 +24,7 @@ from ui.widgets import chip, grouped
 MOVING_S = 0.22
 """The view counts as moving for this long after the last change of it."""
 WIPE_GRAB_PX = 9.0
+TOOLBAR_HEIGHT = 38.0
 STALE_AFTER_S = 0.15
 COMPARE_WORDS = {"off": "Off", "wipe": "Wipe", "side": "Side by side"}
 
@@ -92,14 +93,18 @@ class ViewportPanel:
             imgui.get_window_draw_list().add_rect_filled(area.low, area.high, theme.u32(theme.VOID))
             draw_welcome(session, dispatch, ui, area)
             return
+        start = imgui.get_cursor_screen_pos()
+        width, height = imgui.get_content_region_avail().x, imgui.get_content_region_avail().y
+        bar = Rect(start.x, start.y, start.x + width, start.y + TOOLBAR_HEIGHT)
+        imgui.get_window_draw_list().add_rect_filled(bar.low, bar.high, theme.u32(theme.PANEL))
         self._draw_toolbar(session, dispatch, ui)
-        origin, size = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
-        if size.x < 32 or size.y < 32:
+        area = Rect(bar.x0, bar.y1, bar.x1, bar.y1 + height - TOOLBAR_HEIGHT)
+        if area.width < 32 or area.height < 32:
             return
-        area = Rect(origin.x, origin.y, origin.x + size.x, origin.y + size.y)
+        imgui.set_cursor_screen_pos(area.low)
         buttons = imgui.ButtonFlags_
         flags = buttons.mouse_button_left | buttons.mouse_button_right | buttons.mouse_button_middle
-        imgui.invisible_button("canvas", size, flags)
+        imgui.invisible_button("canvas", ImVec2(area.width, area.height), flags)
         ui.mark_rect("viewport.canvas", area)
         shown = session.view.look_through
         image_size = None
@@ -215,8 +220,9 @@ class ViewportPanel:
     def _draw_picture(self, session: Any, ui: UiState, area: Rect, panes: Panes) -> None:
         draw = imgui.get_window_draw_list()
         draw.push_clip_rect(area.low, area.high, True)
-        draw.add_rect_filled(area.low, area.high, theme.u32(theme.VOID))
         pane = panes.rendered
+        if pane != area:  # the backdrop shows; where the picture covers everything it would only cost time
+            draw.add_rect_filled(area.low, area.high, theme.u32(theme.VOID))
         ui.mark_rect("viewport.rendered", pane)
         density = imgui.get_io().display_framebuffer_scale.x
         size = (max(round(pane.width * density), 16), max(round(pane.height * density), 16))

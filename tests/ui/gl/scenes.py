@@ -11,7 +11,6 @@ import torch
 from engine.capture.rig import CameraRig
 from engine.raster import Gaussians, rasterize
 
-
 FIELDS = ("means", "quats", "scales", "opacities", "colors")
 
 
@@ -108,7 +107,8 @@ def ball(position: tuple[float, float, float], color: tuple[float, float, float]
 
 def joined(*parts: Splats) -> Splats:
     """All rows one after another."""
-    return Splats(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in FIELDS})
+    rows = [np.concatenate([getattr(part, name) for part in parts]) for name in FIELDS]
+    return Splats(*rows)
 
 
 def rasterized(splats: Splats, camera: Camera, *, near: float = 0.01) -> np.ndarray:
