@@ -15,7 +15,7 @@ from engine.cloud.image_filters import block_mean
 
 EDGE_GREY_LEVELS = 10.0
 """Smoothness falls by e for this grey difference."""
-MEMBRANE_WEIGHT = 0.02
+MEMBRANE_WEIGHT = 0.1
 """A little first-difference smoothness keeps large unseen areas from extrapolating wildly."""
 MIN_BEND_WEIGHT = 0.1
 HALF = 2

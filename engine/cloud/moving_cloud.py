@@ -112,6 +112,7 @@ def build_moving_cloud(
     # start from what the probe promises: surface counts fall with the square of the voxel
     promised = probe.size * float(np.sqrt(_n_union(coarse) / max_points))
     size = max(wanted, promised, float((np.prod(high - low) / MAX_GRID_VOXELS) ** (1 / 3)))
+    n_hidden, grid, surfaces = 0, Grid.over(low, high, size), []
     for attempt in range(MAX_CARVES):
         n_hidden, grid = 0, Grid.over(low, high, size)
         surfaces = [surface(m, grid) for m in range(n_frames)]

@@ -41,6 +41,8 @@ GREY_FROM_RGB = np.array([0.299, 0.587, 0.114])
 AGREE_TOLERANCE = 0.02
 FILLED_TOLERANCE = 0.04
 MIN_AGREE = 2
+MIN_AGREED_PIXELS = 100
+"""With fewer agreed pixels their range says nothing about the rest of the picture."""
 COLOR_DEPTH_TOLERANCE = 0.05
 
 
@@ -179,6 +181,9 @@ def estimate_depth_maps(
         check, agreed = raw_checks[camera], is_agreed[camera]
         weights = agreed * np.minimum(check.n_agree, 3) / 3.0
         low, high = 1.0 / far[camera], 1.0 / near[camera]
+        if agreed.sum() >= MIN_AGREED_PIXELS:  # a plate extrapolates freely: keep it within what was measured
+            nearest, farthest = np.percentile(check.depths[agreed], [1.0, 99.0])
+            low, high = max(low, 0.95 / farthest), min(high, 1.1 / nearest)
         filled = fill_inverse_depth(1.0 / check.depths, weights, greys[camera], low=low, high=high)
         is_close = agreed & (np.abs(filled * check.depths - 1.0) < 0.1)
         return np.where(is_close, check.depths, 1.0 / filled)
@@ -256,8 +261,8 @@ def _search_ranges(
             far[camera] = max(1.3 * high, 1.5 * near[camera])
             is_measured[camera] = True
     if has_points:
-        near = np.where(is_measured, np.minimum(near, np.maximum(point_near, 0.6 * near)), near)
-        far = np.where(is_measured, np.maximum(far, np.minimum(point_far, 1.6 * far)), far)
+        near = np.where(is_measured, np.minimum(near, np.maximum(point_near, 0.8 * near)), near)
+        far = np.where(is_measured, np.maximum(far, np.minimum(point_far, 1.25 * far)), far)
     report(
         f"Depth range: {np.median(near):.3g} to {np.median(far):.3g} scene units (medians over cameras): coarse sweep "
         f"in {is_measured.sum()} of {len(rig)}, the rest from "

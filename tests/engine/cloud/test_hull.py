@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -150,7 +152,7 @@ def test_moving_cloud_follows_the_sphere_through_the_clip() -> None:
     def picture(row: int, frame_in_clip: int) -> np.ndarray:
         return np.where(masks[frame_in_clip, row][..., None], [200, 100, 50], [0, 255, 0]).astype(np.uint8)
 
-    bounds = {"bounds_min": np.full(3, -1.5), "bounds_max": np.full(3, 1.8)}
+    bounds: dict[str, Any] = {"bounds_min": np.full(3, -1.5), "bounds_max": np.full(3, 1.8)}
     cloud = build_moving_cloud(picture, masks, rig, gains, **bounds, max_points=3000, report=lines.append)
     assert len(lines) == 2
     assert 500 < len(cloud.points) <= 3150
