@@ -6,6 +6,7 @@ import argparse
 import logging
 from pathlib import Path
 
+from engine.synthetic.scene import SAMPLE_CAMERAS
 from engine.synthetic.writing import write_capture
 
 
@@ -16,7 +17,7 @@ def main() -> None:
     parser.add_argument("--truth", type=Path, help="folder for ground-truth depth and part indices")
     parser.add_argument("--width", type=int, default=320)
     parser.add_argument("--height", type=int, default=240)
-    parser.add_argument("--cameras", type=int, default=12)
+    parser.add_argument("--cameras", type=int, default=SAMPLE_CAMERAS)
     parser.add_argument("--frames", type=int, default=30)
     parser.add_argument("--clip-length", type=int, default=10)
     parser.add_argument("--supersampling", type=int, default=3, help="rays along each side of a pixel")

@@ -21,6 +21,9 @@ LIGHT_POSITION = np.array([0.5, -0.7, 2.6])
 """Centre of the lamp."""
 LIGHT_RADIUS = 0.45
 """The lamp is a level disc of this radius, which makes shadows soft."""
+SAMPLE_CAMERAS = 20
+"""18 degrees apart: with 12 (30 degrees) a third of the floor finds no match and depth is off by 28 cm at the third
+quartile; with 20 by 10 cm."""
 RING_RADIUS = 2.7
 """Distance of the cameras from the middle of the room."""
 RING_HEIGHTS = (1.05, 1.85)
@@ -86,7 +89,7 @@ class SyntheticScene:
 def make_scene(
     *,
     size: tuple[int, int] = (320, 240),
-    n_cameras: int = 12,
+    n_cameras: int = SAMPLE_CAMERAS,
     n_frames: int = 30,
     clip_length: int = 10,
     fps: float = 30.0,

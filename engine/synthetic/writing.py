@@ -21,7 +21,7 @@ import av
 import numpy as np
 
 from engine.synthetic.raycast import SceneCamera, make_truth
-from engine.synthetic.scene import SyntheticScene, make_scene
+from engine.synthetic.scene import SAMPLE_CAMERAS, SyntheticScene, make_scene
 
 logger = logging.getLogger(__name__)
 
@@ -35,7 +35,7 @@ def write_capture(
     out_dir: Path | str,
     *,
     size: tuple[int, int] = (320, 240),
-    n_cameras: int = 12,
+    n_cameras: int = SAMPLE_CAMERAS,
     n_frames: int = 30,
     clip_length: int = 10,
     fps: float = 30.0,
