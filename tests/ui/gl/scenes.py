@@ -107,8 +107,7 @@ def ball(position: tuple[float, float, float], color: tuple[float, float, float]
 
 def joined(*parts: Splats) -> Splats:
     """All rows one after another."""
-    rows = [np.concatenate([getattr(part, name) for part in parts]) for name in FIELDS]
-    return Splats(*rows)
+    return replace(parts[0], **{name: np.concatenate([getattr(part, name) for part in parts]) for name in FIELDS})
 
 
 def rasterized(splats: Splats, camera: Camera, *, near: float = 0.01) -> np.ndarray:
