@@ -112,12 +112,13 @@ def build_moving_cloud(
     # start from what the probe promises: surface counts fall with the square of the voxel
     promised = probe.size * float(np.sqrt(_n_union(coarse) / max_points))
     size = max(wanted, promised, float((np.prod(high - low) / MAX_GRID_VOXELS) ** (1 / 3)))
+    size = voxel_size or size
     n_hidden, grid, surfaces = 0, Grid.over(low, high, size), []
-    for attempt in range(MAX_CARVES):
+    for attempt in range(1 if voxel_size else MAX_CARVES):
         n_hidden, grid = 0, Grid.over(low, high, size)
         surfaces = [surface(m, grid) for m in range(n_frames)]
         n_union = _n_union(surfaces)
-        if n_union <= 1.05 * max_points or attempt == MAX_CARVES - 1:
+        if voxel_size or n_union <= 1.05 * max_points or attempt == MAX_CARVES - 1:
             break
         size *= float(np.clip(np.sqrt(n_union / max_points), 1.03, 4.0))
     voxels, presence = _fuse(surfaces)

@@ -156,7 +156,7 @@ class _Fused(torch.autograd.Function):
         inputs = (raw, log_offset, log_base)
         _backward(
             *(t.numpy() for t in inputs),
-            ctx.k,
+            ctx.k,  # pyright: ignore[reportCallIssue] - sees no lengths
             *(t.numpy() for t in (scales, opacities, colors)),
             *(gradient.contiguous().numpy() for gradient in gradients),
             *(t.numpy() for t in (d_raw, d_log_offset, d_log_base)),

@@ -28,8 +28,8 @@ class ClipState:
     """Named arrays and a header. A value.
 
     Header keys: schema, role ("reference" or "source"), clip_index, clip_length, n_frames, start, step, n_steps,
-    seed, config (difference from defaults), camera_names (of the gains), near_plane, spacing, moving_spacing, fingerprint,
-    reference_fingerprint, field (FieldShape or None), metrics.
+    seed, config (difference from defaults), camera_names (of the gains), near_plane, spacing, moving_spacing,
+    fingerprint, reference_fingerprint, field (FieldShape or None), metrics.
     """
 
     arrays: dict[str, np.ndarray]

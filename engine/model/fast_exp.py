@@ -42,5 +42,6 @@ def exp_float32(x):
     p = p * r + _C2
     p = p * r + _ONE
     p = p * r + _ONE
-    power = _float_from_bits(np.int32((np.int32(k) + np.int32(127)) << np.int32(23)))
+    bits = np.int32((np.int32(k) + np.int32(127)) << np.int32(23))
+    power = _float_from_bits(bits)  # pyright: ignore[reportCallIssue] - numba passes the typing context itself
     return p * power if x == x else x

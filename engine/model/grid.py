@@ -111,7 +111,8 @@ class _Encode(torch.autograd.Function):
         return out
 
     @staticmethod
-    def backward(ctx, out_grad: Tensor):
+    def backward(ctx, *gradients: Tensor):
+        (out_grad,) = gradients
         table_grad = torch.empty(ctx.table_shape)
         corners = ctx.corners
         _scatter(

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from torch import Tensor, nn
 
 from engine.capture.capture import Capture
@@ -351,7 +351,7 @@ class ClipTraining:
             for frame in range(self.clip.n_frames):
                 surface = cloud.points[cloud.presence[:, frame]]
                 if len(surface):
-                    distance, _ = cKDTree(surface).query(centers, distance_upper_bound=_ALIVE_SPACINGS * cloud.spacing)
+                    distance, _ = KDTree(surface).query(centers, distance_upper_bound=_ALIVE_SPACINGS * cloud.spacing)
                     presence[:, frame] = np.isfinite(distance)
             moving.presence = torch.from_numpy(presence)
         n_new, n_all = int(is_new.sum()), len(cloud.points)
@@ -378,7 +378,7 @@ class ClipTraining:
         if "moving" not in self.model.roles():
             return
         moving = self.model.anchor_set("moving")
-        _, nearest = cKDTree(moving.positions.numpy()).query(residual.positions.numpy())
+        _, nearest = KDTree(moving.positions.numpy()).query(residual.positions.numpy())
         with torch.no_grad():
             rows = torch.from_numpy(nearest)
             residual.features.copy_(moving.features[rows])

@@ -157,7 +157,8 @@ class _Photometric(torch.autograd.Function):
         return torch.tensor((1 - ssim_weight) * l1 + ssim_weight * (1 - ssim), dtype=image.dtype)
 
     @staticmethod
-    def backward(ctx, loss_grad: Tensor):
+    def backward(ctx, *gradients: Tensor):
+        (loss_grad,) = gradients
         return ctx.gradient * loss_grad, None, None, None
 
 

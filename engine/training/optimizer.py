@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from torch import nn
+from torch import Tensor, nn
 
 from engine.errors import NonFiniteLoss
 from engine.model.clip_model import ClipModel
@@ -27,8 +27,8 @@ def named_parameters(
     """Trainable parameters by name with their initial rate; frozen ones are left out altogether."""
     chosen: dict[str, tuple[nn.Parameter, float]] = {}
 
-    def add(name: str, parameter: nn.Parameter, rate: float) -> None:
-        if parameter.requires_grad and parameter.numel():
+    def add(name: str, parameter: Tensor, rate: float) -> None:
+        if isinstance(parameter, nn.Parameter) and parameter.requires_grad and parameter.numel():
             chosen[name] = (parameter, rate)
 
     for role in model.roles():

@@ -164,10 +164,7 @@ def moving_cloud(
     def say(line: str) -> None:
         report(Progress("Carving what moves", 0.5, line))
 
-    lower, upper = (
-        np.quantile(static_points, 0.01, axis=0),
-        np.quantile(static_points, 0.99, axis=0),
-    )
+    lower, upper = motion_bounds(static_points, rig)
     return build_moving_cloud(
         pictures.raw,
         masks,
