@@ -1,5 +1,6 @@
 """The command line: exit codes, messages, outputs; training inline."""
 
+import io
 import json
 import os
 import signal
@@ -115,7 +116,12 @@ def test_a_damaged_picture_found_while_training_is_bad_input(run, tmp_path):
 
 def _reads_pictures(job, report):
     training = make_fake(job, report)
-    training.prepare = lambda: [training.capture.frames_of(c, range(6)) for c in range(4)]
+
+    def prepare() -> None:
+        for camera_index in range(4):
+            training.capture.frames_of(camera_index, range(6))
+
+    training.prepare = prepare
     return training
 
 
@@ -269,21 +275,19 @@ def test_ranges_that_are_none(text):
         parse_range(text, 7, option="--frames", what="frames")
 
 
-class Stream:
-    """Collects what is written."""
+class Stream(io.StringIO):
+    """Collects what is written; says whether it is a terminal."""
 
     def __init__(self, is_terminal: bool) -> None:
-        self.text, self._is_terminal = "", is_terminal
+        super().__init__()
+        self._is_terminal = is_terminal
 
     def isatty(self) -> bool:
         return self._is_terminal
 
-    def write(self, text: str) -> int:
-        self.text += text
-        return len(text)
-
-    def flush(self) -> None:
-        pass
+    @property
+    def text(self) -> str:
+        return self.getvalue()
 
 
 def test_a_terminal_gets_one_line_that_redraws_itself():

@@ -1,5 +1,7 @@
 """Activations: the fused back end against torch in float64, forward and gradient, hard values included."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 import torch
@@ -11,7 +13,7 @@ from engine.model.fast_exp import exp_float32
 K = 5
 
 
-def make_inputs(n: int, *, spread: float, seed: int = 0) -> dict[str, torch.Tensor]:
+def make_inputs(n: int, *, spread: float, seed: int = 0) -> dict[str, Any]:
     generator = torch.Generator().manual_seed(seed)
 
     def normal(*size: int) -> torch.Tensor:
@@ -48,7 +50,8 @@ def test_fused_matches_reference_forward_and_gradient(spread):
         assert (ours - truth).abs().max() < 1e-6 * max(1.0, truth.abs().max().item())  # a few float32 roundings
     for name in learned:
         ours, truth = fast[name].grad, slow[name].grad
-        assert ours is not None and truth is not None
+        assert ours is not None
+        assert truth is not None
         assert (ours - truth).norm() < 1e-6 * truth.norm()  # worst seen 2e-7
 
 

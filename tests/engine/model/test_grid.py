@@ -28,7 +28,8 @@ def test_encode_matches_reference_forward_and_gradient(cells):
     (out_slow * weight.double()).sum().backward()
     # float32 sums of 8 products of size about 1: rounding stays below 1e-6
     assert (out_fast - out_slow).abs().max() < 2e-6
-    assert fast.grad is not None and slow.grad is not None
+    assert fast.grad is not None
+    assert slow.grad is not None
     # up to 100 rows share an entry at the coarsest level: 100 roundings of 6e-8 at values of a few
     assert (fast.grad - slow.grad).abs().max() < 2e-5
 
@@ -39,14 +40,16 @@ def test_no_rows_give_an_empty_result_and_a_zero_gradient():
     out = encode(fast, np.zeros(0, np.int64), corners)
     assert out.shape == (0, 8)
     out.sum().backward()
-    assert fast.grad is not None and not fast.grad.any()
+    assert fast.grad is not None
+    assert not fast.grad.any()
 
 
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.floats(allow_nan=True, allow_infinity=True, width=32), min_size=3, max_size=3))
 def test_corners_stay_inside_the_table_for_any_position(position):
     corners = corner_table(np.array([position], np.float64), (8, 100), 256)
-    assert corners.indices.min() >= 0 and corners.indices.max() < 256
+    assert corners.indices.min() >= 0
+    assert corners.indices.max() < 256
     assert np.allclose(corners.weights.sum(-1), 1.0, atol=1e-6)
 
 
