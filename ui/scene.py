@@ -281,7 +281,7 @@ class Scene:
             self._inherited.draw(target, *camera, shape="ring", size=_mark_px(self.counts.n_inherited), opacity=0.7)
         if self.counts.n_residual and session.overlays.show_residual:
             self._residual.draw(
-                target, *camera, shape="diamond", size=_mark_px(self.counts.n_residual) + 1.5, outline_px=1.0
+                target, *camera, shape="diamond", size=_mark_px(self.counts.n_residual) + 2.5, outline_px=1.0
             )
         target.resolve(BACKGROUND)
 
@@ -293,4 +293,4 @@ class Scene:
 
 def _mark_px(n_marks: int) -> float:
     """Many marks are drawn smaller, so that the picture under them stays visible."""
-    return float(np.clip(6.5 - np.log10(max(n_marks, 1)) * 0.8, 2.5, 5.5))
+    return float(np.clip(7.0 - np.log10(max(n_marks, 1)) * 0.8, 3.0, 6.0))
