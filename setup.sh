@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes the environment: a virtual environment in .venv with the exact versions of requirements.lock, and the system
-# libraries it needs. Running it again costs a second: a stamp in .venv remembers what was installed.
+# libraries it needs. Running it again costs a second: stamps in .venv remember what was installed.
 #
 #   ./setup.sh              everything `make run` needs
 #   ./setup.sh --tests      the same, and what the end-to-end test of the window needs (Xvfb, xdotool, xwd)
@@ -16,7 +16,6 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
 VENV=.venv
-STAMP=$VENV/.setup-stamp
 TORCH_CPU_INDEX=https://download.pytorch.org/whl/cpu
 WITH_TESTS=no
 [ "${1:-}" = "--tests" ] && WITH_TESTS=yes
@@ -119,12 +118,14 @@ install_packages() {
     if [ "$torch_build" = default ]; then
         pip install -qq --retries 2 "torch==$version" # and the libraries, on Linux CUDA's, which that build asks for
     fi
-    pip install -qq --no-deps --no-build-isolation --editable .
 }
 
-fingerprint() { # what decides whether the environment is current; the folder counts because a venv cannot be moved
-    { cat requirements.lock pyproject.toml setup.sh && pwd && printf '%s\n' "${CLIPGSTREAM_TORCH:-}" "${PYTHON:-}"; } | cksum
+install_project() { pip install -qq --no-deps --no-build-isolation --editable .; }
+
+packages_key() { # what decides whether the packages are current; the folder counts because a venv cannot be moved
+    { cat requirements.lock && pwd && printf '%s\n' "${CLIPGSTREAM_TORCH:-}" "${PYTHON:-}"; } | cksum
 }
+project_key() { cksum <pyproject.toml; } # entry point and package list of the editable install
 
 # ---------------------------------------------------------------- system libraries
 missing_libraries() { # Debian packages whose library cannot be loaded, one line
@@ -180,13 +181,22 @@ check_system() {
 }
 
 # ---------------------------------------------------------------- main
-if [ ! -x "$VENV/bin/python" ] || [ "$(cat "$STAMP" 2>/dev/null)" != "$(fingerprint)" ]; then
+is_stamped() { [ "$(cat "$VENV/.$1" 2>/dev/null)" = "$2" ]; }
+stamp() { printf '%s\n' "$2" >"$VENV/.$1.new" && mv "$VENV/.$1.new" "$VENV/.$1"; }
+
+if ! "$VENV/bin/python" -c '' 2>/dev/null || ! is_stamped packages "$(packages_key)"; then
     started=$SECONDS
     make_venv "$(find_python)"
     check_system
     install_packages
-    fingerprint >"$STAMP.new" && mv "$STAMP.new" "$STAMP"
+    stamp packages "$(packages_key)"
+    install_project
+    stamp project "$(project_key)"
     say "ready in $((SECONDS - started)) s: $VENV"
 else
     check_system
+    if ! is_stamped project "$(project_key)"; then
+        install_project
+        stamp project "$(project_key)"
+    fi
 fi
