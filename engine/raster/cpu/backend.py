@@ -2,7 +2,7 @@
 
 records (project) -> depth order (sort) -> tile lists (binning) -> pixels (blend); backward: replay of the tiles
 (blend_backward) -> gradients (project_backward). Sources of the method: 3D Gaussian Splatting (Kerbl et al. 2023) for
-the image formation; everything else is in the module docstrings and in ARCHITECTURE.md.
+the image formation; the rest is explained where it is done.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ POOL = WorkspacePool()
 """Idle buffers of this process."""
 
 _MAX_PAIRS = 2**31 - 1
+_EARLY_AND_LATE = "unsorted, then pair_sums"
+"""Unsorted records are done with before the backward pass begins; its largest buffer takes their place."""
 
 
 @dataclass(slots=True)
@@ -116,7 +118,7 @@ def _draw(view: PinholeView, background: Tensor, parameters: tuple[Tensor, ...] 
     n_tiles = n_columns * n_tile_rows
 
     n_padded = -(-max(n_rows, 1) // 16) * 16
-    unsorted = workspace.array("unsorted", (n_padded, RECORD_FLOATS), np.float32)
+    unsorted = workspace.array(_EARLY_AND_LATE, (n_padded, RECORD_FLOATS), np.float32)
     depths = workspace.array("depths", (n_padded,), np.float32)
     if n_rows:
         project.project(means, quats, scales, opacities, colors, camera, unsorted, depths)
@@ -189,7 +191,7 @@ def _differentiate(
     workspace = drawing.workspace
     n_threads = get_num_threads()
     scratch = workspace.array("scratch", (n_threads, SCRATCH_FLOATS), np.float32)
-    pair_sums = workspace.array("pair_sums", (drawing.n_pairs, PAIR_FLOATS), np.float32)
+    pair_sums = workspace.array(_EARLY_AND_LATE, (drawing.n_pairs, PAIR_FLOATS), np.float32)
     blend_backward.replay_tiles(
         drawing.records,
         drawing.tile_starts,

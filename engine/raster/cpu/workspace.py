@@ -35,10 +35,6 @@ class Workspace:
             self._buffers[name] = buffer = _aligned_bytes(int(needed * _GROWTH))
         return buffer[:n_bytes].view(dtype).reshape(shape)
 
-    def drop(self, name: str) -> None:
-        """Forget one buffer."""
-        self._buffers.pop(name, None)
-
     @property
     def n_bytes(self) -> int:
         """Bytes held."""
