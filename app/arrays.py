@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -70,7 +71,7 @@ class PointArrays:
     key: Hashable
     is_hint: bool = False
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Any]:
         return iter((self.points, self.colors, self.key))
 
 

@@ -1,19 +1,38 @@
-"""A hint of the scene before there is any cloud: every camera's picture, placed in space where the cameras look.
+"""What can be seen of a capture before anything is trained: a hint at once, a first rough cloud after some seconds.
 
-Cheap and rough by intention; it shows which camera sees what until the training has built the real cloud.
+The hint places every camera's picture in space. The cloud is made by the same reconstruction as the real one, from
+small pictures of a single moment, in a short process of its own: compiling and computing must not hold up a window.
 """
 
 from __future__ import annotations
 
+import logging
+import multiprocessing
+import os
+from contextlib import suppress
+from pathlib import Path
+
 import numpy as np
+from safetensors import SafetensorError, safe_open
+from safetensors.numpy import save_file
 
 from app.arrays import PointArrays
+from app.jobs import JobContext
 from app.pictures import downsized
-from engine.capture.capture import Capture
+from engine.capture.capture import Capture, open_capture
+from engine.errors import EngineError, PreparationError, ProjectError
+from engine.files import atomic_path
+
+logger = logging.getLogger(__name__)
 
 PICTURE_WIDTH_PX = 40
 DEPTH_SHARE = 0.16
-"""The pictures stand this share of the way from their camera to the focus point."""
+"""The pictures of the hint stand this share of the way from their camera to the focus point."""
+CLOUD_WIDTH_PX = 200
+"""Pictures for the first cloud are at most this wide."""
+MAX_CLOUD_POINTS = 20_000
+NICENESS = 10
+POLL_EVERY_S = 0.1
 
 
 def picture_hint(capture: Capture, frame_index: int) -> PointArrays:
@@ -42,3 +61,75 @@ def picture_hint(capture: Capture, frame_index: int) -> PointArrays:
         ("hint", capture.fingerprint, frame_index),
         is_hint=True,
     )
+
+
+def make_cloud(capture_path: Path, *, holdout: tuple[int, ...], path: Path, context: JobContext) -> Path:
+    """Build the first cloud in a process and wait for it. To be run on a job's thread.
+
+    Args:
+        capture_path: The capture.
+        holdout: Cameras to leave out, as training does.
+        path: File for the cloud.
+        context: Receives signs of life; cancelling it ends the process.
+    Raises:
+        PreparationError: There is no cloud; the log says why.
+    """
+    process = multiprocessing.get_context("spawn").Process(
+        target=write_cloud, args=(str(capture_path), holdout, str(path)), name="first cloud", daemon=True
+    )
+    process.start()
+    try:
+        while process.is_alive():
+            context.report(0.0, "from one moment, in small")
+            process.join(POLL_EVERY_S)
+    finally:
+        if process.is_alive():
+            process.terminate()
+            process.join(2.0)
+    if process.exitcode != 0 or not path.is_file():
+        raise PreparationError(f"The first cloud could not be built (exit code {process.exitcode}).")
+    return path
+
+
+def write_cloud(capture_path: str, holdout: tuple[int, ...], path: str) -> None:
+    """Build and write the first cloud. Runs in the child; its exit code is 1 when there is none."""
+    with suppress(OSError, AttributeError):
+        os.nice(NICENESS)
+    from engine.cloud.static_cloud import build_static_cloud
+
+    try:
+        capture = open_capture(capture_path)
+        widest = int(capture.rig.image_sizes[:, 0].max())
+        if widest > CLOUD_WIDTH_PX:
+            capture = open_capture(capture_path, scale=CLOUD_WIDTH_PX / widest)
+        cameras = [camera for camera in range(len(capture.rig)) if camera not in holdout]
+        pictures = np.stack([capture.frame(camera, 0) for camera in cameras])
+        cloud = build_static_cloud(
+            pictures,
+            np.ones(pictures.shape[:3], bool),
+            capture.rig.subset(cameras),
+            max_points=MAX_CLOUD_POINTS,
+            report=logger.debug,
+        )
+    except (EngineError, ValueError) as error:  # ValueError: cameras of different sizes cannot be stacked
+        logger.warning("no first cloud: %s", error)
+        raise SystemExit(1) from error
+    arrays = {
+        "points": np.ascontiguousarray(cloud.points, np.float32),
+        "colors": np.ascontiguousarray(np.clip(cloud.colors, 0.0, 1.0), np.float32),
+    }
+    with atomic_path(path) as partial:
+        save_file(arrays, partial)
+
+
+def read_cloud(path: Path) -> PointArrays:
+    """A cloud written by `write_cloud`.
+
+    Raises:
+        ProjectError: The file is missing or damaged.
+    """
+    try:
+        with safe_open(path, framework="numpy") as file:
+            return PointArrays(file.get_tensor("points"), file.get_tensor("colors"), ("first cloud", str(path)))
+    except (OSError, SafetensorError) as error:
+        raise ProjectError(f"The first cloud cannot be read ({error}).", path=path) from error

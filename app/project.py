@@ -89,6 +89,11 @@ class Project:
         """What clips share."""
         return self.folder / "prep"
 
+    @property
+    def first_cloud_path(self) -> Path:
+        """A rough cloud to look at before anything is trained."""
+        return self.prep_dir / "first_cloud.safetensors"
+
     def clip_path(self, clip_index: int) -> Path:
         """A finished clip."""
         return self.folder / "clips" / f"{clip_index:04d}.safetensors"

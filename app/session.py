@@ -11,13 +11,13 @@ from pathlib import Path
 
 from app import commands
 from app.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
-from app.jobs import JobContext, Jobs
+from app.jobs import Job, JobContext, Jobs
 from app.latest import LatestWorker
 from app.notices import Notices
 from app.opening import Opened, open_for_window
 from app.pictures import CapturedPictures
 from app.playback import FrameRequest, Playback, static_points
-from app.preview import picture_hint
+from app.preview import make_cloud, picture_hint, read_cloud
 from app.project import Project, check_settings
 from app.render import Renderer
 from app.settings import Settings
@@ -68,8 +68,9 @@ class Session:
         launch: Starts a training worker; a process by default.
         settings: Preferences; the user's own when None.
         opener: Opens captures; tests bring their own.
-        is_preloading: Load what draws right away. It takes a second or two and holds the window up a little, which
-            nobody notices at the start but everybody would in the middle of a drag.
+        is_preloading: Build a first cloud of a new capture, and load what draws right away. Loading takes a second or
+            two and holds the window up a little, which nobody notices at the start but everybody would in the middle
+            of a drag. Off in most tests.
     """
 
     def __init__(
@@ -103,6 +104,8 @@ class Session:
         self._anchor_counts: dict[int, tuple[int, int]] = {}
         self._seen: tuple[object, ...] = ()
         self._is_closed = False
+        self._is_preloading = is_preloading
+        self._first_cloud: Job | None = None
         if is_preloading:
             self._renderer.worker.start()
             self._playback.worker.start()
@@ -245,6 +248,24 @@ class Session:
             self.notices.add("warn", "The capture is odd but usable", sentence)
         if opened.note is not None:
             self.notices.add("warn", *opened.note)
+        if self._is_preloading and opened.project.is_writable:
+            self._build_first_cloud(opened.capture, opened.project)
+
+    def _build_first_cloud(self, capture: Capture, project: Project) -> None:
+        """Something of the scene to look at until the first training has built the real cloud."""
+        reference = self._known(0)
+        path = project.first_cloud_path
+        if path.is_file() or (reference is not None and reference.file is not None):
+            return
+        capture_path, holdout = capture.path, self.holdout
+
+        def work(context: JobContext) -> Path:
+            return make_cloud(capture_path, holdout=holdout, path=path, context=context)
+
+        def failed(error: Exception) -> None:  # the hint stays; training will say what is wrong
+            logger.warning("no first cloud: %s", error)
+
+        self._first_cloud = self._jobs.start("Building a first cloud", work, lambda _: None, failed)
 
     def _take_clips(self, capture: Capture, project: Project) -> None:
         frame_index = self.timeline.frame_index
@@ -259,6 +280,8 @@ class Session:
         for store in (self._playback, self._renderer, self._pictures):
             store.clear()
         self._points.forget()
+        if self._first_cloud is not None:
+            self._first_cloud.context.cancel()
         self._unread, self._anchor_counts = None, {}
         service, project, self._service = self._service, self.project, None
         if service is None or project is None:
@@ -442,7 +465,8 @@ class Session:
         return self._playback.anchors(clip.clip_index, known.revision)
 
     def shown_points(self) -> PointArrays | None:
-        """A cloud for frames that are not trained: the still part of the reference clip, before that a hint.
+        """A cloud for frames that are not trained: the still part of the reference clip, before that a rough first
+        cloud, before that a hint.
 
         None until it is made, and through a capture camera while there is only the hint: the captured picture itself
         says more there.
@@ -452,6 +476,8 @@ class Session:
         reference = self._known(0)
         if reference is not None and reference.file is not None:
             request = PointsRequest("cloud", reference.revision, path=reference.file)
+        elif self.project is not None and self.project.first_cloud_path.is_file():
+            request = PointsRequest("first cloud", self.capture.fingerprint, path=self.project.first_cloud_path)
         else:
             request = PointsRequest("hint", self.capture.fingerprint, capture=self.capture)
         newest = self._points.newest
@@ -485,6 +511,8 @@ _TITLES: dict[type, str] = {
 
 
 def _compute_points(request: PointsRequest) -> PointArrays:
+    if request.path is not None and request.kind == "first cloud":
+        return read_cloud(request.path)
     if request.path is not None:
         return static_points(request.path, request.revision)
     assert request.capture is not None

@@ -1,0 +1,234 @@
+"""The loop around one training: commands, snapshots with backpressure, checkpoints, ends. No process, own clock."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.project import create_project, default_settings
+from app.training import messages as m
+from app.training.rate import Rate
+from app.training.run import CHECKPOINT_EVERY_S, TrainingRun
+from app.training.snapshots import Cadence, keep_clip
+from engine.capture.capture import open_capture
+from engine.errors import NonFiniteLoss, ProjectError
+from engine.model.clip_state import ClipState, read_clip_state
+from engine.training.report import Progress
+from tests.app.fakes import make_fake
+
+
+class Bench:
+    """A run with a clock that the test turns and commands that the test queues."""
+
+    def __init__(self, folder, capture_folder, *, n_steps=100, change=None) -> None:
+        self.settings = default_settings(open_capture(capture_folder))
+        self.project = create_project(folder, self.settings)
+        self.job = m.TrainJob(str(folder), str(capture_folder), 1.0, self.settings.clip_length, 0, seed=0)
+        self.commands, self.events, self.now_s = [], [], 0.0
+        self.is_alone = False
+        self.training = None
+        self._n_steps, self._change = n_steps, change
+        self.run = TrainingRun(
+            self.job,
+            receive=self._receive,
+            send=self.events.append,
+            make_training=self._make,
+            can_wait=False,
+            clock=lambda: self.now_s,
+        )
+
+    def _make(self, job, report):
+        self.training = make_fake(job, report)
+        self.training.n_steps = self._n_steps
+        if self._change is not None:
+            self._change(self)
+        return self.training
+
+    def _receive(self, wait_s):
+        if self.is_alone:
+            raise EOFError
+        return self.commands.pop(0) if self.commands else None
+
+    def steps(self, n, *, each_s=1.0) -> bool:
+        """Advance n times or until the end. Whether it goes on."""
+        for _ in range(n):
+            self.now_s += each_s
+            if not self.run.advance():
+                return False
+        return True
+
+    def of(self, kind):
+        return [event for event in self.events if isinstance(event, kind)]
+
+    @property
+    def checkpoint(self):
+        return self.project.checkpoint_path(0)
+
+
+@pytest.fixture
+def bench(tmp_path, capture_folder):
+    def make(**options) -> Bench:
+        return Bench(tmp_path / "p", capture_folder, **options)
+
+    return make
+
+
+def test_the_next_snapshot_waits_until_the_last_one_was_read(bench):
+    it = bench()
+    it.steps(20)
+    assert [event.revision for event in it.of(m.SnapshotWritten)] == [1]
+    it.commands.append(m.SnapshotConsumed(1))
+    it.steps(2)
+    assert [event.revision for event in it.of(m.SnapshotWritten)] == [1, 2]
+    it.commands.append(m.SnapshotConsumed(2))
+    it.steps(1, each_s=0.1)
+    assert sorted(path.name for path in it.project.live_dir.iterdir()) == ["clip-0000-r0002.safetensors"]
+    state = read_clip_state(it.of(m.SnapshotWritten)[1].path)
+    assert state.header["step"] == it.of(m.SnapshotWritten)[1].step
+
+
+def test_a_snapshot_on_demand_does_not_wait_for_its_time(bench):
+    it = bench()
+    it.steps(1)
+    it.commands += [m.SnapshotConsumed(1), m.SnapshotNow()]
+    it.steps(1, each_s=0.01)
+    assert [event.revision for event in it.of(m.SnapshotWritten)] == [1, 2]
+
+
+def test_what_was_learned_is_kept_about_every_half_minute(bench):
+    it = bench(n_steps=1000)
+    it.steps(int(CHECKPOINT_EVERY_S) - 1)
+    assert not it.checkpoint.exists()
+    it.steps(5)
+    assert read_clip_state(it.checkpoint).header["step"] >= CHECKPOINT_EVERY_S - 2
+
+
+def test_stopping_while_preparing_ends_at_the_next_report(bench):
+    def stop_in_between(it):
+        def prepare():
+            it.training.report(Progress("Building", 0.2))
+            it.commands.append(m.Stop(keep=True))
+            it.training.report(Progress("Building", 0.4))
+            raise AssertionError("not reached")
+
+        it.training.prepare = prepare
+
+    it = bench(change=stop_in_between)
+    assert it.steps(1) is False
+    assert it.events[-1] == m.TrainingStopped("", 0)
+
+
+def test_stopping_in_a_change_of_phase_keeps_the_state_before_it(bench):
+    def add_phase(it):
+        ordinary = it.training.step
+
+        def step():
+            if it.training.steps_done == 5:
+                it.training.report(Progress("Carving", 0.0))
+                it.training.value = 1e9  # half changed: must not be kept
+                it.commands.append(m.Stop(keep=True))
+                it.training.report(Progress("Carving", 0.5))
+                raise AssertionError("not reached")
+            return ordinary()
+
+        it.training.step = step
+
+    it = bench(change=add_phase)
+    assert it.steps(10) is False
+    kept = read_clip_state(it.checkpoint)
+    assert kept.header["step"] == 5
+    assert kept.arrays["value"][0] < 1e6
+    assert it.events[-1] == m.TrainingStopped(str(it.checkpoint), 5)
+
+
+def test_a_window_that_is_gone_ends_the_run_and_keeps_it(bench):
+    it = bench()
+    it.steps(4)
+    it.is_alone = True
+    assert it.steps(1) is False
+    assert read_clip_state(it.checkpoint).header["step"] == 3
+
+
+def test_stopping_without_keeping_forgets(bench):
+    it = bench()
+    it.steps(4)
+    it.commands.append(m.Pause())
+    it.steps(1)
+    assert it.checkpoint.is_file()
+    it.commands.append(m.Stop(keep=False))
+    assert it.steps(1) is False
+    assert not it.checkpoint.exists()
+    assert it.events[-1] == m.TrainingStopped("", 3)
+
+
+def test_a_full_disk_costs_the_snapshot_not_the_training(bench, monkeypatch):
+    it = bench(n_steps=3)
+
+    def full(*_args):
+        raise ProjectError("The clip could not be written (No space left on device).", hint="Free some space.")
+
+    monkeypatch.setattr("app.training.snapshots.write_clip_state", full)
+    it.steps(1)
+    assert it.of(m.WarningRaised)[0].hint == "Free some space."
+    monkeypatch.undo()
+    assert it.steps(5) is False
+    assert isinstance(it.events[-1], m.ClipTrained)
+
+
+def test_a_fault_of_the_program_is_reported_with_its_trace(bench):
+    def break_it(it):
+        it.training.step = lambda: 1 // 0
+
+    it = bench(change=break_it)
+    assert it.steps(2) is False
+    failed = it.events[-1]
+    assert isinstance(failed, m.TrainingFailed)
+    assert failed.kind == "ZeroDivisionError"
+    assert "Traceback" in failed.trace
+    assert "fault of the program" in failed.hint
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_clip_with_numbers_that_are_none_is_not_kept(tmp_path, bad):
+    state = ClipState({"value": np.array([1.0, bad], np.float32)}, {"schema": 1, "role": "reference"})
+    with pytest.raises(NonFiniteLoss):
+        keep_clip(state, tmp_path / "clips" / "0000.safetensors", tmp_path / "live")
+    assert not list(tmp_path.rglob("*.safetensors"))
+
+
+def test_a_clip_that_reads_back_differently_does_not_replace_the_old_one(tmp_path, monkeypatch):
+    path = tmp_path / "clips" / "0000.safetensors"
+    good = ClipState({"value": np.ones(2, np.float32)}, {"schema": 1, "role": "reference"})
+    keep_clip(good, path, tmp_path / "live")
+    other = ClipState({"value": np.zeros(2, np.float32)}, good.header)
+    monkeypatch.setattr("app.training.snapshots.read_clip_state", lambda _path: good)
+    with pytest.raises(ProjectError, match="differs"):
+        keep_clip(other, path, tmp_path / "live")
+    monkeypatch.undo()
+    assert read_clip_state(path).arrays["value"][0] == 1.0
+    assert not list((tmp_path / "live").iterdir())
+
+
+def test_what_is_dear_is_done_less_often():
+    cadence = Cadence(2.0, max_share=0.1)
+    assert not cadence.is_due(0.0)
+    assert cadence.is_due(2.0)
+    cadence.done(2.0, 3.0)  # it took a second: nine more pass before the next
+    assert not cadence.is_due(12.9)
+    assert cadence.is_due(13.0)
+
+
+def test_the_rate_follows_and_leaves_pauses_out():
+    rate = Rate(time_constant_s=5.0)
+    assert rate.eta_s(10) is None
+    for second in range(60):
+        rate.update(done=4.0 * second, now_s=float(second))
+    assert rate.per_s == pytest.approx(4.0, rel=1e-9)
+    rate.pause()
+    rate.update(done=4.0 * 59, now_s=1000.0)
+    rate.update(done=4.0 * 60, now_s=1001.0)
+    assert rate.per_s == pytest.approx(4.0, rel=1e-9)
+    for second in range(1, 40):
+        rate.update(done=240.0 + second, now_s=1001.0 + second)
+    assert rate.per_s == pytest.approx(1.0, rel=0.01)  # exp(-39/5) of the old speed is left
+    assert rate.eta_s(10) == pytest.approx(10.0, rel=0.01)
