@@ -94,9 +94,8 @@ def _run_window(options: argparse.Namespace) -> int:
 
     pyglet.options.shadow_window = False  # no hidden second context
     pyglet.options.dpi_scaling = "stretch"
-    from app.session import Session
-
     from app.commands import OpenCapture
+    from app.session import Session
     from ui.window import DEFAULT_SIZE, StudioWindow
 
     width, height = _parse_size(options.size) or DEFAULT_SIZE
