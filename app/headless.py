@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from app.kernels import use_threads
 from app.opening import check_capture
 from app.project import Project
 from app.status import TrainingStatus
@@ -192,6 +193,7 @@ def evaluate_project(
     Raises:
         ProjectError: A clip is not trained or does not fit.
     """
+    use_threads(None)
     from engine.training.evaluate import evaluate_clip, means
 
     project, capture = opened.project, opened.capture
@@ -243,6 +245,7 @@ def render_frames(
     Raises:
         ProjectError: A frame lies in a clip that is not trained; said before the first picture.
     """
+    use_threads(None)
     from engine.model.view import View, render_model
     from engine.training.evaluate import camera_gain
 

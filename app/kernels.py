@@ -48,17 +48,22 @@ def warm_cache() -> None:
         logger.warning("kernels could not be compiled ahead: %s", error)
 
 
-def use_one_thread() -> None:
-    """Keep the calling thread's kernels on one core: a window has others to share the machine with."""
+def use_threads(n_threads: int | None) -> int:
+    """Set how many threads the calling thread computes with; None for every core. Returns how many it will be.
+
+    To be called before torch is imported where that is possible: OpenMP reads its environment when it is loaded. The
+    spin count is that of engine.raster.cpu.threads, which cannot be asked without importing torch.
+    """
+    os.environ.setdefault("GOMP_SPINCOUNT", "20000")
     from engine.raster.cpu.threads import configure_threads
 
-    configure_threads(1)
+    return configure_threads(n_threads)
 
 
 def prepare_drawing() -> None:
     """Once on a thread that draws: compiled kernels, one core, and everything loaded that a first picture needs."""
     warm_cache()
-    use_one_thread()
+    use_threads(1)
     if is_cache_warm():
         from engine.raster.cpu.warm import warm_up
 
@@ -69,4 +74,4 @@ def prepare_decoding() -> None:
     """Once on a thread that decodes: one core, and everything loaded that a first frame needs."""
     import engine.model.clip_model  # noqa: F401
 
-    use_one_thread()
+    use_threads(1)

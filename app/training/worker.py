@@ -14,6 +14,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from app.kernels import use_threads
 from app.logs import FORMAT
 from app.training.messages import Command, Event, TrainJob, decode, encode
 from app.training.run import MakeTraining, TrainingRun
@@ -69,12 +70,7 @@ def _set_threads(*, is_window_open: bool) -> int:
     if is_window_open and cores <= 2 and hasattr(os, "nice"):
         with suppress(OSError):
             os.nice(NICENESS)
-    # OpenMP reads these when it is loaded, which importing torch does; the spin count is that of the kernels
-    os.environ["OMP_NUM_THREADS"] = str(n_threads)
-    os.environ.setdefault("GOMP_SPINCOUNT", "20000")
-    from engine.raster.cpu.threads import configure_threads
-
-    return configure_threads(n_threads)
+    return use_threads(n_threads)
 
 
 def _receiver(commands: Connection) -> Callable[[float], Command | None]:
