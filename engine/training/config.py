@@ -61,8 +61,10 @@ class TrainConfig:
     # learning rates; all fall log-linearly to `final_lr_ratio` of their start over the phase
     feature_lr: float = 7.5e-3
     scale_lr: float = 7e-3
-    table_lr: float = 5e-3
-    field_mlp_lr: float = 2e-3
+    table_lr: float = 0.04
+    field_mlp_lr: float = 8e-3
+    """Table and network of the field. At an eighth and a quarter of these, a source clip of the sample ended 2.7 dB
+    lower on moving pixels of a validation camera: frozen heads leave all change over time to the field."""
     opacity_head_lr: float = 2e-3
     shape_head_lr: float = 4e-3
     color_head_lr: float = 4e-3

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import platform
 import tempfile
 import time
@@ -27,12 +28,25 @@ from engine.model.clip_model import load_clip_model
 from engine.model.clip_state import ClipState
 from engine.model.view import View, render_model
 from engine.raster.cpu.threads import configure_threads
+from engine.synthetic.raycast import make_truth
+from engine.synthetic.scene import make_scene
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig, parse_overrides
 from engine.training.evaluate import evaluate_clip, means
+from engine.training.metrics import psnr
 from engine.training.report import Progress
 
-COLUMNS = ("psnr", "psnr_fit", "psnr_moving", "psnr_rest", "psnr_fit_moving", "ssim", "ssim_fit", "moving_share")
+COLUMNS = (
+    "psnr",
+    "psnr_fit",
+    "psnr_moving",
+    "psnr_rest",
+    "psnr_fit_moving",
+    "ssim",
+    "ssim_fit",
+    "moving_share",
+    "psnr_new_object",
+)
 
 
 def train(
@@ -93,18 +107,46 @@ def write_pictures(
     """Truth, render and four times the error, one row per camera."""
     model = load_clip_model(state, reference)
     frame = clip.start + clip.n_frames // 2
-    near, reach = reference.header["near_plane"], 4.0 * reference.header["spacing"]
+    reach = 4.0 * reference.header["spacing"]
     rows = []
     for camera in cameras:
-        width, height = (int(v) for v in capture.rig.image_sizes[camera])
-        matrices = (capture.rig.world_to_camera[camera], capture.rig.Ks[camera])
-        view = View.from_arrays(*matrices, width=width, height=height, near_plane=near)
+        view = _view(capture, camera, reference)
         truth = capture.frame(camera, frame) / 255.0
         image = render_model(model, view, clip.clip_time(frame), reach=reach).numpy().clip(0, 1)
         rows.append(np.concatenate([truth, image, np.clip(4 * np.abs(image - truth), 0, 1)], axis=1))
     folder.mkdir(parents=True, exist_ok=True)
     sheet = (np.concatenate(rows) * 255).astype(np.uint8)
     Image.fromarray(sheet).save(folder / f"clip{clip.clip_index}.png")
+
+
+def new_object_psnr(
+    capture: Capture, clip: Clip, state: ClipState, reference: ClipState, cameras: list[int]
+) -> float | None:
+    """PSNR inside the true mask of the sample's "gift", which first appears in clip 1; None for other captures.
+
+    Mean over all frames of the clip and the given cameras, raw colours, dB.
+    """
+    scene = make_scene()
+    is_sample = capture.rig.names == scene.rig.names and np.allclose(capture.rig.Ks, scene.rig.Ks)
+    if not is_sample or clip.clip_index == 0:
+        return None
+    model = load_clip_model(state, reference)
+    values = []
+    for camera in cameras:
+        view = _view(capture, camera, reference)
+        for frame in clip.frame_indices():
+            mask = make_truth(scene, camera, frame).mask("gift")
+            if mask.sum() < 50:  # hidden from this camera
+                continue
+            image = render_model(model, view, clip.clip_time(frame), reach=4.0 * reference.header["spacing"])
+            values.append(psnr(image.numpy(), capture.frame(camera, frame) / 255.0, mask))
+    return float(np.mean(values)) if values else None
+
+
+def _view(capture: Capture, camera: int, reference: ClipState) -> View:
+    width, height = (int(v) for v in capture.rig.image_sizes[camera])
+    matrices = (capture.rig.world_to_camera[camera], capture.rig.Ks[camera])
+    return View.from_arrays(*matrices, width=width, height=height, near_plane=reference.header["near_plane"])
 
 
 def main() -> None:
@@ -127,6 +169,7 @@ def main() -> None:
     config = TrainConfig(**parse_overrides(args.set))
     clips = split_clips(capture.n_frames, args.clip_length)[: args.clips]
     versions = f"torch {torch.__version__}, Python {platform.python_version()}, {torch.get_num_threads()} threads"
+    versions += f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
     print(f"{capture.path.name}: {len(capture.rig)} cameras, held out {', '.join(names)}; {versions}")
     reference: ClipState | None = None
     table = []
@@ -148,7 +191,9 @@ def main() -> None:
             figures = means(rows)
             by_camera = {n: means([row for row in rows if row.camera == n])["psnr"] for n in names}
             size_mb = sum(array.nbytes for array in state.arrays.values()) / 1e6
-            table.append({"clip": clip.clip_index, **timing, **figures, "by_camera": by_camera, "size_mb": size_mb})
+            new_object = new_object_psnr(capture, clip, state, reference, holdout)
+            row = {"clip": clip.clip_index, **timing, **figures, "psnr_new_object": new_object}
+            table.append(row | {"by_camera": by_camera, "size_mb": size_mb})
             if args.pictures:
                 write_pictures(args.pictures, capture, clip, state, reference, holdout)
     print("clip  prep s  train s  steps  " + "  ".join(f"{c:>15}" for c in COLUMNS) + "  MB")
