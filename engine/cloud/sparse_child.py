@@ -45,6 +45,10 @@ def triangulate_folder(
     model.mkdir()
     for name, image in zip(names, images, strict=True):
         Image.fromarray(image).save(pictures / name, compress_level=1)
+    reader = pycolmap.ImageReaderOptions(camera_model="PINHOLE")
+    # images first: extraction alone would number them in the order in which its threads finish
+    pycolmap.Database.open(database).close()
+    pycolmap.import_images(database, pictures, pycolmap.CameraMode.PER_IMAGE, image_names=names, options=reader)
     extraction = pycolmap.FeatureExtractionOptions()
     extraction.sift.max_num_features = MAX_FEATURES
     pycolmap.extract_features(
@@ -52,14 +56,16 @@ def triangulate_folder(
         pictures,
         image_names=names,
         camera_mode=pycolmap.CameraMode.PER_IMAGE,
-        reader_options=pycolmap.ImageReaderOptions(camera_model="PINHOLE"),
+        reader_options=reader,
         extraction_options=extraction,
         device=pycolmap.Device.cpu,
     )
     with pycolmap.Database.open(database) as tables:
         reconstruction = _known_reconstruction(pycolmap, tables, names, Ks, poses)
         n_features = int(tables.num_keypoints())
-    pycolmap.match_exhaustive(database, device=pycolmap.Device.cpu)
+    verification = pycolmap.TwoViewGeometryOptions()
+    verification.ransac.random_seed = 0  # else the outcome depends on which thread takes which pair
+    pycolmap.match_exhaustive(database, verification_options=verification, device=pycolmap.Device.cpu)
     options = pycolmap.IncrementalPipelineOptions()
     options.random_seed = 0
     reconstruction = pycolmap.triangulate_points(reconstruction, database, pictures, model, options=options)

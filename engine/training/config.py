@@ -56,7 +56,7 @@ class TrainConfig:
     joint_steps: int = 0
     """Steps of the reference clip after that; 0 derives 8 per training picture, 1200 to 3000."""
     source_steps: int = 0
-    """Steps of a source clip; 0 derives 8 per training picture, 1000 to 3000."""
+    """Steps of a source clip; 0 derives 12 per training picture, 1200 to 3000: frozen heads learn more slowly."""
 
     # learning rates; all fall log-linearly to `final_lr_ratio` of their start over the phase
     feature_lr: float = 7.5e-3
@@ -109,7 +109,7 @@ class TrainConfig:
 
     def n_source_steps(self, n_pictures: int) -> int:
         """Steps of a source clip with this many training pictures."""
-        return self.source_steps or min(max(8 * n_pictures, 1000), 3000)
+        return self.source_steps or min(max(12 * n_pictures, 1200), 3000)
 
 
 _RANGES: dict[str, tuple[float, float]] = {
