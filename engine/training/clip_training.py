@@ -13,36 +13,29 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from scipy.spatial import KDTree
 from torch import Tensor, nn
 
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.cloud.dedup import mean_neighbor_distance, residual_rows
 from engine.cloud.moving_cloud import MovingCloud
 from engine.cloud.range import near_plane
 from engine.errors import NonFiniteLoss, PreparationError, ProjectError
-from engine.model.anchors import AnchorSet
-from engine.model.clip_model import ClipModel, decoder_sizes, inherit, load_clip_model
+from engine.model.clip_model import decoder_sizes, load_clip_model
 from engine.model.clip_state import SCHEMA, ClipState, read_clip_state, write_clip_state
-from engine.model.decoder import Decoder
-from engine.model.field import (
-    FieldShape,
-    SpatioTemporalField,
-    derive_cells,
-    derive_log2_entries,
-)
 from engine.model.view import View, render_gaussians, render_model
+from engine.training.building import (
+    add_residual,
+    fit_field,
+    inheriting_model,
+    moving_anchors,
+    remove_gate,
+    static_model,
+)
 from engine.training.config import TrainConfig
 from engine.training.losses import LossWorkspace, photometric_loss
 from engine.training.metrics import psnr
 from engine.training.optimizer import PhaseOptimizer, named_parameters
-from engine.training.pictures import (
-    ShuffledOrder,
-    TrainingPictures,
-    shared_image_size,
-    to_float,
-)
+from engine.training.pictures import ShuffledOrder, TrainingPictures, shared_image_size, to_float
 from engine.training.preparation import (
     Backgrounds,
     correct_backgrounds,
@@ -57,8 +50,6 @@ from engine.training.report import Progress, ReportProgress, StepStats
 
 _REACH_SPACINGS = 4.0
 """Gaussians are expected within this many anchor spacings of their anchor when anchors are culled."""
-_ALIVE_SPACINGS = 0.87
-"""An inherited anchor is alive in a frame if the frame's hull surface passes within half a voxel diagonal of it."""
 
 
 class ClipTraining:
@@ -87,12 +78,7 @@ class ClipTraining:
         prep_dir: Path,
         report: ReportProgress,
     ) -> None:
-        self.capture, self.clip, self.config, self.reference = (
-            capture,
-            clip,
-            config,
-            reference,
-        )
+        self.capture, self.clip, self.config, self.reference = (capture, clip, config, reference)
         self.holdout = sorted(set(holdout))
         self.camera_indices = [c for c in range(len(capture.rig)) if c not in self.holdout]
         if len(self.camera_indices) < 2:
@@ -161,13 +147,7 @@ class ClipTraining:
         self.report(Progress("Reading pictures", 0.0))
         self.pictures = TrainingPictures(self.capture, self.clip, self.camera_indices)
         size_mb = len(self.pictures) * self.width * self.height * 3 / 1e6
-        self.report(
-            Progress(
-                "Reading pictures",
-                1.0,
-                f"{len(self.pictures)} pictures, {size_mb:.0f} MB",
-            )
-        )
+        self._say("Reading pictures", f"{len(self.pictures)} pictures, {size_mb:.0f} MB")
 
     def _background_key(self, *, is_corrected: bool) -> dict:
         return {
@@ -189,39 +169,14 @@ class ClipTraining:
             )
         self.spacing = float(cloud.spacing)
         self.gains = nn.Parameter(torch.from_numpy(cloud.gains).float())
-        anchors = AnchorSet.from_cloud(
-            torch.from_numpy(cloud.points),
-            torch.from_numpy(cloud.colors),
-            spacing=self.spacing,
-            feature_dim=self.config.static_feature_dim,
-            presence=None,
-        )
-        decoder = Decoder(
-            static_dim=self.config.static_feature_dim,
-            dynamic_dim=self.config.dynamic_feature_dim,
-            gaussians_per_anchor=self.config.gaussians_per_anchor,
-            hidden=self.config.head_hidden,
-            generator=self._generator,
-        )
-        self.model = self._new_model({"static": anchors}, decoder)
-        self.report(
-            Progress(
-                "Building the static cloud",
-                1.0,
-                f"{len(anchors)} static anchors, spacing {self.spacing:.4g}",
-            )
-        )
+        self.model = static_model(cloud, self.clip, self.config, self._generator)
+        self._say("Building the static cloud", f"{len(cloud.points)} static anchors, spacing {self.spacing:.4g}")
 
-    def _new_model(self, sets: dict[str, AnchorSet], decoder: Decoder) -> ClipModel:
-        return ClipModel(
-            sets=sets,
-            decoder=decoder,
-            field=None,
-            clip_length=self.clip.clip_length,
-            n_frames=self.clip.n_frames,
-        )
+    def _say(self, stage: str, message: str) -> None:
+        self.report(Progress(stage, 1.0, message))
 
-    def _find_motion(self, *, static_points: np.ndarray) -> MovingCloud:
+    def _find_motion(self) -> MovingCloud:
+        static_points = self.model.anchor_set("static").positions.numpy()
         masks = motion_masks(self.pictures, self.backgrounds, self.report)
         gains = self.gains.detach().numpy()
         voxel_size = None if self.reference is None else self.reference.header["moving_spacing"]
@@ -235,81 +190,19 @@ class ClipTraining:
         """Between the phases of a reference clip: corrected backgrounds, motion, moving anchors, field."""
         self.backgrounds = correct_backgrounds(self.backgrounds, self.pictures, self._render_static, self.report)
         write_backgrounds(self.prep_dir, self.backgrounds, self._background_key(is_corrected=True))
-        cloud = self._find_motion(static_points=self.model.anchor_set("static").positions.numpy())
+        cloud = self._find_motion()
         if len(cloud.points):
-            self.model.add_set(
-                "moving",
-                self._anchors_on(cloud.points, cloud.colors, cloud.presence, cloud.spacing),
-            )
-        self._ungate()
-        self._attach_field(cloud.spacing)
-        self.report(Progress("Carving what moves", 1.0, f"{len(cloud.points)} moving anchors"))
+            self.model.add_set("moving", moving_anchors(cloud, np.ones(len(cloud.points), bool), self.config))
+        self._say("Carving what moves", f"{len(cloud.points)} moving anchors")
+        self._make_dynamic(cloud)
 
-    def _anchors_on(
-        self,
-        points: np.ndarray,
-        colors: np.ndarray,
-        presence: np.ndarray,
-        spacing: float,
-    ) -> AnchorSet:
-        return AnchorSet.from_cloud(
-            torch.from_numpy(points),
-            torch.from_numpy(colors),
-            spacing=spacing,
-            feature_dim=self.config.static_feature_dim,
-            presence=torch.from_numpy(presence),
-        )
-
-    def _ungate(self) -> None:
-        """gate=off, the published method: every anchor has a dynamic feature at every time."""
+    def _make_dynamic(self, cloud: MovingCloud) -> None:
+        """Last step of preparation: the gate and the field."""
         if self.config.gate == "off":
-            for role in self.model.roles():
-                anchors = self.model.anchor_set(role)
-                anchors.presence = torch.ones(len(anchors), self.clip.n_frames, dtype=torch.bool)
-
-    def _attach_field(self, spacing: float) -> None:
-        """A fresh field over the dynamic anchors that are alive in this clip; none when nothing moves."""
-        parts, n_alive = [], 0
-        for role in self.model.roles():
-            anchors = self.model.anchor_set(role)
-            if anchors.presence is not None:
-                parts.append(anchors.positions[anchors.presence.any(1)])
-                n_alive += int(anchors.presence.sum(0).max())
-        positions = torch.cat(parts) if parts else torch.zeros(0, 3)
-        if len(positions) == 0:
-            return
-        # percentiles, so that one stray point does not stretch the grid; beyond them positions clamp to the border
-        lower, upper = (
-            positions.quantile(0.005, dim=0),
-            positions.quantile(0.995, dim=0),
-        )
-        side = max(float((upper - lower).max()), 4 * spacing) + 2 * spacing
-        log2_entries = self.config.field_log2_entries or derive_log2_entries(n_alive)
-        shape = FieldShape(
-            n_knots=self.clip.n_frames,
-            cells=derive_cells(
-                side=side,
-                spacing=spacing,
-                base=self.config.field_base_cells,
-                growth=self.config.field_growth,
-                max_levels=self.config.field_max_levels,
-            ),
-            n_entries=2**log2_entries,
-            channels=self.config.field_channels,
-            hidden=self.config.field_hidden,
-            feature_dim=self.config.dynamic_feature_dim,
-            bounds_min=tuple((lower - spacing).tolist()),
-            side=side,
-        )
-        self.model.attach_field(SpatioTemporalField(shape, self._generator))
-        self.report(
-            Progress(
-                "Sizing the field",
-                1.0,
-                f"{len(shape.cells)} levels up to {shape.cells[-1]} cells (anchors {spacing:.3g} apart), "
-                f"2^{log2_entries} entries ({n_alive} anchors alive)",
-            )
-        )
+            remove_gate(self.model)
+        spacing = float(cloud.spacing)
+        made = fit_field(self.model, spacing=spacing, config=self.config, generator=self._generator)
+        self._say("Sizing the field", made)
 
     def _prepare_source(self, reference: ClipState) -> None:
         self.spacing = reference.header["spacing"]
@@ -319,71 +212,15 @@ class ClipTraining:
                 "The training cameras differ from those of the reference clip.",
                 hint="Use the same hold-out for every clip of a project.",
             )
-        placeholder = {
-            role: torch.zeros(
-                len(reference.arrays[f"sets.{role}.positions"]),
-                self.clip.n_frames,
-                dtype=torch.bool,
-            )
-            for role in ("static", "moving")
-            if f"sets.{role}.presence" in reference.arrays
-        }
-        sets, decoder = inherit(reference, placeholder)
-        self.model = self._new_model(sets, decoder)
+        self.model = inheriting_model(reference, self.clip)
         known = read_backgrounds(self.prep_dir, self._background_key(is_corrected=True))
         if known is None:
             raw = estimate_backgrounds(self.capture, self.camera_indices, self.config, self.report)
             known = correct_backgrounds(raw, self.pictures, self._render_static, self.report)
         self.backgrounds = known
-        cloud = self._find_motion(static_points=self.model.anchor_set("static").positions.numpy())
-        self._inherit_motion(cloud)
-        self._ungate()
-        self._attach_field(cloud.spacing)
-
-    def _inherit_motion(self, cloud: MovingCloud) -> None:
-        """Split the clip's moving points into those the reference covers and residual anchors."""
-        is_new = np.ones(len(cloud.points), bool)
-        if "moving" in self.model.roles() and len(cloud.points):
-            moving = self.model.anchor_set("moving")
-            centers = moving.positions.numpy()
-            is_new = residual_rows(cloud.points, centers, mean_neighbor_distance(centers, k=3))
-            presence = np.zeros((len(centers), self.clip.n_frames), bool)
-            for frame in range(self.clip.n_frames):
-                surface = cloud.points[cloud.presence[:, frame]]
-                if len(surface):
-                    distance, _ = KDTree(surface).query(centers, distance_upper_bound=_ALIVE_SPACINGS * cloud.spacing)
-                    presence[:, frame] = np.isfinite(distance)
-            moving.presence = torch.from_numpy(presence)
-        n_new, n_all = int(is_new.sum()), len(cloud.points)
-        if n_new:
-            residual = self._anchors_on(
-                cloud.points[is_new],
-                cloud.colors[is_new],
-                cloud.presence[is_new],
-                cloud.spacing,
-            )
-            self._start_like_neighbors(residual)
-            self.model.add_set("residual", residual)
-        share = 100 * n_new / max(n_all, 1)
-        self.report(
-            Progress(
-                "Comparing with the reference",
-                1.0,
-                f"{n_new} of {n_all} moving points ({share:.0f} %) lie outside the inherited anchors: residual anchors",
-            )
-        )
-
-    def _start_like_neighbors(self, residual: AnchorSet) -> None:
-        """Residual anchors begin with the look of the nearest inherited moving anchor: frozen heads know it."""
-        if "moving" not in self.model.roles():
-            return
-        moving = self.model.anchor_set("moving")
-        _, nearest = KDTree(moving.positions.numpy()).query(residual.positions.numpy())
-        with torch.no_grad():
-            rows = torch.from_numpy(nearest)
-            residual.features.copy_(moving.features[rows])
-            residual.log_offset_scales.copy_(moving.log_offset_scales[rows])
-            residual.log_base_scales.copy_(moving.log_base_scales[rows])
+        cloud = self._find_motion()
+        self._say("Comparing with the reference", add_residual(self.model, cloud, self.config))
+        self._make_dynamic(cloud)
 
     # ---------------------------------------------------------------- steps
 
@@ -422,11 +259,7 @@ class ClipTraining:
         gaussians = self.model.decode(clip_time, self._rows(camera_row, clip_time))
         image = render_gaussians(gaussians, view).image[0] * self.gains[camera_row]
         if stage == "static":  # unstable pixels count as right: no loss, no gradient
-            image = torch.where(
-                torch.from_numpy(self.backgrounds.is_stable[camera_row])[..., None],
-                image,
-                truth,
-            )
+            image = torch.where(torch.from_numpy(self.backgrounds.is_stable[camera_row])[..., None], image, truth)
         loss = photometric_loss(image, truth, ssim_weight=self.config.ssim_weight, workspace=self._workspace)
         if self.config.volume_weight and len(gaussians):
             volume = (gaussians.scales / self.spacing).prod(1).mean()
@@ -434,10 +267,7 @@ class ClipTraining:
         value = float(loss.detach())
         where = f"step {self.steps_done + 1}, camera {self.rig.names[camera_row]}"
         if not np.isfinite(value):
-            raise NonFiniteLoss(
-                f"The loss became {value} at {where}.",
-                hint="The last good state was kept.",
-            )
+            raise NonFiniteLoss(f"The loss became {value} at {where}.", hint="The last good state was kept.")
         if loss.requires_grad:
             loss.backward()
         try:
@@ -502,12 +332,7 @@ class ClipTraining:
         values = []
         for i, camera in enumerate(self.holdout[:n_pictures]):
             frame = self.clip.start + (i * self.clip.n_frames) // max(len(self.holdout[:n_pictures]), 1)
-            image = render_model(
-                self.model,
-                self._views[camera],
-                self.clip.clip_time(frame),
-                reach=self._reach,
-            )
+            image = render_model(self.model, self._views[camera], self.clip.clip_time(frame), reach=self._reach)
             values.append(psnr(image.numpy(), self.capture.frame(camera, frame) / 255.0))
         return float(np.mean(values)) if values else float("nan")
 

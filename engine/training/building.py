@@ -1,0 +1,160 @@
+"""From clouds to the parts of a ClipModel: anchor sets, decoder, field, and what a source clip inherits.
+
+Sizes follow the data and the reasons are returned as lines to report. Nothing here trains or looks at pixels.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import torch
+from scipy.spatial import KDTree
+from torch import Tensor
+
+from engine.capture.clip import Clip
+from engine.cloud.dedup import mean_neighbor_distance, residual_rows
+from engine.cloud.moving_cloud import MovingCloud
+from engine.cloud.static_cloud import StaticCloud
+from engine.model.anchors import AnchorSet
+from engine.model.clip_model import ClipModel, inherit
+from engine.model.clip_state import ClipState
+from engine.model.decoder import Decoder
+from engine.model.field import FieldShape, SpatioTemporalField, derive_cells, derive_log2_entries
+from engine.training.config import TrainConfig
+
+
+def static_model(cloud: StaticCloud, clip: Clip, config: TrainConfig, generator: torch.Generator) -> ClipModel:
+    """A reference clip before its motion is known: static anchors and a fresh decoder."""
+    anchors = AnchorSet.from_cloud(
+        torch.from_numpy(cloud.points),
+        torch.from_numpy(cloud.colors),
+        spacing=float(cloud.spacing),
+        feature_dim=config.static_feature_dim,
+        presence=None,
+    )
+    decoder = Decoder(
+        static_dim=config.static_feature_dim,
+        dynamic_dim=config.dynamic_feature_dim,
+        gaussians_per_anchor=config.gaussians_per_anchor,
+        hidden=config.head_hidden,
+        generator=generator,
+    )
+    return ClipModel(
+        sets={"static": anchors}, decoder=decoder, field=None, clip_length=clip.clip_length, n_frames=clip.n_frames
+    )
+
+
+def inheriting_model(reference: ClipState, clip: Clip) -> ClipModel:
+    """A source clip before its motion is known: everything inherited is frozen, no moving anchor is alive yet."""
+    absent = {
+        role: torch.zeros(len(reference.arrays[f"sets.{role}.positions"]), clip.n_frames, dtype=torch.bool)
+        for role in ("static", "moving")
+        if f"sets.{role}.presence" in reference.arrays
+    }
+    sets, decoder = inherit(reference, absent)
+    return ClipModel(sets=sets, decoder=decoder, field=None, clip_length=clip.clip_length, n_frames=clip.n_frames)
+
+
+def moving_anchors(cloud: MovingCloud, rows: np.ndarray, config: TrainConfig) -> AnchorSet:
+    """Fresh trainable anchors on the chosen rows of a moving cloud. rows: [P] bool"""
+    return AnchorSet.from_cloud(
+        torch.from_numpy(cloud.points[rows]),
+        torch.from_numpy(cloud.colors[rows]),
+        spacing=float(cloud.spacing),
+        feature_dim=config.static_feature_dim,
+        presence=torch.from_numpy(cloud.presence[rows]),
+    )
+
+
+def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> str:
+    """Split a source clip's moving points into those the reference covers and residual anchors; says how many.
+
+    A point is covered when it lies inside the union of spheres around the inherited moving anchors, each with the
+    mean distance to its three nearest neighbours as radius. Covered points switch on the inherited anchor nearest to
+    them in the frames they are present in, so nothing covered is left without an anchor; the others become residual
+    anchors. Source: ClipGStream, geometry-aware deduplication, with the exact union.
+    """
+    is_new = np.ones(len(cloud.points), bool)
+    moving = model.anchor_set("moving") if "moving" in model.roles() else None
+    if moving is not None and len(cloud.points):
+        centers = moving.positions.numpy()
+        is_new = residual_rows(cloud.points, centers, mean_neighbor_distance(centers, k=3))
+        _, nearest = KDTree(centers).query(cloud.points[~is_new])
+        presence = np.zeros((len(centers), cloud.presence.shape[1]), bool)
+        np.logical_or.at(presence, nearest, cloud.presence[~is_new])
+        moving.presence = torch.from_numpy(presence)
+    if is_new.any():
+        residual = moving_anchors(cloud, is_new, config)
+        if moving is not None:
+            _start_like_neighbors(residual, moving)
+        model.add_set("residual", residual)
+    share = 100 * is_new.mean() if len(is_new) else 0.0
+    return (
+        f"{is_new.sum()} of {len(is_new)} moving points ({share:.0f} %) lie outside the inherited anchors: "
+        "residual anchors"
+    )
+
+
+def _start_like_neighbors(residual: AnchorSet, moving: AnchorSet) -> None:
+    """Residual anchors begin with the look of the nearest inherited moving anchor: frozen heads know it."""
+    _, nearest = KDTree(moving.positions.numpy()).query(residual.positions.numpy())
+    rows = torch.from_numpy(nearest)
+    with torch.no_grad():
+        residual.features.copy_(moving.features[rows])
+        residual.log_offset_scales.copy_(moving.log_offset_scales[rows])
+        residual.log_base_scales.copy_(moving.log_base_scales[rows])
+
+
+def remove_gate(model: ClipModel) -> None:
+    """gate=off, the published method: every anchor has a dynamic feature at every time."""
+    for role in model.roles():
+        anchors = model.anchor_set(role)
+        anchors.presence = torch.ones(len(anchors), model.n_frames, dtype=torch.bool)
+
+
+def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generator: torch.Generator) -> str:
+    """Attach a fresh field over the dynamic anchors alive in this clip; none when nothing moves. Says its size.
+
+    Args:
+        spacing: Distance between moving anchors, scene units.
+    """
+    positions, n_alive = _alive_positions(model)
+    if len(positions) == 0:
+        return "no field: nothing moves in this clip"
+    # percentiles, so that one stray point does not stretch the grid; beyond them positions clamp to the border
+    lower, upper = positions.quantile(0.005, dim=0), positions.quantile(0.995, dim=0)
+    side = max(float((upper - lower).max()), 4 * spacing) + 2 * spacing
+    log2_entries = config.field_log2_entries or derive_log2_entries(n_alive)
+    cells = derive_cells(
+        side=side,
+        spacing=spacing,
+        base=config.field_base_cells,
+        growth=config.field_growth,
+        max_levels=config.field_max_levels,
+    )
+    x, y, z = (lower - spacing).tolist()
+    shape = FieldShape(
+        n_knots=model.n_frames,
+        cells=cells,
+        n_entries=2**log2_entries,
+        channels=config.field_channels,
+        hidden=config.field_hidden,
+        feature_dim=config.dynamic_feature_dim,
+        bounds_min=(x, y, z),
+        side=side,
+    )
+    model.attach_field(SpatioTemporalField(shape, generator))
+    return (
+        f"{len(cells)} levels up to {cells[-1]} cells (anchors {spacing:.3g} apart), "
+        f"2^{log2_entries} entries ({n_alive} anchors alive)"
+    )
+
+
+def _alive_positions(model: ClipModel) -> tuple[Tensor, int]:
+    """Positions of dynamic anchors that exist in some frame [n, 3], and the most that exist in one frame."""
+    parts, n_alive = [torch.zeros(0, 3)], 0
+    for role in model.roles():
+        anchors = model.anchor_set(role)
+        if anchors.presence is not None and len(anchors):
+            parts.append(anchors.positions[anchors.presence.any(1)])
+            n_alive += int(anchors.presence.sum(0).max())
+    return torch.cat(parts), n_alive
