@@ -101,8 +101,8 @@ class ClipModel(nn.Module):
     def is_constant(self, role: str) -> bool:
         """Whether the set's Gaussians never change: static anchors under a frozen decoder."""
         anchors = self.anchor_set(role)
-        is_decoder_frozen = not any(p.requires_grad for p in self.decoder.parameters())
-        return not anchors.is_dynamic and not anchors.is_trainable and is_decoder_frozen
+        is_learning = anchors.features.requires_grad or any(p.requires_grad for p in self.decoder.parameters())
+        return not anchors.is_dynamic and not is_learning
 
     def knots(self, clip_time: float) -> list[tuple[int, float]]:
         """Frames of the clip around this time and their weights."""
@@ -162,18 +162,20 @@ class ClipModel(nn.Module):
             dynamic_features=dynamic_features,
         )
 
-    def anchors(self) -> AnchorView:
-        """Positions for display."""
+    def anchors(self, clip_time: float | None = None) -> AnchorView:
+        """Positions for display: all, or those that exist at a time of the clip, in [0, 1)."""
         inherited, own = [], []
         for role in self.roles():
             anchors = self.anchor_set(role)
-            (own if anchors.is_trainable else inherited).append(anchors)
+            rows = slice(None) if clip_time is None else self.alive(role, clip_time)
+            shown = (anchors.positions[rows].numpy(), anchors.is_dynamic)
+            (own if anchors.is_trainable else inherited).append(shown)
 
-        def positions(sets: list[AnchorSet]) -> np.ndarray:
-            return np.concatenate([np.zeros((0, 3), np.float32), *(s.positions.numpy() for s in sets)])
+        def positions(sets: list[tuple[np.ndarray, bool]]) -> np.ndarray:
+            return np.concatenate([np.zeros((0, 3), np.float32), *(points for points, _ in sets)])
 
-        def dynamic(sets: list[AnchorSet]) -> np.ndarray:
-            return np.concatenate([np.zeros(0, bool), *(np.full(len(s), s.is_dynamic) for s in sets)])
+        def dynamic(sets: list[tuple[np.ndarray, bool]]) -> np.ndarray:
+            return np.concatenate([np.zeros(0, bool), *(np.full(len(points), flag) for points, flag in sets)])
 
         return AnchorView(positions(inherited), positions(own), dynamic(own), dynamic(inherited))
 
@@ -224,12 +226,14 @@ def inherit(reference: ClipState, presence: dict[str, Tensor]) -> tuple[dict[str
     return sets, decoder
 
 
-def load_clip_model(state: ClipState, reference: ClipState | None) -> ClipModel:
+def load_clip_model(state: ClipState, reference: ClipState | None, *, is_learning: bool = False) -> ClipModel:
     """Rebuild a clip for viewing or for going on.
 
     Args:
         state: The clip.
         reference: What it inherits from; not used for a reference clip.
+        is_learning: Keep the clip's own parameters trainable. Otherwise nothing is, and what never changes over time
+            is decoded only once.
     Raises:
         ProjectError: A source clip without its reference, or with another one than it was trained on.
     """
@@ -259,13 +263,10 @@ def load_clip_model(state: ClipState, reference: ClipState | None) -> ClipModel:
     if header.get("field"):
         field = SpatioTemporalField(FieldShape.from_dict(header["field"]))
         field.load_state_dict(_strip(state.arrays, "field."))
-    return ClipModel(
-        sets=sets,
-        decoder=decoder,
-        field=field,
-        clip_length=header["clip_length"],
-        n_frames=header["n_frames"],
+    model = ClipModel(
+        sets=sets, decoder=decoder, field=field, clip_length=header["clip_length"], n_frames=header["n_frames"]
     )
+    return model if is_learning else model.requires_grad_(requires_grad=False)
 
 
 def _roles(arrays: dict[str, np.ndarray]) -> list[str]:

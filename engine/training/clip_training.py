@@ -405,7 +405,7 @@ class ClipTraining:
         self._load_pictures()
         resume = json.loads(kept.header["resume"])
         self.spacing, self.moving_spacing = kept.header["spacing"], kept.header["moving_spacing"]
-        self.model = load_clip_model(kept, self.reference)
+        self.model = load_clip_model(kept, self.reference, is_learning=True)
         self.gains = nn.Parameter(torch.from_numpy(kept.arrays["resume.gains"].copy()))
         images = kept.arrays["resume.backgrounds"]
         stable = np.unpackbits(kept.arrays["resume.is_stable"], axis=-1, count=images.shape[2]).astype(bool)

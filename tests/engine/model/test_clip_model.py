@@ -141,7 +141,11 @@ def test_constant_sets_are_decoded_once_and_equal_the_plain_decode():
     rows = {"static": torch.tensor([3, 1]), "moving": torch.zeros(0, dtype=torch.int64)}
     rows["residual"] = rows["moving"]
     cached = source.decode(0.0, rows)
-    plain = load_clip_model(reference, None).decode(0.0, {"static": rows["static"], "moving": rows["moving"]})
+    viewed = load_clip_model(reference, None)
+    assert viewed.is_constant("static")  # nothing learns in a clip that is only viewed
+    learning = load_clip_model(reference, None, is_learning=True)
+    assert not learning.is_constant("static")
+    plain = learning.decode(0.0, {"static": rows["static"], "moving": rows["moving"]})
     assert torch.allclose(cached.means, plain.means, atol=1e-6)  # the same sums in another order
 
 
