@@ -10,13 +10,15 @@ import argparse
 import contextlib
 import json
 import logging
+import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
+from app.arguments import EXIT_BAD_INPUT, PlainParser
 from app.headless import (
     ClipOutcome,
     evaluate_project,
@@ -47,20 +49,15 @@ from engine.files import atomic_path
 
 logger = logging.getLogger(__name__)
 
-EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_INTERRUPTED = 0, 1, 2, 130
+EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
+BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
+"""Failures of a worker that are the input's and not the program's."""
 VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov")
-
-
-class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line and how to get help."""
-
-    def error(self, message: str) -> NoReturn:
-        self.exit(EXIT_BAD_INPUT, f"{self.prog}: {message}. See `{self.prog} --help`.\n")
 
 
 def build_parser() -> argparse.ArgumentParser:
     """Arguments of every subcommand."""
-    parser = _Parser(prog="clipgstream", description="Train, measure and render dynamic captures without a window.")
+    parser = PlainParser(prog="clipgstream", description="Train, measure and render dynamic captures without a window.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     train = commands.add_parser("train", help="train clips of a capture", description="Train clips of a capture.")
@@ -261,7 +258,9 @@ def _clips(capture: Capture, clip_length: int) -> list[Any]:
 
 
 def _train(options: argparse.Namespace, launch: Launch) -> int:
+    was_folder, was_project = options.project.exists(), (options.project / PROJECT_FILE).is_file()
     project, capture = _open_for_training(options)
+    is_refused = False
     line = ProgressLine(is_quiet=options.quiet)
     service: TrainingService | None = None
     try:
@@ -281,17 +280,26 @@ def _train(options: argparse.Namespace, launch: Launch) -> int:
             on_event=lambda event: _show_event(line, event),
             on_outcome=lambda outcome: _show_outcome(line, outcome),
         )
+        is_refused = outcomes[-1].kind in BAD_INPUT_KINDS
         line.finish()
         if options.json:
             print(json.dumps(train_document(project, capture, outcomes), indent=2))
+    except (CaptureError, ProjectError):
+        is_refused = True
+        raise
     finally:
         line.finish()
         if service is not None:
             service.close()
+        if is_refused and not was_project and not project.has_progress:  # bad input leaves nothing behind
+            project.remove_files()
         project.close()
+        if is_refused and not was_folder:
+            with contextlib.suppress(OSError):  # not empty: something was learned
+                options.project.rmdir()
     last = outcomes[-1]
     if last.state == "failed":
-        code = EXIT_BAD_INPUT if last.kind in ("CaptureError", "ProjectError") else EXIT_FAILED
+        code = EXIT_BAD_INPUT if last.kind in BAD_INPUT_KINDS else EXIT_FAILED
         return _fail(code, " ".join(part for part in (last.message, last.hint) if part))
     return EXIT_OK
 
@@ -331,6 +339,8 @@ def _show_outcome(line: ProgressLine, outcome: ClipOutcome) -> None:
 
 
 def _evaluate(options: argparse.Namespace, launch: Launch) -> int:
+    if options.json != "-":
+        check_writable(Path(options.json))
     opened = open_trained(open_project(options.project, is_writable=False))
     chosen = list(parse_range(options.clips, len(opened.clips), option="--clips", what="clips"))
     if options.clips.strip() == ":":
@@ -354,6 +364,20 @@ def _evaluate(options: argparse.Namespace, launch: Launch) -> int:
                 )
     line.say(f"{len(document['rows'])} rows in {options.json}")
     return EXIT_OK
+
+
+def check_writable(path: Path) -> None:
+    """See that a result can be written, before the work that leads to it. Makes nothing.
+
+    Raises:
+        ProjectError: The path is a folder, or lies where nothing may be written.
+    """
+    if path.is_dir():
+        raise ProjectError("This is a folder, not a file.", hint="Give the name of a file.", path=path)
+    folder = next((parent for parent in path.absolute().parents if parent.exists()), Path(path.anchor))
+    if not folder.is_dir() or not os.access(folder, os.W_OK):
+        reason = "may not be written to" if folder.is_dir() else "is a file"
+        raise ProjectError(f"{folder} {reason}.", hint="Choose another place.", path=path)
 
 
 def _write_text(path: Path, text: str) -> None:
@@ -401,12 +425,14 @@ def _render(options: argparse.Namespace, launch: Launch) -> int:
 
     out: Path = options.out
     if out.suffix.lower() in VIDEO_SUFFIXES:
+        check_writable(out)
         n_images = write_video(out, (image for _, image in images()), fps=capture.fps)
     elif out.suffix and not out.is_dir():
         raise ProjectError(
             f"--out ends in '{out.suffix}', which is no known video.", hint="Write FILE.mp4 or a folder.", path=out
         )
     else:
+        check_writable(out / "frame.png")
         n_images = write_pictures(out, images())
     line.say(f"{n_images} frames of camera {chosen[0]} in {out}")
     return EXIT_OK

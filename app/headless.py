@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from app.kernels import use_threads
-from app.opening import check_capture
+from app.opening import open_capture_of
 from app.project import Project
 from app.status import TrainingStatus
 from app.training.messages import ClipTrained, Event, TrainingFailed, TrainingStopped, WorkerDied
 from app.training.service import TrainingService
-from engine.capture.capture import Capture, open_capture
+from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
 from engine.model.clip_state import ClipState, read_clip_state
@@ -169,8 +169,7 @@ def open_trained(project: Project) -> TrainedProject:
         ProjectError: It is another one, or nothing is trained yet.
     """
     settings = project.settings
-    capture = open_capture(settings.capture, scale=settings.scale)
-    check_capture(capture, settings.fingerprint, project.folder)
+    capture = open_capture_of(settings, project.folder)
     if not project.is_trained(0):
         raise ProjectError(
             "Nothing is trained in this project yet.", hint="Run `clipgstream train` first.", path=project.folder
@@ -243,7 +242,7 @@ def render_frames(
     """Frames as a capture camera would see them, in that camera's colours. Yields (frame_index, [H, W, 3] uint8).
 
     Raises:
-        ProjectError: A frame lies in a clip that is not trained; said before the first picture.
+        ProjectError: A frame lies in a clip that is not trained or damaged; said before the first picture.
     """
     use_threads(None)
     from engine.model.view import View, render_model
@@ -259,6 +258,8 @@ def render_frames(
             hint=f"Trained are {opened.trained}.",
             path=opened.project.folder,
         )
+    for clip_index in needed:  # a damaged one is found before anything is written; only one at a time is kept
+        opened.model(clip_index)
     width, height = (int(v) for v in capture.rig.image_sizes[camera_index])
     view = View.from_arrays(
         capture.rig.world_to_camera[camera_index],

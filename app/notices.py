@@ -59,9 +59,7 @@ class Notices:
 
     def add_error(self, title: str, error: EngineError) -> Notice:
         """A failure the user can act on; every problem of a capture is listed."""
-        lines = [error.message if error.path is None else f"{error.message} - {error.path}"]
-        lines += [str(problem) for problem in getattr(error, "problems", ())]
-        return self.add("error", title, "\n".join(lines), error.hint)
+        return self.add("error", title, *error.told_apart())
 
     def dismiss(self, index: int) -> None:
         """Remove one notice; an index that is gone already is ignored."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from app.jobs import JobContext
 from app.project import (
     PROJECT_FILE,
     Project,
+    ProjectSettings,
     create_project,
     default_project_dir,
     default_settings,
@@ -16,7 +17,7 @@ from app.project import (
     read_settings,
 )
 from engine.capture.capture import Capture, open_capture
-from engine.errors import ProjectError
+from engine.errors import CaptureError, ProjectError
 
 WINDOW_WIDTH_PX = 960
 """Wider captures are worked on at a smaller scale unless one is asked for; training on a CPU goes with the pixels."""
@@ -65,25 +66,49 @@ def open_for_window(
 
 def _open_project(folder: Path, current: Path | None, capture: Capture | None = None) -> Opened:
     settings = read_settings(folder)
-    if capture is None or capture.scale != settings.scale:
-        capture = open_capture(settings.capture, scale=settings.scale)
-    check_capture(capture, settings.fingerprint, folder)
+    if capture is None:
+        capture = open_capture_of(settings, folder)
+    else:
+        capture = capture if capture.scale == settings.scale else open_capture(capture.path, scale=settings.scale)
+        check_capture(capture, settings, folder)
     if current is not None and current.resolve() == folder.resolve():
         return Opened(capture, None)
     try:
-        return Opened(capture, open_project(folder))
+        project = open_project(folder)
+        place = str(Path(capture.path).resolve())
+        if settings.capture != place:  # it has moved since; workers open it where the project says
+            project.update(replace(settings, capture=place))
+        return Opened(capture, project)
     except ProjectError as error:  # most likely locked; looking at it does no harm
         note = ("The project is open for reading only", str(error), "Training is off until it is closed there.")
         return Opened(capture, open_project(folder, is_writable=False), note)
 
 
-def check_capture(capture: Capture, fingerprint: str, folder: Path) -> None:
+def open_capture_of(settings: ProjectSettings, folder: Path) -> Capture:
+    """Open the capture of the project in this folder.
+
+    Raises:
+        CaptureError: It is gone or damaged.
+        ProjectError: Another one lies in its place.
+    """
+    if not Path(settings.capture).is_dir():
+        raise CaptureError(
+            "The capture of this project is no longer where it was.",
+            hint=f"Put it back, or say where it is: clipgstream train NEW_PLACE --project {folder}",
+            path=settings.capture,
+        )
+    capture = open_capture(settings.capture, scale=settings.scale)
+    check_capture(capture, settings, folder)
+    return capture
+
+
+def check_capture(capture: Capture, settings: ProjectSettings, folder: Path) -> None:
     """See that the capture is the one the project was made for.
 
     Raises:
         ProjectError: It is another one.
     """
-    if capture.fingerprint != fingerprint:
+    if capture.fingerprint != settings.fingerprint:
         raise ProjectError(
             f"The capture in {capture.path} is not the one this project was made for.",
             hint="Put the original capture back, or make a new project.",

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import shutil
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -62,7 +63,10 @@ class ProjectSettings:
     schema: int = SCHEMA
 
     def config(self) -> TrainConfig:
-        """The training settings. Raises ProjectError for a value outside its range."""
+        """The training settings. Raises ProjectError for an unknown one or a value outside its range."""
+        unknown = sorted(set(self.overrides) - {item.name for item in fields(TrainConfig)})
+        if unknown:
+            raise ProjectError(f"There is no training setting called {', '.join(unknown)}.", hint="Take it out.")
         return TrainConfig(**self.overrides)
 
 
@@ -144,6 +148,12 @@ class Project:
         """Release the lock. The object can still be read from."""
         if self._lock is not None:
             self._lock.release()
+
+    def remove_files(self) -> None:
+        """Take back a project that has learned nothing: its own files and folders go, other things stay."""
+        for name in ("clips", "checkpoints", "live", "prep", "metrics", "logs"):
+            shutil.rmtree(self.folder / name, ignore_errors=True)
+        (self.folder / PROJECT_FILE).unlink(missing_ok=True)
 
 
 # ---------------------------------------------------------------- opening
@@ -310,10 +320,14 @@ def read_settings(folder: Path) -> ProjectSettings:
             seed=int(content.get("seed", 0)),
             overrides=dict(content.get("overrides", {})),
         )
+        if not (0.0 < settings.scale <= 1.0 and settings.clip_length >= 1):
+            raise ValueError(f"scale {settings.scale:g} or clip_length {settings.clip_length} is out of range")
         settings.config()
+    except ProjectError as error:
+        raise ProjectError(error.message, hint="Correct it or restore the file from a copy.", path=path) from error
     except (KeyError, TypeError, ValueError) as error:
         raise ProjectError(
-            f"The project file has a missing or ill-typed entry ({error}).", hint="Restore it from a copy.", path=path
+            f"The project file has a missing or wrong entry ({error}).", hint="Restore it from a copy.", path=path
         ) from error
     return settings
 

@@ -46,7 +46,9 @@ def write_video(path: Path, images: Iterable[np.ndarray], *, fps: float) -> int:
                 container.mux(packet)
     except (OSError, av.error.FFmpegError) as error:
         raise ProjectError(
-            f"The video could not be written ({error}).", hint="Check the folder and the free space.", path=path
+            f"The video could not be written ({error.strerror or error}).",
+            hint="Check the folder and the free space.",
+            path=path,
         ) from error
     return n_images
 
@@ -65,6 +67,8 @@ def write_pictures(folder: Path, images: Iterable[tuple[int, np.ndarray]]) -> in
             n_images += 1
     except OSError as error:
         raise ProjectError(
-            f"A picture could not be written ({error}).", hint="Check the folder and the free space.", path=folder
+            f"A picture could not be written ({error.strerror or error}).",
+            hint="Check the folder and the free space.",
+            path=folder,
         ) from error
     return n_images

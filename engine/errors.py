@@ -35,6 +35,12 @@ class EngineError(Exception):
         text = " ".join(part for part in (self.message, self.hint) if part)
         return f"{text} - {self.path}" if self.path is not None else text
 
+    def told_apart(self) -> tuple[str, str]:
+        """What happened and what to do, for those who show them apart. Joined by a space they are str(self)."""
+        if self.hint and self.path is not None:
+            return self.message, f"{self.hint} - {self.path}"
+        return str(EngineError(self.message, path=self.path)), self.hint
+
     def __reduce__(self) -> tuple[Any, ...]:  # keeps keyword-only arguments through a process boundary
         return (_rebuild, (type(self), self.message, self.hint, self.path))
 
@@ -63,6 +69,10 @@ class CaptureError(EngineError):
 
     def __str__(self) -> str:
         return "\n".join([super().__str__(), *(f"  {problem}" for problem in self.problems)])
+
+    def told_apart(self) -> tuple[str, str]:
+        """As of every error; listed problems carry their own hints and stand with what happened."""
+        return (str(self), "") if self.problems else super().told_apart()
 
 
 class ProjectError(EngineError):

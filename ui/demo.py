@@ -13,8 +13,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from app.arguments import EXIT_BAD_INPUT
 from app.commands import OpenCapture, SetFrame, ToggleOverlay
 from app.progress import ProgressLine
+from app.project import PROJECT_FILE
 from app.session import Session
 
 if TYPE_CHECKING:
@@ -27,7 +29,6 @@ OPEN_TIMEOUT_S = 120.0
 PICTURE_TIMEOUT_S = 60.0
 THUMBNAILS_TIMEOUT_S = 10.0
 POLL_S = 0.02
-EXIT_BAD_INPUT = 2
 QUICK_OVERRIDES = (
     "static_steps=20",
     "joint_steps=30",
@@ -42,7 +43,7 @@ def run_demo(capture_path: Path, out_dir: Path, quick: bool = False) -> int:
     """Do everything once and say where the results lie.
 
     Args:
-        capture_path: Capture folder.
+        capture_path: Capture folder; or a project folder, which then is the one trained in.
         out_dir: Gets project/ or project_quick/, metrics.json, window.png and held_out.mp4. A second run goes on
             from the first.
         quick: Train a few steps only.
@@ -52,12 +53,15 @@ def run_demo(capture_path: Path, out_dir: Path, quick: bool = False) -> int:
     from app.cli import main as run_command
 
     line = ProgressLine()
-    project_dir = out_dir / ("project_quick" if quick else "project")
+    is_project = (capture_path / PROJECT_FILE).is_file()
+    project_dir = capture_path if is_project else out_dir / ("project_quick" if quick else "project")
     session = Session(project_dir=project_dir)
     try:
         if not _open(session, capture_path, line):
             return EXIT_BAD_INPUT
         assert session.rig is not None
+        assert session.capture is not None
+        capture_path = session.capture.path
         n_clips = min(2, len(session.clips))
         n_frames = session.clips[n_clips - 1].stop
         camera = session.rig.names[session.holdout[0] if session.holdout else 0]
@@ -106,7 +110,7 @@ def picture_of_window(capture_path: Path, project_dir: Path, path: Path, line: P
         except Exception as error:  # a missing library or driver shows as one of many kinds
             logger.info("no OpenGL without a display", exc_info=True)
             line.say(f"No picture of the window: OpenGL without a display is not available ({error}).")
-            line.say("Installing Mesa's driver helps: apt-get install libegl1 libgl1-mesa-dri")
+            line.say("`make setup` installs the system libraries that it needs, or prints the line that does.")
             return None
         try:
             return _draw_window(studio, session, capture_path, path, line)

@@ -11,9 +11,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from app.arguments import PlainParser
+from engine.assets import asset_path
+
 COMMANDS = ("train", "eval", "render", "inspect", "doctor")
 """Subcommands that app.cli serves without a window."""
-EXIT_BAD_INPUT = 2
 
 
 def has_display() -> bool:
@@ -23,27 +25,22 @@ def has_display() -> bool:
     return bool(os.environ.get("DISPLAY"))
 
 
-def sample_path() -> Path:
-    """The capture that ships with the program."""
-    return Path(__file__).resolve().parents[1] / "assets" / "sample"
-
-
 def build_parser() -> argparse.ArgumentParser:
     """Arguments of the window and of the headless demo; the other commands have their own."""
-    parser = argparse.ArgumentParser(
+    parser = PlainParser(
         prog="clipgstream",
         description="View, train and replay dynamic captures clip by clip.",
         epilog=f"Without a window: clipgstream {{{','.join(COMMANDS)}}} --help, or clipgstream demo [PATH].",
     )
     parser.add_argument("path", nargs="?", type=Path, help="capture or project folder to open")
-    parser.add_argument("--size", default=None, metavar="WxH", help="window size in pixels, for example 1440x900")
+    parser.add_argument("--size", type=_parse_size, metavar="WxH", help="window size in pixels, for example 1440x900")
     parser.add_argument("--verbose", action="store_true", help="log more")
     return parser
 
 
 def build_demo_parser() -> argparse.ArgumentParser:
     """Arguments of the headless job."""
-    parser = argparse.ArgumentParser(
+    parser = PlainParser(
         prog="clipgstream demo",
         description="Train the first two clips without a window, then write a picture of the window and a video.",
     )
@@ -77,15 +74,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run_demo(options: argparse.Namespace) -> int:
     from ui.demo import run_demo
 
-    return run_demo(options.path or sample_path(), options.out, quick=options.quick)
+    return run_demo(options.path or asset_path("sample"), options.out, quick=options.quick)
 
 
-def _parse_size(text: str | None) -> tuple[int, int] | None:
-    if text is None:
-        return None
+def _parse_size(text: str) -> tuple[int, int]:
     width, _, height = text.lower().partition("x")
-    if not (width.isdigit() and height.isdigit()):
-        return None
+    if not (width.isdigit() and height.isdigit() and int(width) > 0 and int(height) > 0):
+        raise argparse.ArgumentTypeError(f"'{text}' is no size such as 1440x900")
     return int(width), int(height)
 
 
@@ -98,7 +93,7 @@ def _run_window(options: argparse.Namespace) -> int:
     from app.session import Session
     from ui.window import DEFAULT_SIZE, StudioWindow
 
-    width, height = _parse_size(options.size) or DEFAULT_SIZE
+    width, height = options.size or DEFAULT_SIZE
     session = Session()
     window = StudioWindow(session, width=width, height=height)
     try:

@@ -377,9 +377,7 @@ class TrainingRun:
                     self._write_checkpoint(self._training)
         message, hint = str(error), ""
         if isinstance(error, EngineError):
-            message = error.message if error.path is None else f"{error.message} - {error.path}"
-            problems = getattr(error, "problems", ())
-            message, hint = "\n".join([message, *(str(problem) for problem in problems)]), error.hint
+            message, hint = error.told_apart()
         elif isinstance(error, MemoryError):
             message, hint = "There is not enough memory.", "Use a smaller scale or fewer points."
         else:

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli import main, parse_range
+from app.cli import check_writable, main, parse_range
 from app.progress import ProgressLine, duration_text
-from app.project import open_project
+from app.project import open_project, read_settings
 from app.video import write_pictures, write_video
 from engine.errors import ProjectError
 from engine.model.clip_state import read_clip_state
@@ -109,9 +109,14 @@ def test_a_damaged_picture_found_while_training_is_bad_input(run, tmp_path):
     bad.write_bytes(bad.read_bytes()[:200])
     code, _, err = run("train", folder, "--project", tmp_path / "q", make_training=_reads_pictures)
     assert code == 2
-    assert "000003.jpg" in err
+    assert err.rstrip().endswith("000003.jpg")  # cause, what to do, and the file last
     assert "Traceback" not in err
-    assert not list((tmp_path / "q" / "clips").glob("*"))
+    assert not (tmp_path / "q").exists()
+    (tmp_path / "r").mkdir()  # the user's own folder stays, and stays empty
+    assert run("train", folder, "--project", tmp_path / "r", make_training=_reads_pictures)[0] == 2
+    assert not list((tmp_path / "r").iterdir())
+    code, _, err = run("train", folder, "--project", tmp_path / "p", make_training=_reads_pictures)
+    assert read_clip_state(tmp_path / "p" / "clips" / "0000.safetensors").header["step"] == N_STEPS  # what was learned
 
 
 def _reads_pictures(job, report):
@@ -184,6 +189,48 @@ def test_rendering_names_what_is_wrong_with_its_arguments(run, capture_folder, t
         code, _, err = run(*render, *extra)
         assert (code, expected in err) == (2, True), err
     assert not list(tmp_path.glob("o.*"))
+
+
+def test_a_damaged_clip_is_named_before_anything_is_written(run, capture_folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        "engine.model.clip_model.load_clip_model", lambda state, reference: state
+    )  # fakes hold no model
+    run("train", capture_folder, "--project", tmp_path / "p", "--clip-length", 3)
+    clip = tmp_path / "p" / "clips" / "0001.safetensors"
+    clip.write_bytes(clip.read_bytes()[:-10])
+    for command in (
+        ("render", tmp_path / "p", "--camera", "1", "--out", tmp_path / "pictures"),
+        ("render", tmp_path / "p", "--camera", "1", "--out", tmp_path / "o.mp4"),
+        ("eval", tmp_path / "p", "--json", tmp_path / "o.json"),
+    ):
+        code, _, err = run(*command)
+        assert code == 2
+        assert err.rstrip().endswith(f"Train the clip again. - {clip}")
+    assert not list(tmp_path.glob("o.*"))
+    assert not (tmp_path / "pictures").exists()
+
+
+def test_results_that_cannot_be_written_are_refused_before_the_work(run, capture_folder, tmp_path):
+    (tmp_path / "file").write_text("")
+    for out, expected in ((tmp_path / "file" / "o.json", "is a file"), (tmp_path, "is a folder")):
+        with pytest.raises(ProjectError, match=expected):
+            check_writable(out)
+        code, _, err = run("eval", tmp_path / "p", "--json", out)
+        assert (code, expected in err) == (2, True), err
+    check_writable(tmp_path / "new" / "deep" / "o.json")
+    assert [path.name for path in tmp_path.iterdir() if path.name in ("file", "new")] == ["file"]
+
+
+def test_a_capture_that_has_moved_is_said_and_found_again(run, tmp_path):
+    folder = write_capture(tmp_path / "c")
+    project = tmp_path / "p"
+    assert run("train", folder, "--project", project)[0] == 0
+    folder.rename(tmp_path / "d")
+    code, _, err = run("eval", project, "--json", "-")
+    assert code == 2
+    assert f"clipgstream train NEW_PLACE --project {project} - {folder}" in err
+    assert run("train", tmp_path / "d", "--project", project)[0] == 0
+    assert read_settings(project).capture == str(tmp_path / "d")
 
 
 def test_inspecting_prints_stable_json(run, capture_folder):

@@ -48,8 +48,10 @@ def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch):
     [
         ({"schema": 99}, "schema 99"),
         ({"extra": 1}, "unknown entries: extra"),
-        ({"scale": "wide"}, "ill-typed"),
-        ({"overrides": {"nonsense": 1}}, "ill-typed"),
+        ({"scale": "wide"}, "missing or wrong"),
+        ({"scale": 5}, "scale 5"),
+        ({"clip_length": 0}, "clip_length 0"),
+        ({"overrides": {"nonsense": 1}}, "no training setting called nonsense"),
         ({"overrides": {"gaussians_per_anchor": 99}}, "between 1 and 32"),
     ],
 )
@@ -57,8 +59,9 @@ def test_a_bad_project_file_is_named(tmp_path, change, expected):
     create_project(tmp_path / "p", SETTINGS).close()
     path = tmp_path / "p" / "project.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | change))
-    with pytest.raises(ProjectError, match=expected):
+    with pytest.raises(ProjectError, match=expected) as caught:
         read_settings(tmp_path / "p")
+    assert str(caught.value).endswith(str(path))
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '"x"', "\x00"])

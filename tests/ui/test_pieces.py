@@ -132,3 +132,15 @@ def test_without_a_display_the_demo_runs_instead(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("ui.main.has_display", lambda: False)
     assert main(["some_capture"]) == 0
     assert [str(path) for path, _, _ in seen] == ["some_capture"]
+
+
+def test_nonsense_arguments_end_with_2_and_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    from ui.main import main
+
+    for arguments, expected in ((["--size", "wide"], "'wide' is no size"), (["a", "b"], "unrecognized arguments: b")):
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        message = capsys.readouterr().err
+        assert ended.value.code == 2
+        assert expected in message
+        assert message.count("\n") == 1

@@ -150,12 +150,21 @@ def _table_shape(table: Any) -> tuple[int, int]:
 
 
 def _check_motionless(name: str, Ks: np.ndarray, poses: np.ndarray, path: Path) -> list[CaptureError]:
+    is_number = np.isfinite(Ks).all((1, 2)) & np.isfinite(poses).all((1, 2))  # [T]
+    if not is_number.all():
+        return [
+            CaptureError(
+                f'Camera "{name}" has NaN or infinity in its calibration of frame {int(np.argmin(is_number))}.',
+                hint="Export the calibration again.",
+                path=path,
+            )
+        ]
     is_same = (np.abs(Ks - Ks[0]).max((1, 2)) < 1e-6) & (np.abs(poses - poses[0]).max((1, 2)) < 1e-6)  # [T]
     if is_same.all():
         return []
     return [
         CaptureError(
-            f'Camera "{name}" moves or has NaN from frame {int(np.argmin(is_same))} on.',
+            f'Camera "{name}" moves from frame {int(np.argmin(is_same))} on.',
             hint="Only cameras that stand still are supported; take this one out.",
             path=path,
         )
@@ -225,7 +234,7 @@ def _missing_frames(folder: Path, cameras: list[_MetaCamera], found: list[list[b
 
 
 def _check_images(camera: _MetaCamera, paths: list[Path]) -> list[CaptureError]:
-    """Ends of all files, size of the first one."""
+    """Ends and sizes of all files, by their headers; one problem per size that is not the calibrated one."""
     hint = "Copy or export this file again."
     damaged = [(path, reason) for path in paths if (reason := check_image_file(path)) is not None]
     problems = [
@@ -233,10 +242,12 @@ def _check_images(camera: _MetaCamera, paths: list[Path]) -> list[CaptureError]:
         for path, reason in damaged
     ]
     whole = [path for path in paths if path not in {path for path, _ in damaged}]
-    if whole:
+    first_of_size: dict[tuple[int, int], Path] = {}
+    for path in whole:
         try:
-            size = image_size_of(whole[0])
+            first_of_size.setdefault(image_size_of(path), path)
         except CaptureError as error:
-            return [*problems, error]
-        problems += check_image_size(str(camera.camera_id), size, camera.image_size, whole[0])
+            problems.append(error)
+    for size, path in first_of_size.items():
+        problems += check_image_size(str(camera.camera_id), size, camera.image_size, path)
     return problems
