@@ -45,7 +45,7 @@ class GaussianArrays:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AnchorArrays:
-    """Anchor positions of one clip, scene units, float32.
+    """Anchor positions of one clip, all or those of one frame, scene units, float32.
 
     Attributes:
         inherited_positions: From the reference clip; empty in the reference clip itself. [A0, 3]
@@ -64,12 +64,14 @@ class PointArrays:
 
     Attributes:
         is_hint: Captured pictures placed in space, because there is no cloud yet.
+        spacing: Usual distance between neighbours, scene units; 0 when unknown.
     """
 
     points: np.ndarray
     colors: np.ndarray
     key: Hashable
     is_hint: bool = False
+    spacing: float = 0.0
 
     def __iter__(self) -> Iterator[Any]:
         return iter((self.points, self.colors, self.key))
@@ -83,8 +85,10 @@ class Picture:
         image: [H, W, 3] uint8 RGB.
         key: What it shows; equal keys mean equal pictures.
         is_stale: It is not what was asked for now, but the newest there is; the right one is on its way.
+        duration_s: How long it took to make; 0 when unknown.
     """
 
     image: np.ndarray
     key: Hashable
     is_stale: bool = False
+    duration_s: float = 0.0

@@ -7,6 +7,8 @@ import threading
 from collections.abc import Callable, Hashable
 from typing import Generic, TypeVar
 
+from app.priority import lower_thread
+
 Request = TypeVar("Request", bound=Hashable)
 Result = TypeVar("Result")
 logger = logging.getLogger(__name__)
@@ -113,6 +115,7 @@ class LatestWorker(Generic[Request, Result]):
             logger.warning("%s could not be prepared", self._name, exc_info=True)
 
     def _run(self) -> None:
+        lower_thread()
         self._prepare_thread()
         while True:
             with self._condition:

@@ -10,9 +10,10 @@ from collections import OrderedDict
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from app.arrays import AnchorArrays, GaussianArrays, PointArrays
 from app.kernels import prepare_decoding
@@ -20,8 +21,13 @@ from app.latest import LatestWorker
 from engine.capture.clip import Clip
 from engine.model.clip_state import ClipState, read_clip_state
 
+if TYPE_CHECKING:
+    from engine.model.clip_model import AnchorView  # brings torch, which only the thread needs
+
 CACHE_BYTES = 384 << 20
 """Decoded frames kept in memory."""
+SPACING_SAMPLE = 2000
+"""Points that are asked for their nearest neighbour to learn how dense a cloud is."""
 MAX_MODELS = 3
 """Loaded clips kept in memory: the shown one, its reference, and the one shown before."""
 
@@ -56,6 +62,14 @@ class LoadedClip:
     model: Any
     anchors: AnchorArrays
     near_plane: float
+
+
+@dataclass(frozen=True, slots=True)
+class ShownFrame:
+    """What is drawn of a frame: Gaussians, and the anchors that exist then."""
+
+    gaussians: GaussianArrays
+    anchors: AnchorArrays
 
 
 class ByteCache:
@@ -110,12 +124,12 @@ class Playback:
         self._cache = ByteCache(cache_bytes)
         self._models: OrderedDict[tuple[int, str], LoadedClip] = OrderedDict()
         self._reference: tuple[tuple[str, int], ClipState] | None = None
-        self._last: GaussianArrays | None = None
-        self.worker: LatestWorker[FrameRequest, GaussianArrays] = LatestWorker(
+        self._last: ShownFrame | None = None
+        self.worker: LatestWorker[FrameRequest, ShownFrame] = LatestWorker(
             "playback", self._compute, prepare=prepare_decoding
         )
 
-    def gaussians(self, request: FrameRequest) -> GaussianArrays | None:
+    def frame(self, request: FrameRequest) -> ShownFrame | None:
         """The frame if it is ready; otherwise it is asked for and the newest finished one is returned."""
         known = self._cache.get(request.key)
         if known is not None:
@@ -128,7 +142,7 @@ class Playback:
         return self._last
 
     def anchors(self, clip_index: int, revision: str) -> AnchorArrays | None:
-        """Anchors of a state; None until it was loaded."""
+        """All anchors of a state; None until it was loaded."""
         loaded = self._models.get((clip_index, revision))
         return None if loaded is None else loaded.anchors
 
@@ -149,12 +163,14 @@ class Playback:
 
     # ---------------------------------------------------------------- on the thread
 
-    def _compute(self, request: FrameRequest) -> GaussianArrays:
+    def _compute(self, request: FrameRequest) -> ShownFrame:
         import torch
 
         loaded = self._load(request)
+        clip_time = request.clip.clip_time(request.frame_index)
         with torch.no_grad():
-            gaussians = loaded.model.decode(request.clip.clip_time(request.frame_index))
+            gaussians = loaded.model.decode(clip_time)
+        anchors = _anchor_arrays(loaded.model.anchors(clip_time), request.key)
         values = [np.ascontiguousarray(tensor.numpy(), np.float32) for tensor in gaussians.tensors()]
         arrays = GaussianArrays(
             *values,
@@ -163,8 +179,10 @@ class Playback:
             clip_index=request.clip_index,
             frame_index=request.frame_index,
         )
-        self._cache.put(request.key, arrays, arrays.n_bytes)
-        return arrays
+        shown = ShownFrame(arrays, anchors)
+        n_bytes = arrays.n_bytes + anchors.inherited_positions.nbytes + anchors.own_positions.nbytes
+        self._cache.put(request.key, shown, n_bytes)
+        return shown
 
     def _load(self, request: FrameRequest) -> LoadedClip:
         identity = (request.clip_index, request.revision)
@@ -177,12 +195,7 @@ class Playback:
         state = read_clip_state(request.path)
         reference = None if state.is_reference else self._read_reference(request.reference_path)
         model = load_clip_model(state, reference)
-        view = model.anchors()
-        anchors = AnchorArrays(
-            np.ascontiguousarray(view.inherited_positions, np.float32),
-            np.ascontiguousarray(view.own_positions, np.float32),
-            identity,
-        )
+        anchors = _anchor_arrays(model.anchors(), identity)
         loaded = LoadedClip(model, anchors, float(state.header["near_plane"]))
         self._cache.drop(lambda key: key[0] == request.clip_index and key[1] != request.revision)
         kept = [(key, value) for key, value in models.items() if key[0] != request.clip_index]
@@ -199,6 +212,23 @@ class Playback:
         return self._reference[1]
 
 
+def _anchor_arrays(view: AnchorView, key: Hashable) -> AnchorArrays:
+    return AnchorArrays(
+        np.ascontiguousarray(view.inherited_positions, np.float32),
+        np.ascontiguousarray(view.own_positions, np.float32),
+        key,
+    )
+
+
+def point_spacing(points: np.ndarray) -> float:
+    """Usual distance from a point to its nearest neighbour, from a sample of them; 0 for fewer than two points."""
+    if len(points) < 2:
+        return 0.0
+    sample = points[:: max(len(points) // SPACING_SAMPLE, 1)]
+    distances, _ = KDTree(points).query(sample, k=2)
+    return float(np.median(distances[:, 1]))
+
+
 def static_points(path: Path, revision: str) -> PointArrays:
     """The still part of a reference clip as a coloured cloud.
 
@@ -209,4 +239,5 @@ def static_points(path: Path, revision: str) -> PointArrays:
     points = state.arrays["sets.static.positions"].astype(np.float32, copy=False)
     logits = state.arrays["sets.static.color_logits"].astype(np.float32, copy=False)
     colors = 1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0)))
-    return PointArrays(np.ascontiguousarray(points), colors.astype(np.float32), ("cloud", revision))
+    spacing = point_spacing(points)
+    return PointArrays(np.ascontiguousarray(points), colors.astype(np.float32), ("cloud", revision), spacing=spacing)

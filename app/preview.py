@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
-import os
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +17,8 @@ from safetensors.numpy import save_file
 from app.arrays import PointArrays
 from app.jobs import JobContext
 from app.pictures import downsized
+from app.playback import point_spacing
+from app.priority import lower_process
 from engine.capture.capture import Capture, open_capture
 from engine.errors import EngineError, PreparationError, ProjectError
 from engine.files import atomic_path
@@ -31,7 +31,6 @@ DEPTH_SHARE = 0.16
 CLOUD_WIDTH_PX = 200
 """Pictures for the first cloud are at most this wide."""
 MAX_CLOUD_POINTS = 20_000
-NICENESS = 10
 POLL_EVERY_S = 0.1
 
 
@@ -93,8 +92,7 @@ def make_cloud(capture_path: Path, *, holdout: tuple[int, ...], path: Path, cont
 
 def write_cloud(capture_path: str, holdout: tuple[int, ...], path: str) -> None:
     """Build and write the first cloud. Runs in the child; its exit code is 1 when there is none."""
-    with suppress(OSError, AttributeError):
-        os.nice(NICENESS)
+    lower_process()
     from engine.cloud.static_cloud import build_static_cloud
 
     try:
@@ -130,6 +128,7 @@ def read_cloud(path: Path) -> PointArrays:
     """
     try:
         with safe_open(path, framework="numpy") as file:
-            return PointArrays(file.get_tensor("points"), file.get_tensor("colors"), ("first cloud", str(path)))
+            points, colors = file.get_tensor("points"), file.get_tensor("colors")
     except (OSError, SafetensorError) as error:
         raise ProjectError(f"The first cloud cannot be read ({error}).", path=path) from error
+    return PointArrays(points, colors, ("first cloud", str(path)), spacing=point_spacing(points))

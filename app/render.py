@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -60,6 +61,7 @@ def render(request: RenderRequest) -> Picture:
 
     from engine.raster import Gaussians, rasterize
 
+    started_s = time.perf_counter()
     arrays = request.gaussians
     gaussians = Gaussians(
         *(torch.from_numpy(a) for a in (arrays.means, arrays.quats, arrays.scales, arrays.opacities, arrays.colors))
@@ -75,4 +77,5 @@ def render(request: RenderRequest) -> Picture:
             near_plane=arrays.near_plane,
         )
         image = (rendering.image[0].clamp(0.0, 1.0) * 255.0 + 0.5).to(torch.uint8).numpy()
-    return Picture(image, (arrays.key, request.view_bytes, request.width, request.height))
+    key = (arrays.key, request.view_bytes, request.width, request.height)
+    return Picture(image, key, duration_s=time.perf_counter() - started_s)

@@ -16,7 +16,7 @@ from app.latest import LatestWorker
 from app.notices import Notices
 from app.opening import Opened, open_for_window
 from app.pictures import CapturedPictures
-from app.playback import FrameRequest, Playback, static_points
+from app.playback import FrameRequest, Playback, ShownFrame, static_points
 from app.preview import make_cloud, picture_hint, read_cloud
 from app.project import Project, check_settings
 from app.render import Renderer
@@ -441,11 +441,15 @@ class Session:
     def shown_gaussians(self) -> GaussianArrays | None:
         """Gaussians of the shown frame; the newest ones there are until those are decoded; None where nothing is
         trained."""
+        shown = self._shown_frame()
+        return None if shown is None else shown.gaussians
+
+    def _shown_frame(self) -> ShownFrame | None:
         clip = self.timeline.clip
         known = None if clip is None else self._known(clip.clip_index)
         if clip is None or known is None or known.file is None or self.project is None:
             return None
-        return self._playback.gaussians(
+        return self._playback.frame(
             FrameRequest(
                 clip_index=clip.clip_index,
                 revision=known.revision,
@@ -457,12 +461,9 @@ class Session:
         )
 
     def shown_anchors(self) -> AnchorArrays | None:
-        """Anchors of the shown clip; None until its state was loaded."""
-        clip = self.timeline.clip
-        known = None if clip is None else self._known(clip.clip_index)
-        if clip is None or known is None or not known.revision:
-            return None
-        return self._playback.anchors(clip.clip_index, known.revision)
+        """Anchors that exist at the shown frame; those of the newest frame there is until it was decoded."""
+        shown = self._shown_frame()
+        return None if shown is None else shown.anchors
 
     def shown_points(self) -> PointArrays | None:
         """A cloud for frames that are not trained: the still part of the reference clip, before that a rough first

@@ -38,6 +38,7 @@ ATTENDED_S = 0.5
 """For this long after an input, every picture that arrives is shown at once."""
 MAX_TICK_S = 0.25
 STATUS_BAR_HEIGHT = 28.0
+NOTHING = ImVec4(0, 0, 0, 0)
 VIEWPORT, TIMELINE, TRAINING, CAPTURE = "Viewport", "Timeline", "Training", "Capture"
 
 
@@ -60,13 +61,23 @@ class Frame:
         ctx: moderngl context adopted from it.
         session: The program's state; see app.session.Session.
         fixed_delta_s: Seconds per frame as told to ImGui; tests fix it.
+        on_input: Called after each input that wants a frame, so that it need not wait for the next tick.
     """
 
-    def __init__(self, window: Any, ctx: moderngl.Context, session: Any, *, fixed_delta_s: float | None = None) -> None:
+    def __init__(
+        self,
+        window: Any,
+        ctx: moderngl.Context,
+        session: Any,
+        *,
+        fixed_delta_s: float | None = None,
+        on_input: Callable[[], None] = lambda: None,
+    ) -> None:
         self._window = window
         self._ctx = ctx
         self.session = session
-        self.backend = ImGuiBackend(window, on_input=self.request_redraw, fixed_delta_s=fixed_delta_s)
+        self.backend = ImGuiBackend(window, on_input=self._input_came, fixed_delta_s=fixed_delta_s)
+        self._on_input = on_input
         self.ui = UiState(fonts=theme.load_fonts())
         theme.apply_style()
         self.viewport = ViewportPanel(Scene(ctx))
@@ -79,6 +90,7 @@ class Frame:
         self._has_news = False
         self._is_laid_out = False
         self._failed_panels: set[str] = set()
+        self._floating_panels: set[str] = set()
         self._panels: tuple[tuple[str, Callable[[Any, Dispatch, UiState], None], bool], ...] = (
             (VIEWPORT, self.viewport.draw, False),
             (CAPTURE, self.capture.draw, True),
@@ -92,6 +104,10 @@ class Frame:
         """Draw at least this many frames from now on: the user did something."""
         self._input_s = time.perf_counter()
         self._frames_wanted = max(self._frames_wanted, frames)
+
+    def _input_came(self) -> None:
+        self.request_redraw()
+        self._on_input()
 
     def update(self, dt_s: float) -> bool:
         """Drain the session and move time on. True when a frame has to be drawn."""
@@ -124,7 +140,7 @@ class Frame:
         self._guard("Window", self._compose)
         self._ctx.screen.use()
         self._ctx.viewport = (0, 0, *self._window.get_framebuffer_size())
-        self._ctx.clear(*theme.VOID)
+        self._ctx.clear(*theme.PANEL)
         self.backend.end_frame()
         free_dropped(self._ctx)
         self._drawn_s = time.perf_counter()
@@ -135,7 +151,9 @@ class Frame:
         self._guard("Keys", lambda: handle_shortcuts(session, dispatch, ui))
         self._guard("Menu", self._draw_menu_bar)
         self._guard("Status bar", self._draw_status_bar)
+        imgui.push_style_color(imgui.Col_.window_bg, NOTHING)  # the frame is cleared to the panels' colour
         dock_id = imgui.dock_space_over_viewport(0, imgui.get_main_viewport(), imgui.DockNodeFlags_.none)
+        imgui.pop_style_color()
         if not self._is_laid_out or ui.is_layout_reset_requested:
             self._lay_out(dock_id)
         for title, draw_panel, has_padding in self._panels:
@@ -169,7 +187,14 @@ class Frame:
             flags |= imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
         if title == VIEWPORT:  # its picture and toolbar cover all of it
             flags |= imgui.WindowFlags_.no_background
+        # A docked panel lies on the cleared frame. Filling it again is what costs most where the CPU draws.
+        is_bare = title not in self._floating_panels
+        if is_bare:
+            imgui.push_style_color(imgui.Col_.window_bg, NOTHING)
         is_visible, _ = imgui.begin(title, None, flags)
+        if is_bare:
+            imgui.pop_style_color()
+        (self._floating_panels.discard if imgui.is_window_docked() else self._floating_panels.add)(title)
         if not has_padding:
             imgui.pop_style_var()
         if is_visible:

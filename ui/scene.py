@@ -7,6 +7,7 @@ faster, so its picture is uploaded instead. Redrawn only when the key of what it
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -30,8 +31,14 @@ from ui.gl import (
 BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
 MAX_PICTURE_WIDTH = 960
 """The CPU rasterizer is not asked for more than this; the picture is stretched."""
-MOVING_SHARE = 0.5
-"""Share of the full size that the CPU rasterizer draws while the view moves."""
+MOVING_SHARES = (0.25, 1.0)
+"""Smallest and largest share of the full size at which a picture is made while the view moves."""
+MOVING_MS = 40.0
+"""A picture while the view moves should take about this long; its size follows from the last one's time."""
+MAX_MARKS = 2_500
+"""At most this many anchors of a kind are marked, evenly thinned: they should not drown the picture."""
+CLOUD_OVERLAP = 1.5
+"""Diameter of a cloud's points, in distances between neighbours."""
 FRUSTUM_SHARE = 0.09
 """Length of a camera's pyramid as a share of the rig's radius."""
 HINT_NEAR_SHARE = 0.4
@@ -93,7 +100,7 @@ class Scene:
         self.counts = AnchorCounts()
         self.shows = MARKS
         self.is_stale = False
-        self._target = Target(ctx)
+        self._target = Target(ctx, precision="f1" if self.is_software else "f2")
         self._picture = ImageTexture(ctx)
         self._captured = ImageTexture(ctx)
         self._splats = SplatRenderer(ctx)
@@ -105,8 +112,9 @@ class Scene:
         self._asked_size: tuple[int, int] | None = None
         self._asked_capture: tuple[int, int, int] | None = None
         self._near = NEAR
+        self._moving_share = MOVING_SHARES[1]
         self._is_hint = False
-        self._hint_size = 1.0
+        self._point_size = 0.0
         self._picture_key: Hashable = None
         self._captured_key: Hashable = None
 
@@ -169,13 +177,16 @@ class Scene:
         return None if self._captured.is_empty else self._captured.texture
 
     def _take_picture(self, session: Any, view: SceneView) -> tuple[Hashable, bool]:
-        share = min(MAX_PICTURE_WIDTH / view.width, 1.0) * (MOVING_SHARE if view.is_moving else 1.0)
+        full = min(MAX_PICTURE_WIDTH / view.width, 1.0)
+        share = full * (self._moving_share if view.is_moving else 1.0)
         self._asked_size = (max(round(view.width * share), 16), max(round(view.height * share), 16))
         picture = session.request_render(*self._asked_size)
         if picture is None:
             self._picture_key = None
             return None, False
-        self._picture.set(picture.image, key=picture.key)
+        if self._picture.set(picture.image, key=picture.key) and picture.duration_s > 0:
+            drawn_share = picture.image.shape[1] / (view.width * full)
+            self._moving_share = moving_share(drawn_share, picture.duration_s * 1e3)
         self._picture_key = picture.key
         return picture.key, bool(picture.is_stale)
 
@@ -197,7 +208,9 @@ class Scene:
         self._cloud.set(points, colors, key=key)
         self._is_hint = cloud.is_hint
         if self._is_hint and len(points) > 1:  # pictures as grids: as large as the gap between neighbours
-            self._hint_size = 1.8 * float(np.linalg.norm(points[1] - points[0]))
+            self._point_size = 1.8 * float(np.linalg.norm(points[1] - points[0]))
+        else:
+            self._point_size = CLOUD_OVERLAP * cloud.spacing
         return key
 
     def _take_captured(self, session: Any, width_px: int) -> Hashable:
@@ -233,9 +246,9 @@ class Scene:
             inherited, residual = residual, inherited
         self.counts = AnchorCounts(len(inherited), len(residual), is_reference)
         if overlays.show_inherited:
-            self._inherited.set(inherited, np.array(INHERITED_ANCHOR_COLOR), key=anchors.key)
+            self._inherited.set(thinned(inherited), np.array(INHERITED_ANCHOR_COLOR), key=anchors.key)
         if overlays.show_residual:
-            self._residual.set(residual, np.array(RESIDUAL_ANCHOR_COLOR), key=anchors.key)
+            self._residual.set(thinned(residual), np.array(RESIDUAL_ANCHOR_COLOR), key=anchors.key)
         return (
             frusta_key,
             session.view.look_through,
@@ -255,7 +268,7 @@ class Scene:
     ) -> None:
         camera = (view.world_to_camera, view.K, view.width, view.height)
         target = self._target
-        target.clear()
+        target.clear(BACKGROUND)
         if base_key is not None:
             self.shows = RENDERED
             if self.is_software:
@@ -265,7 +278,7 @@ class Scene:
         elif points_key is not None:
             self.shows = HINT if self._is_hint else CLOUD
             unit: Literal["px", "world"]
-            size, unit = (self._hint_size, "world") if self._is_hint else (self._cloud_point_px(view), "px")
+            size, unit = (self._point_size, "world") if self._point_size > 0 else (self._cloud_point_px(view), "px")
             # A picture that stands right before the eye would hide all the others.
             near = HINT_NEAR_SHARE * session.view.distance if self._is_hint else NEAR
             self._cloud.draw(target, *camera, near, shape="circle", size=size, unit=unit, is_depth_tested=True)
@@ -278,11 +291,9 @@ class Scene:
         if session.overlays.show_frusta and is_free:  # from inside a camera the others are only in the way
             self._frusta.draw(target, *camera, width_px=1.5, opacity=0.8)
         if self.counts.n_inherited and session.overlays.show_inherited:
-            self._inherited.draw(target, *camera, shape="ring", size=_mark_px(self.counts.n_inherited), opacity=0.7)
+            self._inherited.draw(target, *camera, shape="ring", size=5.0, opacity=0.55)
         if self.counts.n_residual and session.overlays.show_residual:
-            self._residual.draw(
-                target, *camera, shape="diamond", size=_mark_px(self.counts.n_residual) + 2.5, outline_px=1.0
-            )
+            self._residual.draw(target, *camera, shape="diamond", size=6.5, outline_px=1.0, opacity=0.8)
         target.resolve(BACKGROUND)
 
     def _cloud_point_px(self, view: SceneView) -> float:
@@ -291,6 +302,20 @@ class Scene:
         return float(np.clip(0.45 * np.sqrt(per_point_px2), 2.0, 5.0))
 
 
-def _mark_px(n_marks: int) -> float:
-    """Many marks are drawn smaller, so that the picture under them stays visible."""
-    return float(np.clip(7.0 - np.log10(max(n_marks, 1)) * 0.8, 3.0, 6.0))
+def moving_share(drawn_share: float, took_ms: float) -> float:
+    """Share of the full size at which a picture takes about MOVING_MS, given what another one took.
+
+    In eighths, so that the size does not change with every picture.
+    """
+    share = drawn_share * math.sqrt(MOVING_MS / max(took_ms, 1e-3))
+    return float(np.clip(math.floor(share * 8) / 8, *MOVING_SHARES))
+
+
+def thinned(positions: np.ndarray, most: int = MAX_MARKS) -> np.ndarray:
+    """At most this many rows, chosen by chance but always the same ones. [n <= most, 3]
+
+    By chance, because anchors lie in the order of a grid: every tenth of them would draw stripes.
+    """
+    if len(positions) <= most:
+        return positions
+    return positions[np.random.default_rng(0).choice(len(positions), most, replace=False)]

@@ -81,7 +81,7 @@ class StudioWindow:
         self.window = make_window(width, height)
         self.ctx = moderngl.create_context(require=330)
         self.ctx.gc_mode = "context_gc"  # dropped objects wait for free_dropped() on this thread
-        self.frame = Frame(self.window, self.ctx, session, fixed_delta_s=fixed_delta_s)
+        self.frame = Frame(self.window, self.ctx, session, fixed_delta_s=fixed_delta_s, on_input=self._answer_soon)
         self._handlers = {
             "on_file_drop": self._file_dropped,
             "on_close": self._close_asked,
@@ -91,6 +91,8 @@ class StudioWindow:
         }
         self.window.push_handlers(**self._handlers)
         self._is_closed = False
+        self._is_running = False
+        self._is_answer_due = False
         self._title = ""
 
     # ---- the loop --------------------------------------------------------------------------------------------
@@ -99,11 +101,13 @@ class StudioWindow:
         """Serve events and draw on demand until the window is closed."""
         previous = signal.signal(signal.SIGTERM, lambda *_: pyglet.app.exit())
         pyglet.clock.schedule_interval(self.tick, TICK_S)
+        self._is_running = True
         try:
             pyglet.app.run(None)
         except KeyboardInterrupt:
             logger.info("Interrupted; closing")
         finally:
+            self._is_running = False
             pyglet.clock.unschedule(self.tick)
             signal.signal(signal.SIGTERM, previous)
 
@@ -114,6 +118,16 @@ class StudioWindow:
         if self.frame.ui.quit_requested:
             pyglet.app.exit()
         self._show_title()
+
+    def _answer_soon(self) -> None:
+        """Draw right after the events at hand, instead of up to a tick later."""
+        if self._is_running and not self._is_answer_due:
+            self._is_answer_due = True
+            pyglet.clock.schedule_once(self._answer, 0.0)
+
+    def _answer(self, dt_s: float) -> None:
+        self._is_answer_due = False
+        self.tick(0.0)  # the regular tick counts the time
 
     def draw(self) -> None:
         """Draw one frame now."""

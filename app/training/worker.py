@@ -16,13 +16,11 @@ from pathlib import Path
 
 from app.kernels import use_threads
 from app.logs import FORMAT
+from app.priority import lower_process
 from app.training.messages import Command, Event, TrainJob, decode, encode
 from app.training.run import MakeTraining, TrainingRun
 
 logger = logging.getLogger(__name__)
-
-NICENESS = 5
-"""On two cores the worker needs both; being nice lets the window go first."""
 
 
 def n_cores() -> int:
@@ -65,12 +63,9 @@ def _redirect_output(path: Path) -> None:
 
 
 def _set_threads(*, is_window_open: bool) -> int:
-    cores = n_cores()
-    n_threads = n_training_threads(cores, is_window_open=is_window_open)
-    if is_window_open and cores <= 2 and hasattr(os, "nice"):
-        with suppress(OSError):
-            os.nice(NICENESS)
-    return use_threads(n_threads)
+    if is_window_open:  # before any thread is started, since threads take over the priority
+        lower_process()
+    return use_threads(n_training_threads(n_cores(), is_window_open=is_window_open))
 
 
 def _receiver(commands: Connection) -> Callable[[float], Command | None]:

@@ -14,7 +14,7 @@ import numpy as np
 from ui.gl.image import ImagePainter, ImageTexture, Rect
 from ui.gl.shaders import load_program
 
-Precision = Literal["f2", "f4"]
+Precision = Literal["f1", "f2", "f4"]
 BLACK = (0.0, 0.0, 0.0)
 
 
@@ -24,7 +24,9 @@ class Target:
     Args:
         ctx: Current context. All methods belong to its thread.
         size: Width and height, px.
-        precision: "f2" for RGBA16F (display), "f4" for RGBA32F (checks).
+        precision: "f2" for RGBA16F (display), "f4" for RGBA32F (checks), "f1" for 8 bits that are shown as they are:
+            cleared to the background, nothing to resolve. Good for a few marks over a picture, not for many faint
+            layers, and one pass over all pixels less.
     """
 
     def __init__(self, ctx: moderngl.Context, size: tuple[int, int] = (16, 16), *, precision: Precision = "f2") -> None:
@@ -47,6 +49,11 @@ class Target:
         return self._size
 
     @property
+    def is_direct(self) -> bool:
+        """Is what is drawn shown as it is?"""
+        return self._precision == "f1"
+
+    @property
     def framebuffer(self) -> moderngl.Framebuffer:
         """What is drawn into: premultiplied colour and depth. Replaced by resize()."""
         assert self._framebuffer is not None, "the target was released"
@@ -55,8 +62,9 @@ class Target:
     @property
     def texture(self) -> moderngl.Texture:
         """The 8-bit picture of the last resolve(), upright with ImGui's default uv. Replaced by resize()."""
-        assert self._resolved is not None, "the target was released"
-        return self._resolved
+        shown = self._color if self.is_direct else self._resolved
+        assert shown is not None, "the target was released"
+        return shown
 
     def resize(self, width: int, height: int) -> bool:
         """Take another size; contents are lost (cleared) when it differs.
@@ -73,13 +81,17 @@ class Target:
         self._release_pictures()
         self._size = (width, height)
         self._color = self._ctx.texture(self._size, 4, dtype=self._precision)
-        self._color.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self._color.filter = (
+            (moderngl.LINEAR, moderngl.LINEAR) if self.is_direct else (moderngl.NEAREST, moderngl.NEAREST)
+        )
+        self._color.repeat_x = self._color.repeat_y = False
         self._depth = self._ctx.depth_renderbuffer(self._size)
         self._framebuffer = self._ctx.framebuffer([self._color], self._depth)
-        self._resolved = self._ctx.texture(self._size, 4)
-        self._resolved.filter = (moderngl.LINEAR, moderngl.LINEAR)
-        self._resolved.repeat_x = self._resolved.repeat_y = False
-        self._resolved_framebuffer = self._ctx.framebuffer([self._resolved])
+        if not self.is_direct:
+            self._resolved = self._ctx.texture(self._size, 4)
+            self._resolved.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            self._resolved.repeat_x = self._resolved.repeat_y = False
+            self._resolved_framebuffer = self._ctx.framebuffer([self._resolved])
         self.clear()
         self.resolve()
         return True
@@ -96,9 +108,12 @@ class Target:
             self._ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
             self._ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
 
-    def clear(self) -> None:
-        """Nothing drawn: transparent black and far depth."""
-        self.framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
+    def clear(self, background: tuple[float, float, float] = BLACK) -> None:
+        """Nothing drawn, and far depth: transparent black, or the background where nothing is resolved later."""
+        if self.is_direct:
+            self.framebuffer.clear(*background, 1.0, depth=1.0)
+        else:
+            self.framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
 
     def draw_image(self, image: ImageTexture, rect: Rect | None = None) -> None:
         """Draw an opaque picture, such as one from the CPU rasterizer, to draw overlays on top of.
@@ -112,7 +127,7 @@ class Target:
         self._painter.draw(self, image, rect)
 
     def resolve(self, background: tuple[float, float, float] | None = BLACK) -> moderngl.Texture:
-        """Put what was drawn over a background and round it to 8 bits.
+        """Put what was drawn over a background and round it to 8 bits; a direct target has that behind it already.
 
         Args:
             background: Display-encoded RGB in 0..1. None keeps the picture transparent, with colours not multiplied by
@@ -120,6 +135,8 @@ class Target:
         Returns:
             The RGBA8 picture, also at `texture`; opaque unless background is None.
         """
+        if self.is_direct:
+            return self.texture
         assert self._color is not None, "the target was released"
         assert self._resolved_framebuffer is not None, "the target was released"
         self._bind(self._resolved_framebuffer, moderngl.NOTHING)
@@ -138,9 +155,10 @@ class Target:
 
     def read_resolved(self) -> np.ndarray:
         """The picture of the last resolve() without its alpha. [H, W, 3] uint8. Waits for the GPU."""
-        assert self._resolved_framebuffer is not None, "the target was released"
+        shown = self._framebuffer if self.is_direct else self._resolved_framebuffer
+        assert shown is not None, "the target was released"
         width, height = self._size
-        raw = self._resolved_framebuffer.read(components=3, alignment=1)
+        raw = shown.read(components=3, alignment=1)
         return np.frombuffer(raw, dtype=np.uint8).reshape(height, width, 3).copy()
 
     def release(self) -> None:

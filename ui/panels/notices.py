@@ -16,6 +16,8 @@ TOAST_WIDTH = 420.0
 INFO_LIFETIME_S = 6.0
 WARNING_LIFETIME_S = 20.0
 MAX_TOASTS = 4
+ROOM_BELOW = 34.0
+"""The line that says what is shown stays readable."""
 
 _LOOKS = {
     "info": (Icon.INFO, theme.SKY),
@@ -41,7 +43,7 @@ class NoticesPanel:
         now_s = time.monotonic()
         alive = {id(notice) for notice in notices}
         self._seen_s = {key: seen_s for key, seen_s in self._seen_s.items() if key in alive}
-        right, y = area.x1 - 12, area.y1 - 12
+        right, y = area.x1 - 12, area.y1 - 12 - ROOM_BELOW
         for index in reversed(range(max(len(notices) - MAX_TOASTS, 0), len(notices))):
             notice = notices[index]
             age_s = now_s - self._seen_s.setdefault(id(notice), now_s)

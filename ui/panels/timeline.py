@@ -145,7 +145,7 @@ def _draw_track(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         band = Rect(x0, band_top, x1, band_bottom)
         ui.mark_rect(f"timeline.clip{clip.clip_index}", band)
         _draw_band(draw, band, session, clip, status, ui)
-    _draw_ruler(draw, track, timeline.n_frames, band_bottom)
+    _draw_ruler(draw, track, timeline.n_frames, timeline.frame_index)
     if hovered is not None and hovered != timeline.frame_index:
         _draw_hover(draw, track, hovered, timeline.n_frames)
     _draw_playhead(draw, track, timeline.frame_index, timeline.n_frames, ui)
@@ -233,7 +233,8 @@ def _hatch(draw: Any, rect: Rect, color: theme.Color, spacing: float) -> None:
     draw.pop_clip_rect()
 
 
-def _draw_ruler(draw: Any, track: Rect, n_frames: int, band_bottom: float) -> None:
+def _draw_ruler(draw: Any, track: Rect, n_frames: int, shown_frame: int) -> None:
+    flag = _flag_rect(track, shown_frame, n_frames)
     step = tick_step(n_frames, track.width)
     is_each_frame_wide = track.width / max(n_frames, 1) >= 7
     if is_each_frame_wide:
@@ -243,7 +244,9 @@ def _draw_ruler(draw: Any, track: Rect, n_frames: int, band_bottom: float) -> No
     for frame_index in range(0, n_frames, step):
         x = cell_left(frame_index, track, n_frames)
         draw.add_line_v(x, track.y0 + 6, track.y0 + RULER_HEIGHT - 1, theme.u32(theme.RAISED_ACTIVE))
-        draw.add_text(ImVec2(x + 4, track.y0 + 2), theme.u32(theme.TEXT_DIM), str(frame_index))
+        label = str(frame_index)
+        if x + 4 > flag.x1 or x + 4 + imgui.calc_text_size(label).x < flag.x0:  # a label half hidden is a wrong number
+            draw.add_text(ImVec2(x + 4, track.y0 + 2), theme.u32(theme.TEXT_DIM), label)
 
 
 def _draw_hover(draw: Any, track: Rect, frame_index: int, n_frames: int) -> None:
@@ -260,9 +263,15 @@ def _draw_playhead(draw: Any, track: Rect, frame_index: int, n_frames: int, ui: 
         ImVec2(left, track.y0 + RULER_HEIGHT), ImVec2(right, track.y1), theme.u32(theme.faded(theme.PLAYHEAD, 0.10))
     )
     draw.add_line_v(x, track.y0 + 10, track.y1, white, 2)
-    label = str(frame_index)
-    half = imgui.calc_text_size(label).x / 2 + 6
-    flag_x = min(max(x, track.x0 + half), track.x1 - half)
-    draw.add_rect_filled(ImVec2(flag_x - half, track.y0), ImVec2(flag_x + half, track.y0 + 18), white, 3)
-    draw.add_text(ImVec2(flag_x - half + 6, track.y0 + 1), theme.u32(theme.VOID), label)
-    ui.mark_rect("timeline.playhead", Rect(flag_x - half, track.y0, flag_x + half, track.y0 + 18))
+    flag = _flag_rect(track, frame_index, n_frames)
+    draw.add_rect_filled(flag.low, flag.high, white, 3)
+    draw.add_text(ImVec2(flag.x0 + 6, track.y0 + 1), theme.u32(theme.VOID), str(frame_index))
+    ui.mark_rect("timeline.playhead", flag)
+
+
+def _flag_rect(track: Rect, frame_index: int, n_frames: int) -> Rect:
+    """Where the playhead's number stands; held inside the track."""
+    x = (cell_left(frame_index, track, n_frames) + cell_left(frame_index + 1, track, n_frames)) / 2
+    half = imgui.calc_text_size(str(frame_index)).x / 2 + 6
+    middle = min(max(x, track.x0 + half), track.x1 - half)
+    return Rect(middle - half, track.y0, middle + half, track.y0 + 18)

@@ -124,13 +124,17 @@ def _pair(left: str, right: str) -> None:
 
 def _draw_curves(status: Any, ui: UiState) -> None:
     height = min(max((imgui.get_content_region_avail().y - 190) / 2, 84.0), 150.0)
-    _draw_curve("Held-out PSNR, dB", status.psnr_history, theme.GREEN, height, has_markers=True, digits=2)
+    n_steps = status.n_steps
+    _draw_curve("Held-out PSNR, dB", status.psnr_history, theme.GREEN, height, n_steps, has_markers=True, digits=2)
     ui.mark("training.psnr")
-    _draw_curve("Loss", status.loss_history, theme.SKY, height, has_markers=False, digits=4)
+    _draw_curve("Loss", status.loss_history, theme.SKY, height, n_steps, has_markers=False, digits=4)
     ui.mark("training.loss")
 
 
-def _draw_curve(title: str, history: Any, color: theme.Color, height: float, *, has_markers: bool, digits: int) -> None:
+def _draw_curve(
+    title: str, history: Any, color: theme.Color, height: float, n_steps: int, *, has_markers: bool, digits: int
+) -> None:
+    """One curve over the steps of the whole clip, so that it also shows how far the training has come."""
     steps, values = plot_arrays(history)
     _pair(title, f"{values[-1]:.{digits}f}" if len(values) else "–")
     flags = implot.Flags_.canvas_only | implot.Flags_.no_inputs | implot.Flags_.no_frame
@@ -141,9 +145,9 @@ def _draw_curve(title: str, history: Any, color: theme.Color, height: float, *, 
         low, high = float(values.min()), float(values.max())
         margin = max((high - low) * 0.1, abs(high) * 0.01, 1e-6)
         implot.setup_axes("", "", axis, axis)
-        implot.setup_axes_limits(
-            float(steps[0]), float(max(steps[-1], steps[0] + 1)), low - margin, high + margin, implot.Cond_.always
-        )
+        last = float(max(steps[-1], n_steps, 10))
+        implot.setup_axes_limits(0.0, last, low - margin, high + margin, implot.Cond_.always)
+        implot.setup_axis_ticks(implot.ImAxis_.x1, 0.0, last, 5)
         spec = implot.Spec(line_color=ImVec4(*color), line_weight=2.0)
         if has_markers:
             spec.marker = implot.Marker_.circle
@@ -159,7 +163,7 @@ def _draw_curve(title: str, history: Any, color: theme.Color, height: float, *, 
 
 def _draw_clips(session: Any) -> None:
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.borders_inner_h | imgui.TableFlags_.scroll_y
-    flags |= imgui.TableFlags_.sizing_fixed_fit
+    flags |= imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.pad_outer_x
     if not imgui.begin_table("clips", 4, flags, ImVec2(0, max(imgui.get_content_region_avail().y - 4, 90))):
         return
     imgui.table_setup_scroll_freeze(0, 1)
