@@ -89,3 +89,13 @@ def test_released_target_can_be_released_again(ctx: moderngl.Context) -> None:
     target = Target(ctx, (4, 4))
     target.release()
     target.release()
+
+
+def test_a_direct_target_shows_marks_over_its_background(ctx: moderngl.Context, keep: Keep) -> None:
+    target = keep(Target(ctx, (4, 2), precision="f1"))
+    target.clear((0.2, 0.4, 0.6))
+    target.use(moderngl.BLEND)
+    assert target.resolve((1.0, 0.0, 0.0)) is target.texture  # nothing is left to do
+    np.testing.assert_array_equal(
+        target.read_resolved(), np.broadcast_to(np.array([51, 102, 153], np.uint8), (2, 4, 3))
+    )
