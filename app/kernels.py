@@ -12,6 +12,8 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+from engine.conventions import SPIN_COUNT
+
 logger = logging.getLogger(__name__)
 
 WARM_UP = "from engine.raster.cpu.warm import warm_up; warm_up()"
@@ -51,10 +53,10 @@ def warm_cache() -> None:
 def use_threads(n_threads: int | None) -> int:
     """Set how many threads the calling thread computes with; None for every core. Returns how many it will be.
 
-    To be called before torch is imported where that is possible: OpenMP reads its environment when it is loaded. The
-    spin count is that of engine.raster.cpu.threads, which cannot be asked without importing torch.
+    To be called before torch is imported where that is possible: OpenMP reads its environment when it is loaded, so
+    the spin count is set here and not only in configure_threads, whose module imports torch.
     """
-    os.environ.setdefault("GOMP_SPINCOUNT", "20000")
+    os.environ.setdefault("GOMP_SPINCOUNT", str(SPIN_COUNT))
     from engine.raster.cpu.threads import configure_threads
 
     return configure_threads(n_threads)

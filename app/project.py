@@ -22,8 +22,6 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from safetensors import SafetensorError, safe_open
-
 from app.lock import ProcessLock
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip, split_clips
@@ -348,16 +346,6 @@ def with_overrides(settings: ProjectSettings, overrides: dict[str, Any]) -> Proj
     changed = replace(settings, overrides=settings.overrides | overrides)
     changed.config()
     return changed
-
-
-def read_clip_header(path: Path) -> dict[str, Any] | None:
-    """Header of a clip, checkpoint or snapshot without its arrays; None when there is none or it is damaged."""
-    try:
-        with safe_open(path, framework="numpy") as file:
-            header = json.loads((file.metadata() or {})["header"])
-    except (OSError, SafetensorError, KeyError, ValueError):
-        return None
-    return header if isinstance(header, dict) else None
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:

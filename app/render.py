@@ -12,7 +12,7 @@ from app.kernels import prepare_drawing
 from app.latest import LatestWorker
 
 BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
-"""Behind everything; the same dark grey as the viewport's."""
+"""Behind everything; the viewport takes its dark grey from here."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,3 +20,6 @@ EPS2D_PX2 = 0.3
 """Low-pass added to both diagonal entries of the projected covariance, square pixels."""
 FRUSTUM_MARGIN = 0.15
 """The slope x/z used in the projection Jacobian is clamped this share of the image beyond its borders."""
+SPIN_COUNT = 20_000
+"""Rounds an idle OpenMP thread spins before it sleeps (GOMP_SPINCOUNT). Unbounded spinning falls off a cliff beside a
+busy process (10 times slower), sleeping at once loses half the speed (measured 2026-11 on 2 cores)."""

@@ -15,6 +15,7 @@ from typing import Any, Literal
 import moderngl
 import numpy as np
 
+from app.render import BACKGROUND
 from ui.gl import (
     INHERITED_ANCHOR_COLOR,
     NEAR,
@@ -28,7 +29,6 @@ from ui.gl import (
     is_software,
 )
 
-BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
 MAX_PICTURE_WIDTH = 960
 """The CPU rasterizer is not asked for more than this; the picture is stretched."""
 MOVING_SHARES = (0.25, 1.0)

@@ -1,7 +1,6 @@
 """Colours, fonts and spacing of the whole window. Draws nothing by itself.
 
-Hues that carry meaning come from the Okabe-Ito set, which stays apart for the common kinds of colour blindness; every
-one of them is also told apart by a shape, an icon or a word where it is used.
+Hues that carry meaning are those of ui.colors.
 """
 
 from __future__ import annotations
@@ -13,14 +12,13 @@ from pathlib import Path
 import imgui_bundle
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
+from app.render import BACKGROUND
+from ui.colors import GREEN, ORANGE, SKY, VERMILLION, YELLOW, Color, rgb
+from ui.colors import HELD_OUT as HELD_OUT  # looked up as theme.HELD_OUT by the panels, as all colours are
+from ui.colors import INHERITED as INHERITED
+from ui.colors import RESIDUAL as RESIDUAL
+
 logger = logging.getLogger(__name__)
-
-Color = tuple[float, float, float, float]
-
-
-def rgb(r: int, g: int, b: int, alpha: float = 1.0) -> Color:
-    """An 8-bit colour as floats in 0..1."""
-    return (r / 255.0, g / 255.0, b / 255.0, alpha)
 
 
 def faded(color: Color, alpha: float) -> Color:
@@ -33,19 +31,11 @@ def u32(color: Color) -> int:
     return imgui.color_convert_float4_to_u32(ImVec4(*color))
 
 
-# Okabe-Ito
-SKY = rgb(86, 180, 233)
 SKY_LIGHT = rgb(120, 198, 242)
 SKY_DARK = rgb(60, 158, 214)
-ORANGE = rgb(230, 159, 0)
-GREEN = rgb(0, 158, 115)
-YELLOW = rgb(240, 228, 66)
-BLUE = rgb(0, 114, 178)
-VERMILLION = rgb(213, 94, 0)
-PURPLE = rgb(204, 121, 167)
 
 # Surfaces, dark to light
-VOID = rgb(18, 20, 24)
+VOID: Color = (*BACKGROUND, 1.0)
 BACKDROP = rgb(24, 27, 32)
 PANEL = rgb(32, 36, 43)
 RAISED = rgb(44, 49, 58)
@@ -58,9 +48,6 @@ TEXT_ON_ACCENT = rgb(10, 20, 30)
 STATUS_BAR = rgb(216, 221, 228)
 STATUS_TEXT = rgb(32, 38, 46)
 
-INHERITED = SKY
-RESIDUAL = ORANGE
-HELD_OUT = PURPLE
 PLAYHEAD = rgb(255, 255, 255)
 
 CLIP_COLORS: dict[str, Color] = {

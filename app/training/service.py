@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from app.project import Project, read_clip_header, read_metrics
+from app.project import Project, read_metrics
 from app.status import ClipStatus, TrainingStatus
 from app.training.messages import (
     ENDINGS,
@@ -39,6 +39,7 @@ from app.training.messages import (
 from app.training.process import ProcessWorker, Worker
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
+from engine.model.clip_state import read_clip_header
 
 logger = logging.getLogger(__name__)
 

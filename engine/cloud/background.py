@@ -17,7 +17,7 @@ from engine.cloud.image_filters import dilate, erode, remove_small_blobs
 from engine.cloud.parallel import map_ordered, row_spans
 
 CLUSTER_SHARE = 0.3
-"""Share of the frames that must agree; the mode of the shortest window with this share (feasibility.md section 1)."""
+"""Share of the frames that must agree; the mode of the shortest window with this share."""
 STABLE_SHARE = 0.5
 """A pixel is stable when at least this share of frames lies within the noise of its background: a clear majority. In
 short captures a larger share would also give up places that people merely cross often."""

@@ -1,8 +1,8 @@
 """Geometry-aware deduplication: which points of a clip are not already covered by the reference clip's points.
 
 Every inherited point owns a sphere; the union's signed distance is min_i(|q - p_i| - r_i), exactly. Testing only the
-nearest centre is not the union: a farther but larger sphere may cover q (18 % against 10 % kept on random points,
-method.md section 1). Source: ClipGStream, geometry-aware deduplication.
+nearest centre is not the union: a farther but larger sphere may cover q (18 % against 10 % kept on random points).
+Source: ClipGStream, geometry-aware deduplication.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Per-camera white balance: camera_colour = gain * scene_colour, one gain per channel.
 
 Not a full colour model (no offset, no cross terms). The gauge is fixed by a geometric mean of 1 over the cameras, so
-scene colours are those of the mean camera. Measured spread on a real dome: 0.78 to 1.23 (feasibility.md section 1).
+scene colours are those of the mean camera. Measured spread on a real dome: 0.78 to 1.23.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 No shape of the scene is assumed. Cameras may sit on the scene's own surface (a dome, the walls of a room), so the
 near plane is not a small constant: with 1 cm instead of a fifth of the focus distance, wall Gaussians beside an unseen
-camera covered its whole picture and cost 19 dB (feasibility.md section 2).
+camera covered its whole picture and cost 19 dB (measured 2026-11).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Semi-global smoothing of matching costs and the choice of one inverse depth per pixel.
 
 Source: Hirschmueller 2008, "Stereo processing by semiglobal matching"; eight paths. The jump penalty is unusually
-strong because bare walls carry no evidence of their own (feasibility.md section 7).
+strong because bare walls carry no evidence of their own.
 """
 
 from __future__ import annotations

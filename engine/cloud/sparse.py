@@ -1,6 +1,6 @@
 """Sparse points from SIFT matches and the known poses, by pycolmap in a child process of its own.
 
-pycolmap installs native signal handlers and, imported before Python's zlib, breaks it (gui.md section 7); neither must
+pycolmap installs native signal handlers and, imported before Python's zlib, breaks it; neither must
 reach this process. Arrays cross as .npz files; there is no pickle. A failure costs the points, never the job: they only
 set depth ranges, and the coarse sweep can do that too.
 """

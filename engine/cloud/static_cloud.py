@@ -1,7 +1,7 @@
 """The static scene as points: depth maps of the backgrounds by a multi-view sweep, checked, filled and fused.
 
 No shape is assumed (no floor, no dome): the same steps serve a ring of cameras, a room and a forward-facing rig.
-Recipe and figures: feasibility.md section 7. What moves is not here (engine.cloud.moving_cloud).
+What moves is not here (engine.cloud.moving_cloud).
 Letters: C cameras, H W full pictures, h w working pictures (about 160 x 90).
 """
 
@@ -30,7 +30,7 @@ from engine.errors import PreparationError
 Report = Callable[[str], None]
 
 WORKING_PIXELS = 160 * 90
-"""Depth maps of about this many pixels: at twice the size the cloud was no better (feasibility.md section 7)."""
+"""Depth maps of about this many pixels: at twice the size the cloud was no better (measured 2026-11 on a dome)."""
 PROBE_PIXELS = 80 * 45
 """Size of the first look that finds the depth range where there are no sparse points."""
 PROBE_RANGE = (0.3, 12.0)

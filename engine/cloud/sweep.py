@@ -81,7 +81,7 @@ def _probe_points(rig: CameraRig, camera: int, near: float, far: float) -> np.nd
 def plane_inverse_depths(rig: CameraRig, camera: int, sources: list[int], near: float, far: float) -> np.ndarray:
     """Planes uniform in inverse depth, at most one pixel of disparity apart in the sources. float32 [D], rising.
 
-    Coarser steps skip the match altogether (feasibility.md section 7: 3.4 px steps lost 10x). D is kept in 24..192.
+    Coarser steps skip the match altogether (steps of 3.4 px left a tenth of the points). D is kept in 24..192.
     """
     n_planes = 24.0
     for other in sources:

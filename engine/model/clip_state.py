@@ -96,3 +96,13 @@ def read_clip_state(path: Path | str) -> ClipState:
             path=path,
         )
     return ClipState(arrays, header)
+
+
+def read_clip_header(path: Path) -> dict[str, Any] | None:
+    """Header of a clip, checkpoint or snapshot without its arrays; None when there is none or it is damaged."""
+    try:
+        with safe_open(path, framework="numpy") as file:
+            header = json.loads((file.metadata() or {})["header"])
+    except (OSError, SafetensorError, KeyError, ValueError):
+        return None
+    return header if isinstance(header, dict) else None

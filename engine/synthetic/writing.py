@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import re
 from collections.abc import Callable, Iterable
 from fractions import Fraction
@@ -20,6 +19,7 @@ from typing import Any
 import av
 import numpy as np
 
+from engine.files import atomic_path
 from engine.synthetic.raycast import SceneCamera, make_truth
 from engine.synthetic.scene import SAMPLE_CAMERAS, SyntheticScene, make_scene
 
@@ -98,11 +98,10 @@ def cameras_document(scene: SyntheticScene) -> dict[str, Any]:
 
 def write_json(path: Path, document: dict[str, Any]) -> None:
     """Write JSON with each innermost list on one line, replacing the file at once."""
-    temporary = path.with_name(f".{path.name}.part")
     text = json.dumps(document, indent=1)
     text = re.sub(r"\[\s+([^\[\]{}]*?)\s+\]", lambda row: "[" + re.sub(r",\s+", ", ", row[1]) + "]", text)
-    temporary.write_text(text + "\n", encoding="utf-8")
-    os.replace(temporary, path)
+    with atomic_path(path) as partial:
+        partial.write_text(text + "\n", encoding="utf-8")
 
 
 def write_truth(scene: SyntheticScene, camera_index: int, folder: Path) -> None:
@@ -111,11 +110,8 @@ def write_truth(scene: SyntheticScene, camera_index: int, folder: Path) -> None:
     write_json(folder / "parts.json", {"parts": [part.name for part in scene.parts]})
     for frame_index in range(scene.n_frames):
         truth = make_truth(scene, camera_index, frame_index)
-        path = folder / f"{frame_index:06d}.npz"
-        temporary = path.with_name(f".{path.name}.part")
-        with temporary.open("wb") as file:
-            np.savez_compressed(file, depths=truth.depths, part_indices=truth.part_indices)
-        os.replace(temporary, path)
+        with atomic_path(folder / f"{frame_index:06d}.npz") as partial:
+            np.savez_compressed(partial, depths=truth.depths, part_indices=truth.part_indices)
 
 
 def write_video(path: Path, frames: Iterable[np.ndarray], *, fps: float, crf: int = CRF) -> None:
@@ -128,23 +124,18 @@ def write_video(path: Path, frames: Iterable[np.ndarray], *, fps: float, crf: in
         crf: x264 quality, lower is better.
     """
     rate = Fraction(fps).limit_denominator(1001)
-    temporary = path.with_name(f".{path.name}.part")
     options = {"movflags": "+faststart", "fflags": "+bitexact"}
-    try:
-        with av.open(str(temporary), "w", format="mp4", options=options) as container:
-            stream: Any = None
-            for index, frame in enumerate(frames):
-                if stream is None:
-                    stream = _add_stream(container, rate, frame.shape[1], frame.shape[0], crf)
-                picture = av.VideoFrame.from_ndarray(to_yuv444(frame), format="yuv444p")
-                picture.pts = index
-                picture.time_base = 1 / rate
-                container.mux(stream.encode(picture))
-            if stream is not None:
-                container.mux(stream.encode())
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with atomic_path(path) as partial, av.open(str(partial), "w", format="mp4", options=options) as container:
+        stream: Any = None
+        for index, frame in enumerate(frames):
+            if stream is None:
+                stream = _add_stream(container, rate, frame.shape[1], frame.shape[0], crf)
+            picture = av.VideoFrame.from_ndarray(to_yuv444(frame), format="yuv444p")
+            picture.pts = index
+            picture.time_base = 1 / rate
+            container.mux(stream.encode(picture))
+        if stream is not None:
+            container.mux(stream.encode())
 
 
 def _add_stream(container: Any, rate: Fraction, width: int, height: int, crf: int) -> Any:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import shutil
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -22,6 +25,8 @@ from app.commands import (
     TogglePlay,
     TrainNextClip,
 )
+from app.session import Session
+from app.settings import Settings
 from app.status import ClipStatus
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
@@ -326,3 +331,58 @@ def test_closing_closes_the_session_once(open_pilot: Callable[..., Pilot]) -> No
     pilot.studio.close()
     pilot.studio.close()
     assert pilot.session.is_closed
+
+
+def _without_cameras(folder: Path) -> str:
+    (folder / "cameras.json").unlink()
+    return "no capture"
+
+
+def _with_half_a_video(folder: Path) -> str:
+    video = folder / "cam01.mp4"
+    video.write_bytes(video.read_bytes()[: video.stat().st_size * 6 // 10])
+    return "cam01"
+
+
+def _with_nan_in_a_pose(folder: Path) -> str:
+    path = folder / "cameras.json"
+    document = json.loads(path.read_text())
+    document["cameras"][2]["world_to_camera"][0][3] = float("nan")
+    path.write_text(json.dumps(document))
+    return "has NaN"
+
+
+@pytest.mark.parametrize("damage", [_without_cameras, _with_half_a_video, _with_nan_in_a_pose])
+def test_a_capture_that_cannot_be_opened_becomes_a_notice_and_the_window_goes_on(
+    damage: Callable[[Path], str],
+    open_pilot: Callable[..., Pilot],
+    tiny_capture: Path,
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "holiday"
+    shutil.copytree(tiny_capture, folder)
+    expected = damage(folder)
+    before = sorted(folder.iterdir())
+    session = Session(
+        project_dir=tmp_path / "project", settings=Settings(tmp_path / "settings.json"), is_preloading=False
+    )
+    pilot = open_pilot(session)  # closes the session with the window
+    pilot.studio.window.dispatch_event("on_file_drop", 10, 10, [str(folder)])
+    until_s = time.monotonic() + 30.0
+    while not len(session.notices):
+        assert time.monotonic() < until_s, "no notice came"
+        pilot.draw()
+    pilot.draw(3)
+    notice = session.notices[0]
+    assert notice.kind == "error"
+    assert expected in notice.detail
+    assert str(folder) in f"{notice.detail} {notice.hint}"
+    assert sorted(folder.iterdir()) == before
+    assert not (tmp_path / "project").exists()
+    pilot.click("notice0.close")
+    assert len(session.notices) == 0
+    session.dispatch(OpenCapture(tiny_capture))
+    while session.capture is None:
+        assert time.monotonic() < until_s, f"a good capture did not open: {list(session.notices)}"
+        pilot.draw()
+    assert len(session.clips) == 1

@@ -119,10 +119,11 @@ def test_a_folder_that_is_no_capture_becomes_a_notice(tmp_path: Path, monkeypatc
     desk = Desk(tmp_path, [str(empty)])
     try:
         state = desk.wait_for("an error notice", lambda s: bool(s["notices"]), 40)
-        kind, title, detail, _ = state["notices"][0]
+        kind, title, detail, hint = state["notices"][0]
         assert kind == "error"
         assert "holiday" in title
-        assert str(empty) in detail
+        assert "no capture" in detail
+        assert hint.endswith(str(empty))
         assert state["capture"] is None
     finally:
         desk.close()

@@ -11,6 +11,7 @@ import moderngl
 import numpy as np
 
 from engine.capture.rig import CameraRig
+from ui.colors import CHOSEN, HELD_OUT
 from ui.gl.camera import NEAR, clip_matrix, uniform_matrix
 from ui.gl.shaders import load_program
 from ui.gl.targets import Target
@@ -18,10 +19,8 @@ from ui.gl.targets import Target
 LINES_PER_FRUSTUM = 10
 TRAINING_CAMERA_COLOR = (0.82, 0.85, 0.89, 1.0)
 """Neutral light grey: training cameras are the rule, so they carry no hue."""
-HELD_OUT_CAMERA_COLOR = (204 / 255, 121 / 255, 167 / 255, 1.0)
-"""Okabe-Ito reddish purple."""
-CHOSEN_CAMERA_COLOR = (240 / 255, 228 / 255, 66 / 255, 1.0)
-"""Okabe-Ito yellow."""
+HELD_OUT_CAMERA_COLOR = HELD_OUT
+CHOSEN_CAMERA_COLOR = CHOSEN
 _FLOATS_PER_LINE = 14
 
 

@@ -11,6 +11,7 @@ from typing import Literal
 import moderngl
 import numpy as np
 
+from ui.colors import INHERITED, RESIDUAL
 from ui.gl.camera import NEAR, clip_matrix, uniform_matrix
 from ui.gl.lines import with_alpha
 from ui.gl.shaders import load_program
@@ -19,10 +20,10 @@ from ui.gl.targets import Target
 PointShape = Literal["circle", "ring", "diamond"]
 SizeUnit = Literal["px", "world"]
 _SHAPE_NUMBERS: dict[PointShape, int] = {"circle": 0, "ring": 1, "diamond": 2}
-INHERITED_ANCHOR_COLOR = (86 / 255, 180 / 255, 233 / 255, 1.0)
-"""Okabe-Ito sky blue; drawn as circles."""
-RESIDUAL_ANCHOR_COLOR = (230 / 255, 159 / 255, 0.0, 1.0)
-"""Okabe-Ito orange; drawn as diamonds."""
+INHERITED_ANCHOR_COLOR = INHERITED
+"""Drawn as circles."""
+RESIDUAL_ANCHOR_COLOR = RESIDUAL
+"""Drawn as diamonds."""
 
 
 class PointRenderer:

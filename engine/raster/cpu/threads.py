@@ -20,12 +20,10 @@ import torch
 from numba.core import config as _numba_config
 from numba.np.ufunc.parallel import threading_layer
 
+from engine.conventions import SPIN_COUNT
+
 _config: Any = _numba_config  # its attributes are made at run time
 _log = logging.getLogger(__name__)
-
-SPIN_COUNT = 20_000
-"""Rounds an idle OpenMP thread spins before it sleeps. Unbounded spinning falls off a cliff beside a busy process
-(10 times slower), sleeping at once loses half the speed (kernels.md, section 7)."""
 
 _one_at_a_time = RLock()
 

@@ -16,7 +16,7 @@ from tests.raster_scenes import Scene, camera, gradient, gradients, layered_scen
 
 BACKENDS = ("cpu", "reference")
 NAMES = ("means", "quats", "scales", "opacities", "colors")
-# What kernels.md (section 2) measured for float32 against float64, rounded up.
+# The largest error of float32 against float64 as measured 2026-11, rounded up.
 PIXEL_TOLERANCE = 2e-6
 GRADIENT_TOLERANCE = 5e-6
 
