@@ -33,7 +33,8 @@ logger = logging.getLogger(__name__)
 
 FRAMES_AFTER_INPUT = 2
 """ImGui takes in a press and its release in two frames."""
-TRAINING_REFRESH_S = 0.1
+TRAINING_REFRESH_S = 0.2
+"""Often enough for numbers that nobody waits for; each frame is taken from the training where the CPU draws."""
 ATTENDED_S = 0.5
 """For this long after an input, every picture that arrives is shown at once."""
 MAX_TICK_S = 0.25

@@ -245,7 +245,8 @@ def _draw_ruler(draw: Any, track: Rect, n_frames: int, shown_frame: int) -> None
         x = cell_left(frame_index, track, n_frames)
         draw.add_line_v(x, track.y0 + 6, track.y0 + RULER_HEIGHT - 1, theme.u32(theme.RAISED_ACTIVE))
         label = str(frame_index)
-        if x + 4 > flag.x1 or x + 4 + imgui.calc_text_size(label).x < flag.x0:  # a label half hidden is a wrong number
+        is_clear = x > flag.x1 or x + imgui.calc_text_size(label).x + 12 < flag.x0
+        if is_clear:  # half hidden it would read as another number
             draw.add_text(ImVec2(x + 4, track.y0 + 2), theme.u32(theme.TEXT_DIM), label)
 
 
