@@ -20,6 +20,7 @@ EPS2D_PX2 = 0.3
 """Low-pass added to both diagonal entries of the projected covariance, square pixels."""
 FRUSTUM_MARGIN = 0.15
 """The slope x/z used in the projection Jacobian is clamped this share of the image beyond its borders."""
-SPIN_COUNT = 20_000
-"""Rounds an idle OpenMP thread spins before it sleeps (GOMP_SPINCOUNT). Unbounded spinning falls off a cliff beside a
-busy process (10 times slower), sleeping at once loses half the speed (measured 2026-11 on 2 cores)."""
+SPIN_COUNT = 2_000
+"""Rounds an idle OpenMP thread spins before it sleeps (GOMP_SPINCOUNT). A step of the sample's source clip took, on a
+quiet and on a busy machine of two cores: 20,000 rounds 30 and 210 ms, 2,000 rounds 35 and 90 ms, 200 rounds 42 ms
+quiet, sleeping at once (passive) 35 to 54 ms (2026-11). Unbounded spinning, the default, reached 600 ms busy."""
