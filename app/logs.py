@@ -1,29 +1,15 @@
-"""Logging set-up: one rotating file for the program, one plain file per worker, a ring buffer for a log panel."""
+"""Logging set-up: one rotating file for the program, one plain file per worker."""
 
 from __future__ import annotations
 
 import logging
 import logging.handlers
-from collections import deque
 from pathlib import Path
 
 from app.project import data_dir
 
 FORMAT = "%(asctime)s %(levelname)s %(name)s: %(message)s"
 MAX_LOG_BYTES = 2_000_000
-
-
-class RingBuffer(logging.Handler):
-    """Keeps the last records as text."""
-
-    def __init__(self, n_records: int = 500) -> None:
-        super().__init__(logging.INFO)
-        self.setFormatter(logging.Formatter(FORMAT))
-        self.lines: deque[str] = deque(maxlen=n_records)
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Remember one record."""
-        self.lines.append(self.format(record))
 
 
 def log_path() -> Path:

@@ -16,9 +16,8 @@ import logging
 import os
 import shutil
 import sys
-from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +68,7 @@ class ProjectSettings:
 
 
 class Project:
-    """An opened project folder. Use `create_project`, `open_project` or `open_or_create_project`."""
+    """An opened project folder. Use `create_project` or `open_project`."""
 
     def __init__(self, folder: Path, settings: ProjectSettings, lock: ProcessLock | None) -> None:
         self.folder = folder
@@ -260,13 +259,6 @@ def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
     return project
 
 
-def open_or_create_project(folder: Path | str, make_settings: Callable[[], ProjectSettings]) -> Project:
-    """Open the project in a folder, or make one there."""
-    if (Path(folder) / PROJECT_FILE).exists():
-        return open_project(folder)
-    return create_project(folder, make_settings())
-
-
 def sweep(project: Project) -> None:
     """Remove what a killed program left behind: snapshots and half-written files. Finished files stay."""
     leftovers = [*project.live_dir.glob("*"), *project.folder.rglob(".partial-*")]
@@ -339,13 +331,6 @@ def _write_settings(folder: Path, settings: ProjectSettings) -> None:
         raise ProjectError(
             f"The project could not be saved ({error.strerror}).", hint="Free some space and try again.", path=path
         ) from error
-
-
-def with_overrides(settings: ProjectSettings, overrides: dict[str, Any]) -> ProjectSettings:
-    """The same settings with training settings replaced. Raises ProjectError for a value outside its range."""
-    changed = replace(settings, overrides=settings.overrides | overrides)
-    changed.config()
-    return changed
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:

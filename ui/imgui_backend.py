@@ -200,11 +200,6 @@ class ImGuiBackend:
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
         self._after_frame()
 
-    def abandon_frame(self) -> None:
-        """Close an ImGui frame without drawing it, after something raised in its middle."""
-        imgui.end_frame()
-        self._after_frame()
-
     def _after_frame(self) -> None:
         self._keys_pressed_since_frame = False
         releases, self._held_releases = self._held_releases, []

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from imgui_bundle import ImVec2, imgui
 
+from ui.gl.image import Rect as PixelRect
 from ui.theme import Fonts
 
 Dispatch = Callable[[object], None]
@@ -17,23 +18,8 @@ Dispatch = Callable[[object], None]
 
 
 @dataclass(frozen=True)
-class Rect:
+class Rect(PixelRect):
     """A rectangle in window coordinates: logical pixels, origin top left, y down."""
-
-    x0: float
-    y0: float
-    x1: float
-    y1: float
-
-    @property
-    def width(self) -> float:
-        """Width in logical pixels."""
-        return self.x1 - self.x0
-
-    @property
-    def height(self) -> float:
-        """Height in logical pixels."""
-        return self.y1 - self.y0
 
     @property
     def center(self) -> tuple[float, float]:

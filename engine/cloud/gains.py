@@ -7,7 +7,8 @@ scene colours are those of the mean camera. Measured spread on a real dome: 0.78
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from engine.cloud.median import median_over_cameras
 
 N_ROUNDS = 8
 """Alternations of the two medians; changes are below 1e-3 after about five."""
@@ -45,31 +46,9 @@ def gains_from_observations(log_colors: np.ndarray, first_guess: np.ndarray) -> 
     log_gains = np.log(first_guess)
     is_measured = is_seen.sum(1) >= MIN_OBSERVATIONS
     for _ in range(N_ROUNDS):
-        scene = _median_over_cameras(log_colors, log_gains)
+        scene = median_over_cameras(log_colors - log_gains[:, None])
         for camera in np.flatnonzero(is_measured):
             rows = is_seen[camera]
             log_gains[camera] = np.median(log_colors[camera, rows] - scene[rows], axis=0)
         log_gains -= log_gains.mean(0)
-    return np.exp(log_gains), np.exp(_median_over_cameras(log_colors, log_gains)) - 1.0
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _median_over_cameras(log_colors, log_gains):
-    n_cameras, n_points, _ = log_colors.shape
-    medians = np.full((n_points, 3), np.nan)
-    ranked = np.empty(n_cameras)
-    for p in range(n_points):
-        for channel in range(3):
-            n = 0
-            for camera in range(n_cameras):
-                value = log_colors[camera, p, channel] - log_gains[camera, channel]
-                if np.isfinite(value):
-                    j = n
-                    while j > 0 and ranked[j - 1] > value:
-                        ranked[j] = ranked[j - 1]
-                        j -= 1
-                    ranked[j] = value
-                    n += 1
-            if n > 0:
-                medians[p, channel] = 0.5 * (ranked[(n - 1) // 2] + ranked[n // 2])
-    return medians
+    return np.exp(log_gains), np.exp(median_over_cameras(log_colors - log_gains[:, None])) - 1.0

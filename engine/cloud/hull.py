@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from engine.cloud.median import median_over_cameras
 from engine.cloud.parallel import map_ordered, row_spans
 
 BLOCK = 8
@@ -133,7 +134,7 @@ def hull_colors(pictures: np.ndarray, pixel: np.ndarray, is_visible: np.ndarray,
     for camera, picture in enumerate(pictures):
         rows = is_used[camera]
         samples[camera, rows] = picture.reshape(-1, 3)[pixel[camera, rows]] / gains[camera]
-    return _nan_medians(samples)
+    return median_over_cameras(samples)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -283,26 +284,3 @@ def _see_points(points, size, mask, projection, near):
         slack = COLOR_SLACK_VOXELS * size + shrink * depths[i] / focal  # one buffer cell of a 45 degree slope
         is_visible[i] = depths[i] <= nearest[y // shrink, x // shrink] + slack
     return pixel, is_visible
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _nan_medians(samples):
-    """Median over the first axis of [C, P, 3], ignoring NaN. float32 [P, 3]"""
-    n_cameras, n_points, _ = samples.shape
-    medians = np.full((n_points, 3), np.nan, np.float32)
-    ranked = np.empty(n_cameras, np.float32)
-    for p in range(n_points):
-        for channel in range(3):
-            n = 0
-            for c in range(n_cameras):
-                value = samples[c, p, channel]
-                if np.isfinite(value):
-                    j = n
-                    while j > 0 and ranked[j - 1] > value:
-                        ranked[j] = ranked[j - 1]
-                        j -= 1
-                    ranked[j] = value
-                    n += 1
-            if n > 0:
-                medians[p, channel] = np.float32(0.5) * (ranked[(n - 1) // 2] + ranked[n // 2])
-    return medians

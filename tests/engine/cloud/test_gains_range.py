@@ -7,6 +7,7 @@ import pytest
 
 from engine.capture.rig import CameraRig
 from engine.cloud.gains import gains_from_observations, gains_from_pictures
+from engine.cloud.median import median_over_cameras
 from engine.cloud.range import depth_ranges, near_plane
 from engine.cloud.voxel import voxel_keys, voxel_means
 
@@ -91,3 +92,16 @@ def test_voxel_means_average_per_cell_and_conserve_weight() -> None:
 def test_voxel_keys_refuse_a_hopeless_grid() -> None:
     with pytest.raises(ValueError, match="voxels"):
         voxel_keys(np.array([[0.0, 0.0, 0.0], [1e9, 0.0, 0.0]]), 0.1)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_median_over_cameras_is_that_of_the_finite_values(rng: np.random.Generator, dtype: type) -> None:
+    samples = rng.random((5, 40, 3)).astype(dtype)
+    samples[rng.random(samples.shape) < 0.4] = np.nan
+    samples[:, 7] = np.nan  # seen by nobody
+    samples[:, 8] = [[1.0], [np.inf], [3.0], [np.nan], [2.0]]
+    finite = np.ma.masked_invalid(samples)
+    expected = np.ma.median(finite, axis=0).filled(np.nan)
+    found = median_over_cameras(samples)
+    assert found.dtype == dtype
+    np.testing.assert_allclose(found, expected, rtol=1e-6)  # the mean of two values may round the other way
