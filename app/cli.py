@@ -122,6 +122,8 @@ def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -
         return _fail(EXIT_BAD_INPUT, str(error))
     except EngineError as error:
         return _fail(EXIT_FAILED, str(error))
+    except PermissionError as error:  # a path of the command line below a folder that may not even be looked into
+        return _fail(EXIT_BAD_INPUT, f"{error.strerror}. Choose a folder you may use. - {error.filename}")
     except KeyboardInterrupt:
         return _fail(EXIT_INTERRUPTED, "Interrupted. What was learned is kept; the same command goes on from there.")
     except BrokenPipeError:  # whoever read our output has left

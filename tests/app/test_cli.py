@@ -221,6 +221,20 @@ def test_results_that_cannot_be_written_are_refused_before_the_work(run, capture
     assert [path.name for path in tmp_path.iterdir() if path.name in ("file", "new")] == ["file"]
 
 
+def test_a_folder_that_may_not_be_looked_into_is_named(run, capture_folder, tmp_path, monkeypatch):
+    locked = tmp_path / "locked" / "p"
+    real_stat = Path.stat
+
+    def stat(self: Path, **options):
+        if self == locked or locked in self.parents:
+            raise PermissionError(13, "Permission denied", str(self))
+        return real_stat(self, **options)
+
+    monkeypatch.setattr(Path, "stat", stat)  # root may look into everything, so that rights alone would not do
+    code, _, err = run("train", capture_folder, "--project", locked)
+    assert (code, err) == (2, f"clipgstream: Permission denied. Choose a folder you may use. - {locked}\n")
+
+
 def test_a_capture_that_has_moved_is_said_and_found_again(run, tmp_path):
     folder = write_capture(tmp_path / "c")
     project = tmp_path / "p"
