@@ -415,7 +415,7 @@ class Session:
             if anchors is not None:
                 counts = (len(anchors.inherited_positions), len(anchors.own_positions))
                 self._anchor_counts[clip.clip_index] = counts
-        self.training = self._service.status()
+        self.training = self._service.status(None if clip is None else clip.clip_index)
         self.clip_states = self._service.clip_statuses(self._anchor_counts)
 
     def close(self) -> None:

@@ -39,7 +39,8 @@ class TrainingStatus:
         message: One line with counts and reasons.
         steps_per_s: Smoothed rate; 0 when unknown.
         eta_s: Seconds until the clip is finished; None when unknown.
-        loss_history, psnr_history: (step, value) of the shown clip; PSNR is of held-out pictures, dB.
+        curve_clip_index: Clip of the histories: the one that trains, else the one at the playhead; None without one.
+        loss_history, psnr_history: (step, value) of that clip; PSNR is of held-out pictures, dB.
         can_train_next: Whether TrainNextClip would start something.
         next_clip_index: The clip that TrainNextClip would train; None when all are trained.
         queue: Clips that wait.
@@ -54,6 +55,7 @@ class TrainingStatus:
     message: str = ""
     steps_per_s: float = 0.0
     eta_s: float | None = None
+    curve_clip_index: int | None = None
     loss_history: Sequence[tuple[int, float]] = ()
     psnr_history: Sequence[tuple[int, float]] = ()
     can_train_next: bool = False

@@ -35,8 +35,9 @@ MOVING_SHARES = (0.25, 1.0)
 """Smallest and largest share of the full size at which a picture is made while the view moves."""
 MOVING_MS = 40.0
 """A picture while the view moves should take about this long; its size follows from the last one's time."""
-MAX_MARKS = 2_500
-"""At most this many anchors of a kind are marked, evenly thinned: they should not drown the picture."""
+MAX_INHERITED_MARKS, MAX_RESIDUAL_MARKS = 2_500, 500
+"""At most this many anchors of a kind are marked, evenly thinned: they should not drown the picture. Residual anchors
+crowd where something is new, and that is what one wants to see."""
 CLOUD_OVERLAP = 1.5
 """Diameter of a cloud's points, in distances between neighbours."""
 FRUSTUM_SHARE = 0.09
@@ -246,9 +247,11 @@ class Scene:
             inherited, residual = residual, inherited
         self.counts = AnchorCounts(len(inherited), len(residual), is_reference)
         if overlays.show_inherited:
-            self._inherited.set(thinned(inherited), np.array(INHERITED_ANCHOR_COLOR), key=anchors.key)
+            self._inherited.set(
+                thinned(inherited, MAX_INHERITED_MARKS), np.array(INHERITED_ANCHOR_COLOR), key=anchors.key
+            )
         if overlays.show_residual:
-            self._residual.set(thinned(residual), np.array(RESIDUAL_ANCHOR_COLOR), key=anchors.key)
+            self._residual.set(thinned(residual, MAX_RESIDUAL_MARKS), np.array(RESIDUAL_ANCHOR_COLOR), key=anchors.key)
         return (
             frusta_key,
             session.view.look_through,
@@ -293,7 +296,7 @@ class Scene:
         if self.counts.n_inherited and session.overlays.show_inherited:
             self._inherited.draw(target, *camera, shape="ring", size=5.0, opacity=0.55)
         if self.counts.n_residual and session.overlays.show_residual:
-            self._residual.draw(target, *camera, shape="diamond", size=6.5, outline_px=1.0, opacity=0.8)
+            self._residual.draw(target, *camera, shape="diamond", size=6.5, outline_px=0.8, opacity=0.85)
         target.resolve(BACKGROUND)
 
     def _cloud_point_px(self, view: SceneView) -> float:
@@ -311,7 +314,7 @@ def moving_share(drawn_share: float, took_ms: float) -> float:
     return float(np.clip(math.floor(share * 8) / 8, *MOVING_SHARES))
 
 
-def thinned(positions: np.ndarray, most: int = MAX_MARKS) -> np.ndarray:
+def thinned(positions: np.ndarray, most: int) -> np.ndarray:
     """At most this many rows, chosen by chance but always the same ones. [n <= most, 3]
 
     By chance, because anchors lie in the order of a grid: every tenth of them would draw stripes.

@@ -315,9 +315,15 @@ class TrainingService:
             return "starting"
         return "preparing" if self._step is None else "running"
 
-    def status(self) -> TrainingStatus:
-        """Everything about the training as one value."""
+    def status(self, viewed_clip: int | None = None) -> TrainingStatus:
+        """Everything about the training as one value.
+
+        Args:
+            viewed_clip: Whose curves to show while nothing trains.
+        """
         clip_index = self._shown_clip
+        curve_clip = clip_index if self.worker is not None or viewed_clip is None else viewed_clip
+        curves = None if curve_clip is None else self.progress[curve_clip]
         known = None if clip_index is None else self.progress[clip_index]
         state, step = self.state, self._step
         rate = step.steps_per_s if step is not None else 0.0
@@ -332,8 +338,9 @@ class TrainingService:
             message=self._message(state),
             steps_per_s=rate if state == "running" else 0.0,
             eta_s=left / rate if rate > 0 and state == "running" else None,
-            loss_history=() if known is None else known.loss_history,
-            psnr_history=() if known is None else known.psnr_history,
+            curve_clip_index=curve_clip,
+            loss_history=() if curves is None else curves.loss_history,
+            psnr_history=() if curves is None else curves.psnr_history,
             can_train_next=self.can_train_next,
             next_clip_index=self.next_clip_index,
             queue=tuple(self.queue),

@@ -124,10 +124,13 @@ def _pair(left: str, right: str) -> None:
 
 def _draw_curves(status: Any, ui: UiState) -> None:
     height = min(max((imgui.get_content_region_avail().y - 190) / 2, 84.0), 150.0)
-    n_steps = status.n_steps
-    _draw_curve("Held-out PSNR, dB", status.psnr_history, theme.GREEN, height, n_steps, has_markers=True, digits=2)
+    n_steps = 0 if status.state in ("idle", "failed") else status.n_steps
+    of_clip = "" if status.curve_clip_index is None else f" of clip {status.curve_clip_index}"
+    _draw_curve(
+        f"Held-out PSNR{of_clip}, dB", status.psnr_history, theme.GREEN, height, n_steps, has_markers=True, digits=2
+    )
     ui.mark("training.psnr")
-    _draw_curve("Loss", status.loss_history, theme.SKY, height, n_steps, has_markers=False, digits=4)
+    _draw_curve(f"Loss{of_clip}", status.loss_history, theme.SKY, height, n_steps, has_markers=False, digits=4)
     ui.mark("training.loss")
 
 
