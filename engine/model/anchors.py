@@ -36,6 +36,9 @@ class AnchorSet(nn.Module):
         is_trainable: bool,
     ) -> None:
         super().__init__()
+        rows = {len(t) for t in (positions, color_logits, features, log_offset_scales, log_base_scales)}
+        if len(rows | ({len(presence)} if presence is not None else set())) != 1:
+            raise ValueError(f"an anchor set's tensors have different numbers of rows: {sorted(rows)}")
         self.register_buffer("positions", positions.float().contiguous())
         self.register_buffer("color_logits", color_logits.float().contiguous())
         self.register_buffer("presence", presence)

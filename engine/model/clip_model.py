@@ -235,8 +235,20 @@ def load_clip_model(state: ClipState, reference: ClipState | None, *, is_learnin
         is_learning: Keep the clip's own parameters trainable. Otherwise nothing is, and what never changes over time
             is decoded only once.
     Raises:
-        ProjectError: A source clip without its reference, or with another one than it was trained on.
+        ProjectError: A source clip without its reference or with another one than it was trained on; arrays that are
+            missing or do not fit together.
     """
+    try:
+        model = _rebuild(state, reference)
+    except (KeyError, TypeError, AttributeError, RuntimeError, ValueError) as error:  # arrays that do not fit together
+        raise ProjectError(
+            f"The state of clip {state.header.get('clip_index')} is incomplete or inconsistent ({error}).",
+            hint="Train this clip again.",
+        ) from error
+    return model if is_learning else model.requires_grad_(requires_grad=False)
+
+
+def _rebuild(state: ClipState, reference: ClipState | None) -> ClipModel:
     header = state.header
     if state.is_reference:
         roles = _roles(state.arrays)
@@ -263,10 +275,9 @@ def load_clip_model(state: ClipState, reference: ClipState | None, *, is_learnin
     if header.get("field"):
         field = SpatioTemporalField(FieldShape.from_dict(header["field"]))
         field.load_state_dict(_strip(state.arrays, "field."))
-    model = ClipModel(
+    return ClipModel(
         sets=sets, decoder=decoder, field=field, clip_length=header["clip_length"], n_frames=header["n_frames"]
     )
-    return model if is_learning else model.requires_grad_(requires_grad=False)
 
 
 def _roles(arrays: dict[str, np.ndarray]) -> list[str]:

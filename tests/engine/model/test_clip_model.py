@@ -159,6 +159,19 @@ def test_a_source_clip_refuses_a_missing_or_another_reference():
         load_clip_model(state, other)
 
 
+@pytest.mark.parametrize("name", ["sets.static.features", "decoder.first.color", "field.hidden.weight"])
+@pytest.mark.parametrize("damage", ["missing", "wrong shape"])
+def test_incomplete_states_are_named_and_not_a_fault_of_the_program(name, damage):
+    state = state_of(make_reference(), role="reference")
+    arrays = dict(state.arrays)
+    if damage == "missing":
+        del arrays[name]
+    else:
+        arrays[name] = arrays[name][:1, :1].copy()
+    with pytest.raises(ProjectError, match="clip 0 is incomplete"):
+        load_clip_model(ClipState(arrays, state.header), None).decode(0.0)
+
+
 def test_anchor_view_separates_inherited_from_own():
     reference = state_of(make_reference(), role="reference")
     view = make_source(reference).anchors()
