@@ -18,6 +18,11 @@ COMMANDS = ("train", "eval", "render", "inspect", "doctor")
 """Subcommands that app.cli serves without a window."""
 
 
+SWITCH_INTERVAL_S = 0.0005
+"""How long another thread may keep the interpreter from the window's. A frame asks for it some twenty times, and the
+default of 5 ms adds up to a visible stall while a thread imports what draws."""
+
+
 def has_display() -> bool:
     """Is there a desktop to open a window on? Windows and macOS always have one."""
     if not sys.platform.startswith("linux"):
@@ -87,6 +92,7 @@ def _parse_size(text: str) -> tuple[int, int]:
 def _run_window(options: argparse.Namespace) -> int:
     import pyglet
 
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
     pyglet.options.shadow_window = False  # no hidden second context
     pyglet.options.dpi_scaling = "stretch"
     from app.commands import OpenCapture
