@@ -145,6 +145,7 @@ def measure(desk: Desk, options: argparse.Namespace) -> float:
             wanted = (state_name, "running")
             desk.wait_for(state_name, lambda s, w=wanted: s["training"]["state"] in w, options.steps_timeout)
         if state_name == "running":
+            desk.key("Home")  # into the clip that trains; scrubbing left the playhead elsewhere
             desk.wait_for("a trained picture", lambda s: s["shows"] == "Rendered", options.steps_timeout)
         since_s = time.monotonic()
         sent = drive(desk, options.seconds)
