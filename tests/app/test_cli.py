@@ -280,6 +280,8 @@ class Interrupting(ProcessWorker):
         return events
 
 if __name__ == "__main__":
+    # whatever started the tests in the background made its children ignore Ctrl+C; a terminal does not
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     launch = lambda job, project: Interrupting(job, project, make_slow)
     sys.exit(main(["train", sys.argv[1], "--project", sys.argv[2], "--quiet"], launch=launch))
 """
