@@ -245,7 +245,7 @@ def render_frames(
         ProjectError: A frame lies in a clip that is not trained or damaged; said before the first picture.
     """
     use_threads(None)
-    from engine.model.view import View, render_model
+    from engine.model.view import REACH_SPACINGS, View, render_model
     from engine.training.evaluate import camera_gain
 
     capture, header = opened.capture, opened.reference.header
@@ -274,7 +274,10 @@ def render_frames(
         clip = clip_of[frame_index]
         if loaded is None or loaded[0] != clip.clip_index:
             loaded = (clip.clip_index, opened.model(clip.clip_index))
-        image = render_model(loaded[1], view, clip.clip_time(frame_index), reach=4.0 * header["spacing"]).numpy() * gain
+        image = (
+            render_model(loaded[1], view, clip.clip_time(frame_index), reach=REACH_SPACINGS * header["spacing"]).numpy()
+            * gain
+        )
         yield frame_index, (np.clip(image, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
 
 

@@ -21,6 +21,6 @@ EPS2D_PX2 = 0.3
 FRUSTUM_MARGIN = 0.15
 """The slope x/z used in the projection Jacobian is clamped this share of the image beyond its borders."""
 SPIN_COUNT = 2_000
-"""Rounds an idle OpenMP thread spins before it sleeps (GOMP_SPINCOUNT). A step of the sample's source clip took, on a
-quiet and on a busy machine of two cores: 20,000 rounds 30 and 210 ms, 2,000 rounds 35 and 90 ms, 200 rounds 42 ms
-quiet, sleeping at once (passive) 35 to 54 ms (2026-11). Unbounded spinning, the default, reached 600 ms busy."""
+"""Rounds an idle OpenMP thread spins before it sleeps (GOMP_SPINCOUNT). One step of the sample's source clip on two
+cores, 2026-11: 20,000 rounds 30 ms beside little (load 2 to 4) and 210 ms beside much (load 6); 2,000 rounds 35 and 70
+to 110 ms; 200 rounds 42 ms beside little; sleeping at once 35 to 54 and 52 ms. Loads were not held fixed."""

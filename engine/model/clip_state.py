@@ -29,7 +29,7 @@ class ClipState:
 
     Header keys: schema, role ("reference" or "source"), clip_index, clip_length, n_frames, start, step, n_steps,
     seed, config (difference from defaults), camera_names (of the gains), near_plane, spacing, moving_spacing,
-    fingerprint, reference_fingerprint, field (FieldShape or None), metrics.
+    fingerprint, reference_fingerprint, field (FieldShape or None); a kept clip adds metrics.
     """
 
     arrays: dict[str, np.ndarray]

@@ -16,6 +16,9 @@ from engine.model.clip_model import ClipModel
 from engine.raster import Rendering, rasterize
 from engine.raster.gaussians import Gaussians
 
+REACH_SPACINGS = 4.0
+"""Gaussians are expected within this many static anchor spacings of their anchor when anchors are culled."""
+
 
 @dataclass(frozen=True, slots=True)
 class View:

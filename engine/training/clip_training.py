@@ -22,7 +22,7 @@ from engine.cloud.range import near_plane
 from engine.errors import NonFiniteLoss, PreparationError, ProjectError
 from engine.model.clip_model import decoder_sizes, load_clip_model
 from engine.model.clip_state import SCHEMA, ClipState, read_clip_state, write_clip_state
-from engine.model.view import View, render_gaussians, render_model
+from engine.model.view import REACH_SPACINGS, View, render_gaussians, render_model
 from engine.training.building import (
     add_residual,
     fit_field,
@@ -47,9 +47,6 @@ from engine.training.preparation import (
     write_backgrounds,
 )
 from engine.training.report import Progress, ReportProgress, StepStats
-
-_REACH_SPACINGS = 4.0
-"""Gaussians are expected within this many anchor spacings of their anchor when anchors are culled."""
 
 
 class ClipTraining:
@@ -105,7 +102,6 @@ class ClipTraining:
         self._views = [self._view(camera) for camera in range(len(capture.rig))]
         self._workspace = LossWorkspace(self.height, self.width)
         self._static_sight: dict[tuple[str, int], Tensor] = {}
-        self._metrics: dict[str, float] = {}
 
     # ---------------------------------------------------------------- where we are
 
@@ -304,7 +300,7 @@ class ClipTraining:
 
     @property
     def _reach(self) -> float:
-        return _REACH_SPACINGS * self.spacing
+        return REACH_SPACINGS * self.spacing
 
     def _view(self, camera: int) -> View:
         rig = self.capture.rig
@@ -356,7 +352,6 @@ class ClipTraining:
             "moving_spacing": self.moving_spacing,
             "decoder": decoder_sizes(self.model.decoder),
             "field": None if self.model.field is None else self.model.field.shape.as_dict(),
-            "metrics": dict(self._metrics),
         }
         if self.reference is None:
             arrays["gains"] = self.gains.detach().numpy().copy()

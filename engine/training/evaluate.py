@@ -18,7 +18,7 @@ from engine.cloud.background import estimate_background
 from engine.cloud.masks import motion_mask
 from engine.model.clip_model import ClipModel
 from engine.model.clip_state import ClipState
-from engine.model.view import View, render_model
+from engine.model.view import REACH_SPACINGS, View, render_model
 from engine.training.metrics import fit_colors, psnr, ssim
 from engine.training.preparation import spread_frames
 
@@ -88,7 +88,7 @@ def evaluate_clip(
         frames: Capture frame indices; all of the clip when None.
         on_row: Called after each row, for progress.
     """
-    near, reach = reference.header["near_plane"], 4.0 * reference.header["spacing"]
+    near, reach = reference.header["near_plane"], REACH_SPACINGS * reference.header["spacing"]
     chosen = list(clip.frame_indices() if frames is None else frames)
     spread = spread_frames(capture.n_frames, _BACKGROUND_FRAMES)
     rows = []

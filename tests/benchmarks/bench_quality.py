@@ -26,7 +26,7 @@ from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips
 from engine.model.clip_model import load_clip_model
 from engine.model.clip_state import ClipState
-from engine.model.view import View, render_model
+from engine.model.view import REACH_SPACINGS, View, render_model
 from engine.raster.cpu.threads import configure_threads
 from engine.synthetic.raycast import make_truth
 from engine.synthetic.scene import make_scene
@@ -107,7 +107,7 @@ def write_pictures(
     """Truth, render and four times the error, one row per camera."""
     model = load_clip_model(state, reference)
     frame = clip.start + clip.n_frames // 2
-    reach = 4.0 * reference.header["spacing"]
+    reach = REACH_SPACINGS * reference.header["spacing"]
     rows = []
     for camera in cameras:
         view = _view(capture, camera, reference)
@@ -138,7 +138,7 @@ def new_object_psnr(
             mask = make_truth(scene, camera, frame).mask("gift")
             if mask.sum() < 50:  # hidden from this camera
                 continue
-            image = render_model(model, view, clip.clip_time(frame), reach=4.0 * reference.header["spacing"])
+            image = render_model(model, view, clip.clip_time(frame), reach=REACH_SPACINGS * reference.header["spacing"])
             values.append(psnr(image.numpy(), capture.frame(camera, frame) / 255.0, mask))
     return float(np.mean(values)) if values else None
 
