@@ -19,9 +19,9 @@ from pathlib import Path
 from typing import Any
 
 from app.arguments import EXIT_BAD_INPUT, PlainParser
+from app.evaluation import evaluate_project
 from app.headless import (
     ClipOutcome,
-    evaluate_project,
     open_trained,
     render_frames,
     train_clips,
@@ -83,6 +83,15 @@ def build_parser() -> argparse.ArgumentParser:
     evaluate.add_argument("project", type=Path, help="project folder")
     evaluate.add_argument("--json", required=True, metavar="OUT", help="file for all rows and means; - prints them")
     evaluate.add_argument("--clips", default=":", metavar="A:B", help="clips to measure (default: all trained)")
+    evaluate.add_argument(
+        "--metrics", choices=("quick", "all"), default="all", help="quick: PSNR and SSIM only (default: all)"
+    )
+    evaluate.add_argument(
+        "--precision",
+        choices=("float", "8bit"),
+        default="float",
+        help="compare pictures as rendered, or rounded as in a PNG file (default: float)",
+    )
     evaluate.add_argument("--quiet", action="store_true", help="no progress")
 
     render = commands.add_parser("render", help="render a camera", description="Render a camera of trained clips.")
@@ -90,6 +99,12 @@ def build_parser() -> argparse.ArgumentParser:
     render.add_argument("--camera", required=True, metavar="NAME", help="camera of the capture")
     render.add_argument("--frames", default=":", metavar="A:B", help="frames A up to B, B not included (default: all)")
     render.add_argument("--out", type=Path, required=True, metavar="FILE.mp4|DIR", help="video, or folder for PNGs")
+    render.add_argument(
+        "--features",
+        choices=("both", "static", "dynamic"),
+        default="both",
+        help="show what the static or the dynamic features of the anchors carry (default: both)",
+    )
     render.add_argument("--quiet", action="store_true", help="no progress")
 
     inspect = commands.add_parser("inspect", help="describe a capture", description="Describe a capture.")
@@ -349,23 +364,42 @@ def _evaluate(options: argparse.Namespace, launch: Launch) -> int:
         chosen = opened.trained
     line = ProgressLine(is_quiet=options.quiet)
     progress = _row_progress(line, "Measuring")
-    document = evaluate_project(opened, clip_indices=chosen, on_progress=progress)
+    document = evaluate_project(
+        opened, clip_indices=chosen, metrics=options.metrics, precision=options.precision, on_progress=progress
+    )
     line.finish()
     text = json.dumps(document, indent=1, allow_nan=False)
     if options.json == "-":
         print(text)
         return EXIT_OK
     _write_text(Path(options.json), text + "\n")
+    _show_evaluation(line, document)
+    line.say(f"{len(document['rows'])} rows in {options.json}")
+    return EXIT_OK
+
+
+def _show_evaluation(line: ProgressLine, document: dict[str, Any]) -> None:
     for clip, summary in document["means"]["clips"].items():
         for group, words in (("held_out", "held out"), ("trained_on", "trained on")):
             found = summary[group]
             if found:
                 line.say(
-                    f"Clip {clip}, {words}: PSNR {found['psnr']:.2f} dB, after colour fit {found['psnr_fit']:.2f} dB, "
-                    f"SSIM {found['ssim']:.4f}"
+                    f"Clip {clip}, {words}: PSNR {_figure(found['psnr'], 2)} dB, after colour fit "
+                    f"{_figure(found['psnr_fit'], 2)} dB, SSIM {_figure(found['ssim'], 4)}"
                 )
-    line.say(f"{len(document['rows'])} rows in {options.json}")
-    return EXIT_OK
+    for seam in document["seams"]["boundaries"]:
+        line.say(
+            f"Seam at frame {seam['frame_index']}: score {_figure(seam['score'], 2)}/255, change at the boundary "
+            f"{_figure(seam['ratio_static'], 2)} times that inside the clips on static pixels, "
+            f"{_figure(seam['ratio_moving'], 2)} times on moving ones"
+        )
+    missing = document["columns"]["lpips"]["why_missing"]
+    if document["metrics"] == "all" and missing:
+        line.say(f"LPIPS is left empty: {'; '.join(missing)}")
+
+
+def _figure(value: float | None, n_digits: int) -> str:
+    return "-" if value is None else f"{value:.{n_digits}f}"
 
 
 def check_writable(path: Path) -> None:
@@ -420,7 +454,7 @@ def _render(options: argparse.Namespace, launch: Launch) -> int:
     progress = _row_progress(line, "Rendering")
 
     def images() -> Iterator[tuple[int, Any]]:
-        rendered = render_frames(opened, camera_index=camera_index, frame_indices=frames)
+        rendered = render_frames(opened, camera_index=camera_index, frame_indices=frames, features=options.features)
         for done, item in enumerate(rendered, start=1):
             yield item
             progress(done, len(frames), None)

@@ -1,4 +1,4 @@
-"""The jobs without a window: train clips, evaluate a project, render a camera. Prints nothing; progress by callback."""
+"""The jobs without a window: train clips, open what was trained, render a camera. Prints nothing."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from engine.errors import ProjectError
 from engine.model.clip_state import ClipState, read_clip_state
 
 if TYPE_CHECKING:
+    from engine.metrics.features_apart import Features
     from engine.model.clip_model import ClipModel
 
-EVAL_SCHEMA = 1
 TRAIN_SCHEMA = 1
 POLL_EVERY_S = 0.05
 STOP_TIMEOUT_S = 60.0
@@ -178,75 +178,20 @@ def open_trained(project: Project) -> TrainedProject:
     return TrainedProject(project, capture, project.clips(capture.n_frames), reference)
 
 
-def evaluate_project(
-    opened: TrainedProject, *, clip_indices: Sequence[int], on_progress: Callable[[int, int, Any], None]
-) -> dict[str, Any]:
-    """Compare every frame of the clips with what every camera took.
-
-    Args:
-        on_progress: Gets rows done, rows in all, and the newest row.
-    Returns:
-        JSON-able: schema, project, capture, scale, holdout (names), clips, rows (EvalRow.as_dict: one per clip, frame
-        and camera) and means with keys all, held_out, trained_on and clips (the same two per clip index). A mean
-        leaves out rows without the figure; it is null where no row has it.
-    Raises:
-        ProjectError: A clip is not trained or does not fit.
-    """
-    use_threads(None)
-    from engine.training.evaluate import evaluate_clip, means
-
-    project, capture = opened.project, opened.capture
-    models = {clip_index: opened.model(clip_index) for clip_index in clip_indices}
-    holdout = capture.camera_indices(project.settings.holdout)
-    cameras = range(len(capture.rig))
-    n_rows = sum(opened.clips[i].n_frames for i in clip_indices) * len(cameras)
-    rows: list[Any] = []
-
-    def take(row: Any) -> None:
-        rows.append(row)
-        on_progress(len(rows), n_rows, row)
-
-    for clip_index, model in models.items():
-        evaluate_clip(
-            capture,
-            opened.clips[clip_index],
-            model,
-            reference=opened.reference,
-            cameras=cameras,
-            holdout=holdout,
-            on_row=take,
-        )
-
-    def summary(chosen: list[Any]) -> dict[str, Any]:
-        return {
-            "held_out": means([row for row in chosen if row.is_held_out]),
-            "trained_on": means([row for row in chosen if not row.is_held_out]),
-        }
-
-    per_clip = {str(i): summary([row for row in rows if row.clip_index == i]) for i in clip_indices}
-    return {
-        "schema": EVAL_SCHEMA,
-        "project": str(project.folder),
-        "capture": str(capture.path),
-        "scale": capture.scale,
-        "holdout": list(project.settings.holdout),
-        "clips": list(clip_indices),
-        "rows": [row.as_dict() for row in rows],
-        "means": {"all": means(rows), **summary(rows), "clips": per_clip},
-    }
-
-
 def render_frames(
-    opened: TrainedProject, *, camera_index: int, frame_indices: Sequence[int]
+    opened: TrainedProject, *, camera_index: int, frame_indices: Sequence[int], features: Features = "both"
 ) -> Iterator[tuple[int, np.ndarray]]:
     """Frames as a capture camera would see them, in that camera's colours. Yields (frame_index, [H, W, 3] uint8).
 
+    Args:
+        features: Which features of the anchors are used, see engine.metrics.features_apart.
     Raises:
         ProjectError: A frame lies in a clip that is not trained or damaged; said before the first picture.
     """
     use_threads(None)
+    from engine.metrics.evaluate import camera_gain
+    from engine.metrics.features_apart import with_features
     from engine.model.view import REACH_SPACINGS, View, render_model
-    from engine.training.evaluate import camera_gain
 
     capture, header = opened.capture, opened.reference.header
     clip_of = {frame: clip for clip in opened.clips for frame in clip.frame_indices()}
@@ -273,7 +218,7 @@ def render_frames(
     for frame_index in frame_indices:
         clip = clip_of[frame_index]
         if loaded is None or loaded[0] != clip.clip_index:
-            loaded = (clip.clip_index, opened.model(clip.clip_index))
+            loaded = (clip.clip_index, with_features(opened.model(clip.clip_index), features))
         image = (
             render_model(loaded[1], view, clip.clip_time(frame_index), reach=REACH_SPACINGS * header["spacing"]).numpy()
             * gain

@@ -20,6 +20,7 @@ from engine.capture.clip import Clip
 from engine.cloud.moving_cloud import MovingCloud
 from engine.cloud.range import near_plane
 from engine.errors import NonFiniteLoss, PreparationError, ProjectError
+from engine.metrics.psnr import psnr
 from engine.model.clip_model import decoder_sizes, load_clip_model
 from engine.model.clip_state import SCHEMA, ClipState, read_clip_state, write_clip_state
 from engine.model.view import REACH_SPACINGS, View, render_gaussians, render_model
@@ -33,7 +34,6 @@ from engine.training.building import (
 )
 from engine.training.config import TrainConfig
 from engine.training.losses import LossWorkspace, photometric_loss
-from engine.training.metrics import psnr
 from engine.training.optimizer import PhaseOptimizer, named_parameters
 from engine.training.pictures import ShuffledOrder, TrainingPictures, shared_image_size, to_float
 from engine.training.preparation import (

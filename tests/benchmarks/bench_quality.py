@@ -24,6 +24,9 @@ from PIL import Image
 
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips
+from engine.metrics.evaluate import evaluate_clip
+from engine.metrics.psnr import psnr
+from engine.metrics.summary import means
 from engine.model.clip_model import load_clip_model
 from engine.model.clip_state import ClipState
 from engine.model.view import REACH_SPACINGS, View, render_model
@@ -32,8 +35,6 @@ from engine.synthetic.raycast import make_truth
 from engine.synthetic.scene import make_scene
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig, parse_overrides
-from engine.training.evaluate import evaluate_clip, means
-from engine.training.metrics import psnr
 from engine.training.report import Progress
 
 COLUMNS = (

@@ -12,11 +12,12 @@ from engine.assets import asset_path
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import split_clips
 from engine.errors import NonFiniteLoss, PreparationError, ProjectError
+from engine.metrics.evaluate import evaluate_clip
+from engine.metrics.summary import means
 from engine.model.clip_model import load_clip_model
 from engine.model.clip_state import ClipState
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
-from engine.training.evaluate import evaluate_clip, means
 
 CLIP_LENGTH = 10
 CONFIG = TrainConfig(

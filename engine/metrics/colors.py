@@ -1,0 +1,42 @@
+"""Which colours are compared: as rendered or rounded to 8 bit, raw or after a colour fit.
+
+Pictures are [H, W, 3] in 0..1.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+
+Precision = Literal["float", "8bit"]
+PRECISIONS: tuple[Precision, ...] = get_args(Precision)
+
+
+def as_shown(image: np.ndarray, precision: Precision) -> np.ndarray:
+    """What a reader of the picture gets: clamped to 0..1, and rounded to the 256 levels of a PNG file for "8bit".
+
+    Published figures are mostly of 8-bit files; "float" leaves the rounding out of the error. [H, W, 3] float32
+    """
+    clamped = np.clip(image, 0.0, 1.0).astype(np.float32, copy=False)
+    if precision == "float":
+        return clamped
+    return np.floor(clamped * np.float32(255.0) + np.float32(0.5)) / np.float32(255.0)
+
+
+def fit_colors(image: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """The image after the gain and offset per channel that fit the truth best, least squares. [H, W, 3] float64
+
+    A held-out camera's white balance cannot be known without its pictures; this removes it from the error, and only
+    from figures that say so. A channel of one colour only gets an offset. Not rounded and not clamped.
+    """
+    fitted = np.empty(image.shape, np.float64)
+    for channel in range(3):
+        x = image[..., channel].astype(np.float64)
+        y = truth[..., channel].astype(np.float64)
+        x_mean, y_mean = x.mean(), y.mean()
+        x -= x_mean
+        variance = float((x * x).mean())
+        gain = float((x * (y - y_mean)).mean()) / variance if variance > 1e-12 else 1.0
+        fitted[..., channel] = gain * x + y_mean
+    return fitted

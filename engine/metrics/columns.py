@@ -1,0 +1,61 @@
+"""The table of all figures: name, unit, direction and definition of every column of an evaluation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One figure of a picture.
+
+    Attributes:
+        name: Key in rows and means.
+        unit: "dB", or "1" for a number without unit.
+        is_higher_better: Direction.
+        is_quick: Whether `metrics="quick"` has it too.
+        definition: One sentence.
+    """
+
+    name: str
+    unit: str
+    is_higher_better: bool
+    is_quick: bool
+    definition: str
+
+
+_BASES = (
+    Column("psnr", "dB", True, True, "20 log10(1 / RMSE), one RMSE over the three channels"),
+    Column("ssim", "1", True, True, "SSIM, 11 x 11 window, sigma 1.5, zero padding, data range 1, mean of channels"),
+    Column("dssim1", "1", False, False, "(1 - SSIM) / 2, data range 1"),
+    Column("dssim_range2", "1", False, False, "(1 - SSIM) / 2, constants of data range 2 for pictures in 0..1"),
+    Column("dssim_ms", "1", False, False, "(1 - MS-SSIM) / 2, five scales; sides of 176 px and more"),
+    Column("flip", "1", False, False, "mean LDR-FLIP, 67 pixels per degree, by flip-evaluator"),
+    Column("lpips", "1", False, False, "LPIPS with VGG-16, version 0.1, inputs in -1..1"),
+    Column("lpips_unscaled", "1", False, False, "the same with inputs left in 0..1, as many tables have it"),
+)
+_MASKED = ("psnr", "ssim", "flip")
+"""Figures that exist per pixel, so that they can be taken of a part of the picture."""
+_RAW_ONLY = ("lpips_unscaled",)
+"""There to be compared with published raw figures; a pass of the network takes seconds."""
+
+
+def _table() -> dict[str, Column]:
+    found = []
+    for base in _BASES:
+        for fit, fit_words in (("", ""), ("_fit", ", after the colour fit")):
+            if fit and base.name in _RAW_ONLY:
+                continue
+            parts = (("", ""), ("_moving", ", moving pixels"), ("_rest", ", pixels that do not move"))
+            for part, part_words in parts if base.name in _MASKED else parts[:1]:
+                words = base.definition + part_words + fit_words
+                name = base.name + fit + part
+                found.append(Column(name, base.unit, base.is_higher_better, base.is_quick, words))
+    words = "share of the pixels that differ from the camera's own background"
+    found.append(Column("moving_share", "1", False, True, words))
+    return {column.name: column for column in found}
+
+
+COLUMNS = _table()
+"""Every column by name, in the order of a row. Raw figures have no suffix; `_fit` is after the colour fit, `_moving`
+and `_rest` are of a part of the pixels."""
