@@ -48,6 +48,7 @@ class ProjectSettings:
         holdout: Names of the cameras that training never sees.
         seed: Fixes initial values and the order of pictures.
         overrides: Training settings that differ from the defaults.
+        reference_clip: Index of the clip that the others inherit from.
     """
 
     capture: str
@@ -57,7 +58,12 @@ class ProjectSettings:
     holdout: tuple[str, ...] = ()
     seed: int = 0
     overrides: dict[str, Any] = field(default_factory=dict)
+    reference_clip: int = 0
     schema: int = SCHEMA
+
+    def clips(self, n_frames: int) -> list[Clip]:
+        """The clips of a capture of that many frames."""
+        return split_clips(n_frames, n_frames if self.config().field == "joint" else self.clip_length)
 
     def config(self) -> TrainConfig:
         """The training settings. Raises ProjectError for an unknown one or a value outside its range."""
@@ -121,8 +127,22 @@ class Project:
         return any(any((self.folder / name).glob("*.safetensors")) for name in ("clips", "checkpoints"))
 
     def clips(self, n_frames: int) -> list[Clip]:
-        """The clips of a capture of that many frames."""
-        return split_clips(n_frames, self.settings.clip_length)
+        """The clips of a capture of that many frames; a single one where one field covers everything."""
+        return self.settings.clips(n_frames)
+
+    @property
+    def reference_path(self) -> Path:
+        """The finished clip that the others inherit from."""
+        return self.clip_path(self.settings.reference_clip)
+
+    def base_index(self, clip_index: int) -> int:
+        """The clip that a clip is shown with: the reference, or itself where clips are independent."""
+        return clip_index if self.settings.config().independent else self.settings.reference_clip
+
+    def inherited_index(self, clip_index: int) -> int | None:
+        """The clip that has to be finished before this one can be trained; None for one that inherits nothing."""
+        base = self.base_index(clip_index)
+        return None if base == clip_index else base
 
     def update(self, settings: ProjectSettings) -> None:
         """Replace the settings, on disk first.
@@ -163,6 +183,7 @@ def default_settings(
     holdout: tuple[str, ...] | None = None,
     seed: int = 0,
     overrides: dict[str, Any] | None = None,
+    reference_clip: int = 0,
 ) -> ProjectSettings:
     """Settings for a capture. Without a hold-out the one that the capture suggests; clips of 10 frames, or of all.
 
@@ -178,6 +199,7 @@ def default_settings(
         holdout=tuple(chosen),
         seed=seed,
         overrides=dict(overrides or {}),
+        reference_clip=reference_clip,
     )
     check_settings(settings, capture)
     return settings
@@ -209,7 +231,9 @@ def check_settings(settings: ProjectSettings, capture: Capture) -> None:
             f"{MIN_TRAINING_CAMERAS} are needed.",
             hint="Hold out fewer cameras.",
         )
-    settings.config()
+    n_clips = len(settings.clips(capture.n_frames))
+    if not 0 <= settings.reference_clip < n_clips:
+        raise ProjectError(f"The reference clip is {settings.reference_clip}; clips are 0 to {n_clips - 1}.")
 
 
 def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
@@ -309,6 +333,7 @@ def read_settings(folder: Path) -> ProjectSettings:
             holdout=tuple(str(name) for name in content.get("holdout", ())),
             seed=int(content.get("seed", 0)),
             overrides=dict(content.get("overrides", {})),
+            reference_clip=int(content.get("reference_clip", 0)),
         )
         if not (0.0 < settings.scale <= 1.0 and settings.clip_length >= 1):
             raise ValueError(f"scale {settings.scale:g} or clip_length {settings.clip_length} is out of range")

@@ -253,7 +253,7 @@ class Session:
 
     def _build_first_cloud(self, capture: Capture, project: Project) -> None:
         """Something of the scene to look at until the first training has built the real cloud."""
-        reference = self._known(0)
+        reference = self._known(self.reference_index)
         path = project.first_cloud_path
         if path.is_file() or (reference is not None and reference.file is not None):
             return
@@ -455,10 +455,20 @@ class Session:
                 revision=known.revision,
                 frame_index=self.timeline.frame_index,
                 path=known.file,
-                reference_path=None if clip.clip_index == 0 else self.project.clip_path(0),
+                reference_path=self._inherited_path(clip.clip_index),
                 clip=clip,
             )
         )
+
+    @property
+    def reference_index(self) -> int:
+        """The clip that the others inherit from."""
+        return 0 if self.project is None else self.project.settings.reference_clip
+
+    def _inherited_path(self, clip_index: int) -> Path | None:
+        assert self.project is not None
+        base = self.project.inherited_index(clip_index)
+        return None if base is None else self.project.clip_path(base)
 
     def shown_anchors(self) -> AnchorArrays | None:
         """Anchors that exist at the shown frame; those of the newest frame there is until it was decoded."""
@@ -474,7 +484,7 @@ class Session:
         """
         if self.capture is None:
             return None
-        reference = self._known(0)
+        reference = self._known(self.reference_index)
         if reference is not None and reference.file is not None:
             request = PointsRequest("cloud", reference.revision, path=reference.file)
         elif self.project is not None and self.project.first_cloud_path.is_file():

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.project import open_project
+from app.project import Project, open_project
 from app.training.messages import TrainJob
 from app.training.run import Training
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError
-from engine.model.clip_state import read_clip_state
+from engine.model.clip_state import ClipState, read_clip_state
 from engine.training.config import TrainConfig
 from engine.training.report import Progress, ReportProgress
 
@@ -36,14 +36,36 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
     clips = project.clips(capture.n_frames)
     if not 0 <= job.clip_index < len(clips):
         raise ProjectError(f"There is no clip {job.clip_index}; the capture has {len(clips)}.", path=job.project)
-    reference = None if job.clip_index == 0 else read_clip_state(project.clip_path(0))
+    base = project.inherited_index(job.clip_index)
+    reference = None if base is None else read_clip_state(project.clip_path(base))
+    config = TrainConfig(**job.overrides)
+    previous = None
+    is_first = job.clip_index == project.settings.reference_clip
+    if not is_first and (config.field == "continue" or config.start == "previous"):
+        previous = _read_previous(project, job.clip_index)
     return ClipTraining(
         capture,
         clips[job.clip_index],
-        config=TrainConfig(**job.overrides),
+        config=config,
         holdout=job.holdout,
         reference=reference,
         seed=job.seed,
         prep_dir=project.prep_dir,
         report=report,
+        previous=previous,
     )
+
+
+def _read_previous(project: Project, clip_index: int) -> ClipState:
+    """The trained clip whose field goes on: the one before, which is the reference where there is none.
+
+    Raises:
+        ProjectError: It is not trained.
+    """
+    order = [project.settings.reference_clip, *(i for i in range(clip_index) if i != project.settings.reference_clip)]
+    if not project.is_trained(order[-1]):
+        raise ProjectError(
+            f"Clip {clip_index} goes on where clip {order[-1]} ends, which is not trained.",
+            hint=f"Train clip {order[-1]} first.",
+        )
+    return read_clip_state(project.clip_path(order[-1]))

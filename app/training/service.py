@@ -133,7 +133,7 @@ class TrainingService:
     def _is_stale(self, header: dict[str, Any]) -> bool:
         if header.get("role") != "source":
             return False
-        reference = read_clip_header(self.project.clip_path(0))
+        reference = read_clip_header(self.project.reference_path)
         return reference is None or reference.get("fingerprint") != header.get("reference_fingerprint")
 
     # ---------------------------------------------------------------- commands
@@ -142,7 +142,9 @@ class TrainingService:
     def next_clip_index(self) -> int | None:
         """The first clip that is neither finished nor on its way; None when there is none."""
         taken = {*self.queue, *(() if self.worker is None else (self.worker.job.clip_index,))}
-        for clip_index, known in enumerate(self.progress):
+        first = self.project.settings.reference_clip
+        for clip_index in (first, *(i for i in range(len(self.progress)) if i != first)):
+            known = self.progress[clip_index]
             if known.state != "trained" and clip_index not in taken:
                 return clip_index
         return None
@@ -169,9 +171,11 @@ class TrainingService:
         coming = {*self.queue, *(() if self.worker is None else (self.worker.job.clip_index,))}
         if clip_index in coming:
             return
-        if clip_index > 0 and not self.project.is_trained(0) and 0 not in coming:
+        base = self.project.inherited_index(clip_index)
+        if base is not None and not self.project.is_trained(base) and base not in coming:
             raise ProjectError(
-                f"Clip {clip_index} needs the reference clip 0, which is not trained.", hint="Train clip 0 first."
+                f"Clip {clip_index} needs the reference clip {base}, which is not trained.",
+                hint=f"Train clip {base} first.",
             )
         self.queue.append(clip_index)
         self._start_next()
@@ -290,11 +294,12 @@ class TrainingService:
         self.worker = None
         self._ending = ending
         self._is_paused = self._is_stopping = False
-        for index in range(len(self.clips)) if clip_index == 0 else (clip_index,):
+        is_reference = clip_index == self.project.settings.reference_clip
+        for index in range(len(self.clips)) if is_reference else (clip_index,):
             self.read_clip(index)  # a new reference makes the others stale
         if isinstance(ending, TrainingFailed | WorkerDied):
             self.progress[clip_index].state = "failed"
-            if clip_index == 0 and not self.project.is_trained(0):
+            if is_reference and not self.project.is_trained(clip_index):
                 self.queue.clear()  # what waits needs the reference
         if isinstance(ending, ClipTrained) and ending.held_out_psnr is not None:
             self.progress[clip_index].held_out_psnr = ending.held_out_psnr

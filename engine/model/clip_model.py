@@ -209,20 +209,26 @@ def decoder_sizes(decoder: Decoder) -> dict[str, int]:
     }
 
 
-def inherit(reference: ClipState, presence: dict[str, Tensor]) -> tuple[dict[str, AnchorSet], Decoder]:
-    """Frozen anchor sets and frozen decoder of a reference clip.
+def inherit(
+    reference: ClipState, presence: dict[str, Tensor], *, is_trainable: bool = False
+) -> tuple[dict[str, AnchorSet], Decoder]:
+    """Anchor sets and frozen decoder of a reference clip. Copies, so that nothing learned reaches the reference.
 
     Args:
         reference: A finished reference clip.
-        presence: Gate in time of each dynamic set in the clip that inherits. [A, M] bool per role
+        presence: Gate in time of dynamic sets in the clip that inherits; sets without one are left out. [A, M] bool
+        is_trainable: Whether the anchors go on learning (an ablation; they are stored with the clip then).
     """
     decoder = _read_decoder(reference)
     decoder.requires_grad_(requires_grad=False)
-    roles = _roles(reference.arrays)
-    sets = {role: _read_set(reference.arrays, role, is_trainable=False) for role in roles}
-    for role, anchors in sets.items():
+    sets = {}
+    for role in _roles(reference.arrays):
+        anchors = _read_set(reference.arrays, role, is_trainable=is_trainable)
         if anchors.presence is not None:
+            if role not in presence:
+                continue
             anchors.presence = presence[role]
+        sets[role] = anchors
     return sets, decoder
 
 
@@ -248,6 +254,13 @@ def load_clip_model(state: ClipState, reference: ClipState | None, *, is_learnin
     return model if is_learning else model.requires_grad_(requires_grad=False)
 
 
+def read_field(state: ClipState) -> SpatioTemporalField:
+    """The field of a clip that has one. A copy."""
+    field = SpatioTemporalField(FieldShape.from_dict(state.header["field"]))
+    field.load_state_dict(_strip(state.arrays, "field."))
+    return field
+
+
 def _rebuild(state: ClipState, reference: ClipState | None) -> ClipModel:
     header = state.header
     if state.is_reference:
@@ -271,10 +284,10 @@ def _rebuild(state: ClipState, reference: ClipState | None) -> ClipModel:
         }
         sets, decoder = inherit(reference, presence)
         sets |= {role: _read_set(state.arrays, role, is_trainable=True) for role in _roles(state.arrays)}
-    field = None
-    if header.get("field"):
-        field = SpatioTemporalField(FieldShape.from_dict(header["field"]))
-        field.load_state_dict(_strip(state.arrays, "field."))
+        sets = {role: sets[role] for role in _ROLE_ORDER if role in sets}
+        if any(name.startswith("decoder.") for name in state.arrays):  # it went on learning in this clip
+            decoder = _read_decoder(state)
+    field = read_field(state) if header.get("field") else None
     return ClipModel(
         sets=sets, decoder=decoder, field=field, clip_length=header["clip_length"], n_frames=header["n_frames"]
     )
@@ -292,7 +305,7 @@ _ROLE_ORDER = ["static", "moving", "residual"]
 
 def _read_set(arrays: dict[str, np.ndarray], role: str, *, is_trainable: bool) -> AnchorSet:
     values: dict[str, Any] = {name: arrays.get(f"sets.{role}.{name}") for name in _ANCHOR_ARRAYS}
-    tensors = {name: None if value is None else torch.from_numpy(value) for name, value in values.items()}
+    tensors = {name: None if value is None else torch.from_numpy(value.copy()) for name, value in values.items()}
     return AnchorSet(**tensors, is_trainable=is_trainable)  # type: ignore[arg-type]
 
 

@@ -15,7 +15,7 @@ from engine.cloud.dedup import mean_neighbor_distance, residual_rows
 from engine.cloud.moving_cloud import MovingCloud
 from engine.cloud.static_cloud import StaticCloud
 from engine.model.anchors import AnchorSet
-from engine.model.clip_model import ClipModel, inherit
+from engine.model.clip_model import ClipModel, decoder_sizes, inherit
 from engine.model.clip_state import ClipState
 from engine.model.decoder import Decoder
 from engine.model.field import FieldShape, SpatioTemporalField, derive_cells, derive_log2_entries
@@ -24,13 +24,6 @@ from engine.training.config import TrainConfig
 
 def static_model(cloud: StaticCloud, clip: Clip, config: TrainConfig, generator: torch.Generator) -> ClipModel:
     """A reference clip before its motion is known: static anchors and a fresh decoder."""
-    anchors = AnchorSet.from_cloud(
-        torch.from_numpy(cloud.points),
-        torch.from_numpy(cloud.colors),
-        spacing=float(cloud.spacing),
-        feature_dim=config.static_feature_dim,
-        presence=None,
-    )
     decoder = Decoder(
         static_dim=config.static_feature_dim,
         dynamic_dim=config.dynamic_feature_dim,
@@ -38,20 +31,60 @@ def static_model(cloud: StaticCloud, clip: Clip, config: TrainConfig, generator:
         hidden=config.head_hidden,
         generator=generator,
     )
-    return ClipModel(
-        sets={"static": anchors}, decoder=decoder, field=None, clip_length=clip.clip_length, n_frames=clip.n_frames
+    sets = {"static": static_anchors(cloud, config)}
+    return ClipModel(sets=sets, decoder=decoder, field=None, clip_length=clip.clip_length, n_frames=clip.n_frames)
+
+
+def static_anchors(cloud: StaticCloud, config: TrainConfig) -> AnchorSet:
+    """Fresh trainable anchors on a static cloud."""
+    return AnchorSet.from_cloud(
+        torch.from_numpy(cloud.points),
+        torch.from_numpy(cloud.colors),
+        spacing=float(cloud.spacing),
+        feature_dim=config.static_feature_dim,
+        presence=None,
     )
 
 
-def inheriting_model(reference: ClipState, clip: Clip) -> ClipModel:
-    """A source clip before its motion is known: everything inherited is frozen, no moving anchor is alive yet."""
+def inheriting_model(
+    reference: ClipState, clip: Clip, config: TrainConfig, generator: torch.Generator
+) -> tuple[ClipModel, str]:
+    """A source clip before its motion is known: what it inherits, and no moving anchor alive yet; says what learns.
+
+    `config.inherit` and `config.decoder` say what of it may learn; by default nothing. With inherit=off the anchors
+    are there all the same, because the clip's backgrounds are corrected with them; `drop_inherited` removes them.
+    """
     absent = {
         role: torch.zeros(len(reference.arrays[f"sets.{role}.positions"]), clip.n_frames, dtype=torch.bool)
         for role in ("static", "moving")
         if f"sets.{role}.presence" in reference.arrays
     }
-    sets, decoder = inherit(reference, absent)
-    return ClipModel(sets=sets, decoder=decoder, field=None, clip_length=clip.clip_length, n_frames=clip.n_frames)
+    sets, decoder = inherit(reference, absent, is_trainable=config.inherit == "trainable")
+    if config.decoder == "new":
+        decoder = Decoder(**decoder_sizes(decoder), generator=generator)
+    decoder.requires_grad_(config.decoder != "frozen")
+    model = ClipModel(sets=sets, decoder=decoder, field=None, clip_length=clip.clip_length, n_frames=clip.n_frames)
+    words = {"frozen": "kept as they are", "trainable": "learning on", "off": "left out"}
+    heads = {"frozen": "kept as it is", "finetune": "learning on", "new": "new"}
+    return model, f"inherited anchors {words[config.inherit]}, decoder {heads[config.decoder]}"
+
+
+def merged(state: ClipState) -> ClipState:
+    """A finished clip as a start for another: its residual anchors count among the moving ones from here on."""
+    prefix = "sets.residual."
+    arrays = {name: array for name, array in state.arrays.items() if not name.startswith(prefix)}
+    for name, array in state.arrays.items():
+        if name.startswith(prefix):
+            moving = f"sets.moving.{name.removeprefix(prefix)}"
+            arrays[moving] = np.concatenate([arrays[moving], array]) if moving in arrays else array
+    return ClipState(arrays, state.header)
+
+
+def drop_inherited(model: ClipModel, cloud: StaticCloud, config: TrainConfig) -> None:
+    """inherit=off: static anchors of the clip's own take the place of all inherited ones."""
+    for role in model.roles():
+        del model.sets[role]
+    model.add_set("static", static_anchors(cloud, config))
 
 
 def moving_anchors(cloud: MovingCloud, rows: np.ndarray, config: TrainConfig) -> AnchorSet:
@@ -82,16 +115,16 @@ def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> s
         presence = np.zeros((len(centers), cloud.presence.shape[1]), bool)
         np.logical_or.at(presence, nearest, cloud.presence[~is_new])
         moving.presence = torch.from_numpy(presence)
-    if is_new.any():
-        residual = moving_anchors(cloud, is_new, config)
+    share = 100 * is_new.mean() if len(is_new) else 0.0
+    said = f"{is_new.sum()} of {len(is_new)} moving points ({share:.0f} %) lie outside the inherited anchors"
+    chosen = {"dedup": is_new, "none": np.zeros_like(is_new), "full": np.ones_like(is_new)}[config.residual]
+    if chosen.any():
+        residual = moving_anchors(cloud, chosen, config)
         if moving is not None:
             _start_like_neighbors(residual, moving)
         model.add_set("residual", residual)
-    share = 100 * is_new.mean() if len(is_new) else 0.0
-    return (
-        f"{is_new.sum()} of {len(is_new)} moving points ({share:.0f} %) lie outside the inherited anchors: "
-        "residual anchors"
-    )
+    kept = {"dedup": "they become", "none": "none becomes one of the", "full": "all points become"}[config.residual]
+    return f"{said}; {kept} residual anchors"
 
 
 def _start_like_neighbors(residual: AnchorSet, moving: AnchorSet) -> None:
@@ -123,13 +156,14 @@ def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generato
     # percentiles, so that one stray point does not stretch the grid; beyond them positions clamp to the border
     lower, upper = positions.quantile(0.005, dim=0), positions.quantile(0.995, dim=0)
     side = max(float((upper - lower).max()), 4 * spacing) + 2 * spacing
+    n_levels = config.field_levels or config.field_max_levels
     log2_entries = config.field_log2_entries or derive_log2_entries(n_alive)
     cells = derive_cells(
         side=side,
-        spacing=spacing,
+        spacing=0.0 if config.field_levels else spacing,  # a fixed number of levels does not look at the anchors
         base=config.field_base_cells,
         growth=config.field_growth,
-        max_levels=config.field_max_levels,
+        max_levels=n_levels,
     )
     x, y, z = (lower - spacing).tolist()
     shape = FieldShape(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +22,15 @@ from engine.cloud.moving_cloud import MovingCloud
 from engine.cloud.range import near_plane
 from engine.errors import NonFiniteLoss, PreparationError, ProjectError
 from engine.metrics.psnr import psnr
-from engine.model.clip_model import decoder_sizes, load_clip_model
+from engine.model.clip_model import decoder_sizes, load_clip_model, read_field
 from engine.model.clip_state import SCHEMA, ClipState, read_clip_state, write_clip_state
 from engine.model.view import REACH_SPACINGS, View, render_gaussians, render_model
 from engine.training.building import (
     add_residual,
+    drop_inherited,
     fit_field,
     inheriting_model,
+    merged,
     moving_anchors,
     remove_gate,
     static_model,
@@ -57,7 +60,9 @@ class ClipTraining:
         clip: Frames to train on.
         config: All numbers.
         holdout: Camera indices never looked at in training.
-        reference: Finished reference clip for a source clip, None to train the reference clip itself.
+        reference: Finished reference clip for a source clip, None to train the reference clip itself, or a clip that
+            shares nothing.
+        previous: The clip before, finished: its field goes on with field=continue, all of it with start=previous.
         seed: Fixes initial values and the order of pictures.
         prep_dir: Folder that keeps backgrounds between clips.
         report: Receives progress of the preparation stages.
@@ -74,7 +79,14 @@ class ClipTraining:
         seed: int,
         prep_dir: Path,
         report: ReportProgress,
+        previous: ClipState | None = None,
     ) -> None:
+        self.previous = previous
+        is_streaming = reference is None and previous is not None and config.start == "previous"
+        # what a clip begins with: the reference it inherits from, or the clip before when it goes on from there
+        self._base = merged(previous) if is_streaming and previous is not None else reference
+        if is_streaming:
+            config = replace(config, inherit="trainable", decoder="finetune", field="continue")
         self.capture, self.clip, self.config, self.reference = (capture, clip, config, reference)
         self.holdout = sorted(set(holdout))
         self.camera_indices = [c for c in range(len(capture.rig)) if c not in self.holdout]
@@ -87,9 +99,9 @@ class ClipTraining:
         self.seed, self.prep_dir, self.report = seed, Path(prep_dir), report
         self.width, self.height = shared_image_size(capture)
         self.rig = capture.rig.subset(self.camera_indices)
-        self.near_plane = float(near_plane(self.rig)) if reference is None else reference.header["near_plane"]
+        self.near_plane = float(near_plane(self.rig)) if self._base is None else self._base.header["near_plane"]
         n_pictures = len(self.camera_indices) * clip.n_frames
-        if reference is None:
+        if self._base is None:
             self.phases = [
                 ("static", config.n_static_steps(len(self.camera_indices))),
                 ("joint", config.n_joint_steps(n_pictures)),
@@ -133,10 +145,10 @@ class ClipTraining:
         """
         torch.manual_seed(self.seed)
         self._load_pictures()
-        if self.reference is None:
+        if self._base is None:
             self._prepare_static()
         else:
-            self._prepare_source(self.reference)
+            self._prepare_source(self._base)
         self._start_phase(0, 0)
 
     def _load_pictures(self) -> None:
@@ -175,7 +187,7 @@ class ClipTraining:
         static_points = self.model.anchor_set("static").positions.numpy()
         masks = motion_masks(self.pictures, self.backgrounds, self.report)
         gains = self.gains.detach().numpy()
-        voxel_size = None if self.reference is None else self.reference.header["moving_spacing"]
+        voxel_size = None if self._base is None else self._base.header["moving_spacing"]
         cloud = moving_cloud(
             self.pictures, masks, self.rig, gains, static_points, self.config, self.report, voxel_size=voxel_size
         )
@@ -196,6 +208,10 @@ class ClipTraining:
         """Last step of preparation: the gate and the field."""
         if self.config.gate == "off":
             remove_gate(self.model)
+        if self.config.field == "continue" and self.previous is not None and self.previous.header["field"]:
+            self.model.attach_field(read_field(self.previous))
+            self._say("Sizing the field", f"the field of clip {self.previous.header['clip_index']} goes on")
+            return
         spacing = float(cloud.spacing)
         made = fit_field(self.model, spacing=spacing, config=self.config, generator=self._generator)
         self._say("Sizing the field", made)
@@ -208,12 +224,17 @@ class ClipTraining:
                 "The training cameras differ from those of the reference clip.",
                 hint="Use the same hold-out for every clip of a project.",
             )
-        self.model = inheriting_model(reference, self.clip)
+        self.model, said = inheriting_model(reference, self.clip, self.config, self._generator)
+        self._say("Taking over the reference", said)
         known = read_backgrounds(self.prep_dir, self._background_key(is_corrected=True))
         if known is None:
             raw = estimate_backgrounds(self.capture, self.camera_indices, self.config, self.report)
             known = correct_backgrounds(raw, self.pictures, self._render_static, self.report)
         self.backgrounds = known
+        if self.config.inherit == "off":
+            own = static_cloud(self.backgrounds, self.rig, self.config, self.report)
+            drop_inherited(self.model, own, self.config)
+            self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         cloud = self._find_motion()
         self._say("Comparing with the reference", add_residual(self.model, cloud, self.config))
         self._make_dynamic(cloud)

@@ -5,7 +5,8 @@ Saved as the difference from the defaults; unknown keys and values outside their
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields
 from typing import Any
 
@@ -39,6 +40,8 @@ class TrainConfig:
     """Ratio of cells between levels."""
     field_max_levels: int = 7
     """Levels are added until a cell is about 1.5 anchor spacings, at most this many."""
+    field_levels: int = 0
+    """Number of levels; 0 derives it as said above."""
     field_log2_entries: int = 0
     """log2 of the entries per level and knot; 0 derives it from the anchors alive in a frame."""
 
@@ -57,6 +60,9 @@ class TrainConfig:
     """Steps of the reference clip after that; 0 derives 8 per training picture, 1200 to 3000."""
     source_steps: int = 0
     """Steps of a source clip; 0 derives 12 per training picture, 1200 to 3000: frozen heads learn more slowly."""
+
+    passes: float = 0.0
+    """Passes over the training pictures of a clip, for clips of both kinds; 0 keeps the derived steps above."""
 
     # learning rates; all fall log-linearly to `final_lr_ratio` of their start over the phase
     feature_lr: float = 7.5e-3
@@ -87,13 +93,41 @@ class TrainConfig:
     """hull: static anchors have no dynamic feature, moving ones are decoded only at times where that frame's hull
     has them. off: the published method, every anchor is evaluated at every time."""
 
+    # what a source clip takes over; every value but the first is an ablation (ClipGStream, ablation studies)
+    decoder: str = "frozen"
+    """frozen: the heads of the reference clip as they are. finetune: they go on learning in every source clip.
+    new: they start afresh in every source clip."""
+    residual: str = "dedup"
+    """dedup: residual anchors where the inherited ones leave space uncovered. none: inherited anchors only. full: all
+    moving points of the clip become residual anchors, beside the inherited ones that cover them."""
+    inherit: str = "frozen"
+    """frozen: inherited anchors keep feature and scales. trainable: they start from them and learn. off: the clip
+    builds static and moving anchors of its own; only the decoder is taken over."""
+    field: str = "per_clip"
+    """per_clip: every clip learns a field from nothing. continue: the field of the clip before goes on learning, and
+    its last state shows all clips. joint: one clip, and so one field, for the whole capture."""
+    independent: bool = False
+    """Every clip is trained as a reference clip is, and shares nothing with the others."""
+    start: str = "scratch"
+    """Where an independent clip begins. previous: with everything the clip before has learned, and all of it goes on
+    learning; with clips of one frame this streams frame by frame."""
+
     def __post_init__(self) -> None:
         for name, (low, high) in _RANGES.items():
             value = getattr(self, name)
             if not low <= value <= high:
                 raise ProjectError(f"{name} is {value}; it has to lie between {low} and {high}.")
-        if self.gate not in ("hull", "off"):
-            raise ProjectError(f"gate is '{self.gate}'; it has to be 'hull' or 'off'.")
+        for name, allowed in _CHOICES.items():
+            value = getattr(self, name)
+            if value not in allowed:
+                listed = f"{', '.join(repr(item) for item in allowed[:-1])} or {allowed[-1]!r}"
+                raise ProjectError(f"{name} is {value!r}; it has to be {listed}.")
+        if self.independent and self.field == "continue":
+            raise ProjectError(
+                "independent clips cannot continue each other's field.", hint="Leave out field=continue."
+            )
+        if self.start == "previous" and not self.independent:
+            raise ProjectError("start=previous needs independent=true.", hint="Add it, or leave out start=previous.")
 
     def difference(self) -> dict[str, Any]:
         """Only the values that differ from the defaults."""
@@ -106,11 +140,14 @@ class TrainConfig:
 
     def n_joint_steps(self, n_pictures: int) -> int:
         """Steps of the joint phase of a reference clip with this many training pictures."""
-        return self.joint_steps or min(max(8 * n_pictures, 1200), 3000)
+        return self.joint_steps or self._n_pass_steps(n_pictures) or min(max(8 * n_pictures, 1200), 3000)
 
     def n_source_steps(self, n_pictures: int) -> int:
         """Steps of a source clip with this many training pictures."""
-        return self.source_steps or min(max(12 * n_pictures, 1200), 3000)
+        return self.source_steps or self._n_pass_steps(n_pictures) or min(max(12 * n_pictures, 1200), 3000)
+
+    def _n_pass_steps(self, n_pictures: int) -> int:
+        return math.ceil(self.passes * n_pictures)
 
 
 _RANGES: dict[str, tuple[float, float]] = {
@@ -130,6 +167,8 @@ _RANGES: dict[str, tuple[float, float]] = {
     "static_steps": (0, 1_000_000),
     "joint_steps": (0, 1_000_000),
     "source_steps": (0, 1_000_000),
+    "passes": (0.0, 1000.0),
+    "field_levels": (0, 16),
     "feature_lr": (0.0, 1.0),
     "scale_lr": (0.0, 1.0),
     "table_lr": (0.0, 1.0),
@@ -146,13 +185,31 @@ _RANGES: dict[str, tuple[float, float]] = {
 }
 
 
+_CHOICES: dict[str, tuple[str, ...]] = {
+    "gate": ("hull", "off"),
+    "decoder": ("frozen", "finetune", "new"),
+    "residual": ("dedup", "none", "full"),
+    "inherit": ("frozen", "trainable", "off"),
+    "field": ("per_clip", "continue", "joint"),
+    "start": ("scratch", "previous"),
+}
+_BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+
+
+def _parse_bool(text: str) -> bool:
+    try:
+        return _BOOLEANS[text.lower()]
+    except KeyError as error:
+        raise ValueError(text) from error
+
+
 def parse_overrides(assignments: Sequence[str]) -> dict[str, Any]:
     """Turn ["key=value", ...] into keyword arguments of TrainConfig.
 
     Raises:
         ProjectError: An assignment is malformed, a key is unknown or a value has the wrong type.
     """
-    kinds = {f.name: type(f.default) for f in fields(TrainConfig) if f.default is not MISSING}
+    kinds: dict[str, type] = {f.name: type(f.default) for f in fields(TrainConfig) if f.default is not MISSING}
     values: dict[str, Any] = {}
     for assignment in assignments:
         key, separator, text = assignment.partition("=")
@@ -165,7 +222,8 @@ def parse_overrides(assignments: Sequence[str]) -> dict[str, Any]:
                 hint=f"Known settings: {', '.join(sorted(kinds))}.",
             )
         try:
-            values[key] = kinds[key](text.strip())
+            parse: Callable[[str], Any] = _parse_bool if kinds[key] is bool else kinds[key]
+            values[key] = parse(text.strip())
         except ValueError as error:
             raise ProjectError(f"Setting '{key}' is '{text}', which is no {kinds[key].__name__}.") from error
     return values

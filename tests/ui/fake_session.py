@@ -65,6 +65,7 @@ class FakeSession:
         self.settings = SimpleNamespace(recent=["/captures/kitchen", "/captures/dance_floor"])
         self.training = TrainingStatus(can_train_next=True, next_clip_index=0)
         self.holdout: tuple[int, ...] = (0, 3)
+        self.reference_index = 0
         self.is_closed = False
         self.n_renders = 0
         random = np.random.default_rng(seed)

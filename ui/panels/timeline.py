@@ -109,12 +109,12 @@ def _draw_transport(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     imgui.text_disabled(f"at {timeline.fps:g} frames per second")
     clip = timeline.clip_of(timeline.frame_index)
     if clip is not None:
-        label = f"{_clip_title(clip.clip_index)}, frame {timeline.frame_index - clip.start}"
+        label = f"{_clip_title(clip.clip_index, session)}, frame {timeline.frame_index - clip.start}"
         text_right(label)
 
 
-def _clip_title(clip_index: int) -> str:
-    return f"Clip {clip_index}" + (", reference" if clip_index == 0 else "")
+def _clip_title(clip_index: int, session: Any) -> str:
+    return f"Clip {clip_index}" + (", reference" if clip_index == session.reference_index else "")
 
 
 def _draw_track(session: Any, dispatch: Dispatch, ui: UiState) -> None:
@@ -161,15 +161,16 @@ def _draw_menu(session: Any, dispatch: Dispatch, track: Rect) -> None:
     if clip is not None:
         clip_index = clip.clip_index
         state = session.clip_states[clip_index].state
-        imgui.text_disabled(f"{_clip_title(clip_index)}: {STATE_WORDS.get(state, state)}")
+        imgui.text_disabled(f"{_clip_title(clip_index, session)}: {STATE_WORDS.get(state, state)}")
         imgui.separator()
         is_free = session.training.state in ("idle", "failed")
-        has_reference = clip_index == 0 or session.clip_states[0].state == "trained"
+        reference = session.reference_index
+        has_reference = clip_index == reference or session.clip_states[reference].state == "trained"
         verb = "Train again" if state == "trained" else "Train"
         if imgui.menu_item(f"{Icon.TRAIN}  {verb} this clip", "", False, is_free and has_reference)[0]:
             dispatch(TrainClip(clip_index))
         if not has_reference:
-            imgui.text_disabled("Clip 0, the reference, has to be trained first")
+            imgui.text_disabled(f"Clip {reference}, the reference, has to be trained first")
         if imgui.menu_item(f"{Icon.PLAY}  Go to its first frame", "", False, True)[0]:
             dispatch(SetFrame(session.clips[clip_index].start))
     imgui.end_popup()
@@ -200,7 +201,7 @@ def _draw_band(draw: Any, band: Rect, session: Any, clip: Any, status: Any, ui: 
 def _draw_band_text(draw: Any, band: Rect, session: Any, clip: Any, status: Any, ui: UiState) -> None:
     state = status.state
     icon = theme.CLIP_ICONS.get(state, "")
-    title = _clip_title(clip.clip_index)
+    title = _clip_title(clip.clip_index, session)
     words: str = STATE_WORDS.get(state, str(state))
     if state in ("preparing", "training", "paused"):
         words = f"{words} {status.progress * 100:.0f} %"

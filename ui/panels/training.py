@@ -69,7 +69,11 @@ def _draw_buttons(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         imgui.set_item_tooltip("T")
         if index is not None and index < len(session.clips):
             clip = session.clips[index]
-            kind = "the reference that the others start from" if index == 0 else "it starts from the reference"
+            kind = (
+                "the reference that the others start from"
+                if index == session.reference_index
+                else "it starts from the reference"
+            )
             text_wrapped_dim(f"Next: clip {index}, frames {clip.start} to {clip.stop - 1}, {kind}.")
         return
     half = (width - 8) / 2
