@@ -391,7 +391,7 @@ def _show_evaluation(line: ProgressLine, document: dict[str, Any]) -> None:
         line.say(
             f"Seam at frame {seam['frame_index']}: score {_figure(seam['score'], 2)}/255, change at the boundary "
             f"{_figure(seam['ratio_static'], 2)} times that inside the clips on static pixels, "
-            f"{_figure(seam['ratio_moving'], 2)} times on moving ones"
+            f"{_figure(seam['ratio_moving'], 2)} times on moving ones (truth: {_figure(seam['truth_ratio_moving'], 2)})"
         )
     missing = document["columns"]["lpips"]["why_missing"]
     if document["metrics"] == "all" and missing:

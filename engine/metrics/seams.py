@@ -159,8 +159,8 @@ def summarize(rows: Sequence[PairRow]) -> dict[str, Any]:
         "means": {
             name: {
                 **_measures(part),
-                "boundary": _means([row for row in part if row.is_boundary]),
-                "interior": _means([row for row in part if not row.is_boundary]),
+                "boundary": _means([row for row in part if row.is_boundary], (*_FIGURES, *_TWO_CLIPS)),
+                "interior": _means([row for row in part if not row.is_boundary], _FIGURES),
             }
             for name, part in groups.items()
         },
@@ -175,7 +175,8 @@ DEFINITIONS = {
     "static": f"pixels with a blurred G below {STATIC_THRESHOLD * 255:g}/255, outside the motion masks; moving: others",
     "score": "mean over boundaries and cameras of: E on static pixels at the boundary, less the median of the interior"
     " pairs of the two clips in the same camera, in units of 1/255; 0 is no seam",
-    "ratio": "mean R of the boundaries / mean R of the interior pairs; null where the latter is 0; 1 is no seam",
+    "ratio": "mean R of the boundaries / mean R of the interior pairs; null where the latter is 0; 1 is no seam. Moving"
+    " pixels may move more at a boundary than elsewhere: truth_ratio_moving is the same of G",
     "two_clips": "mean over channels of |clip before the boundary, asked beyond its last frame, - clip after it, at its"
     " first frame|; extrapolated, and equal to R where is_held",
     "map_range": f"maps of R, G and E are drawn from {MAP_RANGE[0]:g} to {MAP_RANGE[1]:g} in every frame",
@@ -183,7 +184,7 @@ DEFINITIONS = {
 
 
 def _measures(rows: Sequence[PairRow]) -> dict[str, float | None]:
-    """score, ratio_static and ratio_moving of the boundary pairs among these rows against the interior ones."""
+    """Score and ratios of the boundary pairs among these rows against the interior ones."""
     boundary = [row for row in rows if row.is_boundary]
     interior = [row for row in rows if not row.is_boundary]
     normal: dict[tuple[str, int], list[float]] = {}
@@ -194,6 +195,7 @@ def _measures(rows: Sequence[PairRow]) -> dict[str, float | None]:
         "score": mean_of([_score(row, normal) for row in boundary]),
         "ratio_static": _ratio(boundary, interior, "change_static"),
         "ratio_moving": _ratio(boundary, interior, "change_moving"),
+        "truth_ratio_moving": _ratio(boundary, interior, "truth_change_moving"),
     }
 
 
@@ -210,11 +212,11 @@ def _ratio(boundary: Sequence[PairRow], interior: Sequence[PairRow], name: str) 
     return None if above is None or not below else above / below
 
 
-def _means(rows: Sequence[PairRow]) -> dict[str, Any]:
+def _means(rows: Sequence[PairRow], names: Sequence[str]) -> dict[str, Any]:
     """Means of every figure over the rows that have it, the number of rows, and how many lack one."""
     found: dict[str, Any] = {"n_pairs": len(rows)}
     missing = {}
-    for name in _FIGURES:
+    for name in names:
         values = [getattr(row, name) for row in rows]
         found[name] = mean_of(values)
         if rows and (n_missing := values.count(None)):
@@ -225,9 +227,8 @@ def _means(rows: Sequence[PairRow]) -> dict[str, Any]:
 _FIGURES = (
     *(f"{what}_{part}" for what in ("change", "truth_change", "excess") for part in ("static", "moving")),
     "static_share",
-    "two_clips_static",
-    "two_clips_moving",
 )
+_TWO_CLIPS = ("two_clips_static", "two_clips_moving")
 
 
 def _of_group(rows: Sequence[PairRow], group: str) -> list[PairRow]:

