@@ -46,7 +46,7 @@ def evaluate_project(
 
     project, capture = opened.project, opened.capture
     for clip_index in clip_indices:  # what is not trained or damaged is found before the work; one is kept at a time
-        opened.model(clip_index)
+        opened.load(clip_index)
     evaluation = _evaluation(opened, metrics=metrics, precision=precision)
     n_rows = sum(opened.clips[i].n_frames for i in clip_indices) * len(capture.rig)
     rows: list[EvalRow] = []
@@ -58,9 +58,9 @@ def evaluate_project(
 
     before = None
     for clip_index in clip_indices:
-        clip, model = opened.clips[clip_index], opened.model(clip_index)
-        evaluation.measure(clip, model, before=before, on_row=take, on_pair=pairs.append)
-        before = (clip, model)
+        trained = opened.load(clip_index)
+        evaluation.measure(trained, before=before, on_row=take, on_pair=pairs.append)
+        before = trained
 
     per_clip = {str(i): summary.by_group([row for row in rows if row.clip_index == i]) for i in clip_indices}
     return {
@@ -96,7 +96,7 @@ def boundary_maps(opened: TrainedProject, *, clip_index: int, camera_index: int)
     if clip_index < 1:
         raise ValueError(f"clip {clip_index} has no clip before it")
     use_threads(None)
-    before, after = ((opened.clips[i], opened.model(i)) for i in (clip_index - 1, clip_index))
+    before, after = opened.load(clip_index - 1), opened.load(clip_index)
     return _evaluation(opened).boundary_maps(before, after, camera_index)
 
 
@@ -105,7 +105,6 @@ def _evaluation(opened: TrainedProject, *, metrics: Choice = "all", precision: P
 
     return Evaluation(
         opened.capture,
-        reference=opened.reference,
         cameras=range(len(opened.capture.rig)),
         holdout=opened.capture.camera_indices(opened.project.settings.holdout),
         metrics=metrics,

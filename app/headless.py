@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,7 @@ from engine.model.clip_state import ClipState, read_clip_state
 
 if TYPE_CHECKING:
     from engine.metrics.features_apart import Features
-    from engine.model.clip_model import ClipModel
+    from engine.metrics.trained_clip import TrainedClip
 
 TRAIN_SCHEMA = 1
 POLL_EVERY_S = 0.05
@@ -131,24 +131,29 @@ def _train_clip(
 
 @dataclass(frozen=True, slots=True)
 class TrainedProject:
-    """A project opened for reading, with its capture and its reference clip."""
+    """A project opened for reading, with its capture.
+
+    Attributes:
+        reference: The clip that others inherit from; None where clips are independent and it is not trained.
+    """
 
     project: Project
     capture: Capture
     clips: list[Clip]
-    reference: ClipState
+    reference: ClipState | None
 
     @property
     def trained(self) -> list[int]:
         """Indices of the finished clips."""
         return [clip.clip_index for clip in self.clips if self.project.is_trained(clip.clip_index)]
 
-    def model(self, clip_index: int) -> ClipModel:
+    def load(self, clip_index: int) -> TrainedClip:
         """Load a finished clip.
 
         Raises:
             ProjectError: It is not trained, damaged, or was trained on another reference.
         """
+        from engine.metrics.trained_clip import TrainedClip
         from engine.model.clip_model import load_clip_model
 
         if clip_index not in self.trained:
@@ -158,7 +163,8 @@ class TrainedProject:
                 path=self.project.folder,
             )
         state = read_clip_state(self.project.clip_path(clip_index))
-        return load_clip_model(state, None if state.is_reference else self.reference)
+        base = state if state.is_reference or self.reference is None else self.reference
+        return TrainedClip(self.clips[clip_index], load_clip_model(state, self.reference), base)
 
 
 def open_trained(project: Project) -> TrainedProject:
@@ -170,12 +176,15 @@ def open_trained(project: Project) -> TrainedProject:
     """
     settings = project.settings
     capture = open_capture_of(settings, project.folder)
-    if not project.is_trained(0):
+    clips = project.clips(capture.n_frames)
+    has_reference = project.is_trained(settings.reference_clip)
+    can_do_without = settings.config().independent and any(project.is_trained(clip.clip_index) for clip in clips)
+    if not has_reference and not can_do_without:
         raise ProjectError(
             "Nothing is trained in this project yet.", hint="Run `clipgstream train` first.", path=project.folder
         )
-    reference = read_clip_state(project.clip_path(0))
-    return TrainedProject(project, capture, project.clips(capture.n_frames), reference)
+    reference = read_clip_state(project.reference_path) if has_reference else None
+    return TrainedProject(project, capture, clips, reference)
 
 
 def render_frames(
@@ -189,11 +198,10 @@ def render_frames(
         ProjectError: A frame lies in a clip that is not trained or damaged; said before the first picture.
     """
     use_threads(None)
-    from engine.metrics.evaluate import camera_gain
+    from engine.metrics.colors import to_levels
     from engine.metrics.features_apart import with_features
-    from engine.model.view import REACH_SPACINGS, View, render_model
 
-    capture, header = opened.capture, opened.reference.header
+    rig = opened.capture.rig
     clip_of = {frame: clip for clip in opened.clips for frame in clip.frame_indices()}
     needed = list(dict.fromkeys(clip_of[frame].clip_index for frame in frame_indices))
     missing = [clip_index for clip_index in needed if clip_index not in opened.trained]
@@ -204,26 +212,14 @@ def render_frames(
             path=opened.project.folder,
         )
     for clip_index in needed:  # a damaged one is found before anything is written; only one at a time is kept
-        opened.model(clip_index)
-    width, height = (int(v) for v in capture.rig.image_sizes[camera_index])
-    view = View.from_arrays(
-        capture.rig.world_to_camera[camera_index],
-        capture.rig.Ks[camera_index],
-        width=width,
-        height=height,
-        near_plane=header["near_plane"],
-    )
-    gain = camera_gain(opened.reference, capture.rig.names[camera_index])
-    loaded: tuple[int, ClipModel] | None = None
+        opened.load(clip_index)
+    loaded: TrainedClip | None = None
     for frame_index in frame_indices:
         clip = clip_of[frame_index]
-        if loaded is None or loaded[0] != clip.clip_index:
-            loaded = (clip.clip_index, with_features(opened.model(clip.clip_index), features))
-        image = (
-            render_model(loaded[1], view, clip.clip_time(frame_index), reach=REACH_SPACINGS * header["spacing"]).numpy()
-            * gain
-        )
-        yield frame_index, (np.clip(image, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+        if loaded is None or loaded.clip != clip:
+            loaded = opened.load(clip.clip_index)
+            loaded = replace(loaded, model=with_features(loaded.model, features))
+        yield frame_index, to_levels(loaded.picture(rig, camera_index, clip.clip_time(frame_index)))
 
 
 def train_document(project: Project, capture: Capture, outcomes: Sequence[ClipOutcome]) -> dict[str, Any]:

@@ -21,7 +21,17 @@ def as_shown(image: np.ndarray, precision: Precision) -> np.ndarray:
     clamped = np.clip(image, 0.0, 1.0).astype(np.float32, copy=False)
     if precision == "float":
         return clamped
-    return np.floor(clamped * np.float32(255.0) + np.float32(0.5)) / np.float32(255.0)
+    return _rounded(clamped) / np.float32(255.0)
+
+
+def to_levels(image: np.ndarray) -> np.ndarray:
+    """A picture as it is written to a PNG file: clamped and rounded. [H, W, 3] uint8"""
+    return _rounded(np.clip(image, 0.0, 1.0)).astype(np.uint8)
+
+
+def _rounded(clamped: np.ndarray) -> np.ndarray:
+    """Levels 0 to 255, still as numbers, so that what is not finite stays so."""
+    return np.floor(clamped * np.float32(255.0) + np.float32(0.5))
 
 
 def fit_colors(image: np.ndarray, truth: np.ndarray) -> np.ndarray:

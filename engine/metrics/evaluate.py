@@ -20,20 +20,12 @@ from engine.metrics.colors import Precision, as_shown
 from engine.metrics.picture import Choice, measure_picture
 from engine.metrics.seams import PairRow, SeamMaps, change_of, part_means, seam_maps
 from engine.metrics.summary import EvalRow
+from engine.metrics.trained_clip import TrainedClip
 from engine.model.clip_model import ClipModel
 from engine.model.clip_state import ClipState
-from engine.model.view import REACH_SPACINGS, View, render_model
 from engine.training.preparation import spread_frames
 
 _BACKGROUND_FRAMES = 50
-
-
-def camera_gain(reference: ClipState, camera_name: str) -> np.ndarray:
-    """Colour gain of a training camera, ones for a held-out one. [3] float32"""
-    names = list(reference.header["camera_names"])
-    if camera_name in names:
-        return reference.arrays["gains"][names.index(camera_name)]
-    return np.ones(3, np.float32)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +43,6 @@ class Evaluation:
 
     Args:
         capture: Its pictures are the truth.
-        reference: The project's reference clip: gains, near plane, spacing.
         cameras: Camera indices to evaluate.
         holdout: Which of them were held out.
         metrics: Which columns, see engine.metrics.picture.measure_picture.
@@ -62,24 +53,21 @@ class Evaluation:
         self,
         capture: Capture,
         *,
-        reference: ClipState,
         cameras: Sequence[int],
         holdout: Sequence[int],
         metrics: Choice = "all",
         precision: Precision = "float",
     ) -> None:
-        self.capture, self.reference = capture, reference
-        self.cameras, self.holdout = list(cameras), frozenset(holdout)
+        self.capture, self.cameras, self.holdout = capture, list(cameras), frozenset(holdout)
         self.metrics: Choice = metrics
         self.precision: Precision = precision
         self._backgrounds: dict[int, np.ndarray] = {}
 
     def measure(
         self,
-        clip: Clip,
-        model: ClipModel,
+        trained: TrainedClip,
         *,
-        before: tuple[Clip, ClipModel] | None = None,
+        before: TrainedClip | None = None,
         frames: Sequence[int] | None = None,
         on_row: Callable[[EvalRow], None] | None = None,
         on_pair: Callable[[PairRow], None] | None = None,
@@ -93,14 +81,15 @@ class Evaluation:
             on_pair: Called for each two neighbouring frames, after the row of the later one; without it no seams are
                 measured.
         """
+        clip = trained.clip
         chosen = list(clip.frame_indices() if frames is None else frames)
-        has_boundary = before is not None and before[0].stop == clip.start and clip.start in chosen
+        neighbour = before if before is not None and before.clip.stop == clip.start else None
         rows = []
         for camera in self.cameras:
             name, is_held_out = self.capture.rig.names[camera], camera in self.holdout
             last: _Shot | None = None
             for frame in chosen:
-                shot = self._shot(clip, model, camera, frame)
+                shot = self._shot(trained, camera, frame)
                 measured = measure_picture(
                     shot.image, shot.pixels, shot.is_moving, metrics=self.metrics, precision=self.precision
                 )
@@ -109,34 +98,32 @@ class Evaluation:
                 if on_row is not None:
                     on_row(row)
                 if on_pair is not None:
-                    if frame == clip.start and before is not None and has_boundary:
-                        on_pair(self._boundary(clip, shot, before, camera)[0])
+                    if frame == clip.start and neighbour is not None:
+                        on_pair(self._boundary(clip, shot, neighbour, camera)[0])
                     elif last is not None and last.frame_index == frame - 1:
                         on_pair(_pair_row(self._maps(shot, last), clip, frame, name, is_held_out, is_boundary=False))
                 last = shot
         return rows
 
-    def boundary_maps(self, before: tuple[Clip, ClipModel], after: tuple[Clip, ClipModel], camera: int) -> SeamMaps:
+    def boundary_maps(self, before: TrainedClip, after: TrainedClip, camera: int) -> SeamMaps:
         """R, G and E of one camera at the boundary between two neighbouring clips, for a picture.
 
         Raises:
             ValueError: The clips are not neighbours.
         """
-        if before[0].stop != after[0].start:
-            raise ValueError(f"clips {before[0].clip_index} and {after[0].clip_index} are not neighbours")
-        clip, model = after
-        return self._boundary(clip, self._shot(clip, model, camera, clip.start), before, camera)[1]
+        clip = after.clip
+        if before.clip.stop != clip.start:
+            raise ValueError(f"clips {before.clip.clip_index} and {clip.clip_index} are not neighbours")
+        return self._boundary(clip, self._shot(after, camera, clip.start), before, camera)[1]
 
-    def _boundary(
-        self, clip: Clip, shot: _Shot, before: tuple[Clip, ClipModel], camera: int
-    ) -> tuple[PairRow, SeamMaps]:
-        clip_before, model_before = before
-        last = self._shot(clip_before, model_before, camera, clip.start - 1)
+    def _boundary(self, clip: Clip, shot: _Shot, before: TrainedClip, camera: int) -> tuple[PairRow, SeamMaps]:
+        clip_before = before.clip
+        last = self._shot(before, camera, clip.start - 1)
         maps = self._maps(shot, last)
         # the same instant by the clip before: its field may end with its last frame, and the picture with it
         beyond = clip_before.n_frames / clip_before.clip_length
-        is_held = model_before.knots(beyond) == model_before.knots(clip_before.clip_time(clip.start - 1))
-        image = last.image if is_held else self._render(model_before, camera, beyond)
+        is_held = before.model.knots(beyond) == before.model.knots(clip_before.clip_time(clip.start - 1))
+        image = last.image if is_held else self._render(before, camera, beyond)
         two_clips = part_means(change_of(shot.image, image), maps.is_static)
         row = _pair_row(
             maps,
@@ -150,20 +137,14 @@ class Evaluation:
         )
         return row, maps
 
-    def _shot(self, clip: Clip, model: ClipModel, camera: int, frame: int) -> _Shot:
+    def _shot(self, trained: TrainedClip, camera: int, frame: int) -> _Shot:
         pixels = self.capture.frame(camera, frame)
-        image = self._render(model, camera, clip.clip_time(frame))
+        image = self._render(trained, camera, trained.clip.clip_time(frame))
         return _Shot(frame, image, pixels, motion_mask(pixels, self._background(camera)))
 
-    def _render(self, model: ClipModel, camera: int, clip_time: float) -> np.ndarray:
+    def _render(self, trained: TrainedClip, camera: int, clip_time: float) -> np.ndarray:
         """Picture in the camera's colours, as it is compared. [H, W, 3] float32"""
-        rig, header = self.capture.rig, self.reference.header
-        width, height = (int(v) for v in rig.image_sizes[camera])
-        view = View.from_arrays(
-            rig.world_to_camera[camera], rig.Ks[camera], width=width, height=height, near_plane=header["near_plane"]
-        )
-        image = render_model(model, view, clip_time, reach=REACH_SPACINGS * header["spacing"]).numpy()
-        return as_shown(image * camera_gain(self.reference, rig.names[camera]), self.precision)
+        return as_shown(trained.picture(self.capture.rig, camera, clip_time), self.precision)
 
     def _background(self, camera: int) -> np.ndarray:
         if camera not in self._backgrounds:
@@ -223,8 +204,6 @@ def evaluate_clip(
     precision: Precision = "float",
     on_row: Callable[[EvalRow], None] | None = None,
 ) -> list[EvalRow]:
-    """One clip by itself; arguments as in Evaluation and its `measure`."""
-    evaluation = Evaluation(
-        capture, reference=reference, cameras=cameras, holdout=holdout, metrics=metrics, precision=precision
-    )
-    return evaluation.measure(clip, model, frames=frames, on_row=on_row)
+    """One clip by itself; `reference` is the base of TrainedClip, other arguments as in Evaluation and `measure`."""
+    evaluation = Evaluation(capture, cameras=cameras, holdout=holdout, metrics=metrics, precision=precision)
+    return evaluation.measure(TrainedClip(clip, model, reference), frames=frames, on_row=on_row)

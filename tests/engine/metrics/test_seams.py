@@ -10,6 +10,7 @@ import pytest
 from engine.metrics.evaluate import Evaluation, evaluate_clip
 from engine.metrics.seams import STATIC_THRESHOLD, PairRow, part_means, seam_maps, summarize
 from engine.metrics.summary import EvalRow
+from engine.metrics.trained_clip import TrainedClip
 from tests.engine.metrics.tiny_clips import CLIP_LENGTH, SIZE, TinyCapture, clips, make_model, reference
 
 STILL = np.zeros((40, 60), bool)
@@ -169,7 +170,6 @@ def capture() -> TinyCapture:
 def evaluate(capture: TinyCapture, models: list, **options: Any) -> tuple[list[EvalRow], list[PairRow]]:
     evaluation = Evaluation(
         capture,  # type: ignore[arg-type]
-        reference=reference(),
         cameras=[0, 1],
         holdout=[1],
         metrics="quick",
@@ -179,8 +179,9 @@ def evaluate(capture: TinyCapture, models: list, **options: Any) -> tuple[list[E
     pairs: list[PairRow] = []
     before = None
     for clip, model in zip(clips(), models, strict=True):
-        rows += evaluation.measure(clip, model, before=before, on_pair=pairs.append)
-        before = (clip, model)
+        trained = TrainedClip(clip, model, reference())
+        rows += evaluation.measure(trained, before=before, on_pair=pairs.append)
+        before = trained
     return rows, pairs
 
 
@@ -238,25 +239,26 @@ def test_an_instant_beyond_the_end_is_rendered_where_the_field_reaches_it(captur
 
 
 def test_clips_apart_have_no_boundary(capture):
-    evaluation = Evaluation(capture, reference=reference(), cameras=[0], holdout=[], metrics="quick")  # type: ignore[arg-type]
-    first, second = clips()
+    evaluation = Evaluation(capture, cameras=[0], holdout=[], metrics="quick")  # type: ignore[arg-type]
     model = make_model(has_motion=False)
+    first, second = (TrainedClip(clip, model, reference()) for clip in clips())
     pairs: list[PairRow] = []
-    evaluation.measure(second, model, on_pair=pairs.append)
-    evaluation.measure(second, model, before=(second, model), on_pair=pairs.append)
+    evaluation.measure(second, on_pair=pairs.append)
+    evaluation.measure(second, before=second, on_pair=pairs.append)
     assert not any(p.is_boundary for p in pairs)
     pairs.clear()
-    evaluation.measure(second, model, before=(first, model), frames=[3, 5], on_pair=pairs.append)
+    evaluation.measure(second, before=first, frames=[3, 5], on_pair=pairs.append)
     assert [(p.frame_index, p.is_boundary) for p in pairs] == [(3, True)]  # 5 does not follow on 3
     with pytest.raises(ValueError, match="not neighbours"):
-        evaluation.boundary_maps((second, model), (first, model), 0)
+        evaluation.boundary_maps(second, first, 0)
 
 
 def test_maps_for_a_picture_are_those_of_the_row(capture):
     models = [make_model(has_motion=True), make_model(has_motion=True, seed=1)]
     _, pairs = evaluate(capture, models)
-    evaluation = Evaluation(capture, reference=reference(), cameras=[0, 1], holdout=[1])  # type: ignore[arg-type]
-    (before, after), boundary = zip(clips(), models, strict=True), next(p for p in pairs if p.is_boundary)
+    evaluation = Evaluation(capture, cameras=[0, 1], holdout=[1])  # type: ignore[arg-type]
+    before, after = (TrainedClip(clip, model, reference()) for clip, model in zip(clips(), models, strict=True))
+    boundary = next(p for p in pairs if p.is_boundary)
     maps = evaluation.boundary_maps(before, after, 0)
     assert maps.change.shape == maps.excess.shape == (SIZE[1], SIZE[0])
     assert part_means(maps.change, maps.is_static) == (boundary.change_static, boundary.change_moving)
@@ -270,8 +272,9 @@ def test_rounding_reaches_rows_and_seams(capture):
     assert [p.change_moving for p in rounded[1]] != [p.change_moving for p in exact[1]]
 
 
-def test_a_picture_that_is_not_finite_costs_its_figures_only(capture, monkeypatch):
-    import engine.metrics.evaluate as module
+@pytest.mark.parametrize("precision", ["float", "8bit"])
+def test_a_picture_that_is_not_finite_costs_its_figures_only(capture, monkeypatch, precision):
+    import engine.metrics.trained_clip as module
 
     render, calls = module.render_model, []
 
@@ -283,7 +286,7 @@ def test_a_picture_that_is_not_finite_costs_its_figures_only(capture, monkeypatc
         return image
 
     monkeypatch.setattr(module, "render_model", spoilt)
-    rows, pairs = evaluate(capture, [make_model(has_motion=False)] * 2)
+    rows, pairs = evaluate(capture, [make_model(has_motion=False)] * 2, precision=precision)
     assert [row.frame_index for row in rows if row.figures["psnr"] is None] == [1]
     assert [p.frame_index for p in pairs if p.change_static is None] == [
         1,
