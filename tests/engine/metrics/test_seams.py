@@ -136,8 +136,10 @@ def test_a_seam_is_found_where_it_is():
 def test_the_score_uses_the_median_of_the_two_clips_only():
     odd = {1: 0.9, 2: 0.008, 4: 0.006, 5: 0.004, 7: 0.9, 8: 0.9}  # two pairs of each of the three clips
     rows = [pair(f, excess_static=odd.get(f, 0.004)) for f in range(1, 9)]
-    boundary = summarize(rows)["boundaries"][0]
-    assert boundary["score"] == pytest.approx(255 * (0.004 - 0.007))
+    found = summarize(rows)
+    assert found["boundaries"][0]["score"] == pytest.approx(255 * (0.004 - 0.007))
+    assert found["boundaries"][1]["score"] == pytest.approx(255 * (0.004 - 0.453))
+    assert found["means"]["all"]["score"] == pytest.approx(255 * (0.004 - 0.23))  # the mean of the two
 
 
 def test_figures_that_do_not_exist_are_none_and_counted():
