@@ -37,7 +37,8 @@ def rasterize(
 
     Differentiable in every Gaussian parameter and in the background, not in the cameras. Rows that cannot be drawn
     (NaN, infinite, a zero quaternion, behind the near plane, opacity below 1/255) are left out and get a zero
-    gradient. Safe to call from several threads at once.
+    gradient. Frozen rows (`Gaussians.is_frozen`) are drawn but get a zero gradient, and cost little of the backward
+    pass. Safe to call from several threads at once.
 
     Args:
         gaussians: What to draw; all five tensors share one floating dtype and one device.
@@ -90,3 +91,12 @@ def _check_gaussians(gaussians: Gaussians) -> None:
             raise TypeError(
                 f"{name} must be {means.dtype} on {means.device} like means, got {tensor.dtype} on {tensor.device}"
             )
+    is_frozen = gaussians.is_frozen
+    if is_frozen is None:
+        return
+    if is_frozen.shape != (n_rows,):
+        raise ValueError(
+            f"is_frozen must be {[n_rows]} to match means {list(means.shape)}, got {list(is_frozen.shape)}"
+        )
+    if is_frozen.dtype != torch.bool or is_frozen.device != means.device:
+        raise TypeError(f"is_frozen must be bool on {means.device}, got {is_frozen.dtype} on {is_frozen.device}")

@@ -27,6 +27,7 @@ def rasterize_reference(
     gaussians: Gaussians, views: list[PinholeView], background: Tensor, want_means2d: bool
 ) -> Rendering:
     """Render every view by brute force. Arguments are those of `rasterize`, already checked."""
+    gaussians = _without_frozen_history(gaussians)
     images, alphas = [], []
     means2d = gaussians.means.new_zeros(len(views), len(gaussians), 2) if want_means2d else None
     rows_per_view = [drawable_rows(gaussians.detach(), view) for view in views]
@@ -39,11 +40,25 @@ def rasterize_reference(
         centers, covariances, _ = project(drawn, view)
         if means2d is not None:  # zero in value; routes the gradient of the centres into the leaf as well
             leaf = means2d[camera, rows]
+            if drawn.is_frozen is not None:
+                leaf = torch.where(drawn.is_frozen[:, None], leaf.detach(), leaf)
             centers = centers + (leaf - leaf.detach())
         image, transmittance = _blend(centers, covariances, drawn.opacities, drawn.colors, view)
         images.append(image + transmittance * background)
         alphas.append(1.0 - transmittance)
     return Rendering(torch.stack(images), torch.stack(alphas), means2d)
+
+
+def _without_frozen_history(gaussians: Gaussians) -> Gaussians:
+    """The same values; nothing flows back to frozen rows."""
+    is_frozen = gaussians.is_frozen
+    if is_frozen is None:
+        return gaussians
+    cut = (
+        torch.where(is_frozen.view(-1, *[1] * (tensor.ndim - 1)), tensor.detach(), tensor)
+        for tensor in gaussians.tensors()
+    )
+    return Gaussians(*cut, is_frozen=is_frozen)
 
 
 def project(gaussians: Gaussians, view: PinholeView) -> tuple[Tensor, Tensor, Tensor]:

@@ -7,6 +7,7 @@ the image formation; the rest is explained where it is done.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +26,8 @@ from engine.raster.gaussians import Gaussians
 from engine.raster.rendering import Rendering
 from engine.raster.view import PinholeView
 
+_NONE_FROZEN = np.zeros(0, np.bool_)
+
 POOL = WorkspacePool()
 """Idle buffers of this process."""
 
@@ -41,10 +44,13 @@ class _Drawing:
     camera: np.ndarray
     n_kept: int
     n_pairs: int
+    n_trained: int
     n_columns: int
     order: np.ndarray
     records: np.ndarray
     tile_starts: np.ndarray
+    trained: np.ndarray
+    pairs_of_record: np.ndarray
     record_starts: np.ndarray
     pair_records: np.ndarray
     pairs_by_record: np.ndarray
@@ -54,6 +60,7 @@ class _Drawing:
 def rasterize_cpu(gaussians: Gaussians, views: list[PinholeView], background: Tensor, want_means2d: bool) -> Rendering:
     """Render every view. Arguments are those of `rasterize`, already checked; float32 on the cpu."""
     parameters = [tensor.contiguous() for tensor in gaussians.tensors()]
+    is_frozen = _NONE_FROZEN if gaussians.is_frozen is None else gaussians.is_frozen.contiguous().numpy()
     background = background.contiguous()
     means2d = torch.zeros(len(views), len(gaussians), 2) if want_means2d else None
     is_recorded = torch.is_grad_enabled() and (
@@ -65,10 +72,10 @@ def rasterize_cpu(gaussians: Gaussians, views: list[PinholeView], background: Te
     for index, view in enumerate(views):
         if is_recorded:
             centers = None if means2d is None else means2d[index]
-            image, alpha = _Rasterize.apply(view, centers, background, *parameters)  # pyright: ignore
+            image, alpha = _Rasterize.apply(view, is_frozen, centers, background, *parameters)  # pyright: ignore
         else:
             with parallel_guard():
-                image, transmittance, drawing = _draw(view, background, parameters)
+                image, transmittance, drawing = _draw(view, is_frozen, background, parameters)
             if means2d is not None:
                 _write_centers(drawing, means2d[index])
             POOL.give_back(drawing.workspace)
@@ -84,9 +91,16 @@ class _Rasterize(torch.autograd.Function):
     """One view. Gradients for the centres, the background and the five parameters."""
 
     @staticmethod
-    def forward(ctx: Any, view: PinholeView, centers: Tensor | None, background: Tensor, *parameters: Tensor):
+    def forward(
+        ctx: Any,
+        view: PinholeView,
+        is_frozen: np.ndarray,
+        centers: Tensor | None,
+        background: Tensor,
+        *parameters: Tensor,
+    ):
         with parallel_guard():
-            image, transmittance, drawing = _draw(view, background, parameters)
+            image, transmittance, drawing = _draw(view, is_frozen, background, parameters)
         if centers is not None:
             _write_centers(drawing, centers)
         ctx.drawing = drawing
@@ -97,17 +111,18 @@ class _Rasterize(torch.autograd.Function):
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, grad_image: Tensor, grad_alpha: Tensor):  # pyright: ignore[reportIncompatibleMethodOverride]
         _lease, image, transmittance, *parameters = ctx.saved_tensors
+        _, _, needs_centers, needs_background, *needs_parameters = ctx.needs_input_grad
+        grad_background = (grad_image * transmittance[..., None]).sum(dim=(0, 1)) if needs_background else None
+        if not needs_centers and not any(needs_parameters):
+            return None, None, None, grad_background, *[None] * len(parameters)
         with parallel_guard():
             grads, grad_centers = _differentiate(
                 ctx.drawing, parameters, image, transmittance, grad_image.contiguous(), -grad_alpha[..., 0]
             )
-        grad_background = None
-        if ctx.needs_input_grad[2]:
-            grad_background = (grad_image * transmittance[..., None]).sum(dim=(0, 1))
-        return None, grad_centers if ctx.needs_input_grad[1] else None, grad_background, *grads
+        return None, None, grad_centers if needs_centers else None, grad_background, *grads
 
 
-def _draw(view: PinholeView, background: Tensor, parameters: tuple[Tensor, ...] | list[Tensor]):
+def _draw(view: PinholeView, is_frozen: np.ndarray, background: Tensor, parameters: Sequence[Tensor]):
     """Image [H, W, 3], transmittance [H, W] and the state for a backward pass."""
     workspace = POOL.take()
     means, quats, scales, opacities, colors = (tensor.detach().numpy() for tensor in parameters)
@@ -127,19 +142,22 @@ def _draw(view: PinholeView, background: Tensor, parameters: tuple[Tensor, ...] 
     scratch = [workspace.array(name, (n_padded,), np.uint32) for name in ("key_a", "key_b", "order_b")]
     n_kept = sort.sort_by_depth(depths, n_rows, scratch[0], scratch[1], order, scratch[2])
     records = workspace.array("records", (n_padded, RECORD_FLOATS), np.float32)
-    sort.permute_records(unsorted, order, n_kept, records)
+    sort.permute_records(unsorted, order, n_kept, is_frozen, records)
 
     counts = workspace.array("counts", (n_threads, n_tiles), np.int64)
     pairs_of_record = workspace.array("pairs_of_record", (n_padded,), np.int32)
     tile_starts = workspace.array("tile_starts", (n_tiles + 1,), np.int64)
-    record_starts = workspace.array("record_starts", (n_kept + 1,), np.int64)
+    record_starts = workspace.array("record_starts", (n_padded,), np.int64)
+    trained = workspace.array("trained", (n_padded,), np.int32)
     packed = records.view(np.int32)
     binning.count_pairs(records, packed, n_kept, n_columns, counts, pairs_of_record)
-    n_pairs = binning.place_pairs(counts, pairs_of_record, n_kept, tile_starts, record_starts)
+    n_pairs, n_trained, n_trained_pairs = binning.place_pairs(
+        records, counts, pairs_of_record, n_kept, tile_starts, trained, record_starts
+    )
     if n_pairs > _MAX_PAIRS:
         raise MemoryError(f"{n_kept} Gaussians cover {n_pairs} tiles of {TILE} px; at most {_MAX_PAIRS} are possible")
     pair_records = workspace.array("pair_records", (n_pairs,), np.int32)
-    pairs_by_record = workspace.array("pairs_by_record", (n_pairs,), np.int32)
+    pairs_by_record = workspace.array("pairs_by_record", (n_trained_pairs,), np.int32)
     binning.fill_pairs(records, packed, n_kept, n_columns, counts, record_starts, pair_records, pairs_by_record)
 
     pair_blocks = workspace.array("pair_blocks", (n_pairs,), np.int64)
@@ -162,10 +180,13 @@ def _draw(view: PinholeView, background: Tensor, parameters: tuple[Tensor, ...] 
         camera,
         n_kept,
         n_pairs,
+        n_trained,
         n_columns,
         order,
         records,
         tile_starts,
+        trained,
+        pairs_of_record,
         record_starts,
         pair_records,
         pairs_by_record,
@@ -188,6 +209,10 @@ def _differentiate(
     grad_transmittance: Tensor,
 ) -> tuple[list[Tensor], Tensor]:
     """Gradients of the five parameters, and of the centres in pixels."""
+    grads = [torch.zeros_like(tensor) for tensor in parameters]
+    grad_centers = torch.zeros(len(parameters[0]), 2)
+    if not drawing.n_trained:
+        return grads, grad_centers
     workspace = drawing.workspace
     n_threads = get_num_threads()
     scratch = workspace.array("scratch", (n_threads, SCRATCH_FLOATS), np.float32)
@@ -207,13 +232,13 @@ def _differentiate(
         np.zeros(1, np.int64),
     )
     means, quats, scales, *_ = (tensor.detach().numpy() for tensor in parameters)
-    grads = [torch.zeros_like(tensor) for tensor in parameters]
     grad_means, grad_quats, grad_scales, grad_opacities, grad_colors = (grad.numpy() for grad in grads)
-    grad_centers = torch.zeros(len(means), 2)
     project_backward.project_backward(
         drawing.records,
         drawing.order,
-        drawing.n_kept,
+        drawing.trained,
+        drawing.n_trained,
+        drawing.pairs_of_record,
         drawing.record_starts,
         drawing.pairs_by_record,
         pair_sums,
@@ -222,7 +247,7 @@ def _differentiate(
         scales,
         drawing.camera,
         scratch,
-        workspace.array("lane_rows", (n_threads, 16), np.int32),
+        workspace.array("lane_rows", (n_threads, 2, 16), np.int32),
         grad_means,
         grad_quats,
         grad_scales,

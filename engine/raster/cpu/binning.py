@@ -22,7 +22,7 @@ _SLACK_PX = f4(1e-3)
 """Added to each side of a span, pixels, against float32 rounding of the square roots."""
 _CENTER_X, _CENTER_Y, _MAJOR, _SLOPE, _MINOR = rec.CENTER_X, rec.CENTER_Y, rec.MAJOR, rec.SLOPE, rec.MINOR
 _REACH, _TILT, _HALF_WIDTH, _HALF_HEIGHT = rec.REACH, rec.TILT, rec.HALF_WIDTH, rec.HALF_HEIGHT
-_COLUMNS, _ROWS = rec.TILE_COLUMNS, rec.TILE_ROWS
+_COLUMNS, _ROWS, _OPACITY = rec.TILE_COLUMNS, rec.TILE_ROWS, rec.OPACITY
 
 
 @njit(inline="always")
@@ -91,12 +91,15 @@ def count_pairs(records, packed, n_records, n_columns, counts, pairs_of_record):
 
 
 @njit(**rec.KERNEL_OPTIONS)
-def place_pairs(counts, pairs_of_record, n_records, tile_starts, record_starts):
-    """Turn counts into start positions, in place, and return the number of pairs.
+def place_pairs(records, counts, pairs_of_record, n_records, tile_starts, trained, record_starts):
+    """Turn counts into start positions, in place.
 
     Args:
         tile_starts: First pair of each tile and one past the last. [tiles + 1] int64
-        record_starts: First entry of each record in `pairs_by_record`, and one past the last. [n_records + 1] int64
+        trained: Written: the records that are not frozen, in order. [n_records] int32
+        record_starts: Written: first entry of each record in `pairs_by_record`, -1 for frozen ones. [n_records] int64
+    Returns:
+        The number of pairs, of trained records, and of the pairs of those.
     """
     n_chunks, n_tiles = counts.shape
     total = 0
@@ -107,12 +110,17 @@ def place_pairs(counts, pairs_of_record, n_records, tile_starts, record_starts):
             counts[chunk, tile] = total
             total += count
     tile_starts[n_tiles] = total
+    n_trained = 0
     position = 0
     for i in range(n_records):
-        record_starts[i] = position
-        position += pairs_of_record[i]
-    record_starts[n_records] = position
-    return total
+        if records[i, _OPACITY] < _ZERO:
+            record_starts[i] = -1
+        else:
+            record_starts[i] = position
+            position += pairs_of_record[i]
+            trained[n_trained] = i
+            n_trained += 1
+    return total, n_trained, position
 
 
 @njit(parallel=True, **rec.KERNEL_OPTIONS)
@@ -122,7 +130,7 @@ def fill_pairs(records, packed, n_records, n_columns, counts, record_starts, pai
     Args:
         counts: Start positions from `place_pairs`; advanced.
         pair_records: Record of each pair, tile by tile in depth order. [pairs] int32
-        pairs_by_record: Pairs of each record, record by record, for the backward gather. [pairs] int32
+        pairs_by_record: Pairs of each trained record, record by record, for the backward gather. [trained pairs] int32
     """
     n_chunks = len(counts)
     for chunk in prange(n_chunks):
@@ -131,6 +139,7 @@ def fill_pairs(records, packed, n_records, n_columns, counts, record_starts, pai
             first_row, last_row = packed[i, _ROWS] & 0xFFFF, packed[i, _ROWS] >> 16
             is_box = first_column == last_column or first_row == last_row
             entry = record_starts[i]
+            is_trained = entry >= 0
             for tile_row in range(first_row, last_row + 1):
                 left, right = first_column, last_column
                 if not is_box:
@@ -140,5 +149,6 @@ def fill_pairs(records, packed, n_records, n_columns, counts, record_starts, pai
                     pair = counts[chunk, tile]
                     counts[chunk, tile] = pair + 1
                     pair_records[pair] = i
-                    pairs_by_record[entry] = pair
-                    entry += 1
+                    if is_trained:
+                        pairs_by_record[entry] = pair
+                        entry += 1

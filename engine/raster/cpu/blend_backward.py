@@ -11,6 +11,8 @@ which is all the projection backward needs (moments of the Cholesky form: no can
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit, prange, types
 from numba.core import cgutils
@@ -25,7 +27,53 @@ from engine.raster.cpu.tile import take_next
 _TILE, _BLOCK, _BLOCKS, _BLOCKS_PER_ROW = rec.TILE, rec.BLOCK, rec.BLOCKS, rec.BLOCKS_PER_ROW
 _RECORD_BYTES, _PAIR_BYTES, _PAIR_FLOATS = rec.RECORD_BYTES, 4 * rec.PAIR_FLOATS, rec.PAIR_FLOATS
 _T, _R, _G, _B, _E = (p // 4 for p in (tl.TRANSMITTANCE, tl.PLANE_R, tl.PLANE_G, tl.PLANE_B, tl.REMAINDER))
-_N_SUMS = 9
+_N_SUMS, _OPACITY = 9, rec.OPACITY
+
+
+def _channels(build: LaneBuilder, fields: list[Any]) -> list[Lanes]:
+    return [build.broadcast(fields[column]) for column in (rec.RED, rec.GREEN, rec.BLUE)]
+
+
+class _Step:
+    """One block of pixels behind one record: values the gradient is made of, and the planes advanced."""
+
+    def __init__(self, build: LaneBuilder, blocks: tl.BlockEvaluator, channels: list[Lanes], block: Any) -> None:
+        log_alphas = blocks.log_alphas(block)
+        plane_t, plane_e = blocks.plane(block, tl.TRANSMITTANCE), blocks.plane(block, tl.REMAINDER)
+        self.transmittance = build.load(plane_t)
+        is_hit = build.all_of(
+            [log_alphas.compare(">=", rec.LOG_ALPHA_MIN), self.transmittance.compare(">=", TRANSMITTANCE_MIN)]
+        )
+        self.unclamped = tl.exp2_eighth(log_alphas)
+        self.alpha = self.unclamped.min(ALPHA_MAX).where(is_hit)
+        self.weight = self.alpha * self.transmittance
+        build.store(self.transmittance - self.weight, plane_t)
+        self.gradients = [build.load(blocks.plane(block, plane)) for plane in (tl.PLANE_R, tl.PLANE_G, tl.PLANE_B)]
+        self.gain = channels[0] * self.gradients[0] + channels[1] * self.gradients[1] + channels[2] * self.gradients[2]
+        self.remainder = build.load(plane_e) - self.weight * self.gain
+        build.store(self.remainder, plane_e)
+
+
+@kernel_intrinsic
+def _pass_record(typing_context, scratch, record, tile_x, tile_y, changed_blocks):
+    """Replay a frozen record in the blocks it changed: transmittance and remainder only, no sums."""
+    signature = types.void(types.int64, types.int64, types.float32, types.float32, types.int64)
+
+    def generate(context, builder, signature, arguments):
+        scratch, record, tile_x, tile_y, changed_blocks = arguments
+        build = LaneBuilder(builder)
+        fields = tl.load_record(build, record)
+        tl.store_block_terms(build, scratch, fields, tile_x, tile_y, cull=False)
+        blocks = tl.BlockEvaluator(build, scratch, fields)
+        channels = _channels(build, fields)
+
+        def pass_block(block, next_block):
+            _Step(build, blocks, channels, block)
+
+        build.for_each_bit(changed_blocks, pass_block)
+        return context.get_dummy_value()
+
+    return signature, generate
 
 
 @kernel_intrinsic
@@ -39,7 +87,7 @@ def _replay_record(typing_context, scratch, record, tile_x, tile_y, changed_bloc
         fields = tl.load_record(build, record)
         tl.store_block_terms(build, scratch, fields, tile_x, tile_y, cull=False)
         blocks = tl.BlockEvaluator(build, scratch, fields)
-        channels = [build.broadcast(fields[column]) for column in (rec.RED, rec.GREEN, rec.BLUE)]
+        channels = _channels(build, fields)
         sums = [cgutils.alloca_once_value(builder, build.constant(0.0).value) for _ in range(_N_SUMS)]
         # offset of the tile's first pixel centre from the Gaussian's centre
         to_left = builder.fsub(builder.fadd(tile_x, build.scalar(0.5)), fields[rec.CENTER_X])
@@ -49,24 +97,11 @@ def _replay_record(typing_context, scratch, record, tile_x, tile_y, changed_bloc
             builder.store((Lanes(build, builder.load(sums[index])) + value).value, sums[index])
 
         def replay_block(block, next_block):
-            log_alphas = blocks.log_alphas(block)
-            plane_t, plane_e = blocks.plane(block, tl.TRANSMITTANCE), blocks.plane(block, tl.REMAINDER)
-            transmittance = build.load(plane_t)
-            is_hit = build.all_of(
-                [log_alphas.compare(">=", rec.LOG_ALPHA_MIN), transmittance.compare(">=", TRANSMITTANCE_MIN)]
-            )
-            unclamped = tl.exp2_eighth(log_alphas)
-            alpha = unclamped.min(ALPHA_MAX).where(is_hit)
-            weight = alpha * transmittance
-            build.store(transmittance - weight, plane_t)
-            gradients = [build.load(blocks.plane(block, plane)) for plane in (tl.PLANE_R, tl.PLANE_G, tl.PLANE_B)]
-            gain = channels[0] * gradients[0] + channels[1] * gradients[1] + channels[2] * gradients[2]
-            remainder = build.load(plane_e) - weight * gain
-            build.store(remainder, plane_e)
-            for index, gradient in enumerate(gradients):
-                add(6 + index, weight * gradient)
-            v = alpha * (transmittance * gain - remainder / (1.0 - alpha))
-            v = v.where(unclamped.compare("<", ALPHA_MAX))
+            step = _Step(build, blocks, channels, block)
+            for index, gradient in enumerate(step.gradients):
+                add(6 + index, step.weight * gradient)
+            v = step.alpha * (step.transmittance * step.gain - step.remainder / (1.0 - step.alpha))
+            v = v.where(step.unclamped.compare("<", ALPHA_MAX))
             column = builder.and_(block, build.int64(rec.BLOCKS_PER_ROW - 1))
             row = builder.lshr(block, build.int64(rec.BLOCKS_PER_ROW.bit_length() - 1))
             block_dx = builder.fadd(to_left, build.scalar_of(builder.mul(column, build.int64(rec.BLOCK))))
@@ -101,7 +136,7 @@ def replay_tiles(
     scratch,
     counter,
 ):
-    """Fill pair_sums [pairs, 12] float32 for all tiles.
+    """Fill pair_sums [pairs, 12] float32 for all tiles; rows of frozen records are left undefined.
 
     Args:
         image, transmittance: Results of `blend_tiles`.
@@ -140,15 +175,14 @@ def replay_tiles(
                     )
             for pair in range(tile_starts[tile], tile_starts[tile + 1]):
                 changed = pair_blocks[pair]
-                if changed != 0:
-                    _replay_record(
-                        address,
-                        records_address + np.int64(pair_records[pair]) * _RECORD_BYTES,
-                        f4(tile_x),
-                        f4(tile_y),
-                        changed,
-                        sums_address + np.int64(pair) * _PAIR_BYTES,
-                    )
+                record = pair_records[pair]
+                record_address = records_address + np.int64(record) * _RECORD_BYTES
+                if records[record, _OPACITY] < f4(0.0):
+                    if changed != 0:
+                        _pass_record(address, record_address, f4(tile_x), f4(tile_y), changed)
+                elif changed != 0:
+                    sums = sums_address + np.int64(pair) * _PAIR_BYTES
+                    _replay_record(address, record_address, f4(tile_x), f4(tile_y), changed, sums)
                 else:
                     for index in range(_PAIR_FLOATS):
                         pair_sums[pair, index] = f4(0.0)

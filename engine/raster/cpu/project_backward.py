@@ -7,6 +7,8 @@ are taken in the same order in every run.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit, prange, types
 from numba.core import cgutils
@@ -42,16 +44,17 @@ def _sum_pairs(typing_context, pair_sums, pairs, n_pairs, destination):
 
 
 @kernel_intrinsic
-def _backward_sixteen(typing_context, sums, records, rows, means, quats, scales, camera):
+def _backward_sixteen(typing_context, sums, records, lane_records, rows, means, quats, scales, camera):
     """Gradients of sixteen Gaussians.
 
     `sums` addresses sixteen vectors of `_sum_pairs` and is overwritten by sixteen gradient rows: mean 3, quat 4,
-    scale 3, opacity 1, color 3, centre 2. `records` are the sixteen sorted records, `rows` [16] int32 their Gaussians.
+    scale 3, opacity 1, color 3, centre 2. `lane_records` [16] int32 are the sorted records to handle,
+    `rows` [16] int32 their Gaussians.
     """
-    signature = types.void(*[types.int64] * 7)
+    signature = types.void(*[types.int64] * 8)
 
     def generate(context, builder, signature, arguments):
-        sums, records, rows, means, quats, scales, camera = arguments
+        sums, records, lane_records, rows, means, quats, scales, camera = arguments
         build = LaneBuilder(builder)
         row_indices = build.load_ints(rows)
         mean, quat, scale = (
@@ -59,7 +62,9 @@ def _backward_sixteen(typing_context, sums, records, rows, means, quats, scales,
         )
         camera_lanes = CameraLanes(build, camera)
         projection = project_lanes(camera_lanes, mean, quat, scale)
-        fields = build.transpose([build.load(records, lane * VECTOR_BYTES) for lane in range(N_LANES)])
+        fields = build.transpose(
+            [build.load(records, _record_offset(build, lane_records, lane)) for lane in range(N_LANES)]
+        )
         moments = build.transpose([build.load(sums, lane * VECTOR_BYTES, align=4) for lane in range(N_LANES)])
         gradients = _gradients(camera_lanes, projection, scale, fields, moments)
         for lane, gradient in enumerate(build.transpose(gradients)):
@@ -67,6 +72,11 @@ def _backward_sixteen(typing_context, sums, records, rows, means, quats, scales,
         return context.get_dummy_value()
 
     return signature, generate
+
+
+def _record_offset(build: LaneBuilder, lane_records: Any, lane: int) -> Any:
+    index = build.ir.load(build.ir.inttoptr(build.address(lane_records, 4 * lane), INT32.as_pointer()))
+    return build.ir.mul(build.ir.sext(index, INT64), build.int64(_RECORD_BYTES))
 
 
 def _gradients(
@@ -167,7 +177,9 @@ def _mean_gradient(
 def project_backward(
     records,
     order,
-    n_kept,
+    trained,
+    n_trained,
+    pairs_of_record,
     record_starts,
     pairs_by_record,
     pair_sums,
@@ -184,36 +196,39 @@ def project_backward(
     grad_colors,
     grad_means2d,
 ):
-    """Add gradients of the drawn Gaussians to the grad_* arrays; rows that were not drawn stay as they are.
+    """Add gradients of the drawn, trained Gaussians to the grad_* arrays; other rows stay as they are.
 
     Args:
         scratch: One row of at least 256 floats per thread.
-        lane_rows: [threads, 16] int32.
+        lane_rows: [threads, 2, 16] int32.
         grad_means2d: Gradient of the centres in pixels. [N, 2]
         Others: As in the forward kernels.
     """
     n_workers = len(scratch)
-    n_groups = (n_kept + 15) // 16
+    n_groups = (n_trained + 15) // 16
     for worker in prange(n_workers):
         sums = scratch[worker]
-        rows = lane_rows[worker]
+        rows = lane_rows[worker, 0]
+        lane_records = lane_rows[worker, 1]
         sums_address = np.int64(sums.ctypes.data)
         for group in range(n_groups * worker // n_workers, n_groups * (worker + 1) // n_workers):
             first = group * 16
-            n_valid = min(16, n_kept - first)
+            n_valid = min(16, n_trained - first)
             for lane in range(16):
-                i = first + min(lane, n_valid - 1)
+                i = trained[first + min(lane, n_valid - 1)]
+                lane_records[lane] = i
                 rows[lane] = order[i]
                 start = record_starts[i]
                 _sum_pairs(
                     np.int64(pair_sums.ctypes.data),
                     np.int64(pairs_by_record.ctypes.data) + np.int64(start) * 4,
-                    np.int64(record_starts[i + 1] - start),
+                    np.int64(pairs_of_record[i]),
                     sums_address + np.int64(lane) * 64,
                 )
             _backward_sixteen(
                 sums_address,
-                np.int64(records.ctypes.data) + np.int64(first) * _RECORD_BYTES,
+                np.int64(records.ctypes.data),
+                np.int64(lane_records.ctypes.data),
                 np.int64(rows.ctypes.data),
                 np.int64(means.ctypes.data),
                 np.int64(quats.ctypes.data),

@@ -20,7 +20,8 @@ from engine.conventions import ALPHA_MIN
 CENTER_X, CENTER_Y, MAJOR, SLOPE, MINOR, LOG_OPACITY, RED = range(7)
 GREEN, BLUE, REACH, TILT, HALF_WIDTH, HALF_HEIGHT, OPACITY = range(7, 14)
 """Columns of a record. Centre and half extents in pixels; REACH = log_opacity - LOG_ALPHA_MIN is the value of the
-quadratic form at the rim; TILT = cov_xy / cov_xx gives the height at which the ellipse is widest."""
+quadratic form at the rim; TILT = cov_xy / cov_xx gives the height at which the ellipse is widest; OPACITY is negated in
+the sorted record of a frozen Gaussian, whose gradient nobody needs."""
 TILE_COLUMNS, TILE_ROWS = 14, 15
 """int32 columns: first and last tile column (row) the bounding box touches, first | last << 16."""
 RECORD_FLOATS = 16
