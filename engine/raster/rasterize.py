@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Literal
+from typing import Literal, Protocol
 
 import torch
 from torch import Tensor
@@ -12,13 +11,28 @@ from engine.raster.cpu.backend import rasterize_cpu
 from engine.raster.gaussians import Gaussians
 from engine.raster.reference import rasterize_reference
 from engine.raster.rendering import Rendering
-from engine.raster.view import PinholeView, pinhole_views
+from engine.raster.view import PinholeView, n_tiles, pinhole_views
 
 BackendName = Literal["auto", "cpu", "reference"]
-Backend = Callable[[Gaussians, list[PinholeView], Tensor, bool], Rendering]
+
+
+class Backend(Protocol):
+    """A rasterizer: gets checked Gaussians and views, a background [3] and a tile mask [C, rows, columns] or None."""
+
+    def __call__(
+        self,
+        gaussians: Gaussians,
+        views: list[PinholeView],
+        background: Tensor,
+        *,
+        tile_mask: Tensor | None,
+        want_means2d: bool,
+        want_depth: bool,
+    ) -> Rendering: ...
+
 
 BACKENDS: dict[str, Backend] = {"cpu": rasterize_cpu, "reference": rasterize_reference}
-"""Name to implementation; arguments are checked Gaussians, views, background [3] and whether to make means2d."""
+"""Name to implementation."""
 
 
 def rasterize(
@@ -31,7 +45,9 @@ def rasterize(
     background: Tensor | None = None,
     near_plane: float = 0.01,
     backend: BackendName = "auto",
+    tile_mask: Tensor | None = None,
     want_means2d: bool = False,
+    want_depth: bool = False,
 ) -> Rendering:
     """Render Gaussians from C cameras.
 
@@ -48,7 +64,10 @@ def rasterize(
         background: Colour behind everything; black if None. [3]
         near_plane: Centres at or before this depth are dropped, scene units.
         backend: "cpu" (float32 tensors in main memory), "reference" (anything, slowly), or "auto": cpu if it can.
+        tile_mask: Tiles of TILE_PX x TILE_PX pixels that are wanted; None for all. Pixels of others hold the background
+            and alpha 0, and pass no gradient to anything. [C, rows, columns] or, for all cameras, [rows, columns] bool
         want_means2d: Also return projected centres that receive a gradient, for densification.
+        want_depth: Also return the accumulated depth.
     Returns:
         Rendering with image [C, H, W, 3] and alpha [C, H, W, 1].
     Raises:
@@ -70,7 +89,27 @@ def rasterize(
         raise ValueError(f"backend must be auto or one of {', '.join(sorted(BACKENDS))}, got {backend!r}")
     if backend == "cpu" and not is_fast:
         raise TypeError(f"backend 'cpu' needs float32 tensors on the cpu, got means {means.dtype} on {means.device}")
-    return BACKENDS[backend](gaussians, views, background, want_means2d)
+    return BACKENDS[backend](
+        gaussians,
+        views,
+        background,
+        tile_mask=None if tile_mask is None else _checked_mask(tile_mask, len(views), int(width), int(height)),
+        want_means2d=want_means2d,
+        want_depth=want_depth,
+    )
+
+
+def _checked_mask(tile_mask: Tensor, n_views: int, width: int, height: int) -> Tensor:
+    """The mask on the cpu. [C, rows, columns] bool"""
+    shape = n_tiles(width, height)
+    if tile_mask.shape not in (shape, (n_views, *shape)):
+        raise ValueError(
+            f"tile_mask must be {[n_views, *shape]} or {list(shape)} for {n_views} images of {width} x {height}, "
+            f"got {list(tile_mask.shape)}"
+        )
+    if tile_mask.dtype != torch.bool:
+        raise TypeError(f"tile_mask must be bool, got {tile_mask.dtype}")
+    return tile_mask.cpu().expand(n_views, *shape)
 
 
 def _check_gaussians(gaussians: Gaussians) -> None:

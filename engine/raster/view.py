@@ -13,6 +13,14 @@ from torch import Tensor
 
 from engine.conventions import FRUSTUM_MARGIN
 
+TILE_PX = 32
+"""Edge of a tile, pixels: what `tile_mask` of `rasterize` counts in. Tiles at the right and lower border may be cut."""
+
+
+def n_tiles(width: int, height: int) -> tuple[int, int]:
+    """Rows and columns of tiles of an image."""
+    return -(-height // TILE_PX), -(-width // TILE_PX)
+
 
 @dataclass(frozen=True, slots=True)
 class PinholeView:

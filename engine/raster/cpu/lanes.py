@@ -100,6 +100,13 @@ class LaneBuilder:
         """One float."""
         return self.ir.load(self.ir.inttoptr(self.address(base, offset), FLOAT.as_pointer()))
 
+    def prefetch(self, address: Any) -> None:
+        """Hint that the cache line at an address is read soon. Never faults."""
+        pointer_type = ir.IntType(8).as_pointer()
+        hints = [ir.Constant(INT32, value) for value in (0, 3, 1)]  # to read, keep in all levels, data
+        pointer = self.ir.inttoptr(address, pointer_type)
+        self._call("llvm.prefetch.p0", ir.VoidType(), [pointer, *hints], [pointer_type, INT32, INT32, INT32])
+
     def gather(self, base: Any, rows: Any, row_floats: int, column: int) -> Lanes:
         """Element `column` of sixteen rows of a [N, row_floats] float32 array; `rows` is a vector of int32."""
         wide_type = ir.VectorType(INT64, N_LANES)
