@@ -247,7 +247,7 @@ def _difference(key: CacheKey, others: Iterable[CacheKey]) -> str:
     if not differences:
         return "never compiled"
     nearest = min(differences, key=len)
-    return reasons[nearest] if nearest in reasons else "sources and libraries changed"
+    return reasons.get(nearest, "sources and libraries changed")
 
 
 def _python_texts(package: str) -> dict[str, bytes]:
