@@ -100,15 +100,20 @@ def _kernels() -> Finding:
 
 
 def _vectors() -> Finding:
-    from llvmlite import binding
-
     from engine.raster.cpu.lanes import N_LANES
 
-    features = {name for name, is_there in binding.get_host_cpu_features().items() if is_there}
-    name, width = vector_width(features, platform.machine())
+    name, width, cpu = host_vectors()
     n_registers = -(-N_LANES // width)
     text = f"{name}, {width} numbers at once: {N_LANES} lanes of a kernel fill {n_registers} register"
-    return Finding("Vectors", f"{text}{'s' if n_registers > 1 else ''} ({binding.get_host_cpu_name()})")
+    return Finding("Vectors", f"{text}{'s' if n_registers > 1 else ''} ({cpu})")
+
+
+def host_vectors() -> tuple[str, int, str]:
+    """Widest instruction set that kernels can use here, float32 numbers it holds, and LLVM's name of the processor."""
+    from llvmlite import binding
+
+    features = {name for name, is_there in binding.get_host_cpu_features().items() if is_there}
+    return *vector_width(features, platform.machine()), binding.get_host_cpu_name()
 
 
 def vector_width(features: set[str], machine: str) -> tuple[str, int]:
