@@ -95,11 +95,12 @@ def rasterize_cpu(
     )
     if means2d is not None:
         means2d.requires_grad_(is_recorded)
+    centers_of = [None] * len(views) if means2d is None else means2d.unbind()
     images, alphas, depths = [], [], []
     for index, view in enumerate(views):
         mask = _NO_FLAGS if tile_mask is None else tile_mask[index].contiguous().numpy()
         request = _Request(view, is_frozen, mask)
-        centers = None if means2d is None else means2d[index]
+        centers = centers_of[index]
         if is_recorded:
             drawing = _DrawingSlot()
             image, alpha = _Rasterize.apply(request, drawing, centers, background, *parameters)  # pyright: ignore

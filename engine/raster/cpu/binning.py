@@ -65,11 +65,12 @@ def _span_of_row(records, i, tile_row, first, last):
     right = -slope * right_y + math.sqrt(max(_ZERO, (reach - minor * right_y * right_y) * inverse_major))
     left = -slope * left_y - math.sqrt(max(_ZERO, (reach - minor * left_y * left_y) * inverse_major))
     center_x = records[i, _CENTER_X]
-    first_pixel = math.ceil(center_x + left - _SLACK_PX - _HALF)
-    last_pixel = math.floor(center_x + right + _SLACK_PX - _HALF)
+    # np.floor stays in float32, math.floor goes through int64 and float64
+    first_pixel = np.ceil(center_x + left - _SLACK_PX - _HALF)
+    last_pixel = np.floor(center_x + right + _SLACK_PX - _HALF)
     return (
-        _clamped(math.floor(first_pixel * _PER_TILE), first, last),
-        _clamped(math.floor(last_pixel * _PER_TILE), first - 1, last),
+        _clamped(np.floor(first_pixel * _PER_TILE), first, last),
+        _clamped(np.floor(last_pixel * _PER_TILE), first - 1, last),
     )
 
 

@@ -36,13 +36,13 @@ def _blend_record(typing_context, scratch, record, tile_x, tile_y, open_blocks):
         channels = [build.broadcast(fields[column]) for column in (rec.RED, rec.GREEN, rec.BLUE)]
         changed_slot = cgutils.alloca_once_value(builder, build.int64(0))
 
-        def blend_block(block, next_block):
+        def blend_block(block):
             _, _, log_alphas = footprint.at(block)
             plane_t = footprint.plane(block, tl.TRANSMITTANCE)
             transmittance = build.load(plane_t)
             is_hit = tl.hits(build, log_alphas, transmittance)
-            build.skip_unless(is_hit, next_block)
-            bit = builder.shl(build.int64(1), block)
+            # no branch around blocks without a hit: predicting it wrongly costs more than blending nothing
+            bit = builder.shl(build.some_lane(is_hit), block)
             builder.store(builder.or_(builder.load(changed_slot), bit), changed_slot)
             alpha = tl.exp2_eighth(log_alphas).min(ALPHA_MAX).where(is_hit)
             weight = alpha * transmittance
@@ -67,8 +67,7 @@ def _find_open_blocks(typing_context, scratch):
         result = build.int64(0)
         for block in range(rec.BLOCKS):
             transmittance = build.load(arguments[0], tl.TRANSMITTANCE + 64 * block)
-            bits = build.mask_bits(transmittance.compare(">=", TRANSMITTANCE_MIN))
-            some = builder.zext(builder.icmp_unsigned("!=", bits, build.int64(0)), build.int64(0).type)
+            some = build.some_lane(transmittance.compare(">=", TRANSMITTANCE_MIN))
             result = builder.or_(result, builder.shl(some, build.int64(block)))
         return result
 

@@ -65,7 +65,7 @@ def _pass_record(typing_context, scratch, record, tile_x, tile_y, changed_blocks
         footprint = tl.Footprint(build, scratch, fields, tile_x, tile_y)
         channels = _channels(build, fields)
 
-        def pass_block(block, next_block):
+        def pass_block(block):
             _Step(build, footprint, channels, block)
 
         build.for_each_bit(changed_blocks, pass_block)
@@ -90,7 +90,7 @@ def _replay_record(typing_context, scratch, record, tile_x, tile_y, changed_bloc
         def add(index: int, value: Lanes) -> None:
             builder.store((Lanes(build, builder.load(sums[index])) + value).value, sums[index])
 
-        def replay_block(block, next_block):
+        def replay_block(block):
             step = _Step(build, footprint, channels, block)
             for index, gradient in enumerate(step.gradients):
                 add(6 + index, step.weight * gradient)

@@ -135,6 +135,10 @@ class LaneBuilder:
         """A comparison result as an int64 whose bit l is lane l."""
         return self.ir.zext(self.ir.bitcast(mask, ir.IntType(N_LANES)), INT64)
 
+    def some_lane(self, mask: Any) -> Any:
+        """1 if some lane of a comparison result is set, else 0, int64."""
+        return self.ir.zext(self.ir.icmp_unsigned("!=", self.mask_bits(mask), self.int64(0)), INT64)
+
     def all_of(self, masks: Sequence[Any]) -> Any:
         """Lane-wise and."""
         result = masks[0]
@@ -176,33 +180,22 @@ class LaneBuilder:
         return Lanes(self, level[0])
 
     # ---- control flow
-    def for_each_bit(self, bits: Any, body: Callable[[Any, Any], None]) -> None:
-        """Run `body(index, next_block)` for every set bit of an int64, lowest first.
-
-        `body` may branch to `next_block` to leave one round early; it ends at an open block.
-        """
+    def for_each_bit(self, bits: Any, body: Callable[[Any], None]) -> None:
+        """Run `body(index)` for every set bit of an int64, lowest first."""
         builder = self.ir
         rest_slot = cgutils.alloca_once_value(builder, bits)
-        test, work, step, done = (builder.append_basic_block(name) for name in ("test", "work", "step", "done"))
+        test, work, done = (builder.append_basic_block(name) for name in ("test", "work", "done"))
         builder.branch(test)
         builder.position_at_end(test)
         rest = builder.load(rest_slot)
         builder.cbranch(builder.icmp_unsigned("!=", rest, self.int64(0)), work, done)
         builder.position_at_end(work)
         index = self._call("llvm.cttz.i64", INT64, [rest, ir.Constant(_BOOL, 1)], [INT64, _BOOL])
-        body(index, step)
-        builder.branch(step)
-        builder.position_at_end(step)
+        body(index)
         rest = builder.load(rest_slot)
         builder.store(builder.and_(rest, builder.sub(rest, self.int64(1))), rest_slot)
         builder.branch(test)
         builder.position_at_end(done)
-
-    def skip_unless(self, mask: Any, otherwise: Any) -> None:
-        """Go on only if some lane of `mask` is set, else branch to `otherwise`."""
-        go_on = self.ir.append_basic_block("some_lane")
-        self.ir.cbranch(self.ir.icmp_unsigned("!=", self.mask_bits(mask), self.int64(0)), go_on, otherwise)
-        self.ir.position_at_end(go_on)
 
     def call_unary(self, name: str, lanes: Lanes) -> Lanes:
         """An elementwise LLVM intrinsic such as sqrt, floor, ceil, log2, fabs."""

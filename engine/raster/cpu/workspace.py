@@ -7,6 +7,7 @@ hold two workspaces; that is what makes interleaved forwards and several threads
 
 from __future__ import annotations
 
+import math
 import weakref
 from collections import deque
 
@@ -28,7 +29,7 @@ class Workspace:
 
     def array(self, name: str, shape: tuple[int, ...], dtype: type[np.generic]) -> np.ndarray:
         """An uninitialised array of this shape in the buffer of this name; an earlier array there becomes invalid."""
-        n_bytes = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
+        n_bytes = math.prod(shape) * np.dtype(dtype).itemsize
         needed = n_bytes + 4 * _PADDING
         buffer = self._buffers.get(name)
         if buffer is None or len(buffer) < needed:
