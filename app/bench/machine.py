@@ -12,7 +12,8 @@ from datetime import date
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """One line under every table. `vectors` names the widest instruction set, `load` the load average at the start."""
+    """One line under every table. `vectors` names the widest instruction set, `load` the load average at the
+    start, below zero where the system knows none."""
 
     cpu: str
     n_cores: int
@@ -26,9 +27,10 @@ class Machine:
     load: float
 
     def __str__(self) -> str:
+        load = f", load {self.load:.1f}" if self.load >= 0 else ""
         return (
             f"{self.cpu}, {self.n_cores} cores ({self.n_threads} threads used), {self.vectors}; {self.system}; "
-            f"Python {self.python}, torch {self.torch}, numba {self.numba}; {self.day}, load {self.load:.1f}"
+            f"Python {self.python}, torch {self.torch}, numba {self.numba}; {self.day}{load}"
         )
 
 
@@ -47,7 +49,7 @@ def describe_machine(n_threads: int) -> Machine:
         torch=importlib.metadata.version("torch"),
         numba=importlib.metadata.version("numba"),
         day=date.today().isoformat(),
-        load=os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan"),
+        load=os.getloadavg()[0] if hasattr(os, "getloadavg") else -1.0,
     )
 
 

@@ -89,7 +89,8 @@ def measure_raster(
     scene = recipe.scene()
     (forward, backward), *_ = interleaved({"cpu": lambda: _stages(scene, "cpu")}, n_runs).values()
     checked = recipe.reduced()
-    marks = _check(name, checked.scene())
+    checked_at = f"{checked.n_rows} in {checked.width}x{checked.height}"
+    marks = _check(name, checked_at, checked.scene())
     n_pairs = evaluated_pairs(scene)
     row = KernelRow(
         operation="raster",
@@ -97,7 +98,7 @@ def measure_raster(
         size=f"{recipe.n_rows} in {recipe.width}x{recipe.height}",
         forward=forward,
         backward=backward,
-        checked_at=f"{checked.n_rows} in {checked.width}x{checked.height}",
+        checked_at=checked_at,
         value_error=marks["cpu"].value_error,
         gradient_error=marks["cpu"].gradient_error,
         reference_ratio=marks["reference"].total_ms / marks["cpu"].total_ms,
@@ -145,7 +146,7 @@ def _stages(scene: Scene, backend: BackendName) -> tuple[float, float]:
     return done.forward_ms, done.backward_ms
 
 
-def _check(name: str, scene: Scene) -> dict[str, SpeedError]:
+def _check(name: str, size: str, scene: Scene) -> dict[str, SpeedError]:
     """Both back ends in float32 beside float64 brute force."""
     exact = run_pass(scene, torch.float64, "reference")
     backends: tuple[BackendName, ...] = ("cpu", "reference")
@@ -157,6 +158,7 @@ def _check(name: str, scene: Scene) -> dict[str, SpeedError]:
         marks[backend] = SpeedError(
             operation="raster",
             scene=name,
+            size=size,
             backend=backend,
             total_ms=sum(stage.median_ms for stage in timings[backend]),
             value_error=(done.rendering.image - exact.rendering.image).abs().max().item(),

@@ -14,6 +14,7 @@ class SpeedError:
     Attributes:
         operation: "raster" or "decode".
         scene: Name of the scene.
+        size: What was computed, for people.
         backend: "cpu", or "reference" for plain torch in float32.
         total_ms: Forward and backward pass, median.
         value_error: Largest error of a value against float64, absolute (pixels: colours in 0..1).
@@ -22,6 +23,7 @@ class SpeedError:
 
     operation: str
     scene: str
+    size: str
     backend: str
     total_ms: float
     value_error: float

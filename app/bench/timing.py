@@ -48,8 +48,8 @@ def interleaved(
     return {name: [Timing.of(stage_ms) for stage_ms in zip(*rows, strict=True)] for name, rows in runs.items()}
 
 
-def peak_extra_mb(prepare: Callable[..., Callable[[], object]], *arguments: Any) -> float:
-    """How far a call pushes the memory of a fresh process beyond what it held before, MB. NaN if that fails.
+def peak_extra_mb(prepare: Callable[..., Callable[[], object]], *arguments: Any) -> float | None:
+    """How far a call pushes the memory of a fresh process beyond what it held before, MB. None if that fails.
 
     Args:
         prepare: Importable function that makes everything ready, warms kernels up and returns the call to measure.
@@ -64,7 +64,7 @@ def peak_extra_mb(prepare: Callable[..., Callable[[], object]], *arguments: Any)
         with suppress(EOFError, OSError):
             if ours.poll(MEMORY_TIMEOUT_S):
                 return float(ours.recv_bytes())
-        return float("nan")
+        return None
     finally:
         process.kill()
         process.join()
