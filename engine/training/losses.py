@@ -59,7 +59,7 @@ def photometric_loss(
         gain: Colour gain of the camera, multiplied onto the image. [3]
         is_counted: Pixels that count; None means all. [H, W] bool
         tile_mask: Active tiles of 32 px, the last ones cut off by the picture; None means all. [rows, columns] bool
-        moments: `truth_moments(truth)`, saves blurring the truth; only "fused" uses them.
+        moments: `truth_moments(truth)` in place of blurring the truth; only "fused" uses them.
         workspace: Scratch for this picture size, kept between calls; None makes one.
         backend: "auto", "fused" (float32 on the CPU) or "reference".
     Returns:

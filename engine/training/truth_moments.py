@@ -1,12 +1,11 @@
-"""Moments of a training picture under the window of SSIM, made once and read at every step that draws the picture.
+"""Moments of a training picture under the window of SSIM, for a truth that is compared with many images.
 
-`TruthMoments` is what "fused" reads instead of blurring the truth again; `MomentCache` keeps those used last.
+"fused" reads them instead of blurring the truth again. Training does without: reading two more planes costs more than
+it saves. One core, loss and gradient, ms with and without: 320 x 240 1.3 and 1.2, 640 x 360 4.2 and 3.3.
 """
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Hashable
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,33 +47,3 @@ def writable_picture(truth: Tensor | np.ndarray) -> np.ndarray:
     """As the kernels take it: contiguous and writable; a read-only array would compile them a second time."""
     pixels = truth.detach().numpy() if isinstance(truth, Tensor) else truth
     return np.require(pixels, requirements=["C", "W"])
-
-
-class MomentCache:
-    """Moments of the pictures used last, up to a number of bytes. Owns no picture.
-
-    Args:
-        max_bytes: Budget; a picture of 320 x 240 takes 2 MB, one of 640 x 360 takes 6.
-    """
-
-    def __init__(self, max_bytes: int = 128 << 20) -> None:
-        self.max_bytes = max_bytes
-        self.n_bytes = 0
-        self._kept: OrderedDict[Hashable, TruthMoments] = OrderedDict()
-
-    def get(self, key: Hashable, truth: Tensor | np.ndarray) -> TruthMoments:
-        """Moments of the picture with this key, made from `truth` unless they are there already."""
-        known = self._kept.get(key)
-        if known is not None:
-            self._kept.move_to_end(key)
-            return known
-        made = truth_moments(truth)
-        self._kept[key] = made
-        self.n_bytes += made.blurred.nbytes
-        while self.n_bytes > self.max_bytes and self._kept:
-            _, dropped = self._kept.popitem(last=False)
-            self.n_bytes -= dropped.blurred.nbytes
-        return made
-
-    def __len__(self) -> int:
-        return len(self._kept)

@@ -10,7 +10,8 @@ from torch import nn
 def warm_up() -> None:
     """One tiny loss with everything it knows, and one step of Adam.
 
-    Seconds of one core when nothing is cached (holding the interpreter lock), a fraction of a second after.
+    About ten seconds of one core when nothing is cached (holding the interpreter lock), a tenth of a second after, plus
+    half a second if these are the first kernels of the process.
     """
     from engine.training.adam import make_adam
     from engine.training.losses import photometric_loss

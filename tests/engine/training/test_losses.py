@@ -12,7 +12,7 @@ from skimage.metrics import structural_similarity
 
 from engine.training.fused_loss import TILE_PX, LossWorkspace, tile_grid
 from engine.training.losses import PhotometricLoss, photometric_loss, ssim_map
-from engine.training.truth_moments import MomentCache, truth_moments
+from engine.training.truth_moments import truth_moments
 
 SIZES = [(1, 1), (1, 40), (40, 1), (3, 40), (37, 50), (100, 70), (70, 700)]
 
@@ -249,19 +249,6 @@ def test_moments_must_be_of_a_picture():
         truth_moments(np.zeros((4, 5), np.uint8))
     with pytest.raises(TypeError, match="int64"):
         truth_moments(np.zeros((4, 5, 3), np.int64))
-
-
-def test_cache_drops_the_moments_not_used_for_longest():
-    truths = [make_truth(16, 16, seed) for seed in range(3)]
-    n_bytes = truth_moments(truths[0]).blurred.nbytes
-    cache = MomentCache(max_bytes=2 * n_bytes)
-    kept = [cache.get(key, truths[key]) for key in (0, 1)]
-    assert cache.get(0, truths[0]) is kept[0]
-    cache.get(2, truths[2])
-    assert cache.get(0, truths[0]) is kept[0]
-    assert cache.get(1, truths[1]) is not kept[1]
-    assert len(cache) == 2
-    assert cache.n_bytes == 2 * n_bytes
 
 
 def test_ssim_agrees_with_scikit_image_away_from_the_border():
