@@ -21,7 +21,6 @@ from engine.raster.gaussians import Gaussians
 from engine.training.config import TrainConfig
 from engine.training.losses import LossWorkspace, photometric_loss
 from engine.training.optimizer import PhaseOptimizer, named_parameters
-from engine.training.truth_moments import truth_moments
 
 SIZES = {
     "2k": ClipRecipe(2_000, 5, 240, 180),
@@ -39,7 +38,6 @@ class StepRun:
         self._model, self._view = make_clip(recipe), make_view(recipe)
         self._gain = nn.Parameter(torch.ones(3), requires_grad=not recipe.is_source)
         self._truth = make_truth(recipe)
-        self._moments = truth_moments(self._truth)
         self._workspace = LossWorkspace(recipe.height, recipe.width)
         parameters = named_parameters(self._model, self._gain, self._config)
         self._optimizer = PhaseOptimizer(parameters, n_steps=10_000, config=self._config)
@@ -92,7 +90,6 @@ class StepRun:
             self._truth,
             ssim_weight=self._config.ssim_weight,
             gain=self._gain,
-            moments=self._moments,
             workspace=self._workspace,
         )
         return found.loss + self._config.volume_weight * gaussians.scales.prod(1).mean()
