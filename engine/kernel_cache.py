@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import os
 import re
+import stat
 import sys
 from collections.abc import Iterable
 from contextlib import suppress
@@ -31,6 +32,7 @@ MAX_FOLDERS = 3
 UNWRITABLE = "folder not writable"
 """Reason of `CacheState` that only the user can mend."""
 
+_ROOT_NAME = "ClipGStream"
 _PREFIX = "kernels-"
 _PACKAGE = Path(__file__).resolve().parent
 _DECORATORS = tuple(
@@ -97,22 +99,29 @@ def cache_root() -> Path:
         root = _home() / "Library" / "Caches"
     else:
         root = Path(os.environ.get("XDG_CACHE_HOME") or _home() / ".cache")
-    return root / "ClipGStream"
+    return root / _ROOT_NAME
 
 
 def fallback_root() -> Path:
-    """Where kernels go when the user's cache cannot be written: a temporary folder of this user alone."""
+    """Where kernels go when the user's cache cannot be written: a temporary folder of this user alone. Made here.
+
+    Machine code is loaded from it, so a folder that anybody else could have filled is not taken.
+    """
     import tempfile
 
     user = str(os.getuid()) if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
-    return Path(tempfile.gettempdir()) / f"ClipGStream-{user}"
+    folder = Path(tempfile.gettempdir()) / f"{_ROOT_NAME}-{user}"
+    with suppress(OSError):
+        folder.mkdir(mode=0o700)
+    return folder if _is_private(folder) else Path(tempfile.mkdtemp(prefix=f"{_ROOT_NAME}-"))
 
 
 def use_kernel_cache() -> Path:
     """Tell numba where to keep compiled kernels, in this process and those it starts. Returns the folder.
 
     Must run before the module of a kernel is imported. A folder of our own that came from a parent process is worked
-    out again, so that sources changed in between are noticed. Creates nothing on disk.
+    out again, so that sources changed in between are noticed. Creates nothing on disk, except for
+    the folder of the fall-back.
     """
     given = os.environ.get(VARIABLE)
     if given and not _is_ours(Path(given)):
@@ -332,11 +341,24 @@ def _chosen_root() -> tuple[Path, bool]:
     root = cache_root()
     if _is_writable(root):
         return root, False
+    given = Path(os.environ.get(VARIABLE, ""))
+    if _is_ours(given) and _is_private(given.parent):  # the fall-back of the parent process
+        return given.parent, True
     return fallback_root(), True
 
 
 def _is_ours(folder: Path) -> bool:
-    return folder.name.startswith(_PREFIX) and folder.parent.name.startswith("ClipGStream")
+    return folder.name.startswith(_PREFIX) and folder.parent.name.startswith(_ROOT_NAME)
+
+
+def _is_private(folder: Path) -> bool:
+    """Whether a folder is there that belongs to this user and that nobody else may write to."""
+    try:
+        found = folder.lstat()
+    except OSError:
+        return False
+    is_mine = not hasattr(os, "getuid") or (found.st_uid == os.getuid() and not found.st_mode & 0o022)
+    return stat.S_ISDIR(found.st_mode) and is_mine
 
 
 def _is_writable(folder: Path) -> bool:
