@@ -312,7 +312,8 @@ def _differentiate(
         grad_image = torch.zeros_like(image)
     workspace = drawing.workspace
     scratch = workspace.array("scratch", (get_num_threads(), SCRATCH_FLOATS), np.float32)
-    pair_sums = workspace.array(_EARLY_AND_LATE, (drawing.n_slots, PAIR_FLOATS), np.float32)
+    # one row more than is used: a row of twelve floats is read as sixteen
+    pair_sums = workspace.array(_EARLY_AND_LATE, (drawing.n_slots + 1, PAIR_FLOATS), np.float32)
     blend_backward.replay_tiles(
         drawing.records,
         drawing.tile_starts,
