@@ -80,7 +80,9 @@ class TorchAdam:
 
     def restore(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
         """See AdamState."""
-        self._adam.state[self._parameters[name]] = {k: torch.from_numpy(v.copy()) for k, v in arrays.items()}
+        state = {k: torch.from_numpy(v.copy()) for k, v in arrays.items()}
+        state["step"] = state["step"].reshape(())  # a file gives a single number back as [1]
+        self._adam.state[self._parameters[name]] = state
 
 
 @kernel_intrinsic
@@ -221,7 +223,7 @@ class FusedAdam:
 
     def restore(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
         """See AdamState."""
-        self._steps[name] = round(float(arrays["step"]))
+        self._steps[name] = round(arrays["step"].item())  # a file gives a single number back as [1]
         self._means[name][...] = arrays["exp_avg"]
         self._squares[name][...] = arrays["exp_avg_sq"]
         is_moving = (self._means[name].ravel() != 0) | (self._squares[name].ravel() != 0)
