@@ -13,14 +13,13 @@ import math
 import torch
 from torch import Tensor, nn
 
-
 HEADS = {"opacity": 1, "color": 3, "shape": 7, "offset": 3}
 """Values per Gaussian of each head, in the order of their slices in the output."""
 N_OUT = sum(HEADS.values())
 
 
 class Decoder(nn.Module):
-    """[f_s; f_d] of anchors to raw values of Gaussians, K per anchor. Owns the heads; `engine.model.decoding` runs them.
+    """The heads: [f_s; f_d] of anchors to raw values of K Gaussians per anchor. `engine.model.decoding` runs them.
 
     The four first layers are one matrix and the four second layers a block each; each head has parameters of its own
     so that its learning rate can differ.

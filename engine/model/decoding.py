@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -73,13 +74,14 @@ def _check(part: ChosenAnchors, decoder: Decoder, field: SpatioTemporalField | N
     rows = part.rows
     if rows.ndim != 1 or rows.dtype != torch.int64:
         raise ValueError(f"rows must be int64 with one axis, got {rows.dtype} of shape {tuple(rows.shape)}")
-    if len(rows) and (int(rows[0]) < 0 or int(rows[-1]) >= n_anchors or not bool((rows[1:] > rows[:-1]).all())):
-        # rows that ascend between a good first and a good last one are good; any others have to be looked at
-        lowest, highest = int(rows.min()), int(rows.max())
-        if lowest < 0 or highest >= n_anchors:
-            raise ValueError(f"rows must lie in 0..{n_anchors - 1}, got {lowest}..{highest}")
-        if len(rows.unique()) != len(rows):
-            raise ValueError(f"rows must differ from each other, got {len(rows.unique())} different of {len(rows)}")
+    values = rows.numpy()  # numpy takes a tenth of torch's time for a look at a few thousand numbers
+    is_ascending = len(values) == 0 or (values[0] >= 0 and values[-1] < n_anchors and (values[1:] > values[:-1]).all())
+    if not is_ascending:  # the usual case is over; these may be good as well
+        if values.min() < 0 or values.max() >= n_anchors:
+            raise ValueError(f"rows must lie in 0..{n_anchors - 1}, got {values.min()}..{values.max()}")
+        n_different = len(np.unique(values))
+        if n_different != len(values):
+            raise ValueError(f"rows must differ from each other, got {n_different} different of {len(values)}")
     n_static = part.anchors.features.shape[1]
     if n_static != decoder.static_dim:
         raise ValueError(f"features have {n_static} columns, the decoder takes {decoder.static_dim}")

@@ -33,9 +33,7 @@ def exp(x: Lanes) -> Lanes:
     value = build.constant(_TAYLOR[-1])
     for coefficient in reversed(_TAYLOR[:-1]):
         value = value.times_plus(rest, coefficient)
-    bits = builder.shl(
-        builder.add(k.to_ints(), ir.Constant(INTS, [127] * N_LANES)), ir.Constant(INTS, [23] * N_LANES)
-    )
+    bits = builder.shl(builder.add(k.to_ints(), ir.Constant(INTS, [127] * N_LANES)), ir.Constant(INTS, [23] * N_LANES))
     power = Lanes(build, builder.bitcast(bits, FLOATS))
     return (value * power).where(x.compare("==", x), x)
 

@@ -21,6 +21,7 @@ from engine.model.cpu.backward import WeightSums, differentiate_blocks, write_we
 from engine.model.cpu.forward import decode_blocks
 from engine.model.cpu.grid_kernels import Spread, spread_gradient
 from engine.model.cpu.layout import BLOCK, Job, Sizes
+from engine.model.cpu.memory import RecycledMemory
 from engine.model.cpu.routines import run
 from engine.model.cpu.rows import Copy, copy_rows
 from engine.model.decoder import HEADS, Decoder
@@ -32,7 +33,9 @@ if TYPE_CHECKING:
     from engine.model.decoding import ChosenAnchors
 
 POOL = WorkspacePool()
-"""Idle buffers of this process."""
+"""Idle scratch memory of this process."""
+MEMORY = RecycledMemory()
+"""Idle memory of results and gradients."""
 
 _ORDINALS = np.arange(BLOCK)
 _PER_SET = 3
@@ -179,7 +182,7 @@ def _decode(plan: _Plan, tensors: list[Tensor], *, keeps_encoded: bool) -> tuple
     """The columns of Gaussians, and the grid values of each set if they are to be kept."""
     sizes = plan.sizes
     n_rows = plan.n_anchors * sizes.n_gaussians
-    columns = tuple(torch.empty(n_rows, width) if width else torch.empty(n_rows) for width in (3, 4, 3, 0, 3))
+    columns = tuple(MEMORY.empty(*((n_rows, width) if width else (n_rows,))) for width in (3, 4, 3, 0, 3))
     kept: list[Tensor] = []
     with _Kernels(plan, tensors, columns, is_backward=False) as kernels:
         for index, part in enumerate(plan.chosen):
@@ -188,7 +191,7 @@ def _decode(plan: _Plan, tensors: list[Tensor], *, keeps_encoded: bool) -> tuple
                 kept.append(torch.empty(0))
                 continue
             n_blocks = -(-len(part.rows) // BLOCK) if keeps_encoded else kernels.n_workers
-            encoded = torch.empty(n_blocks * BLOCK if part.corners is not None else 0, lay.padded(sizes.n_encoded))
+            encoded = MEMORY.empty(n_blocks * BLOCK if part.corners is not None else 0, lay.padded(sizes.n_encoded))
             job = kernels.job(index, encoded)
             kernels.run(decode_blocks, job._replace(keeps_encoded=int(keeps_encoded)))
             kept.append(encoded)
@@ -218,12 +221,12 @@ def _differentiate(
             if not any(wanted):
                 continue
             d_own = [
-                torch.zeros_like(tensor) if is_wanted else torch.empty(0)
+                MEMORY.zeros_like(tensor) if is_wanted else torch.empty(0)
                 for tensor, is_wanted in zip(
                     plan.own(index, tensors), (wanted.features, wanted.scales, wanted.scales), strict=True
                 )
             ]
-            d_encoded = torch.empty_like(kept[index]) if wanted.field else torch.empty(0)
+            d_encoded = MEMORY.empty_like(kept[index]) if wanted.field else torch.empty(0)
             job = kernels.job(index, kept[index])._replace(
                 **dict(zip(_D_COLUMNS, (gradient.data_ptr() for gradient in d_columns), strict=True)),
                 **{f"wants_{name}": int(value) for name, value in wanted._asdict().items()},
@@ -243,12 +246,12 @@ def _differentiate(
                     place = first_table + knot
                     if needs[place]:
                         if is_first:
-                            gradients[place] = torch.empty_like(tensors[place])
+                            gradients[place] = MEMORY.empty_like(tensors[place])
                         kernels.spread(job, knot, gradients[place], is_first=is_first)
                 is_first = False
         for place in range(first_shared, len(tensors)):
             if needs[place] and gradients[place] is None:  # weights are written below, unused tables have no gradient
-                make = torch.empty_like if place < first_table else torch.zeros_like
+                make = MEMORY.empty_like if place < first_table else MEMORY.zeros_like
                 gradients[place] = make(tensors[place])
         kernels.write_weights(sums, starts, gradients[first_shared:first_table])
     return gradients
@@ -351,7 +354,8 @@ class _Kernels:
 
     def write_weights(self, sums: np.ndarray, starts: np.ndarray, gradients: list[Tensor | None]) -> None:
         """Sums of groups to gradients of weights; None where none is wanted."""
-        addresses = np.array([0 if gradient is None else gradient.data_ptr() for gradient in gradients])
+        addresses = np.zeros(lay.N_WEIGHTS, np.int64)  # a model without a field has fewer weights
+        addresses[: len(gradients)] = [0 if gradient is None else gradient.data_ptr() for gradient in gradients]
         if not addresses.any():
             return
         n_outputs, n_inputs = (np.array(widths) for widths in lay.weight_widths(self.plan.sizes))

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+
 from engine.model.cpu.routines import tuple_reader
 from engine.raster.cpu.lanes import N_LANES, kernel_intrinsic
 
@@ -103,7 +104,7 @@ def regions(sizes: Sizes, *, is_backward: bool) -> Regions:
     starts = [0]
     for width in widths:
         starts.append(starts[-1] + (-(-width // N_LANES) + 1) * N_LANES if width else starts[-1])
-    return Regions(*starts, starts[-1] + _ANCHOR_ROWS)
+    return Regions._make([*starts, starts[-1] + _ANCHOR_ROWS])
 
 
 class Job(NamedTuple):

@@ -120,7 +120,7 @@ def _tile_1x1(typing_context, a, b, c, d, e, f, g, h, i, j, k):
 def multiply(
     out, out_row, vectors, vector_row, factors, factor_row, factor_step, n_rows, depth, n_vectors, bias, finish, mask
 ):
-    """out[j, :] = finish(bias[j] + sum over i < depth of factors[j, i] * vectors[i, :]). Addresses and strides in bytes.
+    """out[j, :] = finish(bias[j] + sum over i of factors[j, i] * vectors[i, :]). Addresses and strides in bytes.
 
     Args:
         out, out_row: First vector of the result, distance of its rows. 64-byte aligned

@@ -17,12 +17,10 @@ from engine.raster.cpu.lanes import (
     INT64,
     INTS,
     N_LANES,
-    VECTOR_BYTES,
     LaneBuilder,
     Lanes,
     kernel_intrinsic,
 )
-
 from engine.raster.cpu.tile import take_next
 
 _BOOLS = ir.VectorType(ir.IntType(1), N_LANES)
@@ -57,7 +55,9 @@ def _row_addresses(build: LaneBuilder, base: Any, row_bytes: Any, indices: Any, 
 
 def _masked_load(build: LaneBuilder, address: Any, mask: Any, otherwise: Any) -> Any:
     types_ = [_POINTER, INT32, _BOOLS, FLOATS]
-    load = cgutils.get_or_insert_function(build.ir.module, ir.FunctionType(FLOATS, types_), "llvm.masked.load.v16f32.p0")
+    load = cgutils.get_or_insert_function(
+        build.ir.module, ir.FunctionType(FLOATS, types_), "llvm.masked.load.v16f32.p0"
+    )
     return build.ir.call(load, [build.ir.inttoptr(address, _POINTER), ir.Constant(INT32, 4), mask, otherwise])
 
 
