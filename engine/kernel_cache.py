@@ -154,7 +154,7 @@ def kernel_sources(package: Path) -> dict[str, bytes]:
     """
     texts = _python_texts(str(package))
     found: set[str] = set()
-    waiting = [path for path, text in texts.items() if b"numba" in text and any(name in text for name in _DECORATORS)]
+    waiting = [path for path, text in texts.items() if any(name in text for name in _DECORATORS)]
     while waiting:
         path = waiting.pop()
         if path not in found:
