@@ -94,7 +94,8 @@ def gather_and_count(unsorted, order, n_records, n_columns, tile_mask, records, 
     n_chunks = len(counts)
     has_mask = len(tile_mask) > 0
     for chunk in prange(n_chunks):
-        counts[chunk, :] = 0
+        for tile in range(counts.shape[1]):
+            counts[chunk, tile] = 0
         address = np.int64(unsorted.ctypes.data)
         end = n_records * (chunk + 1) // n_chunks
         for i in range(n_records * chunk // n_chunks, end):

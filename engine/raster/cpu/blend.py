@@ -127,7 +127,8 @@ def blend_tiles(
                 tile = take_next(counter_address)
                 continue
             if tile_x + _TILE <= width and tile_y + _TILE <= height:
-                row[_T : _T + _PLANE] = f4(1.0)
+                for place in range(_T, _T + _PLANE):
+                    row[place] = f4(1.0)
             else:
                 for block in range(_BLOCKS):
                     block_x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
@@ -135,7 +136,8 @@ def blend_tiles(
                     for lane in range(16):
                         inside = block_x + (lane & 3) < width and block_y + (lane >> 2) < height
                         row[_T + block * 16 + lane] = f4(1.0) if inside else f4(0.0)
-            row[_R : _R + 3 * _PLANE] = f4(0.0)
+            for place in range(_R, _R + 3 * _PLANE):
+                row[place] = f4(0.0)
             open_blocks = _find_open_blocks(address)
             while pair < end and open_blocks != 0:
                 stop = min(end, pair + _RECHECK_EVERY)

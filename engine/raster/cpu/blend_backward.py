@@ -152,7 +152,8 @@ def replay_tiles(
                 tile = take_next(counter_address)
                 continue
             if tile_x + _TILE > width or tile_y + _TILE > height:
-                row[: 5 * _BLOCKS * 16] = f4(0.0)
+                for place in range(5 * _BLOCKS * 16):
+                    row[place] = f4(0.0)
             for y in range(tile_y, min(tile_y + _TILE, height)):
                 for x in range(tile_x, min(tile_x + _TILE, width)):
                     block = ((y - tile_y) >> 2) * _BLOCKS_PER_ROW + ((x - tile_x) >> 2)

@@ -237,9 +237,12 @@ def project_backward(
 
 @njit(inline="always")
 def _clear(row, grad_means, grad_quats, grad_scales, grad_opacities, grad_colors, grad_centers):
-    grad_means[row, :] = _ZERO
-    grad_quats[row, :] = _ZERO
-    grad_scales[row, :] = _ZERO
+    for column in range(3):
+        grad_means[row, column] = _ZERO
+        grad_scales[row, column] = _ZERO
+        grad_colors[row, column] = _ZERO
+    for column in range(4):
+        grad_quats[row, column] = _ZERO
     grad_opacities[row] = _ZERO
-    grad_colors[row, :] = _ZERO
-    grad_centers[row, :] = _ZERO
+    grad_centers[row, 0] = _ZERO
+    grad_centers[row, 1] = _ZERO
