@@ -81,6 +81,8 @@ def rasterize(
         background = means.new_zeros(3)
     elif background.shape != (3,):
         raise ValueError(f"background must be [3], got {list(background.shape)}")
+    elif background.is_meta:
+        raise TypeError("background must hold numbers, got a tensor on device meta")
     background = background.to(means)
     is_fast = means.dtype == torch.float32 and means.device.type == "cpu"
     if backend == "auto":
@@ -118,6 +120,8 @@ def _check_gaussians(gaussians: Gaussians) -> None:
         raise ValueError(f"means must be [N, 3], got {list(means.shape)}")
     if not means.dtype.is_floating_point:
         raise TypeError(f"means must be floating point, got {means.dtype}")
+    if means.is_meta:
+        raise TypeError("means must hold numbers, got a tensor on device meta")
     n_rows = len(means)
     wanted = {"quats": (n_rows, 4), "scales": (n_rows, 3), "opacities": (n_rows,), "colors": (n_rows, 3)}
     for name, shape in wanted.items():
