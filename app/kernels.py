@@ -20,8 +20,6 @@ COMPILING = "Compiling kernels, first start only"
 
 def warm_cache() -> None:
     """Compile what is not in the cache yet. Blocks until it is done; failing is no failure."""
-    if is_cache_warm():
-        return
     try:
         compile_all()
     except OSError as error:

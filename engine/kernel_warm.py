@@ -15,7 +15,6 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 
 from engine.kernel_cache import is_cache_warm, use_kernel_cache, write_marker
@@ -51,28 +50,24 @@ def warm_up_all(report: ReportGroups | None = None) -> None:
     Args:
         report: Told about the progress; what it raises ends the compiling processes and passes on.
     """
-    if not is_cache_warm():
-        compile_all(report)
-    for name, module in groups():
+    compile_all(report)
+    for name, module in GROUPS:
         if name != "point clouds":  # not part of a step, and quick to load when clouds are built
             import_module(module).warm_up()
 
 
-def groups() -> list[tuple[str, str]]:
-    """Those of GROUPS whose module is there, in order."""
-    return [(name, module) for name, module in GROUPS if _exists(module)]
-
-
 def compile_all(report: ReportGroups | None = None, *, n_processes: int | None = None) -> bool:
-    """Compile every group in processes of their own. Returns whether all of them succeeded.
+    """Compile every group in processes of their own, unless that was done. Returns whether all of them succeeded.
 
     Args:
         report: See `warm_up_all`.
         n_processes: How many at a time; as many as cores when None, MAX_PROCESSES at most.
     """
+    if is_cache_warm():
+        return True
     report = report or (lambda done, n, what: None)
     folder = use_kernel_cache()
-    waiting = deque(groups())
+    waiting = deque(GROUPS)
     n = len(waiting)
     lock = folder / LOCK
     while not _take(lock):
@@ -155,13 +150,6 @@ def _take(lock: Path) -> bool:
 def _renew(lock: Path) -> None:
     with suppress(OSError):
         os.utime(lock)
-
-
-def _exists(module: str) -> bool:
-    try:
-        return find_spec(module) is not None
-    except ModuleNotFoundError:
-        return False
 
 
 def _n_cores() -> int:

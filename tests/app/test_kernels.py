@@ -74,17 +74,10 @@ def test_compiling_reports_groups_and_says_each_once(monkeypatch):
     assert messages == ["1 of 2 groups of kernels are compiled", "2 of 2 groups of kernels are compiled"]
 
 
-def test_a_warm_cache_starts_no_process(monkeypatch):
-    monkeypatch.setattr(kernels, "is_cache_warm", lambda: True)
-    monkeypatch.setattr(kernels, "compile_all", lambda: pytest.fail("compiled although the cache is warm"))
-    kernels.warm_cache()
-
-
 def test_failing_to_start_processes_is_no_failure(monkeypatch, caplog):
     def refuse() -> bool:
         raise OSError("no more processes")
 
-    monkeypatch.setattr(kernels, "is_cache_warm", lambda: False)
     monkeypatch.setattr(kernels, "compile_all", refuse)
     kernels.warm_cache()
     assert "no more processes" in caplog.text

@@ -107,7 +107,7 @@ def test_all_real_kernels_and_their_vector_helpers_are_sources():
     with_kernels = {
         path.relative_to(ROOT / "engine").as_posix()
         for path in (ROOT / "engine").rglob("*.py")
-        if "\n@njit" in path.read_text("utf-8")
+        if any(f"\n@{name}" in path.read_text("utf-8") for name in ("njit", "routine(", "kernel_intrinsic"))
     }
     assert with_kernels <= found
 
@@ -275,6 +275,12 @@ def test_compiling_runs_every_group_and_leaves_a_marker(small_groups, tmp_path):
     assert not (use_kernel_cache() / kernel_warm.LOCK).exists()
 
 
+def test_a_warm_cache_starts_no_process(small_groups):
+    small_groups(never="raise SystemExit(1)")
+    write_marker(use_kernel_cache())
+    assert kernel_warm.compile_all(lambda *said: pytest.fail("there was nothing to compile"))
+
+
 def test_a_group_that_fails_leaves_no_marker(small_groups, caplog):
     small_groups(good="pass", bad="raise ValueError('no such kernel')")
     assert not kernel_warm.compile_all()
@@ -328,7 +334,5 @@ def test_the_lock_of_a_dead_program_is_broken(small_groups):
 def test_every_group_has_a_warm_up():
     from importlib import import_module
 
-    found = kernel_warm.groups()
-    assert {"rasterizer", "point clouds"} <= {name for name, _ in found}
-    for _, module in found:
+    for _, module in kernel_warm.GROUPS:
         assert callable(import_module(module).warm_up)
