@@ -35,9 +35,9 @@ fmt: setup ## format and apply the safe fixes
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 
-bench: setup ## measure the figures of the README and print them as a table
+bench: setup ## measure the figures of the README, print them as tables, draw out/speed_error.png
 	@$(BIN)/python -m tests.benchmarks.bench_quality $(SAMPLE)
-	@$(BIN)/python -m tests.benchmarks.bench_raster
+	@$(BIN)/clipgstream bench --full --out out
 	@$(BIN)/python -m tests.benchmarks.bench_window $(SAMPLE)
 
 golden: setup ## draw the golden pictures anew; look at each before committing it

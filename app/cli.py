@@ -1,4 +1,4 @@
-"""The command line without a window: train, eval, render, inspect, doctor. The only place that prints.
+"""The command line without a window: train, eval, render, inspect, doctor, bench. The only place that prints.
 
 Exit codes: 0 done, 1 failed, 2 bad input, 130 interrupted. One plain message each, details in the log file. Results
 go to standard output, progress and messages to standard error.
@@ -52,6 +52,7 @@ logger = logging.getLogger(__name__)
 EXIT_OK, EXIT_FAILED, EXIT_INTERRUPTED = 0, 1, 130
 BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
 """Failures of a worker that are the input's and not the program's."""
+CHART_FILE = "speed_error.png"
 VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov")
 
 
@@ -113,6 +114,17 @@ def build_parser() -> argparse.ArgumentParser:
 
     doctor = commands.add_parser("doctor", help="look at this machine", description="Look at this machine.")
     doctor.add_argument("--json", action="store_true", help="print the findings as JSON")
+
+    bench = commands.add_parser(
+        "bench",
+        help="measure the kernels on this machine",
+        description="Measure the kernels on this machine: speed beside error, as a table and a picture.",
+    )
+    bench.add_argument("--out", type=Path, metavar="DIR", help=f"folder for the picture {CHART_FILE}")
+    bench.add_argument("--json", metavar="FILE", help="file for all figures; - prints them instead of the table")
+    bench.add_argument("--full", action="store_true", help="all scenes and sizes; takes some minutes, not one")
+    bench.add_argument("--threads", type=int, metavar="N", help="threads to compute with (default: every core)")
+    bench.add_argument("--quiet", action="store_true", help="no progress")
     return parser
 
 
@@ -140,7 +152,8 @@ def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -
     except PermissionError as error:  # a path of the command line below a folder that may not even be looked into
         return _fail(EXIT_BAD_INPUT, f"{error.strerror}. Choose a folder you may use. - {error.filename}")
     except KeyboardInterrupt:
-        return _fail(EXIT_INTERRUPTED, "Interrupted. What was learned is kept; the same command goes on from there.")
+        kept = "" if options.command == "bench" else " What was learned is kept; the same command goes on from there."
+        return _fail(EXIT_INTERRUPTED, f"Interrupted.{kept}")
     except BrokenPipeError:  # whoever read our output has left
         return EXIT_FAILED
     except Exception as error:  # the edge of the command line: one line, no traceback
@@ -417,9 +430,15 @@ def check_writable(path: Path) -> None:
 
 
 def _write_text(path: Path, text: str) -> None:
+    with _named_failure(path), atomic_path(path) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+@contextlib.contextmanager
+def _named_failure(path: Path) -> Iterator[None]:
+    """A result that cannot be written is the user's to mend."""
     try:
-        with atomic_path(path) as partial:
-            partial.write_text(text, encoding="utf-8")
+        yield
     except OSError as error:
         raise ProjectError(
             f"The file could not be written ({error.strerror}).", hint="Choose another place.", path=path
@@ -510,10 +529,44 @@ def _doctor(options: argparse.Namespace, launch: Launch) -> int:
     return EXIT_OK
 
 
+def _bench(options: argparse.Namespace, launch: Launch) -> int:
+    chart = None if options.out is None else options.out / CHART_FILE
+    table_file = None if options.json in (None, "-") else Path(options.json)
+    for path in (chart, table_file):  # said before a minute is spent
+        if path is not None:
+            check_writable(path)
+    if options.threads is not None and options.threads < 1:
+        raise ProjectError(f"--threads is {options.threads}; at least one is needed.")
+    from app.bench.suite import FULL, QUICK, document, run_plan
+    from app.bench.table import report_text
+
+    line = ProgressLine(is_quiet=options.quiet)
+    try:
+        report = run_plan(
+            FULL if options.full else QUICK,
+            n_threads=options.threads,
+            say=lambda what, done: line.update(f"Measuring: {what}", done),
+        )
+    finally:
+        line.finish()
+    text = json.dumps(document(report), indent=1, allow_nan=False)
+    print(text if options.json == "-" else report_text(report))
+    if table_file is not None:
+        _write_text(table_file, text + "\n")
+    if chart is not None:
+        from app.bench.chart import draw_speed_error
+
+        with _named_failure(chart), atomic_path(chart) as partial:
+            draw_speed_error(report.marks, partial, footer=str(report.machine))
+        line.say(f"Speed against error: {chart}")
+    return EXIT_OK
+
+
 _COMMANDS: dict[str, Callable[[argparse.Namespace, Launch], int]] = {
     "train": _train,
     "eval": _evaluate,
     "render": _render,
     "inspect": _inspect,
     "doctor": _doctor,
+    "bench": _bench,
 }

@@ -11,9 +11,10 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
-from app.kernels import is_cache_warm
+from app.kernels import use_threads
 from app.project import data_dir
 from app.training.worker import n_cores, n_training_threads
+from engine.kernel_cache import UNWRITABLE, cache_root, cache_state
 
 PACKAGES = ("torch", "numpy", "numba", "scipy", "av", "open3d-cpu", "open3d", "pycolmap", "pyglet", "moderngl")
 PACKAGES += ("imgui-bundle", "safetensors")
@@ -37,7 +38,18 @@ class Finding:
 
 def examine() -> list[Finding]:
     """Look at everything; takes a few seconds, because OpenGL is tried in a process of its own."""
-    return [_python(), *_packages(), _cores(), _memory(), _kernels(), _gl(), _display(), _disk()]
+    return [
+        _python(),
+        *_packages(),
+        _cores(),
+        _memory(),
+        _kernels(),
+        _vectors(),
+        _threads(),
+        _gl(),
+        _display(),
+        _disk(),
+    ]
 
 
 def _python() -> Finding:
@@ -76,9 +88,64 @@ def _memory() -> Finding:
 
 
 def _kernels() -> Finding:
-    if is_cache_warm():
-        return Finding("Kernels", "compiled")
-    return Finding("Kernels", "not compiled yet; the first training or picture takes some seconds longer")
+    state = cache_state()
+    place = f"{state.folder}, {state.n_bytes / 2**20:.1f} MB"
+    if state.is_fallback:
+        place += f" (a temporary folder, because {cache_root()} cannot be written)"
+    if state.is_warm:
+        return Finding("Kernels", f"compiled, in {place}", not state.is_fallback)
+    is_fine = state.reason != UNWRITABLE and not state.is_fallback
+    wait = "the first training or picture takes some seconds longer"
+    return Finding("Kernels", f"not compiled: {state.reason}; {wait}. Folder {place}", is_fine)
+
+
+def _vectors() -> Finding:
+    from engine.raster.cpu.lanes import N_LANES
+
+    name, width, cpu = host_vectors()
+    n_registers = -(-N_LANES // width)
+    text = f"{name}, {width} numbers at once: {N_LANES} lanes of a kernel fill {n_registers} register"
+    return Finding("Vectors", f"{text}{'s' if n_registers > 1 else ''} ({cpu})")
+
+
+def host_vectors() -> tuple[str, int, str]:
+    """Widest instruction set that kernels can use here, float32 numbers it holds, and LLVM's name of the processor."""
+    from llvmlite import binding
+
+    features = {name for name, is_there in binding.get_host_cpu_features().items() if is_there}
+    return *vector_width(features, platform.machine()), binding.get_host_cpu_name()
+
+
+def vector_width(features: set[str], machine: str) -> tuple[str, int]:
+    """Name of the widest instruction set that kernels can use, and how many float32 it holds.
+
+    Args:
+        features: Names of LLVM's host features that are there.
+        machine: As platform.machine() says it.
+    """
+    for feature, name, width in (("avx512f", "AVX-512", 16), ("avx2", "AVX2", 8), ("avx", "AVX", 8)):
+        if feature in features:
+            return name, width
+    if "neon" in features or machine.lower() in ("arm64", "aarch64"):
+        return "NEON", 4
+    return ("SSE", 4) if "sse2" in features else ("no vector instructions known", 1)
+
+
+def _threads() -> Finding:
+    n_threads = use_threads(None)
+    from numba.np.ufunc.parallel import threading_layer
+
+    from engine.raster.cpu.threads import parallel_guard
+
+    with parallel_guard():  # starts the threads, so that the layer is known
+        layer = threading_layer()
+    spin = os.environ["GOMP_SPINCOUNT"]
+    policy = os.environ.get("OMP_WAIT_POLICY")
+    waits = f"; OMP_WAIT_POLICY={policy}" if policy else ""
+    text = f"{n_threads}, layer {layer}; an idle one spins {spin} rounds (GOMP_SPINCOUNT){waits}"
+    if layer == "workqueue":
+        return Finding("Threads", f"{text}. No OpenMP (libgomp) was found, so kernels run one call at a time.", False)
+    return Finding("Threads", text)
 
 
 def _gl() -> Finding:

@@ -1,53 +1,45 @@
-"""The rasterizer's compiled kernels: whether they are in the cache, and compiling them where no window waits.
+"""The compiled kernels, as the program uses them: compiling them where no window waits, and threads to run them on.
 
-Compiling holds the interpreter lock for about ten seconds, so it never happens in a process with a window.
+Compiling holds the interpreter lock for seconds, so it happens in processes of its own (`engine.kernel_warm`).
 """
 
 from __future__ import annotations
 
 import logging
 import os
-import subprocess
-import sys
-from importlib.util import find_spec
-from pathlib import Path
 
 from engine.conventions import SPIN_COUNT
+from engine.kernel_cache import is_cache_warm
+from engine.kernel_warm import compile_all, warm_up_all
+from engine.training.report import Progress, ReportProgress
 
 logger = logging.getLogger(__name__)
 
-WARM_UP = "from engine.raster.cpu.warm import warm_up; warm_up()"
-TIME_LIMIT_S = 180.0
-
-
-def is_cache_warm() -> bool:
-    """Whether compiled kernels of the rasterizer lie in numba's cache."""
-    spec = find_spec("engine.raster.cpu")
-    if spec is None or spec.origin is None:
-        return False
-    folders = [Path(spec.origin).parent / "__pycache__"]
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        folders = [Path(os.environ["NUMBA_CACHE_DIR"])]
-    return any(next(folder.rglob("blend*.nbi"), None) is not None for folder in folders if folder.is_dir())
+COMPILING = "Compiling kernels, first start only"
 
 
 def warm_cache() -> None:
-    """Compile in a process of its own, if nothing is cached yet. Blocks until it is done; failing is no failure."""
-    if is_cache_warm():
-        return
-    root = str(Path(__file__).resolve().parent.parent)
-    path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
+    """Compile what is not in the cache yet. Blocks until it is done; failing is no failure."""
     try:
-        subprocess.run(
-            [sys.executable, "-c", WARM_UP],
-            env={**os.environ, "PYTHONPATH": path},
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            timeout=TIME_LIMIT_S,
-            check=False,
-        )
-    except (OSError, subprocess.TimeoutExpired) as error:
+        compile_all()
+    except OSError as error:
         logger.warning("kernels could not be compiled ahead: %s", error)
+
+
+def warm_up_reporting(report: ReportProgress) -> None:
+    """Compile what is not in the cache yet, saying how far that is, and load what a training step needs.
+
+    What `report` raises ends the compiling processes and passes on.
+    """
+    said = -1
+
+    def report_groups(done: int, n: int, what: str) -> None:
+        nonlocal said
+        message = f"{done} of {n} groups of kernels are compiled" if done > max(said, 0) else ""
+        said = max(said, done)
+        report(Progress(COMPILING, done / max(n, 1), message))
+
+    warm_up_all(report_groups)
 
 
 def use_threads(n_threads: int | None) -> int:

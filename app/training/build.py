@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from app.kernels import warm_up_reporting
 from app.project import Project, open_project
 from app.training.messages import TrainJob
 from app.training.run import Training
@@ -20,11 +21,10 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
     Raises:
         CaptureError, ProjectError: Files are missing, damaged or do not fit together.
     """
-    from engine.raster.cpu.warm import warm_up
     from engine.training.clip_training import ClipTraining  # torch takes a second to import
 
     report(Progress("Starting", 0.0))
-    warm_up()  # compiles on the very first start, which takes longer
+    warm_up_reporting(report)
     project = open_project(job.project, is_writable=False)
     capture = open_capture(Path(job.capture), scale=job.scale)
     if capture.fingerprint != project.settings.fingerprint:

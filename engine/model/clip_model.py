@@ -17,6 +17,7 @@ from engine.errors import ProjectError
 from engine.model.anchors import AnchorSet
 from engine.model.clip_state import ClipState
 from engine.model.decoder import Decoder
+from engine.model.decoding import ChosenAnchors, decode_anchors
 from engine.model.field import FieldShape, SpatioTemporalField
 from engine.model.grid import CornerTable
 from engine.raster.gaussians import Gaussians
@@ -129,38 +130,25 @@ class ClipModel(nn.Module):
             K Gaussians per row; sets follow each other in the order of `roles`.
         """
         knots = self.knots(clip_time)
-        parts = []
-        for role in self.roles():
-            chosen = self.alive(role, clip_time) if rows is None else rows[role]
-            if len(chosen):
-                parts.append(self._decode_set(role, chosen, knots))
-        if not parts:
-            zeros = torch.zeros
-            return Gaussians(zeros(0, 3), zeros(0, 4), zeros(0, 3), zeros(0), zeros(0, 3))
-        return Gaussians.concatenate(parts)
+        chosen = [
+            ChosenAnchors(
+                anchors=self.anchor_set(role),
+                rows=self.alive(role, clip_time) if rows is None else rows[role],
+                corners=self._corners.get(role),
+                decoded=self._constant_gaussians(role) if self.is_constant(role) else None,
+            )
+            for role in self.roles()
+        ]
+        return decode_anchors(chosen, self.decoder, self.field, knots)
 
-    def _decode_set(self, role: str, rows: Tensor, knots: list[tuple[int, float]]) -> Gaussians:
-        anchors = self.anchor_set(role)
-        if self.is_constant(role):
-            if role not in self._frozen:
-                with torch.no_grad():
-                    self._frozen[role] = self._decode_rows(anchors, torch.arange(len(anchors)), None)
-            k = self.decoder.gaussians_per_anchor
-            return self._frozen[role][(rows[:, None] * k + torch.arange(k)).reshape(-1)]
-        dynamic_features = None
-        if anchors.is_dynamic and self.field is not None:
-            dynamic_features = self.field(rows.numpy(), self._corners[role], knots)
-        return self._decode_rows(anchors, rows, dynamic_features)
-
-    def _decode_rows(self, anchors: AnchorSet, rows: Tensor, dynamic_features: Tensor | None) -> Gaussians:
-        return self.decoder(
-            positions=anchors.positions[rows],
-            color_logits=anchors.color_logits[rows],
-            log_offset_scales=anchors.log_offset_scales.index_select(0, rows),
-            log_base_scales=anchors.log_base_scales.index_select(0, rows),
-            static_features=anchors.features.index_select(0, rows),
-            dynamic_features=dynamic_features,
-        )
+    def _constant_gaussians(self, role: str) -> Gaussians:
+        """Gaussians of a whole set that never change, decoded at the first call."""
+        if role not in self._frozen:
+            anchors = self.anchor_set(role)
+            everything = ChosenAnchors(anchors=anchors, rows=torch.arange(len(anchors)))
+            with torch.no_grad():
+                self._frozen[role] = decode_anchors([everything], self.decoder, None, [(0, 1.0)])
+        return self._frozen[role]
 
     def anchors(self, clip_time: float | None = None) -> AnchorView:
         """Positions for display: all, or those that exist at a time of the clip, in [0, 1)."""

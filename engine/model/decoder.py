@@ -1,4 +1,4 @@
-"""Decoder: features of anchors to Gaussians. Shared by all clips, frozen after the reference clip.
+"""Decoder: the heads that make Gaussians of features. Shared by all clips, frozen after the reference clip.
 
 Four heads of two layers. Opacity and colour end in a sigmoid, so no Gaussian is ever without gradient; shape gives
 scale ratios and a quaternion; offset is unbounded. Nothing depends on the viewing direction, so one decode serves all
@@ -13,16 +13,13 @@ import math
 import torch
 from torch import Tensor, nn
 
-from engine.model.activation import activate
-from engine.raster.gaussians import Gaussians
-
 HEADS = {"opacity": 1, "color": 3, "shape": 7, "offset": 3}
 """Values per Gaussian of each head, in the order of their slices in the output."""
 N_OUT = sum(HEADS.values())
 
 
 class Decoder(nn.Module):
-    """[f_s; f_d] of anchors to activated Gaussians, K per anchor, anchor-major order.
+    """The heads: [f_s; f_d] of anchors to raw values of K Gaussians per anchor. `engine.model.decoding` runs them.
 
     The four first layers are one matrix and the four second layers a block each; each head has parameters of its own
     so that its learning rate can differ.
@@ -71,7 +68,7 @@ class Decoder(nn.Module):
         ]
 
     def raw(self, static_features: Tensor, dynamic_features: Tensor | None) -> Tensor:
-        """Head outputs before activation, heads side by side. [n, K * 14]
+        """Head outputs before activation, heads side by side, in plain torch, any dtype. [n, K * 14]
 
         Args:
             static_features: [n, static_dim]
@@ -86,24 +83,3 @@ class Decoder(nn.Module):
         hidden = torch.relu(hidden).split(self.hidden, dim=1)
         blocks = [torch.addmm(self.second_bias[head], hidden[i], self.second[head]) for i, head in enumerate(HEADS)]
         return torch.cat(blocks, dim=1)
-
-    def forward(
-        self,
-        *,
-        positions: Tensor,
-        color_logits: Tensor,
-        log_offset_scales: Tensor,
-        log_base_scales: Tensor,
-        static_features: Tensor,
-        dynamic_features: Tensor | None,
-    ) -> Gaussians:
-        """Gaussians of n anchors, n * K rows. Arguments as in AnchorSet, one row per anchor."""
-        raw = self.raw(static_features, dynamic_features)
-        return activate(
-            raw,
-            positions=positions,
-            color_logits=color_logits,
-            log_offset_scales=log_offset_scales,
-            log_base_scales=log_base_scales,
-            gaussians_per_anchor=self.gaussians_per_anchor,
-        )

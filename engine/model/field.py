@@ -107,8 +107,8 @@ class SpatioTemporalField(nn.Module):
             return [(lower, 1.0)]
         return [(lower, 1.0 - fraction), (lower + 1, fraction)]
 
-    def forward(self, rows: np.ndarray, corners: CornerTable, knots: list[tuple[int, float]]) -> Tensor:
-        """Dynamic features of the chosen anchors. [n, feature_dim]
+    def forward(self, rows: Tensor, corners: CornerTable, knots: list[tuple[int, float]]) -> Tensor:
+        """Dynamic features of the chosen anchors in plain torch, any dtype. [n, feature_dim]
 
         Args:
             rows: Rows of the corner table. [n] int64

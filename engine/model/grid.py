@@ -1,11 +1,11 @@
-"""Spatial hash grid of the field: corner indices, weights and the interpolation kernels.
+"""Spatial hash grid of the field: corner indices, weights and the interpolation.
 
 Anchors do not move, so the eight corners of every level and their weights are constants of an anchor; they are
 computed once (`corner_table`) and reused at every step. Time is not a grid axis: each frame of the clip is a knot with
 tables of its own, so a picture touches the eight spatial corners of one knot only.
 
-Letters: n rows, L levels, T entries per level, C channels. `encode` is the public op; `encode_reference` is the slow
-truth it is checked against.
+Letters: n rows, L levels, T entries per level, C channels. `encode` is plain torch; the fused decode has it as a kernel
+(engine.model.cpu.grid_kernels).
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numba import njit, prange
 from torch import Tensor
 
 _PRIMES = (
@@ -31,10 +30,12 @@ class CornerTable:
     Attributes:
         indices: Table entry of each corner. [A, L, 8] int32
         weights: Trilinear weight of each corner; each row sums to 1. [A, L, 8] float32
+        n_entries: Table entries per level; indices are below it.
     """
 
     indices: np.ndarray
     weights: np.ndarray
+    n_entries: int
 
 
 def corner_table(unit_positions: np.ndarray, cells: tuple[int, ...], n_entries: int) -> CornerTable:
@@ -69,79 +70,21 @@ def corner_table(unit_positions: np.ndarray, cells: tuple[int, ...], n_entries: 
                 index = mixed & np.uint64(n_entries - 1)
             indices[:, level, bits] = index.astype(np.int32)
             weights[:, level, bits] = np.where(offset, fraction, 1.0 - fraction).prod(axis=1)
-    return CornerTable(indices, weights)
+    return CornerTable(indices, weights, n_entries)
 
 
-@njit(parallel=True, cache=True, nogil=True, error_model="numpy")
-def _gather(rows, indices, weights, table, out):
-    n_levels, n_channels = table.shape[0], table.shape[2]
-    for i in prange(rows.shape[0]):
-        row = rows[i]
-        for level in range(n_levels):
-            for channel in range(n_channels):
-                out[i, level * n_channels + channel] = 0.0
-            for corner in range(8):
-                entry = indices[row, level, corner]
-                weight = weights[row, level, corner]
-                for channel in range(n_channels):
-                    out[i, level * n_channels + channel] += weight * table[level, entry, channel]
-
-
-@njit(parallel=True, cache=True, nogil=True, error_model="numpy")
-def _scatter(rows, indices, weights, out_grad, table_grad):
-    # Levels run in parallel: each owns its slice of the gradient, so no atomics and one fixed order of additions.
-    n_levels, n_channels = table_grad.shape[0], table_grad.shape[2]
-    for level in prange(n_levels):
-        table_grad[level] = 0.0
-        for i in range(rows.shape[0]):
-            row = rows[i]
-            for corner in range(8):
-                entry = indices[row, level, corner]
-                weight = weights[row, level, corner]
-                for channel in range(n_channels):
-                    table_grad[level, entry, channel] += weight * out_grad[i, level * n_channels + channel]
-
-
-class _Encode(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx, table: Tensor, rows: np.ndarray, corners: CornerTable) -> Tensor:
-        out = torch.empty(len(rows), table.shape[0] * table.shape[2])
-        _gather(rows, corners.indices, corners.weights, table.detach().numpy(), out.numpy())
-        ctx.rows, ctx.corners, ctx.table_shape = rows, corners, table.shape
-        return out
-
-    @staticmethod
-    def backward(ctx, *gradients: Tensor):
-        (out_grad,) = gradients
-        table_grad = torch.empty(ctx.table_shape)
-        corners = ctx.corners
-        _scatter(
-            ctx.rows,
-            corners.indices,
-            corners.weights,
-            out_grad.contiguous().numpy(),
-            table_grad.numpy(),
-        )
-        return table_grad, None, None
-
-
-def encode(table: Tensor, rows: np.ndarray, corners: CornerTable) -> Tensor:
-    """Interpolate one knot's table at the chosen anchors.
+def encode(table: Tensor, rows: Tensor, corners: CornerTable) -> Tensor:
+    """Interpolate one knot's table at the chosen anchors, by torch indexing: the slow truth, any dtype.
 
     Args:
-        table: [L, T, C] float32, contiguous.
+        table: [L, T, C]
         rows: Rows of the corner table. [n] int64
         corners: Constants of all anchors.
     Returns:
-        [n, L * C], levels first. Differentiable in `table`. Checked against `encode_reference`.
+        [n, L * C], levels first. Differentiable in `table`.
     """
-    return _Encode.apply(table, rows, corners)  # type: ignore[no-any-return]
-
-
-def encode_reference(table: Tensor, rows: np.ndarray, corners: CornerTable) -> Tensor:
-    """Slow truth of `encode`, any dtype, by torch indexing and autograd."""
-    indices = torch.from_numpy(corners.indices[rows].astype(np.int64))  # [n, L, 8]
-    weights = torch.from_numpy(corners.weights[rows]).to(table.dtype)
+    indices = torch.from_numpy(corners.indices[rows.numpy()].astype(np.int64))  # [n, L, 8]
+    weights = torch.from_numpy(corners.weights[rows.numpy()]).to(table.dtype)
     levels = torch.arange(table.shape[0])[None, :, None]
     values = table[levels, indices]  # [n, L, 8, C]
     return (values * weights[..., None]).sum(2).flatten(1)

@@ -3,5 +3,6 @@
 from engine.raster.gaussians import Gaussians
 from engine.raster.rasterize import rasterize
 from engine.raster.rendering import Rendering
+from engine.raster.view import TILE_PX
 
-__all__ = ["Gaussians", "Rendering", "rasterize"]
+__all__ = ["TILE_PX", "Gaussians", "Rendering", "rasterize"]

@@ -18,6 +18,8 @@ class Gaussians:
         scales: Standard deviations along the rotated axes, scene units, linear. [N, 3]
         opacities: In 0..1. [N]
         colors: Display-encoded RGB in 0..1. [N, 3]
+        is_frozen: Rows whose gradient nobody needs: drawn like any other, but their gradient is zero and costs no
+            work. None where no row is frozen. [N] bool
     """
 
     means: Tensor
@@ -25,23 +27,35 @@ class Gaussians:
     scales: Tensor
     opacities: Tensor
     colors: Tensor
+    is_frozen: Tensor | None = None
 
     def __len__(self) -> int:
         return self.means.shape[0]
 
     def __getitem__(self, rows: Tensor | slice) -> Gaussians:
         """The chosen rows, in the given order."""
-        return Gaussians(*(tensor[rows] for tensor in self.tensors()))
+        is_frozen = None if self.is_frozen is None else self.is_frozen[rows]
+        return Gaussians(*(tensor[rows] for tensor in self.tensors()), is_frozen=is_frozen)
 
     def tensors(self) -> tuple[Tensor, Tensor, Tensor, Tensor, Tensor]:
-        """means, quats, scales, opacities, colors."""
+        """means, quats, scales, opacities, colors: what a gradient can flow to."""
         return self.means, self.quats, self.scales, self.opacities, self.colors
 
     def detach(self) -> Gaussians:
         """The same values without history."""
-        return Gaussians(*(tensor.detach() for tensor in self.tensors()))
+        return Gaussians(*(tensor.detach() for tensor in self.tensors()), is_frozen=self.is_frozen)
 
     @staticmethod
     def concatenate(parts: list[Gaussians]) -> Gaussians:
         """All parts one after another; the parts keep their rows in order."""
-        return Gaussians(*(torch.cat(tensors) for tensors in zip(*(p.tensors() for p in parts), strict=True)))
+        is_frozen = None
+        if any(part.is_frozen is not None for part in parts):
+            is_frozen = torch.cat([part.frozen_rows() for part in parts])
+        columns = (torch.cat(tensors) for tensors in zip(*(part.tensors() for part in parts), strict=True))
+        return Gaussians(*columns, is_frozen=is_frozen)
+
+    def frozen_rows(self) -> Tensor:
+        """`is_frozen`, all False where it is None. [N] bool"""
+        if self.is_frozen is not None:
+            return self.is_frozen
+        return torch.zeros(len(self), dtype=torch.bool, device=self.means.device)

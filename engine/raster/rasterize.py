@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Literal
+from typing import Literal, Protocol
 
 import torch
 from torch import Tensor
@@ -12,13 +11,28 @@ from engine.raster.cpu.backend import rasterize_cpu
 from engine.raster.gaussians import Gaussians
 from engine.raster.reference import rasterize_reference
 from engine.raster.rendering import Rendering
-from engine.raster.view import PinholeView, pinhole_views
+from engine.raster.view import PinholeView, n_tiles, pinhole_views
 
 BackendName = Literal["auto", "cpu", "reference"]
-Backend = Callable[[Gaussians, list[PinholeView], Tensor, bool], Rendering]
+
+
+class Backend(Protocol):
+    """A rasterizer: gets checked Gaussians and views, a background [3] and a tile mask [C, rows, columns] or None."""
+
+    def __call__(
+        self,
+        gaussians: Gaussians,
+        views: list[PinholeView],
+        background: Tensor,
+        *,
+        tile_mask: Tensor | None,
+        want_means2d: bool,
+        want_depth: bool,
+    ) -> Rendering: ...
+
 
 BACKENDS: dict[str, Backend] = {"cpu": rasterize_cpu, "reference": rasterize_reference}
-"""Name to implementation; arguments are checked Gaussians, views, background [3] and whether to make means2d."""
+"""Name to implementation."""
 
 
 def rasterize(
@@ -31,13 +45,16 @@ def rasterize(
     background: Tensor | None = None,
     near_plane: float = 0.01,
     backend: BackendName = "auto",
+    tile_mask: Tensor | None = None,
     want_means2d: bool = False,
+    want_depth: bool = False,
 ) -> Rendering:
     """Render Gaussians from C cameras.
 
     Differentiable in every Gaussian parameter and in the background, not in the cameras. Rows that cannot be drawn
     (NaN, infinite, a zero quaternion, behind the near plane, opacity below 1/255) are left out and get a zero
-    gradient. Safe to call from several threads at once.
+    gradient. Frozen rows (`Gaussians.is_frozen`) are drawn but get a zero gradient, and cost little of the backward
+    pass. Safe to call from several threads at once.
 
     Args:
         gaussians: What to draw; all five tensors share one floating dtype and one device.
@@ -47,7 +64,10 @@ def rasterize(
         background: Colour behind everything; black if None. [3]
         near_plane: Centres at or before this depth are dropped, scene units.
         backend: "cpu" (float32 tensors in main memory), "reference" (anything, slowly), or "auto": cpu if it can.
+        tile_mask: Tiles of TILE_PX x TILE_PX pixels that are wanted; None for all. Pixels of others hold the background
+            and alpha 0, and pass no gradient to anything. [C, rows, columns] or, for all cameras, [rows, columns] bool
         want_means2d: Also return projected centres that receive a gradient, for densification.
+        want_depth: Also return the accumulated depth.
     Returns:
         Rendering with image [C, H, W, 3] and alpha [C, H, W, 1].
     Raises:
@@ -61,6 +81,8 @@ def rasterize(
         background = means.new_zeros(3)
     elif background.shape != (3,):
         raise ValueError(f"background must be [3], got {list(background.shape)}")
+    elif background.is_meta:
+        raise TypeError("background must hold numbers, got a tensor on device meta")
     background = background.to(means)
     is_fast = means.dtype == torch.float32 and means.device.type == "cpu"
     if backend == "auto":
@@ -69,7 +91,27 @@ def rasterize(
         raise ValueError(f"backend must be auto or one of {', '.join(sorted(BACKENDS))}, got {backend!r}")
     if backend == "cpu" and not is_fast:
         raise TypeError(f"backend 'cpu' needs float32 tensors on the cpu, got means {means.dtype} on {means.device}")
-    return BACKENDS[backend](gaussians, views, background, want_means2d)
+    return BACKENDS[backend](
+        gaussians,
+        views,
+        background,
+        tile_mask=None if tile_mask is None else _checked_mask(tile_mask, len(views), int(width), int(height)),
+        want_means2d=want_means2d,
+        want_depth=want_depth,
+    )
+
+
+def _checked_mask(tile_mask: Tensor, n_views: int, width: int, height: int) -> Tensor:
+    """The mask on the cpu. [C, rows, columns] bool"""
+    shape = n_tiles(width, height)
+    if tile_mask.shape not in (shape, (n_views, *shape)):
+        raise ValueError(
+            f"tile_mask must be {[n_views, *shape]} or {list(shape)} for {n_views} images of {width} x {height}, "
+            f"got {list(tile_mask.shape)}"
+        )
+    if tile_mask.dtype != torch.bool:
+        raise TypeError(f"tile_mask must be bool, got {tile_mask.dtype}")
+    return tile_mask.cpu().expand(n_views, *shape)
 
 
 def _check_gaussians(gaussians: Gaussians) -> None:
@@ -78,6 +120,8 @@ def _check_gaussians(gaussians: Gaussians) -> None:
         raise ValueError(f"means must be [N, 3], got {list(means.shape)}")
     if not means.dtype.is_floating_point:
         raise TypeError(f"means must be floating point, got {means.dtype}")
+    if means.is_meta:
+        raise TypeError("means must hold numbers, got a tensor on device meta")
     n_rows = len(means)
     wanted = {"quats": (n_rows, 4), "scales": (n_rows, 3), "opacities": (n_rows,), "colors": (n_rows, 3)}
     for name, shape in wanted.items():
@@ -90,3 +134,12 @@ def _check_gaussians(gaussians: Gaussians) -> None:
             raise TypeError(
                 f"{name} must be {means.dtype} on {means.device} like means, got {tensor.dtype} on {tensor.device}"
             )
+    is_frozen = gaussians.is_frozen
+    if is_frozen is None:
+        return
+    if is_frozen.shape != (n_rows,):
+        raise ValueError(
+            f"is_frozen must be {[n_rows]} to match means {list(means.shape)}, got {list(is_frozen.shape)}"
+        )
+    if is_frozen.dtype != torch.bool or is_frozen.device != means.device:
+        raise TypeError(f"is_frozen must be bool on {means.device}, got {is_frozen.dtype} on {is_frozen.device}")

@@ -17,17 +17,24 @@ from engine.conventions import ALPHA_MAX, ALPHA_MIN, EPS2D_PX2, TRANSMITTANCE_MI
 from engine.raster.gaussians import Gaussians
 from engine.raster.limits import EXTENT_MAX_PX, QUAT_NORM_SQUARED_MAX, QUAT_NORM_SQUARED_MIN, VALUE_MAX
 from engine.raster.rendering import Rendering
-from engine.raster.view import PinholeView
+from engine.raster.view import TILE_PX, PinholeView
 
 _PAIRS_PER_STRIP = 1 << 22
 """Gaussian-pixel pairs evaluated at once: 32 MiB per float64 intermediate."""
 
 
 def rasterize_reference(
-    gaussians: Gaussians, views: list[PinholeView], background: Tensor, want_means2d: bool
+    gaussians: Gaussians,
+    views: list[PinholeView],
+    background: Tensor,
+    *,
+    tile_mask: Tensor | None,
+    want_means2d: bool,
+    want_depth: bool,
 ) -> Rendering:
     """Render every view by brute force. Arguments are those of `rasterize`, already checked."""
-    images, alphas = [], []
+    gaussians = _without_frozen_history(gaussians)
+    images, alphas, depth_images = [], [], []
     means2d = gaussians.means.new_zeros(len(views), len(gaussians), 2) if want_means2d else None
     rows_per_view = [drawable_rows(gaussians.detach(), view) for view in views]
     if means2d is not None:
@@ -36,14 +43,44 @@ def rasterize_reference(
         means2d.requires_grad_(torch.is_grad_enabled())
     for camera, (view, rows) in enumerate(zip(views, rows_per_view, strict=True)):
         drawn = gaussians[rows]
-        centers, covariances, _ = project(drawn, view)
+        centers, covariances, depths = project(drawn, view)
         if means2d is not None:  # zero in value; routes the gradient of the centres into the leaf as well
             leaf = means2d[camera, rows]
+            if drawn.is_frozen is not None:
+                leaf = torch.where(drawn.is_frozen[:, None], leaf.detach(), leaf)
             centers = centers + (leaf - leaf.detach())
-        image, transmittance = _blend(centers, covariances, drawn.opacities, drawn.colors, view)
-        images.append(image + transmittance * background)
+        channels = torch.cat([drawn.colors, depths[:, None]], -1) if want_depth else drawn.colors
+        image, transmittance = _blend(centers, covariances, drawn.opacities, channels, view)
+        if tile_mask is not None:
+            is_wanted = _pixels_of_tiles(tile_mask[camera], view).to(image.device)
+            image = torch.where(is_wanted, image, 0.0)
+            transmittance = torch.where(is_wanted, transmittance, 1.0)
+            background_here = torch.where(is_wanted, background, background.detach())
+        else:
+            background_here = background
+        images.append(image[..., :3] + transmittance * background_here)
         alphas.append(1.0 - transmittance)
-    return Rendering(torch.stack(images), torch.stack(alphas), means2d)
+        depth_images.append(image[..., 3:])
+    depth = torch.stack(depth_images) if want_depth else None
+    return Rendering(torch.stack(images), torch.stack(alphas), means2d, depth)
+
+
+def _pixels_of_tiles(tile_mask: Tensor, view: PinholeView) -> Tensor:
+    """A mask of tiles as one of pixels. [rows, columns] -> [H, W, 1]"""
+    pixels = tile_mask.repeat_interleave(TILE_PX, 0).repeat_interleave(TILE_PX, 1)
+    return pixels[: view.height, : view.width, None]
+
+
+def _without_frozen_history(gaussians: Gaussians) -> Gaussians:
+    """The same values; nothing flows back to frozen rows."""
+    is_frozen = gaussians.is_frozen
+    if is_frozen is None:
+        return gaussians
+    cut = (
+        torch.where(is_frozen.view(-1, *[1] * (tensor.ndim - 1)), tensor.detach(), tensor)
+        for tensor in gaussians.tensors()
+    )
+    return Gaussians(*cut, is_frozen=is_frozen)
 
 
 def project(gaussians: Gaussians, view: PinholeView) -> tuple[Tensor, Tensor, Tensor]:
@@ -109,20 +146,20 @@ def drawable_rows(gaussians: Gaussians, view: PinholeView) -> Tensor:
 
 
 def _blend(
-    centers: Tensor, covariances: Tensor, opacities: Tensor, colors: Tensor, view: PinholeView
+    centers: Tensor, covariances: Tensor, opacities: Tensor, channels: Tensor, view: PinholeView
 ) -> tuple[Tensor, Tensor]:
-    """Image over black [H, W, 3] and transmittance [H, W, 1] of Gaussians that are sorted by depth."""
+    """Channels over black [H, W, D] and transmittance [H, W, 1] of Gaussians that are sorted by depth."""
     rows_per_strip = max(1, _PAIRS_PER_STRIP // max(1, view.width * len(centers)))
     strips = []
     for first_row in range(0, view.height, rows_per_strip):
         pixels = _pixel_centers(first_row, min(first_row + rows_per_strip, view.height), view.width).to(centers)
-        arguments = (pixels, centers, covariances, opacities, colors)
+        arguments = (pixels, centers, covariances, opacities, channels)
         if torch.is_grad_enabled() and any(tensor.requires_grad for tensor in arguments):
             strips.append(checkpoint(_blend_pixels, *arguments, use_reentrant=False))
         else:
             strips.append(_blend_pixels(*arguments))
     image, transmittance = (torch.cat(parts) for parts in zip(*strips, strict=True))
-    return image.reshape(view.height, view.width, 3), transmittance.reshape(view.height, view.width, 1)
+    return image.reshape(view.height, view.width, -1), transmittance.reshape(view.height, view.width, 1)
 
 
 def _pixel_centers(first_row: int, end_row: int, width: int) -> Tensor:
@@ -132,9 +169,9 @@ def _pixel_centers(first_row: int, end_row: int, width: int) -> Tensor:
 
 
 def _blend_pixels(
-    pixels: Tensor, centers: Tensor, covariances: Tensor, opacities: Tensor, colors: Tensor
+    pixels: Tensor, centers: Tensor, covariances: Tensor, opacities: Tensor, channels: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Front-to-back compositing. [P, 3] and [P]"""
+    """Front-to-back compositing. [P, D] and [P]"""
     dx, dy = (pixels[:, None, :] - centers[None, :, :]).unbind(-1)  # [P, N]
     xx, xy, yy = covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]
     determinant = xx * yy - xy * xy
@@ -145,7 +182,7 @@ def _blend_pixels(
     alphas = torch.where(is_open, alphas, 0.0)
     before = _transmittance_before(alphas)
     last = before[:, -1] * (1.0 - alphas[:, -1]) if alphas.shape[1] else pixels.new_ones(len(pixels))
-    return (alphas * before) @ colors, last
+    return (alphas * before) @ channels, last
 
 
 def _transmittance_before(alphas: Tensor) -> Tensor:

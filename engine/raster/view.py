@@ -13,6 +13,14 @@ from torch import Tensor
 
 from engine.conventions import FRUSTUM_MARGIN
 
+TILE_PX = 32
+"""Edge of a tile, pixels: what `tile_mask` of `rasterize` counts in. Tiles at the right and lower border may be cut."""
+
+
+def n_tiles(width: int, height: int) -> tuple[int, int]:
+    """Rows and columns of tiles of an image."""
+    return -(-height // TILE_PX), -(-width // TILE_PX)
+
 
 @dataclass(frozen=True, slots=True)
 class PinholeView:
@@ -56,6 +64,7 @@ def pinhole_views(viewmats: Tensor, Ks: Tensor, width: int, height: int, near_pl
     """One PinholeView per row of `viewmats` [C, 4, 4] and `Ks` [C, 3, 3].
 
     Raises:
+        TypeError: A tensor without numbers (device meta).
         ValueError: A wrong shape, a number that is not finite, a focal length <= 0, skew, an empty image or a near
             plane <= 0. The message names the argument.
     """
@@ -63,6 +72,9 @@ def pinhole_views(viewmats: Tensor, Ks: Tensor, width: int, height: int, near_pl
         raise ValueError(f"viewmats must be [C, 4, 4] with at least one camera, got {list(viewmats.shape)}")
     if Ks.shape != (len(viewmats), 3, 3):
         raise ValueError(f"Ks must be [{len(viewmats)}, 3, 3] to match viewmats, got {list(Ks.shape)}")
+    for name, tensor in (("viewmats", viewmats), ("Ks", Ks)):
+        if tensor.is_meta:
+            raise TypeError(f"{name} must hold numbers, got a tensor on device meta")
     if width < 1 or height < 1:
         raise ValueError(f"width and height must be at least 1, got {width} x {height}")
     if width >= 1 << 15 or height >= 1 << 15:

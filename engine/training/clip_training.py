@@ -36,9 +36,10 @@ from engine.training.building import (
     static_model,
 )
 from engine.training.config import TrainConfig
-from engine.training.losses import LossWorkspace, photometric_loss
+from engine.training.fused_loss import LossWorkspace
+from engine.training.losses import photometric_loss
 from engine.training.optimizer import PhaseOptimizer, named_parameters
-from engine.training.pictures import ShuffledOrder, TrainingPictures, shared_image_size, to_float
+from engine.training.pictures import ShuffledOrder, TrainingPictures, shared_image_size
 from engine.training.preparation import (
     Backgrounds,
     correct_backgrounds,
@@ -267,17 +268,22 @@ class ClipTraining:
         item = self._order.draw()
         if stage == "static":
             camera_row, clip_time = item, 0.0
-            truth = to_float(self.backgrounds.images[camera_row])
+            truth, is_counted = self.backgrounds.images[camera_row], self.backgrounds.is_stable[camera_row]
         else:
             camera_row, frame = divmod(item, self.clip.n_frames)
             clip_time = frame / self.clip.clip_length
-            truth = self.pictures.truth(camera_row, frame)
+            truth, is_counted = self.pictures.raw(camera_row, frame), None
         view = self._views[self.camera_indices[camera_row]]
         gaussians = self.model.decode(clip_time, self._rows(camera_row, clip_time))
-        image = render_gaussians(gaussians, view).image[0] * self.gains[camera_row]
-        if stage == "static":  # unstable pixels count as right: no loss, no gradient
-            image = torch.where(torch.from_numpy(self.backgrounds.is_stable[camera_row])[..., None], image, truth)
-        loss = photometric_loss(image, truth, ssim_weight=self.config.ssim_weight, workspace=self._workspace)
+        compared = photometric_loss(
+            render_gaussians(gaussians, view).image[0],
+            truth,
+            ssim_weight=self.config.ssim_weight,
+            gain=self.gains[camera_row],
+            is_counted=is_counted,  # unstable pixels of a background do not
+            workspace=self._workspace,
+        )
+        loss = compared.loss
         if self.config.volume_weight and len(gaussians):
             volume = (gaussians.scales / self.spacing).prod(1).mean()
             loss = loss + self.config.volume_weight * volume
@@ -292,12 +298,11 @@ class ClipTraining:
         except NonFiniteLoss as error:
             raise NonFiniteLoss(f"{error.message} ({where})", hint="The last good state was kept.") from error
         self.steps_done += 1
-        mean_square = float(torch.mean((image.detach() - truth) ** 2))
         return StepStats(
             step=self.steps_done,
             n_steps=self.n_steps,
             loss=value,
-            train_psnr=-10.0 * float(np.log10(max(mean_square, 1e-10))),
+            train_psnr=-10.0 * float(np.log10(max(compared.mean_square, 1e-10))),
             n_gaussians=len(gaussians),
             stage=stage,
         )

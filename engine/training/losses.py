@@ -1,205 +1,181 @@
-"""Photometric loss: (1 - w) L1 + w (1 - SSIM), value and gradient in one fused CPU pass.
+"""Photometric loss of one picture: (1 - w) L1 + w (1 - SSIM), one op with two back ends.
 
 SSIM as in 3D Gaussian splatting: 11 x 11 Gaussian window of sigma 1.5, zero padding, per channel, mean, constants
-0.01^2 and 0.03^2. Pictures stay [H, W, 3]: a row is a line of 3 W values whose horizontal neighbours lie 3 apart.
-`photometric_loss` is the public op; `photometric_loss_reference` is the slow truth it is checked against.
+0.01^2 and 0.03^2. "fused" is one numba pass for float32 that also gives the gradients; "reference" is plain torch in
+any float dtype, differentiable by autograd, the slow truth.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 import torch
-from numba import njit, prange
 from torch import Tensor
 from torch.nn import functional
 
-_RADIUS = 5
-_window = np.exp(-((np.arange(2 * _RADIUS + 1) - _RADIUS) ** 2) / (2 * 1.5**2))
-WINDOW = (_window / _window.sum()).astype(np.float32)
-C1, C2 = 0.01**2, 0.03**2
-_W0, _W1, _W2, _W3, _W4, _W5 = (np.float32(w) for w in WINDOW[: _RADIUS + 1])
-_C1, _C2 = np.float32(C1), np.float32(C2)
-_ZERO, _ONE, _TWO = np.float32(0), np.float32(1), np.float32(2)
+from engine.training.fused_loss import TILE_PX, LossWorkspace, loss_terms, tile_grid
+from engine.training.ssim_lanes import C1, C2, RADIUS, WINDOW
+from engine.training.truth_moments import TruthMoments, writable_picture
 
 
-@njit(inline="always")
-def _blur_row(padded, out):
-    """11-tap blur along x of a row of interleaved RGB with 15 zeros on both ends."""
-    for x in range(out.shape[0]):
-        out[x] = (
-            _W5 * padded[x + 15]
-            + _W4 * (padded[x + 12] + padded[x + 18])
-            + _W3 * (padded[x + 9] + padded[x + 21])
-            + _W2 * (padded[x + 6] + padded[x + 24])
-            + _W1 * (padded[x + 3] + padded[x + 27])
-            + _W0 * (padded[x] + padded[x + 30])
-        )
+@dataclass(frozen=True, slots=True)
+class PhotometricLoss:
+    """Loss of one picture.
+
+    Attributes:
+        loss: Scalar, differentiable in image and gain.
+        mean_square: Mean of (image * gain - truth)^2 over the whole picture; what does not count adds zero.
+    """
+
+    loss: Tensor
+    mean_square: float
 
 
-@njit(inline="always")
-def _blur_column(rows, y, out):
-    """11-tap blur along y; `rows` has 5 zero rows on both ends."""
-    a, b, c, d, e, f = (
-        rows[y],
-        rows[y + 1],
-        rows[y + 2],
-        rows[y + 3],
-        rows[y + 4],
-        rows[y + 5],
-    )
-    g, h, i, j, k = rows[y + 6], rows[y + 7], rows[y + 8], rows[y + 9], rows[y + 10]
-    for x in range(out.shape[0]):
-        out[x] = (
-            _W5 * f[x]
-            + _W4 * (e[x] + g[x])
-            + _W3 * (d[x] + h[x])
-            + _W2 * (c[x] + i[x])
-            + _W1 * (b[x] + j[x])
-            + _W0 * (a[x] + k[x])
-        )
-
-
-@njit(
-    parallel=True,
-    cache=True,
-    nogil=True,
-    error_model="numpy",
-    fastmath={"contract", "nsz", "arcp"},
-)
-def _loss_kernel(image, truth, weight, moments, partials, gradient, row_sums):
-    """image, truth, gradient [H, 3W]; moments [5, H + 10, 3W] and partials [3, H + 10, 3W] with zero borders;
-    row_sums [H, 2] receives the sums of |difference| and SSIM of each row."""
-    height, width3 = image.shape
-    for y in prange(height):
-        padded = np.zeros((5, width3 + 30), np.float32)
-        for x in range(width3):
-            a = image[y, x]
-            b = truth[y, x]
-            padded[0, x + 15] = a
-            padded[1, x + 15] = b
-            padded[2, x + 15] = a * a
-            padded[3, x + 15] = b * b
-            padded[4, x + 15] = a * b
-        for m in range(5):
-            _blur_row(padded[m], moments[m, y + 5])
-    for y in prange(height):
-        mean = np.empty((5, width3), np.float32)
-        padded = np.zeros((3, width3 + 30), np.float32)
-        for m in range(5):
-            _blur_column(moments[m], y, mean[m])
-        total = _ZERO
-        for x in range(width3):
-            mu_a, mu_b = mean[0, x], mean[1, x]
-            numerator1 = _TWO * mu_a * mu_b + _C1
-            numerator2 = _TWO * (mean[4, x] - mu_a * mu_b) + _C2
-            denominator1 = mu_a * mu_a + mu_b * mu_b + _C1
-            denominator2 = mean[2, x] - mu_a * mu_a + mean[3, x] - mu_b * mu_b + _C2
-            inverse = _ONE / (denominator1 * denominator2)
-            ssim = numerator1 * numerator2 * inverse
-            d_square = -ssim * denominator1 * inverse  # by the blurred a^2
-            d_product = _TWO * numerator1 * inverse  # by the blurred a b
-            d_mean = (
-                _TWO * mu_b * numerator2 * inverse
-                - _TWO * mu_a * ssim * denominator2 * inverse
-                - _TWO * mu_a * d_square
-                - mu_b * d_product
-            )
-            padded[0, x + 15] = d_mean
-            padded[1, x + 15] = d_square
-            padded[2, x + 15] = d_product
-            total += ssim
-        row_sums[y, 1] = total
-        for m in range(3):
-            _blur_row(padded[m], partials[m, y + 5])
-    n = np.float32(height * width3)
-    ssim_scale = -weight / n
-    l1_scale = (_ONE - weight) / n
-    for y in prange(height):
-        mean = np.empty((3, width3), np.float32)
-        for m in range(3):
-            _blur_column(partials[m], y, mean[m])
-        total = _ZERO
-        for x in range(width3):
-            a, b = image[y, x], truth[y, x]
-            difference = a - b
-            total += abs(difference)
-            sign = l1_scale if difference > _ZERO else (-l1_scale if difference < _ZERO else _ZERO)
-            gradient[y, x] = sign + ssim_scale * (mean[0, x] + _TWO * a * mean[1, x] + b * mean[2, x])
-        row_sums[y, 0] = total
-
-
-class LossWorkspace:
-    """Scratch of one picture size, reused from step to step. Not to be shared between threads."""
-
-    def __init__(self, height: int, width: int) -> None:
-        self.moments = np.zeros((5, height + 10, 3 * width), np.float32)
-        self.partials = np.zeros((3, height + 10, 3 * width), np.float32)
-        self.row_sums = np.zeros((height, 2), np.float64)
-
-
-class _Photometric(torch.autograd.Function):
-    @staticmethod
-    def forward(ctx, image: Tensor, truth: Tensor, ssim_weight: float, workspace: LossWorkspace) -> Tensor:
-        height = image.shape[0]
-        image, truth = image.detach().contiguous(), truth.contiguous()
-        gradient = torch.empty_like(image)
-        _loss_kernel(
-            image.numpy().reshape(height, -1),
-            truth.numpy().reshape(height, -1),
-            np.float32(ssim_weight),
-            workspace.moments,
-            workspace.partials,
-            gradient.numpy().reshape(height, -1),
-            workspace.row_sums,
-        )
-        l1, ssim = workspace.row_sums.sum(0) / image.numel()
-        ctx.gradient = gradient
-        return torch.tensor((1 - ssim_weight) * l1 + ssim_weight * (1 - ssim), dtype=image.dtype)
-
-    @staticmethod
-    def backward(ctx, *gradients: Tensor):
-        (loss_grad,) = gradients
-        return ctx.gradient * loss_grad, None, None, None
-
-
-def photometric_loss(image: Tensor, truth: Tensor, *, ssim_weight: float, workspace: LossWorkspace) -> Tensor:
+def photometric_loss(
+    image: Tensor,
+    truth: Tensor | np.ndarray,
+    *,
+    ssim_weight: float,
+    gain: Tensor | None = None,
+    is_counted: np.ndarray | None = None,
+    tile_mask: np.ndarray | None = None,
+    moments: TruthMoments | None = None,
+    workspace: LossWorkspace | None = None,
+    backend: str = "auto",
+) -> PhotometricLoss:
     """(1 - w) L1 + w (1 - SSIM) of one picture.
 
+    What does not count is right: where `is_counted` is false or the tile is not active, the truth stands in the place
+    of image * gain, whatever the image holds (background, NaN), and no gradient arises. The loss is that of the whole
+    picture after this replacement: divided by all its pixels, with SSIM also in the 5 px of a replaced region whose
+    windows reach into a counted one. So it equals the full loss where the replaced pixels really are right.
+
     Args:
-        image: Rendered, float32. [H, W, 3]
-        truth: Same shape; no gradient flows into it.
+        image: Rendered. [H, W, 3]
+        truth: Values in 0..1 of the image's dtype, or uint8, read as value / 255. No gradient. [H, W, 3]
         ssim_weight: w in 0..1.
-        workspace: Scratch for this picture size.
+        gain: Colour gain of the camera, multiplied onto the image. [3]
+        is_counted: Pixels that count; None means all. [H, W] bool
+        tile_mask: Active tiles of 32 px, the last ones cut off by the picture; None means all. [rows, columns] bool
+        moments: `truth_moments(truth)` in place of blurring the truth; only "fused" uses them.
+        workspace: Scratch for this picture size, kept between calls; None makes one.
+        backend: "auto", "fused" (float32 on the CPU) or "reference".
     Returns:
-        Scalar, differentiable in `image`. Checked against `photometric_loss_reference`.
+        Loss and mean square error. A NaN or infinity in a pixel that counts makes both NaN or infinite.
+    Raises:
+        ValueError, TypeError: Shape or dtype of an argument does not fit; the message names it.
     """
-    return _Photometric.apply(image, truth, ssim_weight, workspace)  # type: ignore[no-any-return]
+    if backend == "auto":
+        backend = "fused" if image.dtype == torch.float32 and image.device.type == "cpu" else "reference"
+    if backend not in _BACKENDS:
+        raise ValueError(f"backend must be auto or one of {', '.join(sorted(_BACKENDS))}, got {backend!r}")
+    _check(image, truth, gain, is_counted, tile_mask, moments, workspace)
+    if backend == "fused" and image.dtype != torch.float32:
+        raise TypeError(f"backend 'fused' needs a float32 image, got {image.dtype}")
+    return _BACKENDS[backend](image, truth, ssim_weight, gain, is_counted, tile_mask, moments, workspace)
 
 
 def ssim_map(image: Tensor, truth: Tensor) -> Tensor:
     """SSIM of each pixel and channel, any float dtype, differentiable. [H, W, 3]"""
-    window = torch.from_numpy(_window / _window.sum()).to(image.dtype)
+    window = torch.from_numpy(WINDOW).to(image.dtype)
     stack = torch.stack([image, truth, image * image, truth * truth, image * truth])  # [5, H, W, 3]
     planes = stack.permute(0, 3, 1, 2).reshape(1, 15, *image.shape[:2])  # depthwise: channels stay channels
-    planes = functional.conv2d(
-        planes,
-        window.view(1, 1, 1, -1).repeat(15, 1, 1, 1),
-        padding=(0, _RADIUS),
-        groups=15,
-    )
-    planes = functional.conv2d(
-        planes,
-        window.view(1, 1, -1, 1).repeat(15, 1, 1, 1),
-        padding=(_RADIUS, 0),
-        groups=15,
-    )
+    along = window.view(1, 1, 1, -1).repeat(15, 1, 1, 1)
+    planes = functional.conv2d(planes, along, padding=(0, RADIUS), groups=15)
+    planes = functional.conv2d(planes, along.transpose(2, 3), padding=(RADIUS, 0), groups=15)
     mu_a, mu_b, aa, bb, ab = planes.reshape(5, 3, *image.shape[:2])
     numerator = (2 * mu_a * mu_b + C1) * (2 * (ab - mu_a * mu_b) + C2)
     denominator = (mu_a**2 + mu_b**2 + C1) * (aa - mu_a**2 + bb - mu_b**2 + C2)
     return (numerator / denominator).permute(1, 2, 0)
 
 
-def photometric_loss_reference(image: Tensor, truth: Tensor, *, ssim_weight: float) -> Tensor:
-    """Slow truth of `photometric_loss`, any float dtype, by torch autograd."""
-    l1 = (image - truth).abs().mean()
-    return (1 - ssim_weight) * l1 + ssim_weight * (1 - ssim_map(image, truth).mean())
+def _reference(image, truth, ssim_weight, gain, is_counted, tile_mask, _moments, _workspace) -> PhotometricLoss:
+    truth = torch.as_tensor(truth)
+    truth = truth.to(image.dtype) / 255 if truth.dtype == torch.uint8 else truth.to(image.dtype)
+    shown = image if gain is None else image * gain
+    counts = np.ones(image.shape[:2], bool) if is_counted is None else is_counted
+    if tile_mask is not None:
+        pixels = tile_mask.repeat(TILE_PX, 0).repeat(TILE_PX, 1)
+        counts = counts & pixels[: image.shape[0], : image.shape[1]]
+    shown = torch.where(torch.from_numpy(counts)[..., None], shown, truth)
+    l1 = (shown - truth).abs().mean()
+    loss = (1 - ssim_weight) * l1 + ssim_weight * (1 - ssim_map(shown, truth).mean())
+    return PhotometricLoss(loss, float(((shown.detach() - truth) ** 2).mean()))
+
+
+class _Fused(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx, image: Tensor, gain: Tensor | None, run: Callable):
+        terms, value = run(image.detach(), None if gain is None else gain.detach())
+        ctx.gradient, ctx.gain_gradient = terms.gradient, terms.gain_gradient
+        return torch.tensor(value, dtype=torch.float32)
+
+    @staticmethod
+    def backward(ctx, *gradients: Tensor):
+        scale = float(gradients[0])
+        image_grad = gain_grad = None
+        if ctx.needs_input_grad[0]:
+            image_grad = ctx.gradient if scale == 1.0 else ctx.gradient * scale
+        if ctx.needs_input_grad[1]:
+            gain_grad = torch.from_numpy((ctx.gain_gradient * scale).astype(np.float32))
+        return image_grad, gain_grad, None
+
+
+def _fused(image, truth, ssim_weight, gain, is_counted, tile_mask, moments, workspace) -> PhotometricLoss:
+    height, width = image.shape[:2]
+    pixels = writable_picture(truth)
+    scratch = workspace or LossWorkspace(height, width)
+    mean_square = 0.0
+
+    def run(image: Tensor, gain: Tensor | None):
+        nonlocal mean_square
+        terms = loss_terms(
+            image.contiguous().numpy(),
+            pixels,
+            ssim_weight=ssim_weight,
+            gain=None if gain is None else gain.contiguous().numpy(),
+            is_counted=None if is_counted is None else np.require(is_counted, requirements=["C", "W"]),
+            tile_mask=None if tile_mask is None else np.require(tile_mask, requirements=["C", "W"]),
+            moments=None if moments is None else moments.blurred,
+            workspace=scratch,
+        )
+        n = image.numel()
+        mean_square = terms.square / n
+        return terms, ((1 - ssim_weight) * terms.l1 + ssim_weight * terms.dissimilarity) / n
+
+    loss = _Fused.apply(image, gain, run)
+    return PhotometricLoss(loss, mean_square)  # pyright: ignore[reportArgumentType] - apply is untyped
+
+
+_BACKENDS: dict[str, Callable[..., PhotometricLoss]] = {"reference": _reference, "fused": _fused}
+
+
+def _check(image, truth, gain, is_counted, tile_mask, moments, workspace) -> None:
+    if image.ndim != 3 or image.shape[2] != 3 or image.numel() == 0:
+        raise ValueError(f"image must be [H, W, 3] with at least one pixel, got {list(image.shape)}")
+    if not image.is_floating_point():
+        raise TypeError(f"image must be floating point, got {image.dtype}")
+    height, width = image.shape[:2]
+    expected = [
+        ("truth", truth, (height, width, 3)),
+        ("gain", gain, (3,)),
+        ("is_counted", is_counted, (height, width)),
+        ("tile_mask", tile_mask, tile_grid(height, width)),
+        ("moments", moments, (height, width)),
+    ]
+    for name, value, shape in expected:
+        if value is not None and tuple(value.shape) != shape:
+            raise ValueError(f"{name} must be {list(shape)} for this image, got {list(value.shape)}")
+    for name, value in (("is_counted", is_counted), ("tile_mask", tile_mask)):
+        if value is not None and value.dtype != np.bool_:
+            raise TypeError(f"{name} must be bool, got {value.dtype}")
+    kinds = ("torch.uint8", "uint8", str(image.dtype), str(image.dtype).removeprefix("torch."))
+    if str(truth.dtype) not in kinds:
+        raise TypeError(f"truth must be uint8 or {image.dtype} like the image, got {truth.dtype}")
+    if gain is not None and gain.dtype != image.dtype:
+        raise TypeError(f"gain must be {image.dtype} like the image, got {gain.dtype}")
+    if workspace is not None and (workspace.height, workspace.width) != (height, width):
+        size = f"{workspace.width} x {workspace.height}"
+        raise ValueError(f"workspace was made for {size}, the image is {width} x {height}")

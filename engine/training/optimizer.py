@@ -5,12 +5,14 @@ Rates carry no scene scale and the horizon is the phase's own number of steps, s
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-import torch
 from torch import Tensor, nn
 
 from engine.errors import NonFiniteLoss
 from engine.model.clip_model import ClipModel
+from engine.training.adam import make_adam, not_finite
 from engine.training.config import TrainConfig
 
 _HEAD_RATES = {
@@ -49,7 +51,14 @@ def named_parameters(
 
 
 class PhaseOptimizer:
-    """Adam over the trainable parameters of one phase. Owns moments and schedule, not the parameters."""
+    """Adam over the trainable parameters of one phase. Owns moments and schedule, not the parameters.
+
+    Args:
+        parameters: By name, with the rate at the start.
+        n_steps: Steps of the phase, over which rates fall.
+        config: Final ratio of the rates and the norm to clip at.
+        backend: Of `engine.training.adam.make_adam`.
+    """
 
     def __init__(
         self,
@@ -57,6 +66,7 @@ class PhaseOptimizer:
         *,
         n_steps: int,
         config: TrainConfig,
+        backend: str = "auto",
     ) -> None:
         self._parameters = {name: parameter for name, (parameter, _) in parameters.items()}
         self._rates = {name: rate for name, (_, rate) in parameters.items()}
@@ -64,49 +74,42 @@ class PhaseOptimizer:
         self._max_norm = config.max_gradient_norm
         self.n_steps = n_steps
         self.steps_done = 0
-        groups = [{"params": [p], "lr": self._rates[name], "name": name} for name, p in self._parameters.items()]
-        # eps far below any gradient: rarely seen anchors must not be slowed down by it
-        self._adam = torch.optim.Adam(groups, eps=1e-15, fused=True) if groups else None
+        self._adam = make_adam(self._parameters, backend)
 
-    def step(self) -> None:
+    def step(self) -> float:
         """Apply the gradients and clear them.
 
+        Returns:
+            Norm over all gradients before clipping.
         Raises:
             NonFiniteLoss: A gradient is not finite; parameters are left as they were.
         """
-        if self._adam is None:
-            return
         gradients = {name: p.grad for name, p in self._parameters.items() if p.grad is not None}
-        norm = torch.nn.utils.get_total_norm(list(gradients.values()))
-        if not torch.isfinite(norm):
-            bad = [name for name, gradient in gradients.items() if not torch.isfinite(gradient).all()]
+        norm = self._adam.norm(gradients)
+        if not math.isfinite(norm):
+            bad = not_finite(gradients)
             raise NonFiniteLoss(f"The gradient of {', '.join(bad) or 'the sum'} is not finite.")
-        if self._max_norm:
-            torch.nn.utils.clip_grads_with_norm_(list(self._parameters.values()), self._max_norm, norm)
+        scale = min(1.0, self._max_norm / (norm + 1e-6)) if self._max_norm else 1.0
         decay = self._final_ratio ** (self.steps_done / max(self.n_steps, 1))
-        for group in self._adam.param_groups:
-            group["lr"] = self._rates[group["name"]] * decay
-        self._adam.step()
-        self._adam.zero_grad(set_to_none=True)
+        self._adam.update(gradients, {name: rate * decay for name, rate in self._rates.items()}, scale)
+        for parameter in self._parameters.values():
+            parameter.grad = None
         self.steps_done += 1
+        return norm
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Moments and step counts, for a checkpoint. Copies."""
-        if self._adam is None:
-            return {}
         return {
-            f"optimizer.{name}.{key}": value.numpy().copy()
-            for name, parameter in self._parameters.items()
-            for key, value in self._adam.state[parameter].items()
+            f"optimizer.{name}.{key}": value
+            for name, state in self._adam.arrays().items()
+            for key, value in state.items()
         }
 
     def restore(self, arrays: dict[str, np.ndarray], steps_done: int) -> None:
         """Inverse of `arrays`."""
         self.steps_done = steps_done
-        for name, parameter in self._parameters.items():
+        for name in self._parameters:
             prefix = f"optimizer.{name}."
-            found = {
-                k.removeprefix(prefix): torch.from_numpy(v.copy()) for k, v in arrays.items() if k.startswith(prefix)
-            }
-            if found and self._adam is not None:
-                self._adam.state[parameter] = found
+            found = {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
+            if found:
+                self._adam.restore(name, found)

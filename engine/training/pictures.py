@@ -1,6 +1,6 @@
 """Training pictures: the pixels of one clip's training cameras, and the order in which they are drawn.
 
-Pictures stay uint8 in memory (a clip of 27 cameras x 10 frames at 640 x 360 is 187 MB) and become float when drawn.
+Pictures stay uint8 in memory (a clip of 27 cameras x 10 frames at 640 x 360 is 187 MB); the loss reads them as they are.
 """
 
 from __future__ import annotations
@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -54,15 +52,6 @@ class TrainingPictures:
     def raw(self, camera_row: int, frame_in_clip: int) -> np.ndarray:
         """One picture as decoded. [H, W, 3] uint8"""
         return self._pixels[camera_row][frame_in_clip]
-
-    def truth(self, camera_row: int, frame_in_clip: int) -> Tensor:
-        """One picture in 0..1. [H, W, 3] float32"""
-        return to_float(self.raw(camera_row, frame_in_clip))
-
-
-def to_float(pixels: np.ndarray) -> Tensor:
-    """uint8 picture to 0..1. [H, W, 3] float32"""
-    return torch.from_numpy(np.ascontiguousarray(pixels)).float().div_(255.0)
 
 
 class ShuffledOrder:

@@ -9,20 +9,31 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit, prange
 
 from engine.raster.cpu import record as rec
 from engine.raster.cpu.record import f4
+from engine.raster.cpu.tile import prefetch
 
-_HALF, _ZERO, _ONE = f4(0.5), f4(0.0), f4(1.0)
+_HALF, _ZERO = f4(0.5), f4(0.0)
 _PER_TILE = f4(1.0 / rec.TILE)
 _TILE = rec.TILE
 _TILE_SPAN = f4(rec.TILE - 1)
 _SLACK_PX = f4(1e-3)
 """Added to each side of a span, pixels, against float32 rounding of the square roots."""
-_CENTER_X, _CENTER_Y, _MAJOR, _SLOPE, _MINOR = rec.CENTER_X, rec.CENTER_Y, rec.MAJOR, rec.SLOPE, rec.MINOR
+_CENTER_X, _CENTER_Y, _INVERSE_MAJOR, _SLOPE, _MINOR = (
+    rec.CENTER_X,
+    rec.CENTER_Y,
+    rec.INVERSE_MAJOR,
+    rec.SLOPE,
+    rec.MINOR,
+)
 _REACH, _TILT, _HALF_WIDTH, _HALF_HEIGHT = rec.REACH, rec.TILT, rec.HALF_WIDTH, rec.HALF_HEIGHT
 _COLUMNS, _ROWS = rec.TILE_COLUMNS, rec.TILE_ROWS
+_RECORD_BYTES = rec.RECORD_BYTES
+_AHEAD = 16
+"""Records between asking for one and copying it."""
 
 
 @njit(inline="always")
@@ -43,7 +54,7 @@ def _span_of_row(records, i, tile_row, first, last):
     slope = records[i, _SLOPE]
     minor = records[i, _MINOR]
     reach = records[i, _REACH]
-    inverse_major = _ONE / records[i, _MAJOR]
+    inverse_major = records[i, _INVERSE_MAJOR]
     top = f4(tile_row * _TILE) + _HALF - records[i, _CENTER_Y]
     bottom = min(top + _TILE_SPAN, half_height)
     top = max(top, -half_height)
@@ -54,28 +65,44 @@ def _span_of_row(records, i, tile_row, first, last):
     right = -slope * right_y + math.sqrt(max(_ZERO, (reach - minor * right_y * right_y) * inverse_major))
     left = -slope * left_y - math.sqrt(max(_ZERO, (reach - minor * left_y * left_y) * inverse_major))
     center_x = records[i, _CENTER_X]
-    first_pixel = math.ceil(center_x + left - _SLACK_PX - _HALF)
-    last_pixel = math.floor(center_x + right + _SLACK_PX - _HALF)
+    # np.floor stays in float32, math.floor goes through int64 and float64
+    first_pixel = np.ceil(center_x + left - _SLACK_PX - _HALF)
+    last_pixel = np.floor(center_x + right + _SLACK_PX - _HALF)
     return (
-        _clamped(math.floor(first_pixel * _PER_TILE), first, last),
-        _clamped(math.floor(last_pixel * _PER_TILE), first - 1, last),
+        _clamped(np.floor(first_pixel * _PER_TILE), first, last),
+        _clamped(np.floor(last_pixel * _PER_TILE), first - 1, last),
     )
 
 
+def mask_sums(tile_mask: np.ndarray) -> np.ndarray:
+    """How many tiles above and left of each tile corner are wanted. [rows, columns] bool -> [rows + 1, columns + 1]"""
+    return np.pad(tile_mask.cumsum(0, np.int32).cumsum(1, np.int32), ((1, 0), (1, 0)))
+
+
 @njit(parallel=True, **rec.KERNEL_OPTIONS)
-def count_pairs(records, packed, n_records, n_columns, counts, pairs_of_record):
-    """Count tiles.
+def gather_and_count(unsorted, order, n_records, n_columns, tile_mask, records, packed, counts, pairs_of_row):
+    """Put the records into depth order, so that blending reads them almost in order, and count their tiles.
 
     Args:
-        records: Sorted records; `packed` is the same memory as int32.
+        unsorted: Records by row. order: Rows by depth. [n_records] uint32
         n_columns: Tiles per image row.
-        counts: Pairs per chunk and tile, zeroed here. [chunks, tiles] int64
-        pairs_of_record: Tiles of each record, written. [n_records] int32
+        tile_mask: Tiles that are wanted, empty for all. [tiles] bool
+        records: Sorted records, written; `packed` is the same memory as int32.
+        counts: Pairs per chunk and tile, written. [chunks, tiles] int64
+        pairs_of_row: Tiles of each row with a record, written. [N] int32
     """
     n_chunks = len(counts)
+    has_mask = len(tile_mask) > 0
     for chunk in prange(n_chunks):
-        counts[chunk, :] = 0
-        for i in range(n_records * chunk // n_chunks, n_records * (chunk + 1) // n_chunks):
+        for tile in range(counts.shape[1]):
+            counts[chunk, tile] = 0
+        address = np.int64(unsorted.ctypes.data)
+        end = n_records * (chunk + 1) // n_chunks
+        for i in range(n_records * chunk // n_chunks, end):
+            prefetch(address + np.int64(order[min(i + _AHEAD, end - 1)]) * _RECORD_BYTES)
+            row = order[i]
+            for column in range(rec.RECORD_FLOATS):
+                records[i, column] = unsorted[row, column]
             first_column, last_column = packed[i, _COLUMNS] & 0xFFFF, packed[i, _COLUMNS] >> 16
             first_row, last_row = packed[i, _ROWS] & 0xFFFF, packed[i, _ROWS] >> 16
             is_box = first_column == last_column or first_row == last_row
@@ -84,20 +111,16 @@ def count_pairs(records, packed, n_records, n_columns, counts, pairs_of_record):
                 left, right = first_column, last_column
                 if not is_box:
                     left, right = _span_of_row(records, i, tile_row, first_column, last_column)
-                for column in range(left, right + 1):
-                    counts[chunk, tile_row * n_columns + column] += 1
-                total += max(0, right - left + 1)
-            pairs_of_record[i] = total
+                for tile in range(tile_row * n_columns + left, tile_row * n_columns + right + 1):
+                    if not has_mask or tile_mask[tile]:
+                        counts[chunk, tile] += 1
+                        total += 1
+            pairs_of_row[row] = total
 
 
 @njit(**rec.KERNEL_OPTIONS)
-def place_pairs(counts, pairs_of_record, n_records, tile_starts, record_starts):
-    """Turn counts into start positions, in place, and return the number of pairs.
-
-    Args:
-        tile_starts: First pair of each tile and one past the last. [tiles + 1] int64
-        record_starts: First entry of each record in `pairs_by_record`, and one past the last. [n_records + 1] int64
-    """
+def place_pairs(counts, tile_starts):
+    """Turn counts into start positions, in place; fill tile_starts [tiles + 1] int64; return the number of pairs."""
     n_chunks, n_tiles = counts.shape
     total = 0
     for tile in range(n_tiles):
@@ -107,38 +130,69 @@ def place_pairs(counts, pairs_of_record, n_records, tile_starts, record_starts):
             counts[chunk, tile] = total
             total += count
     tile_starts[n_tiles] = total
-    position = 0
-    for i in range(n_records):
-        record_starts[i] = position
-        position += pairs_of_record[i]
-    record_starts[n_records] = position
     return total
 
 
+@njit(**rec.KERNEL_OPTIONS)
+def place_slots(pairs_of_row, is_frozen, trained, row_slots):
+    """Give every pair of a row that needs a gradient its row in the buffer of sums: slots of a row are consecutive.
+
+    Args:
+        pairs_of_row: [N] int32, 0 where a row is not drawn.
+        is_frozen: [N] bool, or empty.
+        trained: Written: rows that have slots, ascending. [N] int32
+        row_slots: Written: first slot of each row, -1 without. [N] int32
+    Returns:
+        How many rows have slots, and how many slots there are.
+    """
+    has_frozen = len(is_frozen) > 0
+    n_trained = 0
+    n_slots = 0
+    for row in range(len(pairs_of_row)):
+        n_pairs = pairs_of_row[row]
+        if n_pairs == 0 or (has_frozen and is_frozen[row]):
+            row_slots[row] = -1
+        else:
+            row_slots[row] = n_slots
+            n_slots += n_pairs
+            trained[n_trained] = row
+            n_trained += 1
+    return n_trained, n_slots
+
+
 @njit(parallel=True, **rec.KERNEL_OPTIONS)
-def fill_pairs(records, packed, n_records, n_columns, counts, record_starts, pair_records, pairs_by_record):
+def fill_pairs(records, packed, order, n_records, n_columns, tile_mask, counts, row_slots, pair_records, pair_slots):
     """Write the lists.
 
     Args:
         counts: Start positions from `place_pairs`; advanced.
+        row_slots: Of `place_slots`; empty where no gradient is wanted.
         pair_records: Record of each pair, tile by tile in depth order. [pairs] int32
-        pairs_by_record: Pairs of each record, record by record, for the backward gather. [pairs] int32
+        pair_slots: Row of each pair in the buffer of sums, -1 without. [pairs] int32, left alone without row_slots
+        Others: As in `gather_and_count`.
     """
     n_chunks = len(counts)
+    has_mask = len(tile_mask) > 0
+    has_slots = len(row_slots) > 0
     for chunk in prange(n_chunks):
         for i in range(n_records * chunk // n_chunks, n_records * (chunk + 1) // n_chunks):
             first_column, last_column = packed[i, _COLUMNS] & 0xFFFF, packed[i, _COLUMNS] >> 16
             first_row, last_row = packed[i, _ROWS] & 0xFFFF, packed[i, _ROWS] >> 16
             is_box = first_column == last_column or first_row == last_row
-            entry = record_starts[i]
+            slot = np.int32(-1)
+            if has_slots:
+                slot = row_slots[order[i]]
             for tile_row in range(first_row, last_row + 1):
                 left, right = first_column, last_column
                 if not is_box:
                     left, right = _span_of_row(records, i, tile_row, first_column, last_column)
-                for column in range(left, right + 1):
-                    tile = tile_row * n_columns + column
+                for tile in range(tile_row * n_columns + left, tile_row * n_columns + right + 1):
+                    if has_mask and not tile_mask[tile]:
+                        continue
                     pair = counts[chunk, tile]
                     counts[chunk, tile] = pair + 1
                     pair_records[pair] = i
-                    pairs_by_record[entry] = pair
-                    entry += 1
+                    if has_slots:
+                        pair_slots[pair] = slot
+                        if slot >= 0:
+                            slot += np.int32(1)

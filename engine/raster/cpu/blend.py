@@ -11,13 +11,15 @@ from engine.raster.cpu import record as rec
 from engine.raster.cpu import tile as tl
 from engine.raster.cpu.lanes import LaneBuilder, kernel_intrinsic
 from engine.raster.cpu.record import f4
-from engine.raster.cpu.tile import take_next
+from engine.raster.cpu.tile import prefetch, take_next, write_block_centers
 
 _TILE, _BLOCK, _BLOCKS, _BLOCKS_PER_ROW = rec.TILE, rec.BLOCK, rec.BLOCKS, rec.BLOCKS_PER_ROW
 _RECORD_BYTES = rec.RECORD_BYTES
 _T, _R, _G, _B = (plane // 4 for plane in (tl.TRANSMITTANCE, tl.PLANE_R, tl.PLANE_G, tl.PLANE_B))
+_PLANE = 16 * _BLOCKS
 _RECHECK_EVERY = 16
 """Records between two looks for finished blocks. Looking after every record would make each wait for the last."""
+_AHEAD = tl.PREFETCH_AHEAD
 
 
 @kernel_intrinsic
@@ -29,27 +31,25 @@ def _blend_record(typing_context, scratch, record, tile_x, tile_y, open_blocks):
         scratch, record, tile_x, tile_y, open_blocks = arguments
         build = LaneBuilder(builder)
         fields = tl.load_record(build, record)
-        touched = tl.store_block_terms(build, scratch, fields, tile_x, tile_y, cull=True)
-        blocks = tl.BlockEvaluator(build, scratch, fields)
+        touched = tl.touched_blocks(build, fields, tile_x, tile_y)
+        footprint = tl.Footprint(build, scratch, fields, tile_x, tile_y)
         channels = [build.broadcast(fields[column]) for column in (rec.RED, rec.GREEN, rec.BLUE)]
         changed_slot = cgutils.alloca_once_value(builder, build.int64(0))
 
-        def blend_block(block, next_block):
-            log_alphas = blocks.log_alphas(block)
-            plane_t = blocks.plane(block, tl.TRANSMITTANCE)
+        def blend_block(block):
+            _, _, log_alphas = footprint.at(block)
+            plane_t = footprint.plane(block, tl.TRANSMITTANCE)
             transmittance = build.load(plane_t)
-            is_hit = build.all_of(
-                [log_alphas.compare(">=", rec.LOG_ALPHA_MIN), transmittance.compare(">=", TRANSMITTANCE_MIN)]
-            )
-            build.skip_unless(is_hit, next_block)
-            bit = builder.shl(build.int64(1), block)
+            is_hit = tl.hits(build, log_alphas, transmittance)
+            # no branch around blocks without a hit: predicting it wrongly costs more than blending nothing
+            bit = builder.shl(build.some_lane(is_hit), block)
             builder.store(builder.or_(builder.load(changed_slot), bit), changed_slot)
             alpha = tl.exp2_eighth(log_alphas).min(ALPHA_MAX).where(is_hit)
             weight = alpha * transmittance
-            build.store(transmittance - weight, plane_t)
+            build.store(tl.transmitted(alpha, transmittance), plane_t)
             for plane, channel in zip((tl.PLANE_R, tl.PLANE_G, tl.PLANE_B), channels, strict=True):
-                address = blocks.plane(block, plane)
-                build.store(build.load(address) + weight * channel, address)
+                address = footprint.plane(block, plane)
+                build.store(weight.times_plus(channel, build.load(address)), address)
 
         build.for_each_bit(builder.and_(touched, open_blocks), blend_block)
         return builder.load(changed_slot)
@@ -67,8 +67,7 @@ def _find_open_blocks(typing_context, scratch):
         result = build.int64(0)
         for block in range(rec.BLOCKS):
             transmittance = build.load(arguments[0], tl.TRANSMITTANCE + 64 * block)
-            bits = build.mask_bits(transmittance.compare(">=", TRANSMITTANCE_MIN))
-            some = builder.zext(builder.icmp_unsigned("!=", bits, build.int64(0)), build.int64(0).type)
+            some = build.some_lane(transmittance.compare(">=", TRANSMITTANCE_MIN))
             result = builder.or_(result, builder.shl(some, build.int64(block)))
         return result
 
@@ -77,9 +76,19 @@ def _find_open_blocks(typing_context, scratch):
 
 @njit(parallel=True, **rec.KERNEL_OPTIONS)
 def blend_tiles(
-    records, tile_starts, pair_records, n_columns, background, image, transmittance, pair_blocks, scratch, counter
+    records,
+    tile_starts,
+    pair_records,
+    n_columns,
+    background,
+    image,
+    transmittance,
+    alpha,
+    pair_blocks,
+    scratch,
+    counter,
 ):
-    """Render all tiles.
+    """Render all tiles; one without pairs holds the background.
 
     Args:
         records: Sorted records. [R, 16] float32, 64-byte aligned
@@ -87,7 +96,7 @@ def blend_tiles(
         n_columns: Tiles per image row.
         background: [3] float32
         image: Written. [H, W, 3] float32
-        transmittance: Behind the last Gaussian, written. [H, W] float32
+        transmittance, alpha: What is let through behind the last Gaussian, and one minus it, written. [H, W] float32
         pair_blocks: Blocks changed by each pair, written; the backward pass visits only these. [pairs] int64
         scratch: One row per thread. [threads, SCRATCH_FLOATS] float32, 64-byte aligned
         counter: [1] int64, zero: the next tile. Which thread renders a tile does not change its result.
@@ -99,23 +108,41 @@ def blend_tiles(
         address = np.int64(row.ctypes.data)
         records_address = np.int64(records.ctypes.data)
         counter_address = np.int64(counter.ctypes.data)
+        write_block_centers(address)
         tile = take_next(counter_address)
         while tile < n_tiles:
             tile_x = (tile % n_columns) * _TILE
             tile_y = (tile // n_columns) * _TILE
-            for block in range(_BLOCKS):
-                block_x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
-                block_y = tile_y + _BLOCK * (block // _BLOCKS_PER_ROW)
-                for lane in range(16):
-                    inside = block_x + (lane & 3) < width and block_y + (lane >> 2) < height
-                    row[_T + block * 16 + lane] = f4(1.0) if inside else f4(0.0)
-            row[_R : _R + 3 * _BLOCKS * 16] = f4(0.0)
+            end_x, end_y = min(tile_x + _TILE, width), min(tile_y + _TILE, height)
             pair = tile_starts[tile]
             end = tile_starts[tile + 1]
+            if pair == end:
+                for y in range(tile_y, end_y):
+                    for x in range(tile_x, end_x):
+                        transmittance[y, x] = f4(1.0)
+                        alpha[y, x] = f4(0.0)
+                        image[y, x, 0] = background[0]
+                        image[y, x, 1] = background[1]
+                        image[y, x, 2] = background[2]
+                tile = take_next(counter_address)
+                continue
+            if tile_x + _TILE <= width and tile_y + _TILE <= height:
+                for place in range(_T, _T + _PLANE):
+                    row[place] = f4(1.0)
+            else:
+                for block in range(_BLOCKS):
+                    block_x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
+                    block_y = tile_y + _BLOCK * (block // _BLOCKS_PER_ROW)
+                    for lane in range(16):
+                        inside = block_x + (lane & 3) < width and block_y + (lane >> 2) < height
+                        row[_T + block * 16 + lane] = f4(1.0) if inside else f4(0.0)
+            for place in range(_R, _R + 3 * _PLANE):
+                row[place] = f4(0.0)
             open_blocks = _find_open_blocks(address)
             while pair < end and open_blocks != 0:
                 stop = min(end, pair + _RECHECK_EVERY)
                 while pair < stop:
+                    prefetch(records_address + np.int64(pair_records[min(pair + _AHEAD, end - 1)]) * _RECORD_BYTES)
                     pair_blocks[pair] = _blend_record(
                         address,
                         records_address + np.int64(pair_records[pair]) * _RECORD_BYTES,
@@ -128,12 +155,13 @@ def blend_tiles(
             while pair < end:
                 pair_blocks[pair] = 0
                 pair += 1
-            for y in range(tile_y, min(tile_y + _TILE, height)):
-                for x in range(tile_x, min(tile_x + _TILE, width)):
+            for y in range(tile_y, end_y):
+                for x in range(tile_x, end_x):
                     block = ((y - tile_y) >> 2) * _BLOCKS_PER_ROW + ((x - tile_x) >> 2)
                     place = block * 16 + (y & 3) * 4 + (x & 3)
                     left_over = row[_T + place]
                     transmittance[y, x] = left_over
+                    alpha[y, x] = f4(1.0) - left_over
                     image[y, x, 0] = row[_R + place] + left_over * background[0]
                     image[y, x, 1] = row[_G + place] + left_over * background[1]
                     image[y, x, 2] = row[_B + place] + left_over * background[2]

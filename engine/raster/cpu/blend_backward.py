@@ -11,21 +11,67 @@ which is all the projection backward needs (moments of the Cholesky form: no can
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit, prange, types
 from numba.core import cgutils
 
-from engine.conventions import ALPHA_MAX, TRANSMITTANCE_MIN
+from engine.conventions import ALPHA_MAX
 from engine.raster.cpu import record as rec
 from engine.raster.cpu import tile as tl
 from engine.raster.cpu.lanes import LaneBuilder, Lanes, kernel_intrinsic
 from engine.raster.cpu.record import f4
-from engine.raster.cpu.tile import take_next
+from engine.raster.cpu.tile import prefetch, take_next, write_block_centers
 
 _TILE, _BLOCK, _BLOCKS, _BLOCKS_PER_ROW = rec.TILE, rec.BLOCK, rec.BLOCKS, rec.BLOCKS_PER_ROW
 _RECORD_BYTES, _PAIR_BYTES, _PAIR_FLOATS = rec.RECORD_BYTES, 4 * rec.PAIR_FLOATS, rec.PAIR_FLOATS
 _T, _R, _G, _B, _E = (p // 4 for p in (tl.TRANSMITTANCE, tl.PLANE_R, tl.PLANE_G, tl.PLANE_B, tl.REMAINDER))
+_AHEAD = tl.PREFETCH_AHEAD
 _N_SUMS = 9
+
+
+def _channels(build: LaneBuilder, fields: list[Any]) -> list[Lanes]:
+    return [build.broadcast(fields[column]) for column in (rec.RED, rec.GREEN, rec.BLUE)]
+
+
+class _Step:
+    """One block of pixels behind one record: values the gradient is made of, and the planes advanced."""
+
+    def __init__(self, build: LaneBuilder, footprint: tl.Footprint, channels: list[Lanes], block: Any) -> None:
+        self.u, self.dy, log_alphas = footprint.at(block)
+        plane_t, plane_e = footprint.plane(block, tl.TRANSMITTANCE), footprint.plane(block, tl.REMAINDER)
+        self.transmittance = build.load(plane_t)
+        is_hit = tl.hits(build, log_alphas, self.transmittance)
+        self.unclamped = tl.exp2_eighth(log_alphas)
+        self.alpha = self.unclamped.min(ALPHA_MAX).where(is_hit)
+        self.weight = self.alpha * self.transmittance
+        build.store(tl.transmitted(self.alpha, self.transmittance), plane_t)
+        self.gradients = [build.load(footprint.plane(block, plane)) for plane in (tl.PLANE_R, tl.PLANE_G, tl.PLANE_B)]
+        self.gain = channels[0] * self.gradients[0] + channels[1] * self.gradients[1] + channels[2] * self.gradients[2]
+        self.remainder = build.load(plane_e) - self.weight * self.gain
+        build.store(self.remainder, plane_e)
+
+
+@kernel_intrinsic
+def _pass_record(typing_context, scratch, record, tile_x, tile_y, changed_blocks):
+    """Replay a frozen record in the blocks it changed: transmittance and remainder only, no sums."""
+    signature = types.void(types.int64, types.int64, types.float32, types.float32, types.int64)
+
+    def generate(context, builder, signature, arguments):
+        scratch, record, tile_x, tile_y, changed_blocks = arguments
+        build = LaneBuilder(builder)
+        fields = tl.load_record(build, record)
+        footprint = tl.Footprint(build, scratch, fields, tile_x, tile_y)
+        channels = _channels(build, fields)
+
+        def pass_block(block):
+            _Step(build, footprint, channels, block)
+
+        build.for_each_bit(changed_blocks, pass_block)
+        return context.get_dummy_value()
+
+    return signature, generate
 
 
 @kernel_intrinsic
@@ -37,45 +83,21 @@ def _replay_record(typing_context, scratch, record, tile_x, tile_y, changed_bloc
         scratch, record, tile_x, tile_y, changed_blocks, sums_address = arguments
         build = LaneBuilder(builder)
         fields = tl.load_record(build, record)
-        tl.store_block_terms(build, scratch, fields, tile_x, tile_y, cull=False)
-        blocks = tl.BlockEvaluator(build, scratch, fields)
-        channels = [build.broadcast(fields[column]) for column in (rec.RED, rec.GREEN, rec.BLUE)]
+        footprint = tl.Footprint(build, scratch, fields, tile_x, tile_y)
+        channels = _channels(build, fields)
         sums = [cgutils.alloca_once_value(builder, build.constant(0.0).value) for _ in range(_N_SUMS)]
-        # offset of the tile's first pixel centre from the Gaussian's centre
-        to_left = builder.fsub(builder.fadd(tile_x, build.scalar(0.5)), fields[rec.CENTER_X])
-        to_top = builder.fsub(builder.fadd(tile_y, build.scalar(0.5)), fields[rec.CENTER_Y])
 
         def add(index: int, value: Lanes) -> None:
             builder.store((Lanes(build, builder.load(sums[index])) + value).value, sums[index])
 
-        def replay_block(block, next_block):
-            log_alphas = blocks.log_alphas(block)
-            plane_t, plane_e = blocks.plane(block, tl.TRANSMITTANCE), blocks.plane(block, tl.REMAINDER)
-            transmittance = build.load(plane_t)
-            is_hit = build.all_of(
-                [log_alphas.compare(">=", rec.LOG_ALPHA_MIN), transmittance.compare(">=", TRANSMITTANCE_MIN)]
-            )
-            unclamped = tl.exp2_eighth(log_alphas)
-            alpha = unclamped.min(ALPHA_MAX).where(is_hit)
-            weight = alpha * transmittance
-            build.store(transmittance - weight, plane_t)
-            gradients = [build.load(blocks.plane(block, plane)) for plane in (tl.PLANE_R, tl.PLANE_G, tl.PLANE_B)]
-            gain = channels[0] * gradients[0] + channels[1] * gradients[1] + channels[2] * gradients[2]
-            remainder = build.load(plane_e) - weight * gain
-            build.store(remainder, plane_e)
-            for index, gradient in enumerate(gradients):
-                add(6 + index, weight * gradient)
-            v = alpha * (transmittance * gain - remainder / (1.0 - alpha))
-            v = v.where(unclamped.compare("<", ALPHA_MAX))
-            column = builder.and_(block, build.int64(rec.BLOCKS_PER_ROW - 1))
-            row = builder.lshr(block, build.int64(rec.BLOCKS_PER_ROW.bit_length() - 1))
-            block_dx = builder.fadd(to_left, build.scalar_of(builder.mul(column, build.int64(rec.BLOCK))))
-            block_dy = builder.fadd(to_top, build.scalar_of(builder.mul(row, build.int64(rec.BLOCK))))
-            block_u = builder.fadd(block_dx, builder.fmul(fields[rec.SLOPE], block_dy))
-            dy = blocks.y + build.broadcast(block_dy)
-            u = blocks.u + build.broadcast(block_u)
-            vu, vy = v * u, v * dy
-            for index, value in enumerate((v, vu, vy, vu * u, vu * dy, vy * dy)):
+        def replay_block(block):
+            step = _Step(build, footprint, channels, block)
+            for index, gradient in enumerate(step.gradients):
+                add(6 + index, step.weight * gradient)
+            v = step.alpha * (step.transmittance * step.gain - step.remainder / (1.0 - step.alpha))
+            v = v.where(step.unclamped.compare("<", ALPHA_MAX))
+            vu, vy = v * step.u, v * step.dy
+            for index, value in enumerate((v, vu, vy, vu * step.u, vu * step.dy, vy * step.dy)):
                 add(index, value)
 
         build.for_each_bit(changed_blocks, replay_block)
@@ -91,65 +113,73 @@ def replay_tiles(
     records,
     tile_starts,
     pair_records,
+    pair_slots,
     n_columns,
     image,
     transmittance,
     grad_image,
-    grad_transmittance,
+    grad_alpha,
     pair_blocks,
     pair_sums,
     scratch,
     counter,
 ):
-    """Fill pair_sums [pairs, 12] float32 for all tiles.
+    """Fill pair_sums [slots, 12] float32 for all tiles.
 
     Args:
+        pair_slots: Row of pair_sums of each pair, -1 for pairs of frozen Gaussians. [pairs] int32
         image, transmittance: Results of `blend_tiles`.
         grad_image: Upstream gradient. [H, W, 3] float32
-        grad_transmittance: Upstream gradient. [H, W] float32
+        grad_alpha: Upstream gradient, or empty where it is zero. [H, W] float32
         Others: As in `blend_tiles`; `counter` is zero again.
     """
     height, width = transmittance.shape
     n_tiles = len(tile_starts) - 1
+    has_grad_alpha = len(grad_alpha) > 0
     for worker in prange(len(scratch)):
         row = scratch[worker]
         address = np.int64(row.ctypes.data)
         records_address = np.int64(records.ctypes.data)
         sums_address = np.int64(pair_sums.ctypes.data)
         counter_address = np.int64(counter.ctypes.data)
+        write_block_centers(address)
         tile = take_next(counter_address)
         while tile < n_tiles:
             tile_x = (tile % n_columns) * _TILE
             tile_y = (tile // n_columns) * _TILE
+            first, end = tile_starts[tile], tile_starts[tile + 1]
+            if first == end:
+                tile = take_next(counter_address)
+                continue
             if tile_x + _TILE > width or tile_y + _TILE > height:
-                row[: 5 * _BLOCKS * 16] = f4(0.0)
+                for place in range(5 * _BLOCKS * 16):
+                    row[place] = f4(0.0)
             for y in range(tile_y, min(tile_y + _TILE, height)):
                 for x in range(tile_x, min(tile_x + _TILE, width)):
                     block = ((y - tile_y) >> 2) * _BLOCKS_PER_ROW + ((x - tile_x) >> 2)
                     place = block * 16 + (y & 3) * 4 + (x & 3)
                     red, green, blue = grad_image[y, x, 0], grad_image[y, x, 1], grad_image[y, x, 2]
+                    remainder = red * image[y, x, 0] + green * image[y, x, 1] + blue * image[y, x, 2]
+                    if has_grad_alpha:
+                        remainder -= grad_alpha[y, x] * transmittance[y, x]
                     row[_T + place] = f4(1.0)
                     row[_R + place] = red
                     row[_G + place] = green
                     row[_B + place] = blue
-                    row[_E + place] = (
-                        red * image[y, x, 0]
-                        + green * image[y, x, 1]
-                        + blue * image[y, x, 2]
-                        + grad_transmittance[y, x] * transmittance[y, x]
-                    )
-            for pair in range(tile_starts[tile], tile_starts[tile + 1]):
+                    row[_E + place] = remainder
+            for pair in range(first, end):
+                ahead = min(pair + _AHEAD, end - 1)
+                prefetch(records_address + np.int64(pair_records[ahead]) * _RECORD_BYTES)
                 changed = pair_blocks[pair]
-                if changed != 0:
-                    _replay_record(
-                        address,
-                        records_address + np.int64(pair_records[pair]) * _RECORD_BYTES,
-                        f4(tile_x),
-                        f4(tile_y),
-                        changed,
-                        sums_address + np.int64(pair) * _PAIR_BYTES,
-                    )
+                slot = pair_slots[pair]
+                record_address = records_address + np.int64(pair_records[pair]) * _RECORD_BYTES
+                if slot < 0:
+                    if changed != 0:
+                        _pass_record(address, record_address, f4(tile_x), f4(tile_y), changed)
+                elif changed != 0:
+                    sums = sums_address + np.int64(slot) * _PAIR_BYTES
+                    _replay_record(address, record_address, f4(tile_x), f4(tile_y), changed, sums)
                 else:
                     for index in range(_PAIR_FLOATS):
-                        pair_sums[pair, index] = f4(0.0)
+                        pair_sums[slot, index] = f4(0.0)
             tile = take_next(counter_address)

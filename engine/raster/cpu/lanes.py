@@ -100,6 +100,13 @@ class LaneBuilder:
         """One float."""
         return self.ir.load(self.ir.inttoptr(self.address(base, offset), FLOAT.as_pointer()))
 
+    def prefetch(self, address: Any) -> None:
+        """Hint that the cache line at an address is read soon. Never faults."""
+        pointer_type = ir.IntType(8).as_pointer()
+        hints = [ir.Constant(INT32, value) for value in (0, 3, 1)]  # to read, keep in all levels, data
+        pointer = self.ir.inttoptr(address, pointer_type)
+        self._call("llvm.prefetch.p0", ir.VoidType(), [pointer, *hints], [pointer_type, INT32, INT32, INT32])
+
     def gather(self, base: Any, rows: Any, row_floats: int, column: int) -> Lanes:
         """Element `column` of sixteen rows of a [N, row_floats] float32 array; `rows` is a vector of int32."""
         wide_type = ir.VectorType(INT64, N_LANES)
@@ -127,6 +134,10 @@ class LaneBuilder:
     def mask_bits(self, mask: Any) -> Any:
         """A comparison result as an int64 whose bit l is lane l."""
         return self.ir.zext(self.ir.bitcast(mask, ir.IntType(N_LANES)), INT64)
+
+    def some_lane(self, mask: Any) -> Any:
+        """1 if some lane of a comparison result is set, else 0, int64."""
+        return self.ir.zext(self.ir.icmp_unsigned("!=", self.mask_bits(mask), self.int64(0)), INT64)
 
     def all_of(self, masks: Sequence[Any]) -> Any:
         """Lane-wise and."""
@@ -169,33 +180,22 @@ class LaneBuilder:
         return Lanes(self, level[0])
 
     # ---- control flow
-    def for_each_bit(self, bits: Any, body: Callable[[Any, Any], None]) -> None:
-        """Run `body(index, next_block)` for every set bit of an int64, lowest first.
-
-        `body` may branch to `next_block` to leave one round early; it ends at an open block.
-        """
+    def for_each_bit(self, bits: Any, body: Callable[[Any], None]) -> None:
+        """Run `body(index)` for every set bit of an int64, lowest first."""
         builder = self.ir
         rest_slot = cgutils.alloca_once_value(builder, bits)
-        test, work, step, done = (builder.append_basic_block(name) for name in ("test", "work", "step", "done"))
+        test, work, done = (builder.append_basic_block(name) for name in ("test", "work", "done"))
         builder.branch(test)
         builder.position_at_end(test)
         rest = builder.load(rest_slot)
         builder.cbranch(builder.icmp_unsigned("!=", rest, self.int64(0)), work, done)
         builder.position_at_end(work)
         index = self._call("llvm.cttz.i64", INT64, [rest, ir.Constant(_BOOL, 1)], [INT64, _BOOL])
-        body(index, step)
-        builder.branch(step)
-        builder.position_at_end(step)
+        body(index)
         rest = builder.load(rest_slot)
         builder.store(builder.and_(rest, builder.sub(rest, self.int64(1))), rest_slot)
         builder.branch(test)
         builder.position_at_end(done)
-
-    def skip_unless(self, mask: Any, otherwise: Any) -> None:
-        """Go on only if some lane of `mask` is set, else branch to `otherwise`."""
-        go_on = self.ir.append_basic_block("some_lane")
-        self.ir.cbranch(self.ir.icmp_unsigned("!=", self.mask_bits(mask), self.int64(0)), go_on, otherwise)
-        self.ir.position_at_end(go_on)
 
     def call_unary(self, name: str, lanes: Lanes) -> Lanes:
         """An elementwise LLVM intrinsic such as sqrt, floor, ceil, log2, fabs."""

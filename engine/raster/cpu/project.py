@@ -8,12 +8,14 @@ import numpy as np
 from llvmlite import ir
 from numba import njit, prange, types
 
-from engine.conventions import ALPHA_MIN, EPS2D_PX2
+from engine.conventions import ALPHA_MIN
 from engine.raster.cpu import record as rec
 from engine.raster.cpu.camera_row import CameraLanes
 from engine.raster.cpu.lanes import INTS, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
-from engine.raster.cpu.projection_math import Projection, dot, project_lanes
+from engine.raster.cpu.projection_math import Projection, cholesky, covariance, project_lanes
 from engine.raster.limits import EXTENT_MAX_PX, QUAT_NORM_SQUARED_MAX, QUAT_NORM_SQUARED_MIN, VALUE_MAX
+
+_ZERO = rec.f4(0.0)
 
 
 def gather_rows(build: LaneBuilder, base: Any, rows: Any, n_columns: int) -> tuple[Lanes, ...]:
@@ -68,20 +70,15 @@ def _record_fields(
 ) -> tuple[list[Lanes], Lanes]:
     """Sixteen record columns, and depth where the row can be drawn, else -1."""
     p = projection
-    a, b = p.half_x, p.half_y
     center_x = camera.fx * p.raw_slope_x + camera.cx
     center_y = camera.fy * p.raw_slope_y + camera.cy
-    bare_xx, bare_yy, xy = dot(a, a), dot(b, b), dot(a, b)
-    # Cauchy-Binet: the determinant of half half^T is the sum of squared 2x2 minors; no difference of large numbers.
-    minors = (a[0] * b[1] - a[1] * b[0], a[0] * b[2] - a[2] * b[0], a[1] * b[2] - a[2] * b[1])
-    determinant = dot(minors, minors) + EPS2D_PX2 * (bare_xx + bare_yy) + EPS2D_PX2**2
-    xx, yy = bare_xx + EPS2D_PX2, bare_yy + EPS2D_PX2
-    precision_u, precision_y = yy / determinant, 1.0 / yy  # of dx + slope dy, and of dy given it
-    slope, tilt = -(xy * precision_y), xy / xx
+    cov = covariance(p)
+    precision_u, precision_y, slope = cholesky(cov)
+    tilt = cov.xy / cov.xx
     log_opacity = opacity.log2() * 0.125
     reach = log_opacity - rec.LOG_ALPHA_MIN
     distance_squared = reach * (1.0 / rec.EIGHTH_LOG)  # squared Mahalanobis distance at which alpha is ALPHA_MIN
-    half_width, half_height = (distance_squared * xx).sqrt(), (distance_squared * yy).sqrt()
+    half_width, half_height = (distance_squared * cov.xx).sqrt(), (distance_squared * cov.yy).sqrt()
 
     # first and last pixel whose centre lies in the bounding box, cut to the image; NaN becomes a border
     first_x = (center_x - half_width - 0.5).ceil().max(0.0)
@@ -122,7 +119,7 @@ def _record_fields(
         tilt,
         half_width,
         half_height,
-        opacity,
+        1.0 / (precision_u * rec.EIGHTH_LOG),
         _packed_tiles(build, first_x, last_x, camera.width),
         _packed_tiles(build, first_y, last_y, camera.height),
     ]
@@ -138,9 +135,18 @@ def _packed_tiles(build: LaneBuilder, first: Lanes, last: Lanes, size: Lanes) ->
 
 
 @njit(parallel=True, **rec.KERNEL_OPTIONS)
-def project(means, quats, scales, opacities, colors, camera, records, keys):
-    """Fill records [>= N rounded up to 16, 16] and keys [same]: camera depth, or -1 for rows that cannot be drawn."""
+def project(means, quats, scales, opacities, colors, camera, mask_sums, records, keys, centers):
+    """Fill records and keys: camera depth, or a number <= 0 for rows that need not be drawn.
+
+    Args:
+        mask_sums: [tile rows + 1, tile columns + 1] int32, see `binning.mask_sums`; empty where all tiles are wanted.
+        records: [>= N rounded up to 16, 16] float32
+        keys: [>= N rounded up to 16] float32
+        centers: Centres of the rows that can be drawn, 0 of others, pixels, written unless empty. [N, 2] float32
+    """
     n_rows = len(means)
+    has_mask = len(mask_sums) > 0
+    packed = records.view(np.int32)
     for group in prange((n_rows + 15) // 16):
         first = np.int64(group) * 16
         _project_sixteen(
@@ -155,3 +161,21 @@ def project(means, quats, scales, opacities, colors, camera, records, keys):
             np.int64(records.ctypes.data) + first * 64,
             np.int64(keys.ctypes.data) + first * 4,
         )
+        if len(centers) > 0:
+            for row in range(first, min(first + 16, n_rows)):
+                is_drawn = keys[row] > _ZERO
+                centers[row, 0] = records[row, rec.CENTER_X] if is_drawn else _ZERO
+                centers[row, 1] = records[row, rec.CENTER_Y] if is_drawn else _ZERO
+        if has_mask:
+            for row in range(first, min(first + 16, n_rows)):
+                if keys[row] > _ZERO and not _touches_wanted_tile(packed, row, mask_sums):
+                    keys[row] = _ZERO
+
+
+@njit(inline="always")
+def _touches_wanted_tile(packed, row, mask_sums):
+    """Whether any tile under the bounding box of a record is wanted."""
+    columns, rows = packed[row, rec.TILE_COLUMNS], packed[row, rec.TILE_ROWS]
+    left, right = columns & 0xFFFF, (columns >> 16) + 1
+    top, bottom = rows & 0xFFFF, (rows >> 16) + 1
+    return mask_sums[bottom, right] - mask_sums[top, right] - mask_sums[bottom, left] + mask_sums[top, left] > 0

@@ -13,72 +13,65 @@ from numba.core import cgutils
 
 from engine.raster.cpu import record as rec
 from engine.raster.cpu.camera_row import CameraLanes
-from engine.raster.cpu.lanes import INT32, INT64, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
+from engine.raster.cpu.lanes import N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 from engine.raster.cpu.project import gather_rows
-from engine.raster.cpu.projection_math import Projection, Row, dot, project_lanes
+from engine.raster.cpu.projection_math import Projection, Row, cholesky, covariance, dot, project_lanes
 
-_RECORD_BYTES, _PAIR_BYTES = rec.RECORD_BYTES, 4 * rec.PAIR_FLOATS
+_PAIR_BYTES = 4 * rec.PAIR_FLOATS
+_ZERO = rec.f4(0.0)
 
 
 @kernel_intrinsic
-def _sum_pairs(typing_context, pair_sums, pairs, n_pairs, destination):
-    """Add up the buffer rows listed in `pairs` [n_pairs] int32 into sixteen floats (the last seven mean nothing)."""
-    signature = types.void(*[types.int64] * 4)
+def _sum_pairs(typing_context, pair_sums, n_pairs, destination):
+    """Add up n_pairs consecutive rows of the buffer into sixteen floats (the last seven mean nothing)."""
+    signature = types.void(*[types.int64] * 3)
 
     def generate(context, builder, signature, arguments):
-        pair_sums, pairs, n_pairs, destination = arguments
+        pair_sums, n_pairs, destination = arguments
         build = LaneBuilder(builder)
         total = cgutils.alloca_once_value(builder, build.constant(0.0).value)
         with cgutils.for_range(builder, n_pairs) as loop:
-            entry = build.address(pairs, builder.mul(loop.index, build.int64(4)))
-            pair = builder.load(builder.inttoptr(entry, INT32.as_pointer()))
-            offset = builder.mul(builder.sext(pair, INT64), build.int64(_PAIR_BYTES))
-            row = build.load(pair_sums, offset, align=4)
+            row = build.load(pair_sums, builder.mul(loop.index, build.int64(_PAIR_BYTES)), align=4)
             builder.store((Lanes(build, builder.load(total)) + row).value, total)
-        build.store(Lanes(build, builder.load(total)), destination, align=4)
+        build.store(Lanes(build, builder.load(total)), destination)
         return context.get_dummy_value()
 
     return signature, generate
 
 
 @kernel_intrinsic
-def _backward_sixteen(typing_context, sums, records, rows, means, quats, scales, camera):
+def _backward_sixteen(typing_context, sums, rows, means, quats, scales, opacities, camera):
     """Gradients of sixteen Gaussians.
 
     `sums` addresses sixteen vectors of `_sum_pairs` and is overwritten by sixteen gradient rows: mean 3, quat 4,
-    scale 3, opacity 1, color 3, centre 2. `records` are the sixteen sorted records, `rows` [16] int32 their Gaussians.
+    scale 3, opacity 1, color 3, centre 2. `rows` [16] int32 are the Gaussians.
     """
     signature = types.void(*[types.int64] * 7)
 
     def generate(context, builder, signature, arguments):
-        sums, records, rows, means, quats, scales, camera = arguments
+        sums, rows, means, quats, scales, opacities, camera = arguments
         build = LaneBuilder(builder)
         row_indices = build.load_ints(rows)
-        mean, quat, scale = (
-            gather_rows(build, base, row_indices, n) for base, n in ((means, 3), (quats, 4), (scales, 3))
+        mean, quat, scale, opacity = (
+            gather_rows(build, base, row_indices, n)
+            for base, n in ((means, 3), (quats, 4), (scales, 3), (opacities, 1))
         )
         camera_lanes = CameraLanes(build, camera)
         projection = project_lanes(camera_lanes, mean, quat, scale)
-        fields = build.transpose([build.load(records, lane * VECTOR_BYTES) for lane in range(N_LANES)])
-        moments = build.transpose([build.load(sums, lane * VECTOR_BYTES, align=4) for lane in range(N_LANES)])
-        gradients = _gradients(camera_lanes, projection, scale, fields, moments)
+        moments = build.transpose([build.load(sums, lane * VECTOR_BYTES) for lane in range(N_LANES)])
+        gradients = _gradients(camera_lanes, projection, scale, opacity[0], moments)
         for lane, gradient in enumerate(build.transpose(gradients)):
-            build.store(gradient, sums, lane * VECTOR_BYTES, align=4)
+            build.store(gradient, sums, lane * VECTOR_BYTES)
         return context.get_dummy_value()
 
     return signature, generate
 
 
-def _gradients(
-    camera: CameraLanes, p: Projection, scale: Row, fields: list[Lanes], moments: list[Lanes]
-) -> list[Lanes]:
-    """The sixteen gradient columns from record fields and summed moments."""
+def _gradients(camera: CameraLanes, p: Projection, scale: Row, opacity: Lanes, moments: list[Lanes]) -> list[Lanes]:
+    """The sixteen gradient columns from the projection and summed moments."""
     v, vu, vy, vuu, vuy, vyy, *rest = moments
     grad_color = rest[:3]
-    precision_u = fields[rec.MAJOR] * (1.0 / rec.EIGHTH_LOG)
-    precision_y = fields[rec.MINOR] * (1.0 / rec.EIGHTH_LOG)
-    slope = fields[rec.SLOPE]
-
+    precision_u, precision_y, slope = cholesky(covariance(p))
     grad_center_x = precision_u * vu
     grad_center_y = slope * grad_center_x + precision_y * vy
     uu = precision_u * precision_u * vuu
@@ -94,7 +87,7 @@ def _gradients(
     grad_unit_y = tuple(grad_half_y[k] * scale[k] for k in range(3))
     grad_quat = _quat_gradient(p, grad_unit_x, grad_unit_y)
     grad_mean = _mean_gradient(camera, p, grad_unit_x, grad_unit_y, grad_center_x, grad_center_y)
-    grad_opacity = v / fields[rec.OPACITY]
+    grad_opacity = v / opacity
     return [*grad_mean, *grad_quat, *grad_scale, grad_opacity, *grad_color, grad_center_x, grad_center_y]
 
 
@@ -165,70 +158,91 @@ def _mean_gradient(
 
 @njit(parallel=True, **rec.KERNEL_OPTIONS)
 def project_backward(
-    records,
-    order,
-    n_kept,
-    record_starts,
-    pairs_by_record,
+    trained,
+    n_trained,
+    pairs_of_row,
+    row_slots,
     pair_sums,
     means,
     quats,
     scales,
+    opacities,
     camera,
     scratch,
-    lane_rows,
     grad_means,
     grad_quats,
     grad_scales,
     grad_opacities,
     grad_colors,
-    grad_means2d,
+    grad_centers,
 ):
-    """Add gradients of the drawn Gaussians to the grad_* arrays; rows that were not drawn stay as they are.
+    """Write all gradients; those of rows that are not in `trained` are zero.
 
     Args:
-        scratch: One row of at least 256 floats per thread.
-        lane_rows: [threads, 16] int32.
-        grad_means2d: Gradient of the centres in pixels. [N, 2]
+        trained, pairs_of_row, row_slots: Of `place_slots`.
+        pair_sums: Of `replay_tiles`.
+        scratch: One row per thread of at least 272 floats, 64-byte aligned.
+        grad_centers: Gradient of the centres in pixels. [N, 2]
         Others: As in the forward kernels.
     """
     n_workers = len(scratch)
-    n_groups = (n_kept + 15) // 16
+    n_rows = len(means)
+    n_groups = (n_trained + 15) // 16
     for worker in prange(n_workers):
         sums = scratch[worker]
-        rows = lane_rows[worker]
+        rows = sums[256:272].view(np.int32)
         sums_address = np.int64(sums.ctypes.data)
-        for group in range(n_groups * worker // n_workers, n_groups * (worker + 1) // n_workers):
+        pair_sums_address = np.int64(pair_sums.ctypes.data)
+        first_group, end_group = n_groups * worker // n_workers, n_groups * (worker + 1) // n_workers
+        next_row = 0 if first_group == 0 else trained[first_group * 16 - 1] + 1
+        for group in range(first_group, end_group):
             first = group * 16
-            n_valid = min(16, n_kept - first)
+            n_valid = min(16, n_trained - first)
             for lane in range(16):
-                i = first + min(lane, n_valid - 1)
-                rows[lane] = order[i]
-                start = record_starts[i]
+                row = trained[first + min(lane, n_valid - 1)]
+                rows[lane] = row
                 _sum_pairs(
-                    np.int64(pair_sums.ctypes.data),
-                    np.int64(pairs_by_record.ctypes.data) + np.int64(start) * 4,
-                    np.int64(record_starts[i + 1] - start),
+                    pair_sums_address + np.int64(row_slots[row]) * _PAIR_BYTES,
+                    np.int64(pairs_of_row[row]),
                     sums_address + np.int64(lane) * 64,
                 )
             _backward_sixteen(
                 sums_address,
-                np.int64(records.ctypes.data) + np.int64(first) * _RECORD_BYTES,
                 np.int64(rows.ctypes.data),
                 np.int64(means.ctypes.data),
                 np.int64(quats.ctypes.data),
                 np.int64(scales.ctypes.data),
+                np.int64(opacities.ctypes.data),
                 np.int64(camera.ctypes.data),
             )
             for lane in range(n_valid):
                 row = rows[lane]
+                for gap in range(next_row, row):
+                    _clear(gap, grad_means, grad_quats, grad_scales, grad_opacities, grad_colors, grad_centers)
+                next_row = row + 1
                 source = lane * 16
                 for column in range(3):
-                    grad_means[row, column] += sums[source + column]
-                    grad_scales[row, column] += sums[source + 7 + column]
-                    grad_colors[row, column] += sums[source + 11 + column]
+                    grad_means[row, column] = sums[source + column]
+                    grad_scales[row, column] = sums[source + 7 + column]
+                    grad_colors[row, column] = sums[source + 11 + column]
                 for column in range(4):
-                    grad_quats[row, column] += sums[source + 3 + column]
-                grad_opacities[row] += sums[source + 10]
-                grad_means2d[row, 0] += sums[source + 14]
-                grad_means2d[row, 1] += sums[source + 15]
+                    grad_quats[row, column] = sums[source + 3 + column]
+                grad_opacities[row] = sums[source + 10]
+                grad_centers[row, 0] = sums[source + 14]
+                grad_centers[row, 1] = sums[source + 15]
+        if worker == n_workers - 1:
+            for gap in range(next_row, n_rows):
+                _clear(gap, grad_means, grad_quats, grad_scales, grad_opacities, grad_colors, grad_centers)
+
+
+@njit(inline="always")
+def _clear(row, grad_means, grad_quats, grad_scales, grad_opacities, grad_colors, grad_centers):
+    for column in range(3):
+        grad_means[row, column] = _ZERO
+        grad_scales[row, column] = _ZERO
+        grad_colors[row, column] = _ZERO
+    for column in range(4):
+        grad_quats[row, column] = _ZERO
+    grad_opacities[row] = _ZERO
+    grad_centers[row, 0] = _ZERO
+    grad_centers[row, 1] = _ZERO

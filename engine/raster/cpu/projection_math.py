@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from engine.conventions import EPS2D_PX2
 from engine.raster.cpu.camera_row import CameraLanes
 from engine.raster.cpu.lanes import Lanes
 
@@ -118,3 +119,31 @@ def project_lanes(camera: CameraLanes, mean: Row, quat: tuple[Lanes, ...], scale
         half_x=(unit_x[0] * scale[0], unit_x[1] * scale[1], unit_x[2] * scale[2]),
         half_y=(unit_y[0] * scale[0], unit_y[1] * scale[1], unit_y[2] * scale[2]),
     )
+
+
+@dataclass(slots=True)
+class Covariance:
+    """Covariance of the footprint with the low-pass added, pixels squared, and its determinant."""
+
+    xx: Lanes
+    xy: Lanes
+    yy: Lanes
+    determinant: Lanes
+
+
+def covariance(projection: Projection) -> Covariance:
+    """half half^T + EPS2D.
+
+    The determinant of half half^T is the sum of squared 2x2 minors (Cauchy-Binet): no difference of large numbers.
+    """
+    a, b = projection.half_x, projection.half_y
+    bare_xx, bare_yy = dot(a, a), dot(b, b)
+    minors = (a[0] * b[1] - a[1] * b[0], a[0] * b[2] - a[2] * b[0], a[1] * b[2] - a[2] * b[1])
+    determinant = dot(minors, minors) + EPS2D_PX2 * (bare_xx + bare_yy) + EPS2D_PX2**2
+    return Covariance(bare_xx + EPS2D_PX2, dot(a, b), bare_yy + EPS2D_PX2, determinant)
+
+
+def cholesky(covariance: Covariance) -> tuple[Lanes, Lanes, Lanes]:
+    """Precision of u = dx + slope dy, precision of dy given u, and the slope: `record` explains the form."""
+    precision_y = 1.0 / covariance.yy
+    return covariance.yy / covariance.determinant, precision_y, -(covariance.xy * precision_y)

@@ -16,17 +16,19 @@ import math
 import numpy as np
 
 from engine.conventions import ALPHA_MIN
+from engine.raster.view import TILE_PX
 
 CENTER_X, CENTER_Y, MAJOR, SLOPE, MINOR, LOG_OPACITY, RED = range(7)
-GREEN, BLUE, REACH, TILT, HALF_WIDTH, HALF_HEIGHT, OPACITY = range(7, 14)
+GREEN, BLUE, REACH, TILT, HALF_WIDTH, HALF_HEIGHT, INVERSE_MAJOR = range(7, 14)
 """Columns of a record. Centre and half extents in pixels; REACH = log_opacity - LOG_ALPHA_MIN is the value of the
-quadratic form at the rim; TILT = cov_xy / cov_xx gives the height at which the ellipse is widest."""
+quadratic form at the rim; TILT = cov_xy / cov_xx gives the height at which the ellipse is widest; INVERSE_MAJOR is
+1 / MAJOR."""
 TILE_COLUMNS, TILE_ROWS = 14, 15
 """int32 columns: first and last tile column (row) the bounding box touches, first | last << 16."""
 RECORD_FLOATS = 16
 RECORD_BYTES = 64
 
-TILE = 32
+TILE = TILE_PX
 """Edge of a tile, pixels. Large tiles win because blocks inside them are culled (measured 2026-11)."""
 BLOCK = 4
 """Edge of a block, pixels: one block is one vector."""

@@ -1,9 +1,9 @@
-"""Depth order: a stable radix sort of positive floats, and records gathered into that order."""
+"""Depth order: a stable radix sort of positive floats."""
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from engine.raster.cpu import record as rec
 
@@ -65,12 +65,3 @@ def sort_by_depth(depths, n_rows, key_a, key_b, order, order_b):
         starts[2, digit] = place + np.uint32(1)
         order[place] = order_b[i]
     return n_kept
-
-
-@njit(parallel=True, **rec.KERNEL_OPTIONS)
-def permute_records(records, order, n_kept, sorted_records):
-    """sorted_records[i] = records[order[i]]: one cache line each, so blending then reads them almost in order."""
-    for i in prange(n_kept):
-        row = order[i]
-        for column in range(rec.RECORD_FLOATS):
-            sorted_records[i, column] = records[row, column]

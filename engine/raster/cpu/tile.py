@@ -1,11 +1,7 @@
-"""What the forward and the backward kernel of a tile share: scratch layout, block terms, the exponential, scheduling.
+"""What the forward and the backward kernel of a tile share: scratch layout, reach, the footprint, scheduling.
 
-A tile is 8x8 blocks of 4x4 pixels; lane l of a block is the pixel (l % 4, l // 4). Inside a block the quadratic form
-of a Gaussian is expanded around the block's first pixel,
-
-    log2(alpha) / 8 = start + x * step_x + y * step_y - (major * (x + slope * y)^2 + minor * y^2),   x, y in 0..3,
-
-so that a block costs three fused operations; the last bracket is the same for all blocks.
+A tile is 8x8 blocks of 4x4 pixels; lane l of a block is the pixel (l % 4, l // 4). Both kernels evaluate a Gaussian by
+the same `Footprint`, in the same operations, so that the backward pass repeats the decisions of the forward one.
 """
 
 from __future__ import annotations
@@ -15,100 +11,123 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 
+from engine.conventions import TRANSMITTANCE_MIN
 from engine.raster.cpu import record as rec
 from engine.raster.cpu.lanes import INT64, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 
-LANE_X = [float(lane % rec.BLOCK) for lane in range(N_LANES)]
-LANE_Y = [float(lane // rec.BLOCK) for lane in range(N_LANES)]
-
-_GROUPS = rec.BLOCKS // N_LANES
 _PLANE = rec.BLOCKS * VECTOR_BYTES
 TRANSMITTANCE, PLANE_R, PLANE_G, PLANE_B, REMAINDER = (plane * _PLANE for plane in range(5))
 """Byte offsets of the per-pixel planes of a scratch row, [64 blocks, 16 lanes] each."""
-START, STEP_X, STEP_Y = (5 * _PLANE + term * 4 * rec.BLOCKS for term in range(3))
-"""Byte offsets of the per-block terms, [64] each."""
-SCRATCH_FLOATS = (5 * _PLANE + 3 * 4 * rec.BLOCKS) // 4
+BLOCK_X, BLOCK_Y = (5 * _PLANE + table * 4 * rec.BLOCKS for table in range(2))
+"""Byte offsets of the centre of every block's first pixel, from the corner of the tile. [64] each."""
+SCRATCH_FLOATS = (5 * _PLANE + 2 * 4 * rec.BLOCKS) // 4
 """Length of one scratch row; rows start on cache lines."""
-PLANE_FLOATS = _PLANE // 4
 
-_CULL_SLACK = 1e-5
-"""Added to the rim when blocks are culled, against float32 rounding of the test itself."""
+_LANE_X = [float(lane % rec.BLOCK) for lane in range(N_LANES)]
+_LANE_Y = [float(lane // rec.BLOCK) for lane in range(N_LANES)]
+_SIDES = N_LANES // 2
+PREFETCH_AHEAD = 6
+"""Pairs between asking for a record and blending it."""
+_SLACK_PX = 1e-3
+_SLACK_PER_PX = 1e-6
+"""Slack of a span: fixed, and per pixel of slope * y, against float32 rounding of square roots and products."""
 
 
 def load_record(build: LaneBuilder, address: Any) -> list[Any]:
     """The fourteen float fields of a record as scalars."""
-    return [build.load_scalar(address, 4 * column) for column in range(rec.OPACITY + 1)]
+    return [build.load_scalar(address, 4 * column) for column in range(rec.INVERSE_MAJOR + 1)]
 
 
-def store_block_terms(build: LaneBuilder, scratch: Any, fields: list[Any], tile_x: Any, tile_y: Any, cull: bool) -> Any:
-    """Write start, step_x and step_y of all blocks to the scratch row.
+def touched_blocks(build: LaneBuilder, fields: list[Any], tile_x: Any, tile_y: Any) -> Any:
+    """int64 with one bit per block of a tile that the ellipse alpha = ALPHA_MIN may touch.
+
+    An ellipse cut by a row of blocks is convex, so it touches every block between its leftmost and its rightmost point
+    there. The rim is widest to the right at y = tilt * half_width and to the left at minus that, or at the nearest
+    height that lies in the row. Lanes 0..7 find the right end of all eight rows, lanes 8..15 the left end, mirrored.
 
     Args:
         fields: Scalars of `load_record`.
         tile_x, tile_y: First pixel of the tile, float scalars.
-        cull: Also find the blocks that the Gaussian can reach.
-    Returns:
-        int64 with one bit per block that the ellipse alpha = ALPHA_MIN may touch; 0 when not culling. The least value
-        of a convex quadratic form over a rectangle lies on the vertical or horizontal side facing the centre, where
-        it is a clamped parabola: two candidates, no square root.
     """
-    to_left = build.broadcast(build.ir.fsub(tile_x, fields[rec.CENTER_X]))
-    to_top = build.broadcast(build.ir.fsub(tile_y, fields[rec.CENTER_Y]))
-    major, slope, minor, tilt, log_opacity, reach = (
+    builder = build.ir
+    to_left = build.broadcast(builder.fsub(tile_x, fields[rec.CENTER_X]))
+    to_top = build.broadcast(builder.fsub(tile_y, fields[rec.CENTER_Y]))
+    slope, minor, reach, inverse_major, tilt, half_width, half_height = (
         build.broadcast(fields[column])
-        for column in (rec.MAJOR, rec.SLOPE, rec.MINOR, rec.TILT, rec.LOG_OPACITY, rec.REACH)
+        for column in (rec.SLOPE, rec.MINOR, rec.REACH, rec.INVERSE_MAJOR, rec.TILT, rec.HALF_WIDTH, rec.HALF_HEIGHT)
     )
-    rim = reach + _CULL_SLACK
-    touched = build.int64(0)
-    for group in range(_GROUPS):
-        blocks = range(group * N_LANES, (group + 1) * N_LANES)
-        left = to_left + build.constants([rec.BLOCK * (block % rec.BLOCKS_PER_ROW) + 0.5 for block in blocks])
-        top = to_top + build.constants([rec.BLOCK * (block // rec.BLOCKS_PER_ROW) + 0.5 for block in blocks])
-        if cull:
-            right, bottom = left + float(rec.BLOCK - 1), top + float(rec.BLOCK - 1)
-            near_x, near_y = left.max(0.0).min(right), top.max(0.0).min(bottom)
-            best_y = (near_x * tilt).max(top).min(bottom)
-            best_x = (-(slope * near_y)).max(left).min(right)
-            u_side, u_edge = slope * best_y + near_x, slope * near_y + best_x
-            on_side = major * u_side * u_side + minor * best_y * best_y
-            on_edge = major * u_edge * u_edge + minor * near_y * near_y
-            bits = build.mask_bits(on_side.min(on_edge).compare("<=", rim))
-            touched = build.ir.or_(touched, build.ir.shl(bits, build.int64(group * N_LANES)))
-        u = slope.times_plus(top, left)
-        major_u = major * u
-        minor_y = minor * top
-        step_x = major_u * -2.0
-        start = (-minor_y).times_plus(top, (-major_u).times_plus(u, log_opacity))
-        step_y = minor_y.times_plus(-2.0, slope * step_x)
-        for term, value in ((START, start), (STEP_X, step_x), (STEP_Y, step_y)):
-            build.store(value, scratch, term + group * VECTOR_BYTES)
-    return touched
+    side = build.constants([1.0] * _SIDES + [-1.0] * _SIDES)
+    row_top = to_top + build.constants([rec.BLOCK * row + 0.5 for row in range(_SIDES)] * 2)
+    row_bottom = row_top + float(rec.BLOCK - 1)
+    is_reached = build.all_of([row_top.compare("<=", half_height), row_bottom.compare(">=", -half_height)])
+    y = (tilt * half_width * side).max(row_top.max(-half_height)).min(row_bottom.min(half_height))
+    lean = slope * y
+    half_span = ((reach - minor * y * y).max(0.0) * inverse_major).sqrt()
+    # distance to the right of the tile's first pixel, or to the left of the last pixel of the first block
+    first_pixel = to_left + 0.5
+    offset = build.constants([0.0] * _SIDES + [float(rec.BLOCK - 1)] * _SIDES) - side * first_pixel
+    slack = lean.abs() * _SLACK_PER_PX + _SLACK_PX
+    ends = ((half_span - side * lean + slack + offset) * (1.0 / rec.BLOCK)).floor()
+    last = float(rec.BLOCKS_PER_ROW - 1)
+    ends = ends.max(build.constants([-1.0] * _SIDES + [-last - 1.0] * _SIDES))
+    ends = ends.min(build.constants([last] * _SIDES + [0.0] * _SIDES))
+    return _bits_of_spans(build, ends.where(is_reached, -1.0))
 
 
-class BlockEvaluator:
-    """log2(alpha) / 8 of one Gaussian in any block of the tile, after `store_block_terms`."""
+def _bits_of_spans(build: LaneBuilder, ends: Lanes) -> Any:
+    """Bytes of an int64 from the last block of each row (lanes 0..7) and minus the first one (lanes 8..15)."""
+    builder = build.ir
+    integers = ends.to_ints()
+    eight = ir.VectorType(ir.IntType(32), _SIDES)
 
-    def __init__(self, build: LaneBuilder, scratch: Any, fields: list[Any]) -> None:
-        self.build = build
-        self.scratch = scratch
-        self.x, self.y = build.constants(LANE_X), build.constants(LANE_Y)
-        major, slope, minor = (build.broadcast(fields[column]) for column in (rec.MAJOR, rec.SLOPE, rec.MINOR))
-        self.u = slope.times_plus(self.y, self.x)
-        self.curvature = (-(major * self.u)).times_plus(self.u, -(minor * self.y * self.y))
+    def half(first_lane: int) -> Any:
+        lanes = ir.Constant(eight, list(range(first_lane, first_lane + _SIDES)))
+        return builder.shuffle_vector(integers, integers, lanes)
 
-    def log_alphas(self, block: Any) -> Lanes:
-        """Sixteen values; `block` is an int64."""
-        start, step_x, step_y = (self.build.broadcast(self._term(block, term)) for term in (START, STEP_X, STEP_Y))
-        return self.x.times_plus(step_x, self.y.times_plus(step_y, self.curvature + start))
+    ones, zeros = ir.Constant(eight, [1] * _SIDES), ir.Constant(eight, [0] * _SIDES)
+    up_to_last = builder.sub(builder.shl(ones, builder.add(half(0), ones)), ones)
+    from_first = builder.shl(ir.Constant(eight, [-1] * _SIDES), builder.sub(zeros, half(_SIDES)))
+    in_span = builder.and_(up_to_last, from_first)
+    return builder.bitcast(builder.trunc(in_span, ir.VectorType(ir.IntType(8), _SIDES)), INT64)
+
+
+class Footprint:
+    """One Gaussian in the pixels of one tile."""
+
+    def __init__(self, build: LaneBuilder, scratch: Any, fields: list[Any], tile_x: Any, tile_y: Any) -> None:
+        self._build = build
+        self._scratch = scratch
+        self._x = build.constants(_LANE_X) + build.broadcast(build.ir.fsub(tile_x, fields[rec.CENTER_X]))
+        self._y = build.constants(_LANE_Y) + build.broadcast(build.ir.fsub(tile_y, fields[rec.CENTER_Y]))
+        self._major, self._slope, self._minor, self._log_opacity = (
+            build.broadcast(fields[column]) for column in (rec.MAJOR, rec.SLOPE, rec.MINOR, rec.LOG_OPACITY)
+        )
+
+    def at(self, block: Any) -> tuple[Lanes, Lanes, Lanes]:
+        """u = dx + slope dy, dy and log2(alpha) / 8 in the sixteen pixels of a block, an int64."""
+        dx, dy = self._x + self._per_block(block, BLOCK_X), self._y + self._per_block(block, BLOCK_Y)
+        u = self._slope.times_plus(dy, dx)
+        along_y = (-(self._minor * dy)).times_plus(dy, self._log_opacity)
+        return u, dy, (-(self._major * u)).times_plus(u, along_y)
 
     def plane(self, block: Any, plane: int) -> Any:
         """Address of a block's sixteen pixels in a plane of the scratch row."""
-        offset = self.build.ir.shl(block, self.build.int64(6))
-        return self.build.address(self.build.address(self.scratch, offset), plane)
+        offset = self._build.ir.shl(block, self._build.int64(6))
+        return self._build.address(self._build.address(self._scratch, offset), plane)
 
-    def _term(self, block: Any, term: int) -> Any:
-        offset = self.build.ir.shl(block, self.build.int64(2))
-        return self.build.load_scalar(self.build.address(self.scratch, offset), term)
+    def _per_block(self, block: Any, table: int) -> Lanes:
+        offset = self._build.ir.shl(block, self._build.int64(2))
+        return self._build.broadcast(self._build.load_scalar(self._build.address(self._scratch, offset), table))
+
+
+def hits(build: LaneBuilder, log_alphas: Lanes, transmittance: Lanes) -> Any:
+    """Pixels in which a Gaussian is blended: it is seen there, and light is still let through in front of it."""
+    return build.all_of([log_alphas.compare(">=", rec.LOG_ALPHA_MIN), transmittance.compare(">=", TRANSMITTANCE_MIN)])
+
+
+def transmitted(alpha: Lanes, transmittance: Lanes) -> Lanes:
+    """The transmittance behind a Gaussian."""
+    return (-alpha).times_plus(transmittance, transmittance)
 
 
 def exp2_eighth(log_alphas: Lanes) -> Lanes:
@@ -129,5 +148,35 @@ def take_next(typing_context, counter_address):
     def generate(context, builder, signature, arguments):
         pointer = builder.inttoptr(arguments[0], INT64.as_pointer())
         return builder.atomic_rmw("add", pointer, ir.Constant(INT64, 1), "monotonic")
+
+    return signature, generate
+
+
+@kernel_intrinsic
+def write_block_centers(typing_context, scratch):
+    """Fill the BLOCK_X and BLOCK_Y tables of a scratch row."""
+    signature = types.void(types.int64)
+
+    def generate(context, builder, signature, arguments):
+        build = LaneBuilder(builder)
+        for group in range(0, rec.BLOCKS, N_LANES):
+            blocks = range(group, group + N_LANES)
+            x = build.constants([rec.BLOCK * (block % rec.BLOCKS_PER_ROW) + 0.5 for block in blocks])
+            y = build.constants([rec.BLOCK * (block // rec.BLOCKS_PER_ROW) + 0.5 for block in blocks])
+            build.store(x, arguments[0], BLOCK_X + 4 * group)
+            build.store(y, arguments[0], BLOCK_Y + 4 * group)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@kernel_intrinsic
+def prefetch(typing_context, address):
+    """Ask for the cache line at an address, to be read soon. Any address is allowed."""
+    signature = types.void(types.int64)
+
+    def generate(context, builder, signature, arguments):
+        LaneBuilder(builder).prefetch(arguments[0])
+        return context.get_dummy_value()
 
     return signature, generate

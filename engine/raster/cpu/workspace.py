@@ -7,6 +7,7 @@ hold two workspaces; that is what makes interleaved forwards and several threads
 
 from __future__ import annotations
 
+import math
 import weakref
 from collections import deque
 
@@ -15,8 +16,6 @@ import torch
 from torch import Tensor
 
 _ALIGNMENT = 64
-_PADDING = 64
-"""Floats behind every buffer: vector kernels may read (never use) a few elements past the last row."""
 _GROWTH = 1.25
 
 
@@ -28,11 +27,10 @@ class Workspace:
 
     def array(self, name: str, shape: tuple[int, ...], dtype: type[np.generic]) -> np.ndarray:
         """An uninitialised array of this shape in the buffer of this name; an earlier array there becomes invalid."""
-        n_bytes = int(np.prod(shape, dtype=np.int64)) * np.dtype(dtype).itemsize
-        needed = n_bytes + 4 * _PADDING
+        n_bytes = math.prod(shape) * np.dtype(dtype).itemsize
         buffer = self._buffers.get(name)
-        if buffer is None or len(buffer) < needed:
-            self._buffers[name] = buffer = _aligned_bytes(int(needed * _GROWTH))
+        if buffer is None or len(buffer) < n_bytes:
+            self._buffers[name] = buffer = _aligned_bytes(int(n_bytes * _GROWTH))
         return buffer[:n_bytes].view(dtype).reshape(shape)
 
     @property

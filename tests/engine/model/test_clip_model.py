@@ -99,7 +99,7 @@ def test_a_fresh_field_leaves_the_static_look_almost_unchanged():
     model = make_reference()
     rows = model.alive("moving", 0.0)
     assert model.field is not None
-    dynamic = model.field(rows.numpy(), model.field.corners(model.anchor_set("moving").positions), [(0, 1.0)])
+    dynamic = model.field(rows, model.field.corners(model.anchor_set("moving").positions), [(0, 1.0)])
     # tables start within 1e-3 and two layers of weights below 1 follow
     assert dynamic.abs().max() < 1e-2
 

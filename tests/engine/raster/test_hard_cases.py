@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -10,7 +11,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.raster import Gaussians, rasterize
+from engine.raster import TILE_PX, Gaussians, rasterize
 from engine.raster.rasterize import BackendName
 from tests.raster_scenes import Scene, camera, gaussians_of, gradients, layered_scene, simple_scene
 
@@ -26,6 +27,28 @@ def _spread(n_rows: int, near: float = 2.0, far: float = 6.0, seed: int = 0) -> 
 def _needles() -> Scene:
     long = 10 ** np.random.default_rng(2).uniform(0, 1.2, 50)
     return simple_scene(gaussians_of(_spread(50), np.stack([long, np.full(50, 1e-3), np.full(50, 1e-3)], 1)))
+
+
+def _thin_needles() -> Scene:
+    """One axis ten thousand times the others, up to the length of the image."""
+    long = 10 ** np.random.default_rng(5).uniform(-0.5, 0.5, 60)
+    return simple_scene(gaussians_of(_spread(60), np.stack([long, long * 1e-4, long * 1e-4], 1)))
+
+
+def _at_the_plane() -> Scene:
+    """Depths at the near plane: two neighbours of it in float32, itself, half and minus it, and the camera centre."""
+    near = np.float32(0.5)
+    depths = np.array([near, np.nextafter(near, np.float32(1)), np.nextafter(near, np.float32(0)), near / 2, -near, 0])
+    means = np.stack([np.zeros(6), np.zeros(6), depths], 1)
+    return simple_scene(gaussians_of(means, np.full((6, 3), 0.05)), near_plane=0.5)
+
+
+def _odd_and_opaque() -> Scene:
+    """Opacities of exactly one and the two sides of 1/255, in an image that is no multiple of anything."""
+    edge = np.float32(1 / 255)
+    opacities = np.tile([1.0, np.nextafter(edge, np.float32(0)), np.nextafter(edge, np.float32(1))], 20)
+    scene = gaussians_of(_spread(60), np.full((60, 3), 0.2), opacities=opacities)
+    return simple_scene(scene, width=67, height=43, Ks=camera(67, 43))
 
 
 def _huge() -> Scene:
@@ -89,6 +112,9 @@ CASES = {
     # name: (scene, pixel tolerance, gradient tolerance). A float32 pixel position near 160 is off by up to 8e-6 px,
     # and the alpha of a small splat changes by up to 1 per px, hence 4e-6; needles multiply that by their slope.
     "needles": (_needles, 5e-5, 2e-3),
+    "needles 1:10,000": (_thin_needles, 5e-5, 1e-3),
+    "at the near plane": (_at_the_plane, 4e-6, 1e-5),
+    "opacity 1 and 1/255": (_odd_and_opaque, 4e-6, 1e-5),
     "huge": (_huge, 4e-6, 1e-5),
     "near plane": (_near_plane, 4e-6, 1e-5),
     "opaque stack": (_opaque_stack, 4e-6, 1e-5),
@@ -104,18 +130,31 @@ CASES = {
 }
 
 
-def _outcome(scene: Scene, gaussians: Gaussians, backend: BackendName) -> tuple[torch.Tensor, torch.Tensor, Gaussians]:
+def _outcome(
+    scene: Scene,
+    gaussians: Gaussians,
+    backend: BackendName,
+    *,
+    tile_mask: torch.Tensor | None = None,
+    pixels: torch.Tensor | None = None,
+) -> tuple[torch.Tensor, torch.Tensor, Gaussians]:
+    """Image, alpha and gradients; with `pixels` [H, W] only those count in the loss."""
     dtype = torch.float32 if backend == "cpu" else torch.float64
-    parameters = Gaussians(*(t.detach().to(dtype).clone().requires_grad_() for t in gaussians.tensors()))
+    parameters = Gaussians(
+        *(t.detach().to(dtype).clone().requires_grad_() for t in gaussians.tensors()), is_frozen=gaussians.is_frozen
+    )
     rendering = rasterize(
         parameters,
         *scene.arguments,
         background=scene.background.to(dtype),
         near_plane=scene.near_plane,
         backend=backend,
+        tile_mask=tile_mask,
     )
     generator = torch.Generator().manual_seed(0)
     weights = torch.randn(rendering.image.shape, generator=generator, dtype=torch.float64)
+    if pixels is not None:
+        weights = weights * pixels[..., None]
     ((rendering.image * weights.to(dtype)).sum() + (rendering.alpha * weights[..., :1].to(dtype)).sum()).backward()
     grads = Gaussians(*gradients(parameters))
     return rendering.image.detach(), rendering.alpha.detach(), grads
@@ -135,6 +174,44 @@ def test_fast_matches_reference(case):
         want, got = getattr(expected_grads, name), getattr(grads, name).double()
         assert got.isfinite().all(), name
         assert (got - want).norm() <= gradient_tolerance * want.norm() + floor * 10, name
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_mask_or_frozen_rows_change_nothing_else(case):
+    scene = CASES[case][0]()
+    free = scene.gaussians
+    rows, columns = -(-scene.height // TILE_PX), -(-scene.width // TILE_PX)
+    mask = (torch.arange(rows * columns) % 3 != 1).view(rows, columns)
+    pixels = mask.repeat_interleave(TILE_PX, 0).repeat_interleave(TILE_PX, 1)[: scene.height, : scene.width]
+    full, full_alpha, expected = _outcome(scene, free, "cpu", pixels=pixels)
+    is_frozen = torch.arange(len(free)) % 3 == 1
+    frozen = dataclasses.replace(free, is_frozen=is_frozen)
+    part, alpha, grads = _outcome(scene, frozen, "cpu", tile_mask=mask)
+    assert torch.equal(part[0, pixels], full[0, pixels])
+    assert torch.equal(alpha[0, pixels], full_alpha[0, pixels])
+    for name in NAMES:
+        want, got = getattr(expected, name), getattr(grads, name)
+        assert torch.equal(got[~is_frozen], want[~is_frozen]), name
+        assert not got[is_frozen].any(), name
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("value", [NAN, INF])
+def test_a_bad_lane_does_not_touch_its_neighbours(name, value):
+    """Single bad rows among good ones of the same vector of sixteen."""
+    clean = gaussians_of(_spread(50), np.full((50, 3), 0.1) * [1.0, 0.6, 0.3])
+    dirty = Gaussians(*(tensor.clone() for tensor in clean.tensors()))
+    bad = torch.tensor([0, 3, 7, 14, 15, 16, 30, 33, 49])
+    flat = getattr(dirty, name).view(50, -1)
+    flat[bad, bad % flat.shape[1]] = value
+    scene = simple_scene(clean, width=80, height=60, Ks=camera(80, 60))
+    keep = torch.tensor([row for row in range(50) if row not in bad.tolist()])
+    expected, _, expected_grads = _outcome(scene, clean[keep], "cpu")
+    actual, _, grads = _outcome(scene, dirty, "cpu")
+    assert torch.equal(actual, expected)
+    for field in NAMES:
+        assert torch.equal(getattr(grads, field)[keep], getattr(expected_grads, field)), field
+        assert not getattr(grads, field)[bad].any(), field
 
 
 @pytest.mark.parametrize("backend", ["cpu", "reference"])
@@ -231,3 +308,17 @@ def test_weights_and_transmittance_add_up_to_one(scene):
     assert (image - alpha).abs().max() <= 1e-6  # sums of up to 60 float32 weights
     assert alpha.min() >= 0
     assert alpha.max() <= 1
+
+
+@settings(max_examples=25, deadline=None)
+@given(scene=small_scenes, seed=st.integers(0, 1000), share=st.floats(0, 1))
+def test_frozen_rows_leave_the_gradients_of_others_alone(scene, seed, share):
+    n_rows = len(scene.gaussians)
+    is_frozen = torch.rand(n_rows, generator=torch.Generator().manual_seed(seed)) < share
+    image, _, expected = _outcome(scene, scene.gaussians, "cpu")
+    frozen = dataclasses.replace(scene.gaussians, is_frozen=is_frozen)
+    same_image, _, grads = _outcome(scene, frozen, "cpu")
+    assert torch.equal(image, same_image)
+    for name in NAMES:
+        assert torch.equal(getattr(grads, name)[~is_frozen], getattr(expected, name)[~is_frozen]), name
+        assert not getattr(grads, name)[is_frozen].any(), name

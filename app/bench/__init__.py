@@ -1,0 +1,1 @@
+"""Measurements of the kernels: speed beside error. Numbers and text only; the command line prints."""

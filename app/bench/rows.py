@@ -1,0 +1,79 @@
+"""What a benchmark yields: one row per operation and scene, with speed and error side by side. Plain values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from app.bench.timing import Timing
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedError:
+    """One mark of the chart: a back end on a scene small enough for float64 brute force.
+
+    Attributes:
+        operation: "raster" or "decode".
+        scene: Name of the scene.
+        size: What was computed, for people.
+        backend: "cpu", or "reference" for plain torch in float32.
+        total_ms: Forward and backward pass, median.
+        value_error: Largest error of a value against float64, absolute (pixels: colours in 0..1).
+        gradient_error: Largest relative error of a gradient against float64: |a - b| / |b| over each parameter.
+    """
+
+    operation: str
+    scene: str
+    size: str
+    backend: str
+    total_ms: float
+    value_error: float
+    gradient_error: float
+
+
+@dataclass(frozen=True, slots=True)
+class KernelRow:
+    """Speed of our back end at full size, and its error and its lead over plain torch where both can be known.
+
+    Attributes:
+        operation, scene: As in SpeedError.
+        size: What was computed, for people.
+        forward, backward: At full size.
+        checked_at: Size at which errors and ratio were found: the full one, or the recipe made small.
+        value_error, gradient_error: As in SpeedError.
+        reference_ratio: Time of plain torch in float32 over ours, forward and backward, in the same run.
+        peak_mb: Memory one forward and backward pass adds to a process whose kernels are loaded; None if not measured.
+        forward_pairs_per_s, backward_pairs_per_s: (pixel, Gaussian) evaluations in 4x4 blocks that some Gaussian
+            reaches; None where there are no pixels.
+    """
+
+    operation: str
+    scene: str
+    size: str
+    forward: Timing
+    backward: Timing
+    checked_at: str
+    value_error: float
+    gradient_error: float
+    reference_ratio: float
+    peak_mb: float | None = None
+    forward_pairs_per_s: float | None = None
+    backward_pairs_per_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class IterationRow:
+    """One size and kind of training step.
+
+    Attributes:
+        scene: "joint" (everything learns) or "source" (heads frozen, half of the anchors static and frozen).
+        size: Anchors, Gaussians per anchor and picture.
+        n_gaussians: Gaussians rendered.
+        stages: Name and time of each stage, in order, cut apart at their boundaries.
+        total: The whole step without cuts.
+    """
+
+    scene: str
+    size: str
+    n_gaussians: int
+    stages: tuple[tuple[str, Timing], ...]
+    total: Timing

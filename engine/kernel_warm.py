@@ -1,0 +1,158 @@
+"""Compile every kernel that training and viewing use: each group in a process of its own, several at a time.
+
+Compiling holds the interpreter lock for seconds, so it never happens in a process with a window, and on the first
+start alone. Two programs that start at once do not compile twice: the second one waits for the first.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+
+from engine.kernel_cache import is_cache_warm, use_kernel_cache, write_marker
+
+logger = logging.getLogger(__name__)
+
+GROUPS = (
+    ("rasterizer", "engine.raster.cpu.warm"),
+    ("point clouds", "engine.cloud.warm"),
+    ("decoder", "engine.model.warm"),
+    ("loss and optimiser", "engine.training.warm"),
+)
+"""Name and module of each group, slowest first. Every module has a `warm_up()` that runs each of its kernels once.
+Groups share no cached kernel, or two processes would compile it at the same time."""
+
+MAX_PROCESSES = 4
+TIME_LIMIT_S = 180.0
+POLL_S = 0.05
+LOCK = "compiling.lock"
+LOCK_STALE_S = 10.0
+"""A lock that was not renewed for so long belongs to a process that has died."""
+
+ReportGroups = Callable[[int, int, str], None]
+"""Groups done, groups in all, and what is compiled now. Called often; may raise to cancel."""
+
+
+def warm_up_all(report: ReportGroups | None = None) -> None:
+    """Compile what is not compiled yet, then load what a training step needs into this process.
+
+    Compiling takes about ten seconds on two cores, loading a fraction of a second. A group that fails to compile ahead
+    is logged and left to its first use.
+
+    Args:
+        report: Told about the progress; what it raises ends the compiling processes and passes on.
+    """
+    compile_all(report)
+    for name, module in GROUPS:
+        if name != "point clouds":  # not part of a step, and quick to load when clouds are built
+            import_module(module).warm_up()
+
+
+def compile_all(report: ReportGroups | None = None, *, n_processes: int | None = None) -> bool:
+    """Compile every group in processes of their own, unless that was done. Returns whether all of them succeeded.
+
+    Args:
+        report: See `warm_up_all`.
+        n_processes: How many at a time; as many as cores when None, MAX_PROCESSES at most.
+    """
+    if is_cache_warm():
+        return True
+    report = report or (lambda done, n, what: None)
+    folder = use_kernel_cache()
+    waiting = deque(GROUPS)
+    n = len(waiting)
+    lock = folder / LOCK
+    while not _take(lock):
+        report(0, n, "another program compiles")
+        time.sleep(POLL_S)
+    running: list[tuple[str, subprocess.Popen[bytes], float]] = []
+    n_done, is_fine = 0, True
+    try:
+        if is_cache_warm():  # the program we waited for has done it
+            return True
+        most = min(n_processes or _n_cores(), MAX_PROCESSES)
+        while waiting or running:
+            while waiting and len(running) < most:
+                name, module = waiting.popleft()
+                running.append((name, _start(module), time.monotonic()))
+            report(n_done, n, " and ".join(name for name, _, _ in running))
+            _renew(lock)
+            time.sleep(POLL_S)
+            for item in list(running):
+                name, process, started_s = item
+                seconds = time.monotonic() - started_s
+                if process.poll() is None and seconds < TIME_LIMIT_S:
+                    continue
+                running.remove(item)
+                n_done += 1
+                is_fine &= _end(name, process, seconds)
+        report(n_done, n, "")
+        if is_fine:
+            write_marker(folder)
+        return is_fine
+    finally:
+        for _, process, _ in running:
+            process.kill()
+            process.communicate()
+        with suppress(OSError):
+            lock.unlink(missing_ok=True)
+
+
+def _start(module: str) -> subprocess.Popen[bytes]:
+    root = str(Path(__file__).resolve().parent.parent)
+    path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
+    return subprocess.Popen(
+        # a compiler makes millions of objects that live on: looking for garbage among them takes a fifth of the time
+        [sys.executable, "-c", f"import gc; gc.disable(); from {module} import warm_up; warm_up()"],
+        env={**os.environ, "PYTHONPATH": path},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
+
+
+def _end(name: str, process: subprocess.Popen[bytes], seconds: float) -> bool:
+    """Collect a process that has ended or taken too long; whether it succeeded."""
+    process.kill()
+    _, said = process.communicate()
+    if process.returncode == 0:
+        logger.info("kernels of the %s compiled in %.1f s", name, seconds)
+        return True
+    logger.warning(
+        "kernels of the %s could not be compiled ahead (exit %s): %s", name, process.returncode, said[-2000:]
+    )
+    return False
+
+
+def _take(lock: Path) -> bool:
+    """Whether the lock is ours now. True as well where no lock can be made: better twice than never."""
+    try:
+        lock.parent.mkdir(parents=True, exist_ok=True)
+        os.close(os.open(lock, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
+    except FileExistsError:
+        with suppress(OSError):
+            if time.time() - lock.stat().st_mtime > LOCK_STALE_S:
+                lock.unlink(missing_ok=True)
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def _renew(lock: Path) -> None:
+    with suppress(OSError):
+        os.utime(lock)
+
+
+def _n_cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -1,0 +1,263 @@
+"""Adam over named parameters, two back ends: "fused" numba kernels for float32, "reference" torch in any dtype.
+
+A parameter without a gradient is left alone, moments and step count included. "fused" reads every gradient once for
+norm and finiteness and then updates, each time all parameters in one parallel launch of fixed chunks. Blocks of 64
+values whose gradient was zero at every step so far are skipped: their moments are zero, so nothing would change. Most
+entries of a hash table are never looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+import torch
+from llvmlite import ir
+from numba import njit, prange, types
+from numba.np.numpy_support import carray
+from torch import Tensor
+
+from engine.raster.cpu.lanes import kernel_intrinsic
+
+BETA1, BETA2 = 0.9, 0.999
+EPSILON = 1e-15
+"""Far below any gradient: rarely seen anchors must not be slowed down by it."""
+_BLOCK = 64
+_CHUNK = 1 << 14
+_GRADIENT, _TOUCHED, _COUNT = 1, 4, 5
+_KEEP1, _KEEP2 = np.float32(BETA1), np.float32(BETA2)
+_NEW1, _NEW2 = np.float32(1 - BETA1), np.float32(1 - BETA2)
+_EPSILON = np.float32(EPSILON)
+
+
+class AdamState(Protocol):
+    """Moments of the parameters. Owns neither parameters nor rates."""
+
+    def norm(self, gradients: Mapping[str, Tensor]) -> float:
+        """Euclidean norm over all gradients; not finite if one of them is not."""
+        ...
+
+    def update(self, gradients: Mapping[str, Tensor], rates: Mapping[str, float], scale: float) -> None:
+        """One step of the parameters that have a gradient, which is multiplied by `scale`."""
+        ...
+
+    def arrays(self) -> dict[str, dict[str, np.ndarray]]:
+        """exp_avg, exp_avg_sq and step of every parameter that was ever updated. Copies."""
+        ...
+
+    def restore(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
+        """Inverse of `arrays` for one parameter."""
+        ...
+
+
+class TorchAdam:
+    """The "reference" back end: torch.optim.Adam, any floating dtype."""
+
+    def __init__(self, parameters: Mapping[str, Tensor]) -> None:
+        self._parameters = dict(parameters)
+        groups = [{"params": [p], "name": name} for name, p in self._parameters.items()]
+        self._adam = torch.optim.Adam(groups, betas=(BETA1, BETA2), eps=EPSILON)
+
+    def norm(self, gradients: Mapping[str, Tensor]) -> float:
+        """See AdamState."""
+        return float(torch.nn.utils.get_total_norm(list(gradients.values())))
+
+    def update(self, gradients: Mapping[str, Tensor], rates: Mapping[str, float], scale: float) -> None:
+        """See AdamState."""
+        for group in self._adam.param_groups:
+            name = group["name"]
+            group["lr"] = rates[name]
+            gradient = gradients.get(name)
+            group["params"][0].grad = None if gradient is None else gradient * scale
+        self._adam.step()
+
+    def arrays(self) -> dict[str, dict[str, np.ndarray]]:
+        """See AdamState."""
+        states = {name: self._adam.state[parameter] for name, parameter in self._parameters.items()}
+        return {name: {k: v.numpy().copy() for k, v in state.items()} for name, state in states.items() if state}
+
+    def restore(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
+        """See AdamState."""
+        state = {k: torch.from_numpy(v.copy()) for k, v in arrays.items()}
+        state["step"] = state["step"].reshape(())  # a file gives a single number back as [1]
+        self._adam.state[self._parameters[name]] = state
+
+
+@kernel_intrinsic
+def _pointer(typing_context, address):
+    """An int64 address as a pointer."""
+
+    def generate(context, builder, signature, arguments):
+        return builder.inttoptr(arguments[0], ir.IntType(8).as_pointer())
+
+    return types.voidptr(types.int64), generate
+
+
+@njit(nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+def _sum_squares(values):
+    total = 0.0
+    for i in range(values.shape[0]):
+        wide = np.float64(values[i])
+        total += wide * wide
+    return total
+
+
+@njit(nogil=True, error_model="numpy")
+def _adam(values, gradients, means, squares, scale, step_size, root_scale):
+    """Adam of one block; step_size is rate / (1 - beta1^t), root_scale is 1 / sqrt(1 - beta2^t)."""
+    for i in range(values.shape[0]):
+        gradient = gradients[i] * scale
+        mean = _KEEP1 * means[i] + _NEW1 * gradient
+        square = _KEEP2 * squares[i] + _NEW2 * gradient * gradient
+        means[i] = mean
+        squares[i] = square
+        values[i] -= step_size * (mean / (np.sqrt(square) * root_scale + _EPSILON))
+
+
+@njit(parallel=True, cache=True, nogil=True, error_model="numpy")
+def _adam_kernel(chunks, factors, is_update, scale, sums):
+    """Every chunk [n, 6] int64: addresses of values, gradient, both moments and touched flags, number of values.
+
+    With `is_update`: Adam of the touched blocks, factors [n, 2] as in `_adam`. Without: flags blocks with a gradient
+    and writes the sum of squares of each chunk, float64.
+    """
+    for c in prange(chunks.shape[0]):
+        n = chunks[c, 5]
+        n_blocks = (n + 63) // 64
+        gradients = carray(_pointer(chunks[c, 1]), (n,), np.float32)
+        touched = carray(_pointer(chunks[c, 4]), (n_blocks,), np.uint8)
+        values = carray(_pointer(chunks[c, 0]), (n,), np.float32)
+        means = carray(_pointer(chunks[c, 2]), (n,), np.float32)
+        squares = carray(_pointer(chunks[c, 3]), (n,), np.float32)
+        total = 0.0
+        for block in range(n_blocks):
+            first, end = 64 * block, min(64 * block + 64, n)
+            if not is_update:
+                part = _sum_squares(gradients[first:end])
+                if part != 0.0:
+                    touched[block] = 1
+                total += part
+            elif touched[block]:
+                _adam(
+                    values[first:end],
+                    gradients[first:end],
+                    means[first:end],
+                    squares[first:end],
+                    scale,
+                    factors[c, 0],
+                    factors[c, 1],
+                )
+        if not is_update:
+            sums[c] = total
+
+
+class FusedAdam:
+    """The "fused" back end for contiguous float32 parameters on the CPU."""
+
+    def __init__(self, parameters: Mapping[str, Tensor]) -> None:
+        self._parameters = dict(parameters)
+        self._steps = dict.fromkeys(self._parameters, 0)
+        self._means = {name: np.zeros(p.shape, np.float32) for name, p in self._parameters.items()}
+        self._squares = {name: np.zeros(p.shape, np.float32) for name, p in self._parameters.items()}
+        self._touched = {name: np.zeros(-(-p.numel() // _BLOCK), np.uint8) for name, p in self._parameters.items()}
+        self._chunks = {name: self._cut(name) for name in self._parameters}
+        self._last: tuple[list[Tensor], np.ndarray] | None = None
+
+    def _cut(self, name: str) -> np.ndarray:
+        """Chunks of a parameter, with offsets where the address of the gradient goes."""
+        first = np.arange(0, self._parameters[name].numel(), _CHUNK, dtype=np.int64)
+        chunks = np.empty((len(first), 6), np.int64)
+        bases = (
+            self._parameters[name].data_ptr(),
+            0,
+            self._means[name].ctypes.data,
+            self._squares[name].ctypes.data,
+        )
+        for column, base in enumerate(bases):
+            chunks[:, column] = base + 4 * first
+        chunks[:, _TOUCHED] = self._touched[name].ctypes.data + first // _BLOCK
+        chunks[:, _COUNT] = np.minimum(self._parameters[name].numel() - first, _CHUNK)
+        return chunks
+
+    def _table(self, gradients: Mapping[str, Tensor]) -> tuple[list[Tensor], np.ndarray]:
+        kept = [gradient.contiguous() for gradient in gradients.values()]  # alive as long as addresses are used
+        rows = [self._chunks[name].copy() for name in gradients]
+        for chunk, gradient in zip(rows, kept, strict=True):
+            chunk[:, _GRADIENT] += gradient.data_ptr()
+        return kept, np.concatenate(rows) if rows else np.empty((0, 6), np.int64)
+
+    def norm(self, gradients: Mapping[str, Tensor]) -> float:
+        """See AdamState. Also notes which blocks have a gradient, so `update` must follow it."""
+        _kept, chunks = self._table(gradients)
+        sums = np.zeros(len(chunks))
+        _adam_kernel(chunks, np.empty((0, 2), np.float32), False, np.float32(1), sums)
+        total = float(sums.sum())
+        return math.sqrt(total) if total >= 0.0 else total  # NaN stays NaN
+
+    def update(self, gradients: Mapping[str, Tensor], rates: Mapping[str, float], scale: float) -> None:
+        """See AdamState. `norm` of the same gradients has to be asked for before."""
+        _kept, chunks = self._table(gradients)
+        factors = np.empty((len(chunks), 2), np.float32)
+        first = 0
+        for name in gradients:
+            self._steps[name] += 1
+            end = first + len(self._chunks[name])
+            factors[first:end, 0] = rates[name] / (1.0 - BETA1 ** self._steps[name])
+            factors[first:end, 1] = 1.0 / math.sqrt(1.0 - BETA2 ** self._steps[name])
+            first = end
+        _adam_kernel(chunks, factors, True, np.float32(scale), np.empty(0))
+
+    def arrays(self) -> dict[str, dict[str, np.ndarray]]:
+        """See AdamState."""
+        return {
+            name: {
+                "step": np.array(n_steps, np.float32),
+                "exp_avg": self._means[name].copy(),
+                "exp_avg_sq": self._squares[name].copy(),
+            }
+            for name, n_steps in self._steps.items()
+            if n_steps
+        }
+
+    def restore(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
+        """See AdamState."""
+        self._steps[name] = round(arrays["step"].item())  # a file gives a single number back as [1]
+        self._means[name][...] = arrays["exp_avg"]
+        self._squares[name][...] = arrays["exp_avg_sq"]
+        is_moving = (self._means[name].ravel() != 0) | (self._squares[name].ravel() != 0)
+        starts = np.arange(0, is_moving.size, _BLOCK)
+        self._touched[name][:] = np.logical_or.reduceat(is_moving, starts) if is_moving.size else 0
+
+
+BACKENDS: dict[str, type[TorchAdam] | type[FusedAdam]] = {"reference": TorchAdam, "fused": FusedAdam}
+
+
+def make_adam(parameters: Mapping[str, Tensor], backend: str = "auto") -> AdamState:
+    """Fresh state for these parameters.
+
+    Args:
+        parameters: By name; they must keep their memory.
+        backend: "auto", "fused" or "reference"; "auto" is fused where all parameters allow it.
+    Raises:
+        ValueError: The back end does not exist.
+        TypeError: "fused" with parameters that are not contiguous float32 on the CPU.
+    """
+    unfit = [name for name, parameter in parameters.items() if not _is_fit(parameter)]
+    if backend == "auto":
+        backend = "reference" if unfit else "fused"
+    if backend not in BACKENDS:
+        raise ValueError(f"backend must be auto or one of {', '.join(sorted(BACKENDS))}, got {backend!r}")
+    if backend == "fused" and unfit:
+        raise TypeError(f"backend 'fused' needs contiguous float32 parameters on the cpu; {', '.join(unfit)} is not")
+    return BACKENDS[backend](parameters)
+
+
+def _is_fit(parameter: Tensor) -> bool:
+    return parameter.dtype == torch.float32 and parameter.device.type == "cpu" and parameter.is_contiguous()
+
+
+def not_finite(gradients: Mapping[str, Tensor]) -> list[str]:
+    """Names of the gradients that hold NaN or infinities."""
+    return [name for name, gradient in gradients.items() if not torch.isfinite(gradient).all()]

@@ -1,0 +1,260 @@
+"""The benchmarks yield whole rows, a table, a document and a picture. Nothing here looks at how long anything takes."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from app.bench import raster, suite
+from app.bench.chart import draw_speed_error
+from app.bench.clips import ClipRecipe
+from app.bench.field import SCENES, DecodeScene, measure_decode
+from app.bench.fma_limit import measure_fma_limit
+from app.bench.iteration import SIZES, STAGES, measure_iteration
+from app.bench.machine import describe_machine
+from app.bench.raster import evaluated_pairs, limit_shares, measure_raster
+from app.bench.rows import SpeedError
+from app.bench.scenes import RECIPES, Recipe
+from app.bench.suite import FULL, QUICK, Plan, document
+from app.bench.table import report_text
+from app.bench.timing import Timing, interleaved, peak_extra_mb
+from app.cli import CHART_FILE, main
+
+ROOT = Path(__file__).resolve().parents[2]
+TINY = Recipe(100, 32, 24, 3.0)
+TINY_CLIP = ClipRecipe(60, 2, 32, 24)
+
+
+@pytest.fixture
+def tiny_plan(monkeypatch: pytest.MonkeyPatch) -> Plan:
+    """Stands in for the quick set."""
+    plan = Plan(raster=("small",), decode=("2k",), iterations=("2k",), n_runs=2, n_steps=2)
+    monkeypatch.setattr(suite, "QUICK", plan)
+    monkeypatch.setitem(RECIPES, "small", TINY)
+    monkeypatch.setitem(SCENES, "2k", DecodeScene(TINY_CLIP))
+    monkeypatch.setitem(SIZES, "2k", TINY_CLIP)
+    monkeypatch.setattr("app.bench.fma_limit._ROUNDS_PER_CALL", 100)
+    monkeypatch.setattr("app.kernels.warm_cache", lambda: None)
+    return plan
+
+
+def marks() -> list[SpeedError]:
+    return [
+        SpeedError(operation, scene, "100 in 80x60", backend, ms, error, 3 * error)
+        for operation in ("raster", "decode")
+        for scene, factor in (("small", 1.0), ("large", 7.0))
+        for backend, ms, error in (("cpu", 2.0 * factor, 1e-6), ("reference", 300.0 * factor, 2e-7))
+    ]
+
+
+# ---------------------------------------------------------------- timing
+
+
+def test_candidates_run_in_turn_and_warm_runs_do_not_count():
+    calls = []
+
+    def candidate(name: str, first_ms: float):
+        def run() -> tuple[float, float]:
+            calls.append(name)
+            return (first_ms if calls.count(name) > 1 else 999.0), 1.0
+
+        return run
+
+    found = interleaved({"a": candidate("a", 5.0), "b": candidate("b", 7.0)}, 3, n_warm=1)
+    assert calls == ["a", "b"] * 4
+    assert found == {"a": [Timing(5.0, 5.0), Timing(1.0, 1.0)], "b": [Timing(7.0, 7.0), Timing(1.0, 1.0)]}
+
+
+def prepare_allocation(n_mb: int):
+    """Imported by the process that measures."""
+    return lambda: np.ones(n_mb << 20, np.uint8)
+
+
+def test_peak_memory_sees_what_a_call_allocates():
+    found = peak_extra_mb(prepare_allocation, 64)
+    assert found is not None
+    assert 60 < found < 80
+
+
+def prepare_nothing_good():
+    """Imported by the process that measures; dies there."""
+    raise SystemExit(3)
+
+
+def test_peak_memory_of_a_process_that_dies_is_none():
+    assert peak_extra_mb(prepare_nothing_good) is None
+
+
+# ---------------------------------------------------------------- rows
+
+
+def test_a_reduced_recipe_keeps_the_overlap():
+    small = RECIPES["large"].reduced()
+    before, after = RECIPES["large"], small
+    assert (small.width, small.height) == (80, 60)
+    assert after.n_rows / (80 * 60) == pytest.approx(before.n_rows / (before.width * before.height), rel=0.01)
+    assert RECIPES["accuracy"].reduced() == RECIPES["accuracy"]
+
+
+def test_every_scene_of_the_plans_is_known():
+    for plan in (QUICK, FULL):
+        assert set(plan.raster) <= set(RECIPES)
+        assert set(plan.decode) <= set(SCENES)
+        assert set(plan.iterations) <= set(SIZES)
+        assert plan.with_memory <= {*RECIPES, *SCENES}
+
+
+def test_the_rasterizers_row_has_speed_and_error():
+    row, found = measure_raster("tiny", n_runs=2, has_memory=False, recipe=TINY)
+    assert row.forward.min_ms > 0
+    assert row.backward.median_ms >= row.backward.min_ms > 0
+    assert 0 < row.value_error < 1e-5
+    assert 0 < row.gradient_error < 1e-4
+    assert row.reference_ratio > 0
+    assert [mark.backend for mark in found] == ["cpu", "reference"]
+    forward, backward = limit_shares(row, 1e9) or (0, 0)
+    assert forward == pytest.approx((row.forward_pairs_per_s or 0) * raster.FORWARD_OPERATIONS / 16e9)
+    assert backward > 0
+
+
+def test_pairs_count_blocks_that_a_gaussian_reaches():
+    n_pairs = evaluated_pairs(TINY.scene())
+    assert n_pairs % 16 == 0
+    assert 16 * TINY.n_rows / 4 < n_pairs < TINY.n_rows * 32 * 24
+
+
+def test_the_decodes_row_has_speed_and_error():
+    row, found = measure_decode("tiny", n_runs=2, has_memory=False, scene=DecodeScene(TINY_CLIP))
+    assert 0 < row.value_error < 1e-5
+    assert 0 < row.gradient_error < 1e-4
+    assert limit_shares(row, 1e9) is None
+    assert [mark.operation for mark in found] == ["decode", "decode"]
+
+
+@pytest.mark.parametrize("is_source", [False, True])
+def test_a_training_step_is_cut_into_stages(is_source):
+    row = measure_iteration("tiny", is_source=is_source, n_runs=2, recipe=TINY_CLIP)
+    assert tuple(name for name, _ in row.stages) == STAGES
+    assert row.n_gaussians == 120
+    assert row.total.min_ms > 0
+    assert row.scene == ("source" if is_source else "joint")
+
+
+def test_cut_steps_learn_the_same_as_whole_ones():
+    from app.bench.iteration import StepRun
+
+    runs = [StepRun(TINY_CLIP), StepRun(TINY_CLIP)]
+    for _ in range(3):
+        runs[0].whole()
+        runs[1].staged()
+    first, second = (dict(run._model.named_parameters()) for run in runs)
+    moved = StepRun(TINY_CLIP)._model
+    for name, parameter in first.items():
+        np.testing.assert_allclose(parameter.detach(), second[name].detach(), rtol=1e-4, atol=1e-6, err_msg=name)
+    assert any(not np.array_equal(p.detach(), first[name].detach()) for name, p in moved.named_parameters())
+
+
+def test_the_limit_is_a_plausible_number_of_operations(monkeypatch):
+    monkeypatch.setattr("app.bench.fma_limit._ROUNDS_PER_CALL", 100)
+    assert 1e6 < measure_fma_limit(seconds=0.0) < 1e13
+
+
+# ---------------------------------------------------------------- what comes of it
+
+
+def test_the_command_prints_a_table_and_writes_document_and_picture(tiny_plan, tmp_path, capsys):
+    out = tmp_path / "out"
+    assert main(["bench", "--out", str(out), "--json", str(tmp_path / "b.json")]) == 0
+    said = capsys.readouterr()
+    assert "raster small" in said.out
+    assert "decode 2k" in said.out
+    assert "joint, 60 anchors" in said.out
+    assert "value err" in said.out
+    assert describe_machine(1).cpu in said.out
+    assert "Measuring" in said.err
+    found = json.loads((tmp_path / "b.json").read_text())
+    assert found["schema"] == 1
+    assert [row["operation"] for row in found["kernels"]] == ["raster", "decode"]
+    assert [row["scene"] for row in found["iterations"]] == ["joint", "source"]
+    assert all(math.isfinite(mark["gradient_error"]) for mark in found["speed_error"])
+    assert is_picture(out / CHART_FILE)
+
+
+def test_json_on_standard_output_is_only_json(tiny_plan, monkeypatch, capsys):
+    monkeypatch.setattr(suite, "QUICK", Plan())
+    assert main(["bench", "--json", "-", "--quiet"]) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)["fma_per_s"] > 0
+    assert said.err == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (("--threads", "0"), "--threads is 0"),
+        (("--threads", "many"), "invalid int value"),
+        (("--out", "FILE"), "is a file"),
+        (("--json", "FOLDER"), "This is a folder"),
+    ],
+)
+def test_bad_arguments_end_with_2_before_anything_is_measured(monkeypatch, tmp_path, capsys, arguments, expected):
+    monkeypatch.setattr(suite, "run_plan", lambda *a, **k: pytest.fail("measured all the same"))
+    (tmp_path / "file").write_text("")
+    places = {"FILE": str(tmp_path / "file"), "FOLDER": str(tmp_path)}
+    assert main(["bench", *(str(places.get(word, word)) for word in arguments)]) == 2
+    assert expected in capsys.readouterr().err
+
+
+def test_an_interrupt_is_told_in_one_line(monkeypatch, capsys):
+    def interrupted(*arguments: object, **options: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(suite, "run_plan", interrupted)
+    assert main(["bench"]) == 130
+    assert capsys.readouterr().err.strip() == "clipgstream: Interrupted."
+
+
+def test_the_picture_shows_every_operation(tmp_path):
+    for operations, height in ((("raster",), 400), (("raster", "decode"), 700)):
+        path = tmp_path / f"{len(operations)}.png"
+        draw_speed_error([mark for mark in marks() if mark.operation in operations], path, footer="a machine")
+        assert is_picture(path)
+        with Image.open(path) as image:
+            assert image.size[1] > height
+
+
+def test_a_picture_of_nothing_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="no marks"):
+        draw_speed_error([], tmp_path / "none.png", footer="")
+
+
+def test_errors_of_zero_have_a_place_in_the_picture(tmp_path):
+    draw_speed_error([replace(mark, value_error=0.0) for mark in marks()], tmp_path / "zero.png", footer="")
+    assert is_picture(tmp_path / "zero.png")
+
+
+def test_a_report_without_rows_is_still_text(tiny_plan):
+    report = suite.run_plan(Plan())
+    assert "multiply-adds" in report_text(report)
+    assert document(report)["kernels"] == []
+
+
+def test_only_drawing_imports_matplotlib():
+    probe = "import app.cli, app.bench.suite, app.bench.chart, sys; print('matplotlib' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", probe], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
+def is_picture(path: Path) -> bool:
+    """A PNG in which more is drawn than a background."""
+    with Image.open(path) as image:
+        pixels = np.asarray(image.convert("RGB"))
+    return image.format == "PNG" and len(np.unique(pixels.reshape(-1, 3), axis=0)) > 20 and float(pixels.std()) > 5

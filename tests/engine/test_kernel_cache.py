@@ -1,0 +1,338 @@
+"""The folder of compiled kernels: its key, its marker, where it goes when the user's cache cannot be written."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from engine import kernel_cache, kernel_warm
+from engine.kernel_cache import (
+    MARKER,
+    MAX_FOLDERS,
+    UNWRITABLE,
+    CacheKey,
+    cache_state,
+    current_key,
+    is_cache_warm,
+    kernel_sources,
+    prune,
+    read_marker,
+    sources_hash,
+    use_kernel_cache,
+    write_marker,
+)
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An empty cache of the test's own; numba's setting of this process comes back afterwards."""
+    from numba.core import config
+
+    monkeypatch.setattr(config, "CACHE_DIR", getattr(config, "CACHE_DIR", ""))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("LOCALAPPDATA", str(tmp_path / "cache"))
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", "")  # so that it is put back, whether it was set or not
+    monkeypatch.delenv("NUMBA_CACHE_DIR")
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A small engine: a kernel, a helper it imports, a package that re-exports one more, and a stranger."""
+    folder = tmp_path / "engine"
+    sources = {
+        "__init__.py": "",
+        "a/__init__.py": "",
+        "a/kernel.py": "import numba\nfrom engine.a.helper import f\nfrom engine.b import g\n@numba.njit\ndef k(): 0\n",
+        "a/helper.py": "from engine import constants as c\n\nf = c\n",
+        "b/__init__.py": "from engine.b.inner import (\n    g,\n)\n",
+        "b/inner.py": "g = 1\n",
+        "constants.py": "X = 1\n",
+        "stranger.py": "from engine.a.kernel import k\n",
+    }
+    for name, text in sources.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    return folder
+
+
+def marked_folder(root: Path, name: str, key: CacheKey, *, age_s: float) -> Path:
+    """A folder of another version with its marker."""
+    import json
+
+    folder = root / name
+    folder.mkdir(parents=True)
+    (folder / MARKER).write_text(json.dumps(key._asdict()))
+    when_s = 1_700_000_000 - age_s
+    os.utime(folder / MARKER, (when_s, when_s))
+    return folder
+
+
+# ---------------------------------------------------------------- the key
+
+
+def test_sources_are_the_kernels_and_what_they_import(package):
+    expected = ["a/helper.py", "a/kernel.py", "b/__init__.py", "b/inner.py", "constants.py"]
+    assert list(kernel_sources(package)) == expected
+
+
+@pytest.mark.parametrize("name", ["a/kernel.py", "a/helper.py", "b/inner.py", "constants.py"])
+def test_a_changed_source_changes_the_key(package, name):
+    before = sources_hash(package)
+    with (package / name).open("a") as file:
+        file.write("# changed\n")
+    assert sources_hash(package) != before
+
+
+def test_what_no_kernel_imports_does_not_change_the_key(package):
+    before = sources_hash(package)
+    (package / "stranger.py").write_text("print()\n")
+    assert sources_hash(package) == before
+
+
+def test_all_real_kernels_and_their_vector_helpers_are_sources():
+    found = set(kernel_sources(ROOT / "engine"))
+    assert {"raster/cpu/blend.py", "raster/cpu/lanes.py", "raster/cpu/tile.py", "raster/cpu/record.py"} <= found
+    assert "conventions.py" in found
+    assert "cloud/hull.py" in found
+    with_kernels = {
+        path.relative_to(ROOT / "engine").as_posix()
+        for path in (ROOT / "engine").rglob("*.py")
+        if any(f"\n@{name}" in path.read_text("utf-8") for name in ("njit", "routine(", "kernel_intrinsic"))
+    }
+    assert with_kernels <= found
+
+
+def test_settings_of_numba_that_change_code_change_the_key(monkeypatch):
+    before = current_key()
+    current_key.cache_clear()
+    monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
+    try:
+        assert current_key().libraries != before.libraries
+    finally:
+        current_key.cache_clear()
+
+
+# ---------------------------------------------------------------- where the folder is
+
+
+def test_the_folder_lies_in_the_users_cache_and_reaches_numba(tmp_path):
+    from numba.core import config
+
+    folder = use_kernel_cache()
+    assert folder.parent.name == "ClipGStream"
+    assert folder.is_relative_to(tmp_path)
+    assert os.environ["NUMBA_CACHE_DIR"] == str(folder)
+    assert str(folder) == config.CACHE_DIR  # pyright: ignore[reportAttributeAccessIssue]
+    assert not folder.exists(), "looking for the folder makes nothing"
+
+
+def test_a_folder_of_the_user_wins(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "mine"))
+    assert use_kernel_cache() == tmp_path / "mine"
+    assert os.environ["NUMBA_CACHE_DIR"] == str(tmp_path / "mine")
+
+
+def test_an_inherited_folder_of_our_own_is_worked_out_again(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache" / "ClipGStream" / "kernels-0123456789abcdef"))
+    assert use_kernel_cache().name == current_key().folder_name
+
+
+def test_an_unwritable_home_falls_back_to_a_temporary_folder(tmp_path):
+    (tmp_path / "cache").write_text("a file where the folder should be")
+    folder = use_kernel_cache()
+    assert folder.is_relative_to(tmp_path / "temporary")
+    assert folder.parent.stat().st_mode & 0o077 == 0
+    assert cache_state().is_fallback
+    assert use_kernel_cache() == folder
+
+
+def test_a_temporary_folder_that_others_may_write_to_is_not_taken(tmp_path):
+    (tmp_path / "cache").write_text("a file where the folder should be")
+    shared = kernel_cache.fallback_root()
+    shared.chmod(0o777)
+    folder = use_kernel_cache()
+    assert folder.parent != shared
+    assert folder.is_relative_to(tmp_path / "temporary")
+    assert use_kernel_cache() == folder, "one folder for a process and its children, not one for each call"
+
+
+def test_no_home_at_all_is_no_failure(monkeypatch):
+    monkeypatch.setattr(kernel_cache, "_home", lambda: Path("/nonexistent/home"))
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(kernel_cache, "_is_writable", lambda folder: False)
+    assert use_kernel_cache().is_relative_to(tempfile.gettempdir())
+
+
+def test_importing_engine_sets_the_folder_and_imports_no_numba(tmp_path):
+    probe = "import engine, os, sys; print(os.environ['NUMBA_CACHE_DIR']); print('numba' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", probe], cwd=ROOT, capture_output=True, text=True, check=True)
+    folder, has_numba = done.stdout.split()
+    assert Path(folder).name == current_key().folder_name
+    assert Path(folder).is_relative_to(tmp_path)
+    assert has_numba == "False"
+
+
+# ---------------------------------------------------------------- the marker
+
+
+def test_a_marker_of_this_key_means_warm(tmp_path):
+    folder = use_kernel_cache()
+    assert not is_cache_warm()
+    assert cache_state().reason == "never compiled"
+    write_marker(folder)
+    assert is_cache_warm()
+    state = cache_state()
+    assert (state.is_warm, state.reason, state.is_fallback) == (True, "", False)
+    assert state.n_bytes > 0
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"sources": 1}', "\x00"])
+def test_a_damaged_marker_is_none(text):
+    folder = use_kernel_cache()
+    folder.mkdir(parents=True)
+    (folder / MARKER).write_text(text)
+    assert read_marker(folder) is None
+    assert not is_cache_warm()
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"sources": "x"}, "sources changed"),
+        ({"processor": "x"}, "other CPU"),
+        ({"libraries": "x"}, "other versions of numba, llvmlite or Python"),
+        ({"sources": "x", "processor": "x"}, "sources and libraries changed"),
+    ],
+)
+def test_the_reason_names_what_differs(changes, reason):
+    folder = use_kernel_cache()
+    marked_folder(folder.parent, "kernels-other", current_key()._replace(**changes), age_s=0)
+    assert cache_state().reason == reason
+
+
+def test_an_unwritable_folder_is_the_reason(monkeypatch, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(blocked / "below"))
+    state = cache_state()
+    assert (state.is_warm, state.reason) == (False, UNWRITABLE)
+    write_marker(blocked / "below")  # fails in silence
+    assert not is_cache_warm()
+
+
+def test_old_folders_are_pruned_to_the_newest(tmp_path):
+    root = tmp_path / "root"
+    key = CacheKey("a", "b", "c")
+    folders = [marked_folder(root, f"kernels-{i}", key, age_s=100.0 * i) for i in range(5)]
+    (root / "something else").mkdir()
+    prune(root, keep=folders[4])  # the oldest is the one in use
+    assert sorted(path.name for path in root.iterdir()) == ["kernels-0", "kernels-1", "kernels-4", "something else"]
+    assert MAX_FOLDERS == 3
+
+
+# ---------------------------------------------------------------- compiling ahead
+
+
+@pytest.fixture
+def small_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """Replaces the real groups by modules that take no time; gives a function that makes them."""
+
+    def make(**bodies: str) -> None:
+        folder = tmp_path / "warm_modules"
+        folder.mkdir()
+        for name, body in bodies.items():
+            (folder / f"warm_{name}.py").write_text(f"def warm_up():\n    {body}\n")
+        monkeypatch.setenv("PYTHONPATH", str(folder))
+        monkeypatch.syspath_prepend(str(folder))
+        monkeypatch.setattr(kernel_warm, "GROUPS", tuple((name, f"warm_{name}") for name in bodies))
+
+    return make
+
+
+def test_compiling_runs_every_group_and_leaves_a_marker(small_groups, tmp_path):
+    small_groups(
+        one=f"open({str(tmp_path / '1')!r}, 'w').close()",
+        two=f"open({str(tmp_path / '2')!r}, 'w').close()",
+        three="pass",
+    )
+    said = []
+    assert kernel_warm.compile_all(lambda done, n, what: said.append((done, n)), n_processes=2)
+    assert (tmp_path / "1").exists()
+    assert (tmp_path / "2").exists()
+    assert is_cache_warm()
+    assert said[0] == (0, 3)
+    assert said[-1] == (3, 3)
+    assert not (use_kernel_cache() / kernel_warm.LOCK).exists()
+
+
+def test_a_warm_cache_starts_no_process(small_groups):
+    small_groups(never="raise SystemExit(1)")
+    write_marker(use_kernel_cache())
+    assert kernel_warm.compile_all(lambda *said: pytest.fail("there was nothing to compile"))
+
+
+def test_a_group_that_fails_leaves_no_marker(small_groups, caplog):
+    small_groups(good="pass", bad="raise ValueError('no such kernel')")
+    assert not kernel_warm.compile_all()
+    assert not is_cache_warm()
+    assert "no such kernel" in caplog.text
+
+
+def test_cancelling_ends_the_processes(small_groups, tmp_path):
+    small_groups(slow=f"import os, time; open({str(tmp_path / 'pid')!r}, 'w').write(str(os.getpid())); time.sleep(60)")
+
+    class Cancelled(Exception):
+        pass
+
+    def report(done: int, n: int, what: str) -> None:
+        if (tmp_path / "pid").exists() and (tmp_path / "pid").read_text():
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        kernel_warm.compile_all(report)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "pid").read_text()), 0)
+    assert not (use_kernel_cache() / kernel_warm.LOCK).exists()
+    assert not is_cache_warm()
+
+
+def test_whoever_waits_for_another_program_compiles_nothing(small_groups):
+    small_groups(never="raise SystemExit(1)")
+    lock = use_kernel_cache() / kernel_warm.LOCK
+    lock.parent.mkdir(parents=True)
+    lock.touch()
+    said = []
+
+    def report(done: int, n: int, what: str) -> None:
+        said.append(what)
+        write_marker(use_kernel_cache())  # the other program is done
+        lock.unlink(missing_ok=True)
+
+    assert kernel_warm.compile_all(report)
+    assert said == ["another program compiles"]
+
+
+def test_the_lock_of_a_dead_program_is_broken(small_groups):
+    small_groups(one="pass")
+    lock = use_kernel_cache() / kernel_warm.LOCK
+    lock.parent.mkdir(parents=True)
+    lock.touch()
+    os.utime(lock, (1, 1))
+    assert kernel_warm.compile_all()
+
+
+def test_every_group_has_a_warm_up():
+    from importlib import import_module
+
+    for _, module in kernel_warm.GROUPS:
+        assert callable(import_module(module).warm_up)
