@@ -1,6 +1,6 @@
 """Training pictures: the pixels of one clip's training cameras, and the order in which they are drawn.
 
-Pictures stay uint8 in memory (a clip of 27 cameras x 10 frames at 640 x 360 is 187 MB); the loss reads them as they are.
+Pictures stay uint8 in memory (a clip of 27 cameras x 10 frames at 640 x 360 is 187 MB); the loss reads them like that.
 """
 
 from __future__ import annotations
