@@ -115,7 +115,7 @@ def test_a_source_clip_adds_residual_anchors_and_leaves_everything_inherited_unt
     )
     assert [row.is_held_out for row in rows] == [True, False]
     assert all(row.figures["psnr_fit"] >= row.figures["psnr"] - 1e-6 for row in rows)  # the fit includes doing nothing
-    assert means(rows)["psnr"] == pytest.approx(np.mean([row.psnr for row in rows]))
+    assert means(rows)["psnr"] == pytest.approx(np.mean([row.figures["psnr"] for row in rows]))
 
 
 def test_same_seed_gives_the_same_clip(source):
