@@ -16,7 +16,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Protocol
 
-from app.project import Project, open_project
+from app.project import Project, open_project, read_metrics
 from app.training.messages import (
     ClipTrained,
     Command,
@@ -39,6 +39,7 @@ from app.training.messages import (
 )
 from app.training.rate import Rate
 from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
+from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch, stages_of
 from engine.errors import EngineError, NonFiniteLoss, ProjectError
 from engine.model.clip_state import ClipState
 from engine.training.report import Progress, ReportProgress, StepStats
@@ -138,6 +139,8 @@ class TrainingRun:
         self._reported: tuple[str, str, float] = ("", "", -math.inf)
         self._losses: list[float] = []
         self._rate = Rate()
+        self._watch = StageWatch(clock)
+        self._paused_stage: str | None = None
         self._report_cadence = Cadence(REPORT_EVERY_S)
         self._snapshot_cadence = Cadence(SNAPSHOT_EVERY_S, SNAPSHOT_SHARE)
         self._checkpoint_cadence = Cadence(CHECKPOINT_EVERY_S, CHECKPOINT_SHARE)
@@ -172,6 +175,7 @@ class TrainingRun:
             self._finish(training)
             return False
         self._is_in_step, self._is_checkpointed_in_step = True, False
+        self._watch.enter(TRAINING)
         stats = training.step()
         self._is_in_step = False
         self._after_step(training, stats)
@@ -179,6 +183,7 @@ class TrainingRun:
 
     def _start(self) -> Training:
         job = self._job
+        self._watch.enter(STARTING)
         self._project = open_project(job.project, is_writable=False)
         checkpoint = self._project.checkpoint_path(job.clip_index)
         self._send(WorkerReady(pid=os.getpid(), n_threads=self._n_threads))
@@ -188,6 +193,7 @@ class TrainingRun:
             try:
                 training.restore_checkpoint(checkpoint)
                 is_restored = True
+                self._recall_times(training.steps_done)
                 logger.info("clip %d goes on at step %d", job.clip_index, training.steps_done)
             except ProjectError as error:
                 self._send(WarningRaised(f"Clip {job.clip_index} starts from the beginning", str(error)))
@@ -195,6 +201,7 @@ class TrainingRun:
         if not is_restored:
             self._project.discard_progress(job.clip_index)
             training.prepare()
+        self._watch.enter(KEEPING)
         self._send(
             StepReported(
                 step=training.steps_done,
@@ -212,6 +219,7 @@ class TrainingRun:
         return training
 
     def _after_step(self, training: Training, stats: StepStats) -> None:
+        self._watch.enter(KEEPING)
         now_s = self._clock()
         self._losses.append(stats.loss)
         is_last = training.steps_done >= training.n_steps
@@ -249,6 +257,9 @@ class TrainingRun:
         metrics = dict(state.header.get("metrics") or {})
         if value is not None:
             metrics["held_out_psnr"] = value
+        times = self._watch.document()
+        metrics |= times
+        self._note({"step": training.steps_done, **times})
         path = self._project.clip_path(self._job.clip_index)
         keep_clip(ClipState(state.arrays, state.header | {"metrics": metrics}), path, self._project.live_dir)
         with suppress(OSError):
@@ -276,6 +287,7 @@ class TrainingRun:
                     self._pause()
                 case Resume() if self._is_paused:
                     self._is_paused = False
+                    self._watch.enter(self._paused_stage)
                     self._send(TrainingResumed(self._steps_done))
                 case SnapshotNow():
                     self._is_snapshot_wanted = True
@@ -290,6 +302,7 @@ class TrainingRun:
         self._rate.pause()
         if self._training is not None and not self._is_in_step:
             self._write_checkpoint(self._training)  # a pause may last over night
+        self._paused_stage = self._watch.enter(None)
         self._send(TrainingPaused(self._steps_done))
 
     @property
@@ -304,6 +317,7 @@ class TrainingRun:
             # a step that reports is a change of phase: it takes long and is not done again for nothing
             self._is_checkpointed_in_step = True
             self._write_checkpoint(self._training)
+        self._watch.enter(progress.stage)
         now_s = self._clock()
         stage, message, reported_s = self._reported
         if (stage, message) != (progress.stage, progress.message) or now_s - reported_s >= REPORT_EVERY_S:
@@ -331,8 +345,18 @@ class TrainingRun:
         except ProjectError as error:
             is_written = False
             self._send(WarningRaised("What was learned so far could not be kept", str(error), error.hint))
+        if is_written:  # beside the checkpoint, so that a run that goes on from it knows what it took
+            self._note({"step": training.steps_done, **self._watch.document()})
         self._checkpoint_cadence.done(started_s, self._clock())
         return is_written
+
+    def _recall_times(self, step: int) -> None:
+        """Add what earlier runs took up to the checkpoint that this one goes on from."""
+        assert self._project is not None
+        rows = read_metrics(self._project.metrics_path(self._job.clip_index))
+        known = [stages_of(row) for row in rows if row["step"] <= step and "stages_s" in row]
+        for stage, seconds in (known[-1] if known else {}).items():
+            self._watch.seconds[stage] = self._watch.seconds.get(stage, 0.0) + seconds
 
     def _measure(self, training: Training) -> float | None:
         started_s = self._clock()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.project import create_project, default_settings
+from app.project import create_project, default_settings, read_metrics
 from app.training import messages as m
 from app.training.rate import Rate
 from app.training.run import CHECKPOINT_EVERY_S, TrainingRun
@@ -28,6 +28,10 @@ class Bench:
         self.is_alone = False
         self.training = None
         self._n_steps, self._change = n_steps, change
+        self.start()
+
+    def start(self) -> None:
+        """Begin, or go on after an end, as a new worker would."""
         self.run = TrainingRun(
             self.job,
             receive=self._receive,
@@ -232,3 +236,48 @@ def test_the_rate_follows_and_leaves_pauses_out():
         rate.update(done=240.0 + second, now_s=1001.0 + second)
     assert rate.per_s == pytest.approx(1.0, rel=0.01)  # exp(-39/5) of the old speed is left
     assert rate.eta_s(10) == pytest.approx(10.0, rel=0.01)
+
+
+def test_a_finished_clip_says_how_long_its_stages_took(bench):
+    def take_time(it):
+        def prepare():
+            it.now_s += 2.0
+            it.training.report(Progress("Carving", 0.0))
+            it.now_s += 30.0
+
+        ordinary = it.training.step
+
+        def step():
+            it.now_s += 0.5
+            return ordinary()
+
+        it.training.prepare, it.training.step = prepare, step
+
+    it = bench(n_steps=4, change=take_time)
+    it.steps(3, each_s=0.0)
+    it.commands.append(m.Pause())
+    it.steps(1, each_s=0.0)
+    it.now_s += 10_000.0
+    it.commands.append(m.Resume())
+    assert it.steps(10, each_s=0.0) is False
+    metrics = read_clip_state(it.project.clip_path(0)).header["metrics"]
+    assert metrics["stages_s"] == pytest.approx(
+        {"Starting": 2.0, "Carving": 30.0, "Measuring and keeping": 0.0, "Training": 2.0}
+    )
+    assert metrics["preparation_s"] == pytest.approx(32.0)
+    assert metrics["training_s"] == pytest.approx(2.0)
+    assert read_metrics(it.project.metrics_path(0))[-1]["training_s"] == pytest.approx(2.0)
+
+
+def test_the_times_of_a_training_that_was_stopped_add_up(bench):
+    it = bench(n_steps=6)
+    it.steps(4)  # the first prepares, at second 1
+    it.commands.append(m.Stop(keep=True))
+    assert it.steps(1) is False  # at second 5
+    it.now_s += 10_000.0
+    it.start()
+    assert it.steps(20) is False  # from second 10 006: going on, three steps, the end
+    metrics = read_clip_state(it.project.clip_path(0)).header["metrics"]
+    assert it.now_s == 10_010.0
+    assert metrics["preparation_s"] + metrics["training_s"] == pytest.approx(4.0 + 4.0)
+    assert metrics["stages_s"].keys() >= {"Starting", "Training", "Measuring and keeping"}

@@ -1,0 +1,61 @@
+"""StageWatch: how many seconds of wall time went into which stage of a training. Pauses are left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+STARTING = "Starting"
+TRAINING = "Training"
+KEEPING = "Measuring and keeping"
+"""Held-out figures, live snapshots and checkpoints in between the steps."""
+
+
+class StageWatch:
+    """Time always runs for one stage, or for none.
+
+    Args:
+        clock: Seconds; tests bring their own.
+        seconds: What earlier runs of the same training took.
+    """
+
+    def __init__(self, clock: Callable[[], float], seconds: Mapping[str, float] | None = None) -> None:
+        self._clock = clock
+        self._stage: str | None = None
+        self._since_s = 0.0
+        self.seconds: dict[str, float] = dict(seconds or {})
+
+    def enter(self, stage: str | None) -> str | None:
+        """Time runs for this stage from now on, for none when None. Returns the stage before."""
+        now_s, before = self._clock(), self._stage
+        if before is not None:
+            self.seconds[before] = self.seconds.get(before, 0.0) + now_s - self._since_s
+        self._stage, self._since_s = stage, now_s
+        return before
+
+    def document(self) -> dict[str, Any]:
+        """JSON-able: stages_s by name in the order they were entered; preparation_s and training_s, together all of it.
+
+        Training is the steps with what is measured and kept between them; everything else prepares for them, also
+        where a step begins a new phase.
+        """
+        self.enter(self._stage)
+        training_s = sum(self.seconds.get(stage, 0.0) for stage in (TRAINING, KEEPING))
+        return {
+            "stages_s": {stage: round(seconds, 3) for stage, seconds in self.seconds.items()},
+            "preparation_s": round(sum(self.seconds.values()) - training_s, 3),
+            "training_s": round(training_s, 3),
+        }
+
+
+def stages_of(row: Mapping[str, Any]) -> dict[str, float]:
+    """The stages_s of a document or metrics row; empty where there are none or they are no numbers."""
+    found = row.get("stages_s")
+    if not isinstance(found, dict):
+        return {}
+    return {
+        str(stage): float(seconds)
+        for stage, seconds in found.items()
+        if isinstance(seconds, int | float) and math.isfinite(seconds) and seconds >= 0
+    }
