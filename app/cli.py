@@ -1,4 +1,4 @@
-"""The command line without a window: train, eval, render, inspect, doctor, bench. The only place that prints.
+"""The command line without a window: train, eval, render, inspect, doctor, bench, report. The only place that prints.
 
 Exit codes: 0 done, 1 failed, 2 bad input, 130 interrupted. One plain message each, details in the log file. Results
 go to standard output, progress and messages to standard error.
@@ -125,6 +125,29 @@ def build_parser() -> argparse.ArgumentParser:
     bench.add_argument("--full", action="store_true", help="all scenes and sizes; takes some minutes, not one")
     bench.add_argument("--threads", type=int, metavar="N", help="threads to compute with (default: every core)")
     bench.add_argument("--quiet", action="store_true", help="no progress")
+
+    report = commands.add_parser(
+        "report",
+        help="write a page about a project",
+        description="Write one HTML page about a trained project, with its figures as PNG and numbers as CSV and JSON.",
+    )
+    report.add_argument("project", type=Path, help="project folder")
+    report.add_argument(
+        "--compare",
+        type=Path,
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="OTHER",
+        help="project folders, or folders of projects, to set beside it",
+    )
+    report.add_argument("--out", type=Path, metavar="DIR", help="folder for the page (default: PROJECT/reports)")
+    report.add_argument(
+        "--metrics",
+        choices=("quick", "all"),
+        help="quick: PSNR and SSIM only (default: all for the project, quick for the others)",
+    )
+    report.add_argument("--quiet", action="store_true", help="no progress")
     return parser
 
 
@@ -562,6 +585,28 @@ def _bench(options: argparse.Namespace, launch: Launch) -> int:
     return EXIT_OK
 
 
+def _report(options: argparse.Namespace, launch: Launch) -> int:
+    from app.report.cache import REPORTS
+    from app.report.write import PAGE_FILE, write_report
+
+    read_settings(options.project)  # a folder that is no project is said first
+    check_writable((options.project / REPORTS if options.out is None else options.out) / PAGE_FILE)
+    line = ProgressLine(is_quiet=options.quiet)
+    shown: dict[str, Callable[[int, int, Any], None]] = {}
+
+    def show(stage: str, done: int, n: int) -> None:
+        shown.setdefault(stage, _row_progress(line, stage))(done, n, None)
+
+    try:
+        page = write_report(
+            options.project, compare=options.compare, out=options.out, metrics=options.metrics, on_stage=show
+        )
+    finally:
+        line.finish()
+    line.say(f"Report: {page}")
+    return EXIT_OK
+
+
 _COMMANDS: dict[str, Callable[[argparse.Namespace, Launch], int]] = {
     "train": _train,
     "eval": _evaluate,
@@ -569,4 +614,5 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace, Launch], int]] = {
     "inspect": _inspect,
     "doctor": _doctor,
     "bench": _bench,
+    "report": _report,
 }

@@ -1,7 +1,4 @@
-"""Speed against error as a picture: every back end on every scene, one row of panels per operation.
-
-The only file that imports matplotlib, and only when a picture is drawn: importing it takes longer than most commands.
-"""
+"""Speed against error as a picture: every back end on every scene, one row of panels per operation."""
 
 from __future__ import annotations
 
@@ -11,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from app.bench.rows import SpeedError
+from app.figures import FAINT_COLOR, PALETTE, add_grid, new_figure
 
-_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-"""Okabe and Ito's palette: told apart with any colour vision."""
 _BACKENDS = {"cpu": ("o", "ours (numba, float32)"), "reference": ("D", "plain torch, float32")}
 _OPERATIONS = {
     "raster": ("Rasterizer", "largest pixel error (colours in 0..1)"),
@@ -33,15 +29,10 @@ def draw_speed_error(marks: Sequence[SpeedError], path: Path, *, footer: str) ->
         ValueError: There is nothing to draw.
         OSError: The file cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     operations = [name for name in _OPERATIONS if any(mark.operation == name for mark in marks)]
     if not operations:
         raise ValueError("no marks to draw")
-    height_inches = 0.9 + 3.6 * len(operations)
-    figure = Figure(figsize=(12, height_inches), dpi=110, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(12, 0.9 + 3.6 * len(operations))
     panels = figure.subplots(len(operations), 2, squeeze=False)
     for (left, right), operation in zip(panels, operations, strict=True):
         chosen = [mark for mark in marks if mark.operation == operation]
@@ -50,9 +41,9 @@ def draw_speed_error(marks: Sequence[SpeedError], path: Path, *, footer: str) ->
         _draw(right, chosen, [mark.gradient_error for mark in chosen], _GRADIENT_LABEL)
         left.set_ylabel("forward + backward pass, ms")
         left.set_title(f"{title}: speed beside error", loc="left", fontsize=11, fontweight="bold")
-        right.set_title("lower left is better", loc="right", fontsize=9, color="#555555")
+        right.set_title("lower left is better", loc="right", fontsize=9, color=FAINT_COLOR)
         right.legend(handles=_legend(right, chosen), fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5))
-    figure.supxlabel(footer, fontsize=7, color="#555555")
+    figure.supxlabel(footer, fontsize=7, color=FAINT_COLOR)
     figure.savefig(path, format="png")
 
 
@@ -63,7 +54,7 @@ def _draw(axes: Any, marks: Sequence[SpeedError], errors: Sequence[float], label
     scenes = list(dict.fromkeys(mark.scene for mark in marks))
     smallest = 1e-9  # an error of exactly zero has no place on a logarithmic axis
     for index, scene in enumerate(scenes):
-        color = _COLORS[index % len(_COLORS)]
+        color = PALETTE[index % len(PALETTE)]
         points = [
             (max(error, smallest), mark.total_ms, mark.backend)
             for mark, error in zip(marks, errors, strict=True)
@@ -88,8 +79,7 @@ def _draw(axes: Any, marks: Sequence[SpeedError], errors: Sequence[float], label
         set_limits(10.0 ** math.floor(low), 10.0 ** math.ceil(high))  # whole decades: both ends have a label
         axis.set_minor_formatter(NullFormatter())
     axes.set_xlabel(label)
-    axes.grid(visible=True, which="major", color="#DDDDDD", linewidth=0.6)
-    axes.set_axisbelow(True)
+    add_grid(axes)
 
 
 def _legend(axes: Any, marks: Sequence[SpeedError]) -> list[Any]:
@@ -97,12 +87,14 @@ def _legend(axes: Any, marks: Sequence[SpeedError]) -> list[Any]:
 
     scenes = {mark.scene: mark.size for mark in marks}
     handles = [
-        Line2D([], [], color=_COLORS[i % len(_COLORS)], linewidth=3, label=f"{scene}: {size}")
+        Line2D([], [], color=PALETTE[i % len(PALETTE)], linewidth=3, label=f"{scene}: {size}")
         for i, (scene, size) in enumerate(scenes.items())
     ]
     for backend, (shape, label) in _BACKENDS.items():
-        face = "#555555" if backend == "cpu" else "white"
+        face = FAINT_COLOR if backend == "cpu" else "white"
         handles.append(
-            Line2D([], [], linestyle="", marker=shape, color="#555555", markerfacecolor=face, markersize=8, label=label)
+            Line2D(
+                [], [], linestyle="", marker=shape, color=FAINT_COLOR, markerfacecolor=face, markersize=8, label=label
+            )
         )
     return handles

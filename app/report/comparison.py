@@ -1,0 +1,190 @@
+"""Sections that set projects beside each other: one line each, and speed against error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from app.report.about import all_settings
+from app.report.charts import SpeedPanel, draw_speed_error
+from app.report.facts import ProjectFacts
+from app.report.pareto import pareto_front
+from app.report.parts import Figure, Section
+from app.report.tables import Table, TableColumn
+
+_FIGURES = (
+    ("psnr", "PSNR", "dB", 2),
+    ("psnr_moving", "PSNR, moving", "dB", 2),
+    ("ssim", "SSIM", "", 4),
+    ("dssim1", "DSSIM1", "", 4),
+    ("dssim_range2", "DSSIM range 2", "", 4),
+    ("dssim_ms", "DSSIM MS", "", 4),
+    ("lpips", "LPIPS", "", 4),
+    ("flip", "FLIP", "", 4),
+)
+_SEAMS = (
+    ("ratio_static", "Seam ratio, static", "", 2),
+    ("score", "Seam score", "1/255", 3),
+    ("flicker", "Flicker E, static", "1/255", 3),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """One project of a comparison: its files and its evaluation document."""
+
+    facts: ProjectFacts
+    evaluation: dict[str, Any]
+
+    @property
+    def group(self) -> str:
+        """Cameras that its figures are of: held-out ones where there are any."""
+        return main_group(self.evaluation)
+
+    def figure(self, name: str) -> float | None:
+        """Mean of a column over all clips."""
+        return self.evaluation["means"][self.group].get(name)
+
+    def seam(self, name: str) -> float | None:
+        """A seam figure over all cameras: one of seams.means.all, or flicker, the mean E on static pixels in 1/255."""
+        if name == "flicker":
+            return flicker_of(self.evaluation)
+        return self.evaluation["seams"]["means"]["all"].get(name)
+
+    @property
+    def minutes(self) -> float | None:
+        """Wall time of all clips; None when not recorded."""
+        return None if self.facts.wall_s is None else self.facts.wall_s / 60.0
+
+
+def main_group(evaluation: dict[str, Any]) -> str:
+    """held_out, or trained_on where nothing was held out."""
+    return "held_out" if evaluation["means"].get("held_out") else "trained_on"
+
+
+def flicker_of(evaluation: dict[str, Any]) -> float | None:
+    """Mean of E on static pixels over all pairs of neighbouring frames that have any, 1/255."""
+    values = [row["excess_static"] for row in evaluation["seams"]["rows"] if row["excess_static"] is not None]
+    return 255.0 * sum(values) / len(values) if values else None
+
+
+def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) -> Section:
+    """One line per project, the page's own first. left_out: sentences on projects that could not be compared."""
+    columns = (
+        TableColumn("project", "Project"),
+        TableColumn("settings", "Settings that differ from the first"),
+        *(TableColumn(key, title, n, key.startswith(("psnr", "ssim")), unit) for key, title, unit, n in _FIGURES),
+        *(TableColumn(key, title, n, False, unit) for key, title, unit, n in _SEAMS),
+        TableColumn("minutes", "Time", 2, False, "min"),
+        TableColumn("megabytes", "Size", 1, False, "MB"),
+        TableColumn("clips", "Clips"),
+        TableColumn("columns", "Columns"),
+    )
+    first = compared[0]
+    rows = [
+        {
+            "project": one.facts.name,
+            "settings": _settings_text(first, one),
+            **{key: one.figure(key) for key, *_ in _FIGURES},
+            **{key: one.seam(key) for key, *_ in _SEAMS},
+            "minutes": one.minutes,
+            "megabytes": one.facts.n_bytes / 1e6,
+            "clips": len(one.facts.clips),
+            "columns": one.evaluation["metrics"],
+        }
+        for one in compared
+    ]
+    said = (
+        "Means over all clips and frames of the held-out cameras, raw colours; seams and flicker over all cameras. "
+        "The best value of a column is bold. Projects measured quickly have PSNR and SSIM only."
+    )
+    notes = [note for one in compared[1:] if (note := comparability(first, one))]
+    table = Table("comparison", "All projects", columns, rows)
+    return Section("comparison", "Comparison", [said, table, *notes, *left_out])
+
+
+def comparability(first: Compared, other: Compared) -> str:
+    """What makes the figures of two projects hard to compare, as a sentence; empty when nothing does."""
+    a, b = first.facts.settings, other.facts.settings
+    reasons = []
+    if a.fingerprint != b.fingerprint:
+        reasons.append("is of another capture")
+    elif set(a.holdout) != set(b.holdout):
+        reasons.append(f"holds out other cameras ({', '.join(b.holdout) or 'none'})")
+    if a.scale != b.scale:
+        reasons.append(f"works at scale {b.scale:g}, not {a.scale:g}")
+    frames = [{f for c in one.facts.clips for f in range(c.start, c.start + c.n_frames)} for one in (first, other)]
+    if a.fingerprint == b.fingerprint and frames[0] != frames[1]:
+        reasons.append(f"is measured on {len(frames[1])} frames, not the same {len(frames[0])}")
+    if first.group != other.group:
+        reasons.append("has figures of other kinds of cameras: held out here, trained on there or the other way round")
+    if not reasons:
+        return ""
+    return f"{other.facts.name} {' and '.join(reasons)}; its figures cannot be set beside the first one's as they are."
+
+
+def _settings_text(first: Compared, one: Compared) -> str:
+    if one is first:
+        changed = one.facts.settings.config().difference()
+        return ", ".join(f"{name}={value}" for name, value in changed.items()) or "defaults"
+    usual, own = all_settings(first.facts.settings), all_settings(one.facts.settings)
+    return ", ".join(f"{name}={value}" for name, value in own.items() if value != usual[name]) or "none"
+
+
+def speed_section(compared: Sequence[Compared]) -> Section:
+    """PSNR and flicker against wall time, with the results that nobody beats."""
+    timed = [(one, one.minutes) for one in compared if one.minutes is not None]
+    unknown = [one.facts.name for one in compared if one.minutes is None]
+    parts: list = []
+    if unknown:
+        parts.append(f"Not drawn, because no wall time was recorded when it was trained: {', '.join(unknown)}.")
+    if not timed:
+        return Section("speed", "Speed against error", parts)
+    minutes = [time for _, time in timed]
+    panels = (
+        SpeedPanel(f"PSNR, {timed[0][0].group.replace('_', '-')} cameras, raw, dB", _of(timed, "psnr"), True),
+        SpeedPanel("seam ratio on static pixels", [one.seam("ratio_static") for one, _ in timed], False),
+        SpeedPanel("flicker: mean E on static pixels, 1/255", [one.seam("flicker") for one, _ in timed], False),
+    )
+    names = [one.facts.name for one, _ in timed]
+    on_front = []
+    for panel in panels:
+        known = [i for i, value in enumerate(panel.values) if value is not None]
+        points = [(minutes[i], float(panel.values[i] or 0.0)) for i in known]
+        front = pareto_front(points, is_higher_better=panel.is_higher_better)
+        on_front.append({known[i] for i in front})
+    columns = (
+        TableColumn("project", "Project"),
+        TableColumn("minutes", "Time", 2, unit="min"),
+        TableColumn("psnr", "PSNR", 2, unit="dB"),
+        TableColumn("is_front_psnr", "On its front"),
+        TableColumn("ratio_static", "Seam ratio, static", 2),
+        TableColumn("is_front_ratio", "On its front"),
+        TableColumn("flicker", "Flicker E, static", 3, unit="1/255"),
+        TableColumn("is_front_flicker", "On its front"),
+    )
+    rows = [
+        {
+            "project": name,
+            "minutes": minutes[i],
+            "psnr": panels[0].values[i],
+            "is_front_psnr": i in on_front[0],
+            "ratio_static": panels[1].values[i],
+            "is_front_ratio": i in on_front[1],
+            "flicker": panels[2].values[i],
+            "is_front_flicker": i in on_front[2],
+        }
+        for i, name in enumerate(names)
+    ]
+    caption = (
+        "Each mark is one project; filled marks lie on the Pareto front: no other is both faster and better. The time "
+        "is that of preparation and training of all its clips on the machine that trained."
+    )
+    alt = f"PSNR, seam ratio and flicker of {len(names)} projects against minutes"
+    chart = Figure("speed_error", draw_speed_error(names, minutes, panels), caption, alt)
+    return Section("speed", "Speed against error", [*parts, chart, Table("speed_error", "The marks", columns, rows)])
+
+
+def _of(timed: Sequence[tuple[Compared, float]], name: str) -> list[float | None]:
+    return [one.figure(name) for one, _ in timed]

@@ -1,0 +1,52 @@
+"""Bytes of a clip file by what they describe."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from safetensors import SafetensorError, safe_open
+
+from engine.errors import ProjectError
+
+COMPONENTS = (
+    ("static anchors", ("sets.static.",)),
+    ("moving anchors", ("sets.moving.",)),
+    ("residual anchors", ("sets.residual.",)),
+    ("field tables", ("field.tables.",)),
+    ("networks", ("decoder.", "field.")),
+    ("gains", ("gains",)),
+)
+"""Name of each component and how the names of its arrays begin; the first that fits counts."""
+OTHER = "other"
+"""Arrays of no component, such as the presence of inherited anchors, and the header."""
+COMPONENT_NAMES = (*(name for name, _ in COMPONENTS), OTHER)
+_BYTES = {"F64": 8, "I64": 8, "U64": 8, "F32": 4, "I32": 4, "U32": 4, "F16": 2, "BF16": 2, "I16": 2, "U16": 2}
+
+
+def component_of(array_name: str) -> str:
+    """The component an array of a clip belongs to."""
+    for component, prefixes in COMPONENTS:
+        if array_name.startswith(prefixes):
+            return component
+    return OTHER
+
+
+def storage_of(path: Path) -> dict[str, int]:
+    """Bytes per name of COMPONENT_NAMES; they add up to the size of the file. Reads no array.
+
+    Raises:
+        ProjectError: The file is missing or damaged.
+    """
+    found = dict.fromkeys(COMPONENT_NAMES, 0)
+    try:
+        with safe_open(path, framework="numpy") as file:
+            for name in file.keys():  # noqa: SIM118 - not a mapping
+                part = file.get_slice(name)
+                found[component_of(name)] += math.prod(part.get_shape()) * _BYTES.get(part.get_dtype(), 1)
+        found[OTHER] += path.stat().st_size - sum(found.values())
+    except (OSError, SafetensorError) as error:
+        raise ProjectError(
+            f"The clip file is damaged or no clip file ({error}).", hint="Train the clip again.", path=path
+        ) from error
+    return found
