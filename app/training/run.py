@@ -317,7 +317,7 @@ class TrainingRun:
             # a step that reports is a change of phase: it takes long and is not done again for nothing
             self._is_checkpointed_in_step = True
             self._write_checkpoint(self._training)
-        self._watch.enter(progress.stage)
+        self._watch.reached(progress.stage, float(progress.done))
         now_s = self._clock()
         stage, message, reported_s = self._reported
         if (stage, message) != (progress.stage, progress.message) or now_s - reported_s >= REPORT_EVERY_S:

@@ -34,6 +34,12 @@ class StageWatch:
         self._stage, self._since_s = stage, now_s
         return before
 
+    def reached(self, stage: str, done: float) -> None:
+        """A report of progress. It comes after the piece of work that it tells of, unless its share is 0."""
+        if done > 0 and self._stage is not None:
+            self._stage = stage
+        self.enter(stage)
+
     def document(self) -> dict[str, Any]:
         """JSON-able: stages_s by name in the order they were entered; preparation_s and training_s, together all of it.
 

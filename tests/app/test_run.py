@@ -244,6 +244,9 @@ def test_a_finished_clip_says_how_long_its_stages_took(bench):
             it.now_s += 2.0
             it.training.report(Progress("Carving", 0.0))
             it.now_s += 30.0
+            it.training.report(Progress("Carving", 1.0))
+            it.now_s += 4.0
+            it.training.report(Progress("Sizing", 1.0))  # told when it is done
 
         ordinary = it.training.step
 
@@ -262,9 +265,9 @@ def test_a_finished_clip_says_how_long_its_stages_took(bench):
     assert it.steps(10, each_s=0.0) is False
     metrics = read_clip_state(it.project.clip_path(0)).header["metrics"]
     assert metrics["stages_s"] == pytest.approx(
-        {"Starting": 2.0, "Carving": 30.0, "Measuring and keeping": 0.0, "Training": 2.0}
+        {"Starting": 2.0, "Carving": 30.0, "Sizing": 4.0, "Measuring and keeping": 0.0, "Training": 2.0}
     )
-    assert metrics["preparation_s"] == pytest.approx(32.0)
+    assert metrics["preparation_s"] == pytest.approx(36.0)
     assert metrics["training_s"] == pytest.approx(2.0)
     assert read_metrics(it.project.metrics_path(0))[-1]["training_s"] == pytest.approx(2.0)
 
