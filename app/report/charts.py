@@ -108,7 +108,7 @@ def draw_pictures(truth: np.ndarray, render: np.ndarray, error_range: tuple[floa
         shown: Any = None
         for axes, picture, title in zip(columns, (truth, image, error), ("truth", "render", "error"), strict=True):
             shown = axes.imshow(picture, **_map_options(error_range) if picture is error else {})
-            axes.set_title(title, loc="left")
+            axes.set_title(title, loc="left", fontsize=9)
             axes.set_axis_off()
         _add_color_bar(figure, shown, columns, "mean absolute difference, colours in 0..1")
         return png_of(figure)
@@ -138,7 +138,7 @@ def _map_options(value_range: tuple[float, float]) -> dict[str, Any]:
 
 
 def _row_height(shape: Sequence[int], n_panels: int) -> float:
-    return max(0.95 * WIDTH_INCHES / n_panels * shape[0] / shape[1] + 0.35, 1.6)
+    return max(0.88 * WIDTH_INCHES / n_panels * shape[0] / shape[1] + 0.35, 1.6)
 
 
 def _add_color_bar(figure: Any, shown: Any, axes: Any, label: str) -> None:

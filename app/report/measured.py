@@ -175,7 +175,7 @@ def worst_section(evaluation: dict[str, Any], pictures: Pictures, tick: Tick) ->
         truth, image = pictures.pair(row["clip_index"], row["frame_index"], row["camera"])
         words = "PSNR" if name == "psnr" else "PSNR of moving pixels"
         what = f"Camera {row['camera']}, frame {row['frame_index']}, clip {row['clip_index']}"
-        caption = f"{what}: worst in {words}, {row[name]:.2f} dB; PSNR of all pixels {_db(row['psnr'])}."
+        caption = f"{what}: worst in {words}, {row[name]:.2f} dB."
         alt = f"Truth, render and error beside each other. {caption}"
         parts.append(Figure(f"worst_{number:02d}", draw_pictures(truth, image, ERROR_RANGE), caption, alt))
         tick()
@@ -190,7 +190,3 @@ def worst_section(evaluation: dict[str, Any], pictures: Pictures, tick: Tick) ->
             table = Table(f"worst_{name}", f"Worst frames by {name}", columns, listed)
             parts.append(Folded(f"The {len(listed)} worst frames by {name}", table))
     return Section("worst", "Worst frames", parts)
-
-
-def _db(value: float | None) -> str:
-    return "not known" if value is None else f"{value:.2f} dB"

@@ -11,6 +11,8 @@ from typing import Any
 from app.report.markup import Markup, tag
 
 MISSING = "–"
+_WIDE_TEXT = 24
+"""Longer texts are broken into lines, but not into narrow ones."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,11 +94,15 @@ class Table:
                 value = row[column.key]
                 text = value_text(value, column.n_digits)
                 is_best = value is not None and value == best[column.key]
-                number = "n" if self._is_numeric(column) else None
-                cells.append(tag("td", tag("b", text) if is_best else text, class_=number))
+                kind = "n" if self._is_numeric(column) else "w" if len(text) > _WIDE_TEXT else None
+                cells.append(tag("td", tag("b", text) if is_best else text, class_=kind))
             body.append(tag("tr", *cells))
         table = tag(
-            "table", tag("caption", self.caption), tag("thead", tag("tr", *heads)), tag("tbody", *body), id=self.name
+            "table",
+            tag("caption", self.caption),
+            tag("thead", tag("tr", *heads)),
+            tag("tbody", *body),
+            id=f"table-{self.name}",
         )
         return tag("div", table, class_="scroll", tabindex="0", role="region", aria_label=self.caption)
 
