@@ -174,22 +174,25 @@ def draw_stacked(parts: Mapping[str, Sequence[float]], names: Sequence[str], lab
         return png_of(figure)
 
 
-def draw_speed_error(names: Sequence[str], minutes: Sequence[float], panels: Sequence[SpeedPanel]) -> bytes:
+def draw_speed_error(
+    names: Sequence[str], minutes: Sequence[float], panels: Sequence[SpeedPanel], own: int | None
+) -> bytes:
     """Figures against wall time, a mark with a label per result, and the front of those that nobody beats.
 
     Args:
-        names, minutes: One per result; the first is drawn apart.
+        names, minutes: One per result.
+        own: Index of the result that the page is about; a diamond among circles.
         panels: At least one; those without any value stay empty.
     """
     with plain_texts():
         figure = new_figure(WIDTH_INCHES, 4.2)
         for axes, panel in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
-            _draw_speed_panel(figure, axes, names, minutes, panel)
+            _draw_speed_panel(figure, axes, names, minutes, panel, own)
         return png_of(figure)
 
 
 def _draw_speed_panel(
-    figure: Any, axes: Any, names: Sequence[str], minutes: Sequence[float], panel: SpeedPanel
+    figure: Any, axes: Any, names: Sequence[str], minutes: Sequence[float], panel: SpeedPanel, own: int | None
 ) -> None:
     chosen = [i for i, value in enumerate(panel.values) if value is not None]
     points = [(minutes[i], float(panel.values[i] or 0.0)) for i in chosen]
@@ -211,10 +214,10 @@ def _draw_speed_panel(
         axes.step(xs, ys, where="post", color=PALETTE[1], linewidth=1.4, zorder=1, label="Pareto front")
         axes.legend(fontsize=7, loc="best", frameon=False)
     for index, (x, y) in zip(chosen, points, strict=True):
-        is_first, is_front = index == 0, (x, y) in front
+        is_front = (x, y) in front
         color = PALETTE[0] if is_front else FAINT_COLOR
         face = color if is_front else "white"
-        axes.plot([x], [y], "D" if is_first else "o", color=color, markerfacecolor=face, markersize=8, zorder=3)
+        axes.plot([x], [y], "D" if index == own else "o", color=color, markerfacecolor=face, markersize=8, zorder=3)
     _place_labels(figure, axes, [_shortened(names[i]) for i in chosen], points)
 
 
@@ -237,7 +240,10 @@ def _place_labels(figure: Any, axes: Any, names: Sequence[str], points: Sequence
     marks = axes.transData.transform(points)
     taken: list[Any] = []
     for i, (name, point) in enumerate(zip(names, points, strict=True)):
-        text = axes.annotate(name, point, xytext=(0, 0), textcoords="offset points", fontsize=7.5, zorder=4)
+        paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
+        text = axes.annotate(
+            name, point, xytext=(0, 0), textcoords="offset points", fontsize=7.5, bbox=paper, zorder=2.5
+        )
         costs = []
         for offset in _LABEL_OFFSETS:
             _move(text, offset)

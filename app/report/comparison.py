@@ -96,8 +96,8 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
         for one in compared
     ]
     said = (
-        "Means over all clips and frames of the held-out cameras, raw colours; seams and flicker over all cameras. "
-        "The best value of a column is bold. Projects measured quickly have PSNR and SSIM only."
+        f"Means over all clips and frames of the {first.group.replace('_', '-')} cameras, raw colours; seams and "
+        "flicker over all cameras. The best value of a column is bold. Projects measured quickly have PSNR and SSIM only."
     )
     notes = [note for one in compared[1:] if (note := comparability(first, one))]
     table = Table("comparison", "All projects", columns, rows)
@@ -148,6 +148,7 @@ def speed_section(compared: Sequence[Compared]) -> Section:
         SpeedPanel("flicker: mean E on static pixels, 1/255", [one.seam("flicker") for one, _ in timed], False),
     )
     names = [one.facts.name for one, _ in timed]
+    own = next((i for i, (one, _) in enumerate(timed) if one is compared[0]), None)
     on_front = []
     for panel in panels:
         known = [i for i, value in enumerate(panel.values) if value is not None]
@@ -178,11 +179,12 @@ def speed_section(compared: Sequence[Compared]) -> Section:
         for i, name in enumerate(names)
     ]
     caption = (
-        "Each mark is one project; filled marks lie on the Pareto front: no other is both faster and better. The time "
-        "is that of preparation and training of all its clips on the machine that trained."
+        "Each mark is one project, the diamond the one of this page; filled marks lie on the Pareto front: no other is "
+        "both faster and better. The time is that of preparation and training of all its clips on the machine that "
+        "trained."
     )
     alt = f"PSNR, seam ratio and flicker of {len(names)} projects against minutes"
-    chart = Figure("speed_error", draw_speed_error(names, minutes, panels), caption, alt)
+    chart = Figure("speed_error", draw_speed_error(names, minutes, panels, own), caption, alt)
     return Section("speed", "Speed against error", [*parts, chart, Table("speed_error", "The marks", columns, rows)])
 
 

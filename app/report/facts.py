@@ -152,7 +152,7 @@ def find_projects(given: Sequence[Path], *, besides: Path) -> list[tuple[Path, b
 
 
 def _below(folder: Path, depth: int) -> Iterator[Path]:
-    for child in sorted(entry.path for entry in os.scandir(folder) if entry.is_dir(follow_symlinks=False)):
+    for child in sorted(entry.path for entry in os.scandir(folder) if entry.is_dir()):
         path = Path(child)
         if (path / PROJECT_FILE).is_file():
             yield path

@@ -479,6 +479,24 @@ def test_the_command_writes_the_page(project, tmp_path, monkeypatch, capsys):
     assert (tmp_path / "out" / "report.html").is_file()
 
 
+def test_an_interrupted_report_keeps_what_was_measured_and_writes_no_page(
+    project, tmp_path, capture_folder, monkeypatch, capsys
+):
+    train(tmp_path / "other", capture_folder)
+    measure = Measure()
+
+    def interrupted(opened, **options):
+        if opened.project.folder.name == "other":
+            raise KeyboardInterrupt
+        return measure(opened, **options)
+
+    monkeypatch.setattr(write, "write_report", partial(write_report, measure=interrupted, make_pictures=FakePictures))
+    arguments = ["report", str(project), "--compare", str(tmp_path / "other"), "--quiet"]
+    assert main(arguments) == 130
+    assert "goes on from there" in capsys.readouterr().err
+    assert [path.name for path in (project / "reports").iterdir()] == ["eval-all.json"]
+
+
 # ---------------------------------------------------------------- pieces
 
 
