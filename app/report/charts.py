@@ -19,6 +19,8 @@ LOG_FROM_RATIO = 5.0
 _LABEL_OFFSETS = ((7, 5), (7, -12), (-7, 5), (-7, -12), (7, 17), (7, -24), (-7, 17), (-7, -24), (0, 29), (0, -36))
 """Places of a label beside its mark, points of the typeface; the first that is free is taken."""
 _LABEL_LENGTH = 28
+MAX_NAMED_MARKS = 6
+"""Of more results the marks are numbered, and the names stand beside the panels."""
 _STYLES = ("-", "--", ":", "-.")
 
 
@@ -186,13 +188,20 @@ def draw_speed_error(
     """
     with plain_texts():
         figure = new_figure(WIDTH_INCHES, 4.2)
+        labels = [_shortened(name) for name in names]
+        if len(names) > MAX_NAMED_MARKS:
+            from matplotlib.lines import Line2D
+
+            handles = [Line2D([], [], linestyle="", label=f"{i}  {label}") for i, label in enumerate(labels, start=1)]
+            figure.legend(handles=handles, loc="outside right center", fontsize=7.5, handlelength=0, frameon=False)
+            labels = [str(i) for i in range(1, len(names) + 1)]
         for axes, panel in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
-            _draw_speed_panel(figure, axes, names, minutes, panel, own)
+            _draw_speed_panel(figure, axes, labels, minutes, panel, own)
         return png_of(figure)
 
 
 def _draw_speed_panel(
-    figure: Any, axes: Any, names: Sequence[str], minutes: Sequence[float], panel: SpeedPanel, own: int | None
+    figure: Any, axes: Any, labels: Sequence[str], minutes: Sequence[float], panel: SpeedPanel, own: int | None
 ) -> None:
     chosen = [i for i, value in enumerate(panel.values) if value is not None]
     points = [(minutes[i], float(panel.values[i] or 0.0)) for i in chosen]
@@ -203,6 +212,8 @@ def _draw_speed_panel(
     axes.margins(0.22)
     add_grid(axes)
     if not points:
+        axes.set_xticks([])
+        axes.set_yticks([])
         axes.text(0.5, 0.5, "not measured", transform=axes.transAxes, ha="center", color=FAINT_COLOR)
         return
     times = [x for x, _ in points]
@@ -218,7 +229,7 @@ def _draw_speed_panel(
         color = PALETTE[0] if is_front else FAINT_COLOR
         face = color if is_front else "white"
         axes.plot([x], [y], "D" if index == own else "o", color=color, markerfacecolor=face, markersize=8, zorder=3)
-    _place_labels(figure, axes, [_shortened(names[i]) for i in chosen], points)
+    _place_labels(figure, axes, [labels[i] for i in chosen], points)
 
 
 def _use_log_time(axes: Any) -> None:
@@ -234,15 +245,15 @@ def _shortened(name: str) -> str:
     return name if len(name) <= _LABEL_LENGTH else f"{name[: _LABEL_LENGTH // 2 - 1]}…{name[-_LABEL_LENGTH // 2 :]}"
 
 
-def _place_labels(figure: Any, axes: Any, names: Sequence[str], points: Sequence[tuple[float, float]]) -> None:
+def _place_labels(figure: Any, axes: Any, labels: Sequence[str], points: Sequence[tuple[float, float]]) -> None:
     """Each label beside its mark where it covers no other label or mark, as far as such a place is found."""
     figure.draw_without_rendering()  # the layout has to be known
     marks = axes.transData.transform(points)
     taken: list[Any] = []
-    for i, (name, point) in enumerate(zip(names, points, strict=True)):
+    for i, (label, point) in enumerate(zip(labels, points, strict=True)):
         paper = {"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
         text = axes.annotate(
-            name, point, xytext=(0, 0), textcoords="offset points", fontsize=7.5, bbox=paper, zorder=2.5
+            label, point, xytext=(0, 0), textcoords="offset points", fontsize=7.5, bbox=paper, zorder=2.5
         )
         costs = []
         for offset in _LABEL_OFFSETS:

@@ -97,7 +97,8 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
     ]
     said = (
         f"Means over all clips and frames of the {first.group.replace('_', '-')} cameras, raw colours; seams and "
-        "flicker over all cameras. The best value of a column is bold. Projects measured quickly have PSNR and SSIM only."
+        "flicker over all cameras. The best value of a column is bold. Projects measured quickly have PSNR and SSIM "
+        "only."
     )
     notes = [note for one in compared[1:] if (note := comparability(first, one))]
     table = Table("comparison", "All projects", columns, rows)
@@ -156,6 +157,7 @@ def speed_section(compared: Sequence[Compared]) -> Section:
         front = pareto_front(points, is_higher_better=panel.is_higher_better)
         on_front.append({known[i] for i in front})
     columns = (
+        TableColumn("mark", "Mark"),
         TableColumn("project", "Project"),
         TableColumn("minutes", "Time", 2, unit="min"),
         TableColumn("psnr", "PSNR", 2, unit="dB"),
@@ -167,6 +169,7 @@ def speed_section(compared: Sequence[Compared]) -> Section:
     )
     rows = [
         {
+            "mark": i + 1,
             "project": name,
             "minutes": minutes[i],
             "psnr": panels[0].values[i],

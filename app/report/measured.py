@@ -37,7 +37,7 @@ def clips_section(evaluation: dict[str, Any]) -> Section:
             "unit": column["unit"],
             "better": "higher" if column["is_higher_better"] else "" if name == "moving_share" else "lower",
             **{f"{part}_{group}": found[group].get(name) for part, found in parts for group in groups},
-            "why_missing": missing_text(column) or None,
+            "why_missing": missing_text(column),
         }
         for name, column in described.items()
     ]
