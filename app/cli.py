@@ -65,18 +65,9 @@ def build_parser() -> argparse.ArgumentParser:
     train.add_argument("capture", type=Path, help="capture folder")
     train.add_argument("--project", type=Path, required=True, help="project folder; made when it is not there")
     train.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
-    train.add_argument("--holdout", metavar="NAMES", help="cameras to leave out, or 'none' (default: the capture's)")
-    train.add_argument("--scale", type=float, help="working size, share of the original in (0, 1] (default: 1)")
-    train.add_argument("--clip-length", type=int, metavar="M", help="frames per clip (default: 10)")
+    _add_training_settings(train)
     train.add_argument("--seed", type=int, help="fixes initial values and order of pictures (default: 0)")
-    train.add_argument(
-        "--set",
-        dest="assignments",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change a training setting; may be given several times",
-    )
+    train.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
     train.add_argument("--json", action="store_true", help="print the outcome as JSON on standard output")
     train.add_argument("--quiet", action="store_true", help="no progress")
 
@@ -126,6 +117,22 @@ def build_parser() -> argparse.ArgumentParser:
     bench.add_argument("--threads", type=int, metavar="N", help="threads to compute with (default: every core)")
     bench.add_argument("--quiet", action="store_true", help="no progress")
 
+    ablate = commands.add_parser(
+        "ablate",
+        help="train variants of the method and compare them",
+        description="Train the method, its ablations and baselines on a capture, and write the table.",
+    )
+    ablate.add_argument("capture", type=Path, help="capture folder")
+    ablate.add_argument("--project", type=Path, required=True, help="folder for one project per variant and the table")
+    ablate.add_argument("--variants", metavar="NAMES", help="separated by commas (default: all; --list names them)")
+    ablate.add_argument("--list", action="store_true", help="say what the variants are and end")
+    ablate.add_argument("--n-clips", type=int, metavar="N", help="clips from the first (default: up to 4)")
+    ablate.add_argument("--seeds", default="0", help="separated by commas (default: 0)")
+    ablate.add_argument("--metrics", choices=("quick", "all"), default="quick", help="quick: PSNR and SSIM only")
+    _add_training_settings(ablate)
+    ablate.add_argument("--json", action="store_true", help="print the table as JSON on standard output")
+    ablate.add_argument("--quiet", action="store_true", help="no progress")
+
     report = commands.add_parser(
         "report",
         help="write a page about a project",
@@ -149,6 +156,28 @@ def build_parser() -> argparse.ArgumentParser:
     )
     report.add_argument("--quiet", action="store_true", help="no progress")
     return parser
+
+
+def _add_training_settings(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--holdout", metavar="NAMES", help="cameras to leave out, or 'none' (default: the capture's)")
+    command.add_argument("--scale", type=float, help="working size, share of the original in (0, 1] (default: 1)")
+    command.add_argument("--clip-length", type=int, metavar="M", help="frames per clip (default: 10)")
+    command.add_argument("--preset", metavar="NAME", help="toy, small (the default), medium or paper")
+    command.add_argument(
+        "--set",
+        dest="assignments",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a training setting, also one of the preset; may be given several times",
+    )
+
+
+def _overrides(options: argparse.Namespace) -> dict[str, Any]:
+    from engine.training.config import parse_overrides
+    from engine.training.presets import preset
+
+    return (preset(options.preset) if options.preset else {}) | parse_overrides(options.assignments)
 
 
 def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -> int:
@@ -255,9 +284,7 @@ def parse_cameras(text: str, capture: Capture) -> tuple[str, ...]:
 
 def _open_for_training(options: argparse.Namespace) -> tuple[Project, Capture]:
     """The project of the arguments, made or opened; what was given has to agree with what is there."""
-    from engine.training.config import parse_overrides
-
-    overrides = parse_overrides(options.assignments)
+    overrides = _overrides(options)
     exists = (options.project / PROJECT_FILE).is_file()
     stored = read_settings(options.project) if exists else None
     scale = options.scale if options.scale is not None else 1.0 if stored is None else stored.scale
@@ -270,12 +297,18 @@ def _open_for_training(options: argparse.Namespace) -> tuple[Project, Capture]:
             holdout=holdout,
             seed=options.seed or 0,
             overrides=overrides,
+            reference_clip=options.reference_clip or 0,
         )
-        parse_range(
-            options.clips, len(_clips(capture, settings.clip_length)), option="--clips", what="clips"
-        )  # said before the folder is made
+        n_clips = len(settings.clips(capture.n_frames))
+        parse_range(options.clips, n_clips, option="--clips", what="clips")  # said before the folder is made
         return create_project(options.project, settings), capture
-    given = {"scale": options.scale, "clip_length": options.clip_length, "seed": options.seed, "holdout": holdout}
+    given = {
+        "scale": options.scale,
+        "clip_length": options.clip_length,
+        "seed": options.seed,
+        "holdout": holdout,
+        "reference_clip": options.reference_clip,
+    }
     changes: dict[str, Any] = {
         name: value for name, value in given.items() if value is not None and value != getattr(stored, name)
     }
@@ -301,12 +334,6 @@ def _open_for_training(options: argparse.Namespace) -> tuple[Project, Capture]:
     return project, capture
 
 
-def _clips(capture: Capture, clip_length: int) -> list[Any]:
-    from engine.capture.clip import split_clips
-
-    return split_clips(capture.n_frames, clip_length)
-
-
 # ---------------------------------------------------------------- commands
 
 
@@ -326,9 +353,10 @@ def _train(options: argparse.Namespace, launch: Launch) -> int:
             f"{capture.path}: {len(capture.rig)} cameras (held out: {names}), {capture.n_frames} frames, "
             f"clips {chosen.start} to {chosen.stop - 1} of {len(clips)}"
         )
+        first = project.settings.reference_clip  # the others cannot begin before it
         outcomes = train_clips(
             service,
-            chosen,
+            sorted(chosen, key=lambda clip_index: clip_index != first),
             on_status=lambda status: _show_status(line, status),
             on_event=lambda event: _show_event(line, event),
             on_outcome=lambda outcome: _show_outcome(line, outcome),
@@ -585,6 +613,69 @@ def _bench(options: argparse.Namespace, launch: Launch) -> int:
     return EXIT_OK
 
 
+def _ablate(options: argparse.Namespace, launch: Launch) -> int:
+    from app.ablation.running import RESULT_FILE, TABLE_FILE, Callbacks, run_ablation
+    from app.ablation.table import as_text
+    from app.ablation.variants import VARIANTS, chosen_variants
+
+    if options.list:
+        width = max(len(variant.name) for variant in VARIANTS)
+        for variant in VARIANTS:
+            print(f"{variant.name:<{width}}  {'baseline: ' if variant.is_baseline else ''}{variant.words}")
+        return EXIT_OK
+    names = None if options.variants is None else [name.strip() for name in options.variants.split(",")]
+    variants = chosen_variants(names)
+    try:
+        seeds = [int(seed) for seed in options.seeds.split(",")]
+    except ValueError as error:
+        raise ProjectError(f"--seeds is '{options.seeds}'; write whole numbers separated by commas.") from error
+    capture = open_capture(options.capture, scale=options.scale if options.scale is not None else 1.0)
+    settings = default_settings(
+        capture,
+        clip_length=options.clip_length,
+        holdout=None if options.holdout is None else parse_cameras(options.holdout, capture),
+        seed=seeds[0],
+        overrides=_overrides(options),
+    )
+    most = len(settings.clips(capture.n_frames))
+    n_clips = min(most, 4) if options.n_clips is None else options.n_clips
+    if not 1 <= n_clips <= most:
+        raise ProjectError(f"--n-clips is {n_clips}; the capture has {most} clips of {settings.clip_length} frames.")
+    check_writable(options.project / RESULT_FILE)
+    line = ProgressLine(is_quiet=options.quiet)
+
+    def show_variant(name: str, seed: int, n_done: int, n: int) -> None:
+        line.say(f"{name}, seed {seed} ({n_done + 1} of {n})")
+
+    callbacks = Callbacks(
+        on_variant=show_variant,
+        on_status=lambda status: _show_status(line, status),
+        on_event=lambda event: None,
+        on_outcome=lambda outcome: _show_outcome(line, outcome),
+        on_row=_row_progress(line, "Measuring"),
+    )
+    try:
+        document = run_ablation(
+            options.project,
+            capture,
+            settings,
+            variants=variants,
+            n_clips=n_clips,
+            seeds=seeds,
+            metrics=options.metrics,
+            launch=launch,
+            callbacks=callbacks,
+        )
+    finally:
+        line.finish()
+    if options.json:
+        print(json.dumps(document, indent=1, allow_nan=False))
+    else:
+        print(as_text(document["lines"]))
+    line.say(f"All figures: {options.project / RESULT_FILE} and {TABLE_FILE}")
+    return EXIT_OK
+
+
 def _report(options: argparse.Namespace, launch: Launch) -> int:
     from app.report.cache import REPORTS
     from app.report.write import PAGE_FILE, write_report
@@ -615,4 +706,5 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace, Launch], int]] = {
     "doctor": _doctor,
     "bench": _bench,
     "report": _report,
+    "ablate": _ablate,
 }

@@ -22,6 +22,7 @@ def evaluate_project(
     opened: TrainedProject,
     *,
     clip_indices: Sequence[int],
+    cameras: Sequence[int] | None = None,
     metrics: Choice = "all",
     precision: Precision = "float",
     on_progress: Callable[[int, int, Any], None],
@@ -30,6 +31,7 @@ def evaluate_project(
 
     Args:
         clip_indices: Rising; where one follows the other, the boundary between them is measured.
+        cameras: Indices of the cameras to compare with; all of them when None.
         metrics, precision: See engine.metrics.picture.measure_picture.
         on_progress: Gets rows done, rows in all, and the newest row.
     Returns:
@@ -47,8 +49,8 @@ def evaluate_project(
     project, capture = opened.project, opened.capture
     for clip_index in clip_indices:  # what is not trained or damaged is found before the work; one is kept at a time
         opened.load(clip_index)
-    evaluation = _evaluation(opened, metrics=metrics, precision=precision)
-    n_rows = sum(opened.clips[i].n_frames for i in clip_indices) * len(capture.rig)
+    evaluation = _evaluation(opened, cameras=cameras, metrics=metrics, precision=precision)
+    n_rows = sum(opened.clips[i].n_frames for i in clip_indices) * len(evaluation.cameras)
     rows: list[EvalRow] = []
     pairs: list[PairRow] = []
 
@@ -100,12 +102,18 @@ def boundary_maps(opened: TrainedProject, *, clip_index: int, camera_index: int)
     return _evaluation(opened).boundary_maps(before, after, camera_index)
 
 
-def _evaluation(opened: TrainedProject, *, metrics: Choice = "all", precision: Precision = "float") -> Evaluation:
+def _evaluation(
+    opened: TrainedProject,
+    *,
+    cameras: Sequence[int] | None = None,
+    metrics: Choice = "all",
+    precision: Precision = "float",
+) -> Evaluation:
     from engine.metrics.evaluate import Evaluation
 
     return Evaluation(
         opened.capture,
-        cameras=range(len(opened.capture.rig)),
+        cameras=range(len(opened.capture.rig)) if cameras is None else cameras,
         holdout=opened.capture.camera_indices(opened.project.settings.holdout),
         metrics=metrics,
         precision=precision,

@@ -19,7 +19,7 @@ from app.training.service import TrainingService
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
-from engine.model.clip_state import ClipState, read_clip_state
+from engine.model.clip_state import ClipState, read_clip_header, read_clip_state
 
 if TYPE_CHECKING:
     from engine.metrics.features_apart import Features
@@ -147,6 +147,17 @@ class TrainedProject:
         """Indices of the finished clips."""
         return [clip.clip_index for clip in self.clips if self.project.is_trained(clip.clip_index)]
 
+    def header(self, clip_index: int) -> dict[str, Any]:
+        """Header of a finished clip, see engine.model.clip_state.
+
+        Raises:
+            ProjectError: It is not trained or damaged.
+        """
+        header = read_clip_header(self.project.clip_path(clip_index))
+        if header is None:
+            raise ProjectError(f"Clip {clip_index} is not trained or damaged.", path=self.project.folder)
+        return header
+
     def load(self, clip_index: int) -> TrainedClip:
         """Load a finished clip.
 
@@ -154,7 +165,7 @@ class TrainedProject:
             ProjectError: It is not trained, damaged, or was trained on another reference.
         """
         from engine.metrics.trained_clip import TrainedClip
-        from engine.model.clip_model import load_clip_model
+        from engine.model.clip_model import load_clip_model, read_field
 
         if clip_index not in self.trained:
             raise ProjectError(
@@ -164,7 +175,12 @@ class TrainedProject:
             )
         state = read_clip_state(self.project.clip_path(clip_index))
         base = state if state.is_reference or self.reference is None else self.reference
-        return TrainedClip(self.clips[clip_index], load_clip_model(state, self.reference), base)
+        model = load_clip_model(state, self.reference)
+        if self.project.settings.config().field == "continue":  # one field for all clips: as the last one left it
+            last = read_clip_state(self.project.clip_path(self.trained[-1]))
+            if last.header["field"] and model.field is not None:
+                model.attach_field(read_field(last).requires_grad_(requires_grad=False))
+        return TrainedClip(self.clips[clip_index], model, base)
 
 
 def open_trained(project: Project) -> TrainedProject:

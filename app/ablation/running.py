@@ -1,0 +1,240 @@
+"""Trains and measures the variants of an ablation, each in a project folder of its own; goes on where it stopped.
+
+FOLDER/full-seed0/ and so on are ordinary projects, to be opened, reported or compared like any other. Variants that
+only change source clips take over the reference clip of "full" instead of training the same again.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.ablation.table import VariantResult, as_csv, seam_figures, summarize
+from app.ablation.variants import FULL, Variant, settings_of
+from app.evaluation import evaluate_project
+from app.headless import ClipOutcome, open_trained, train_clips
+from app.project import PROJECT_FILE, Project, ProjectSettings, check_settings, create_project, open_project
+from app.status import TrainingStatus
+from app.training.messages import Event
+from app.training.service import Launch, TrainingService
+from engine.capture.capture import Capture
+from engine.errors import ProjectError, TrainingError
+from engine.files import atomic_path
+
+ABLATION_SCHEMA = 1
+RESULT_FILE = "ablation.json"
+TABLE_FILE = "ablation.csv"
+MEASURED_FILE = "measured.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Callbacks:
+    """Where progress goes.
+
+    Attributes:
+        on_variant: Name, seed, how many are done, and how many there are.
+        on_status, on_event, on_outcome: Of the training, see app.headless.train_clips.
+        on_row: Rows measured, rows in all, the newest row.
+    """
+
+    on_variant: Callable[[str, int, int, int], None]
+    on_status: Callable[[TrainingStatus], None]
+    on_event: Callable[[Event], None]
+    on_outcome: Callable[[ClipOutcome], None]
+    on_row: Callable[[int, int, Any], None]
+
+
+def run_ablation(
+    folder: Path,
+    capture: Capture,
+    settings: ProjectSettings,
+    *,
+    variants: Sequence[Variant],
+    n_clips: int,
+    seeds: Sequence[int],
+    metrics: Any,
+    launch: Launch,
+    callbacks: Callbacks,
+) -> dict[str, Any]:
+    """Train what is not trained yet, measure what is not measured yet, and write the table after every variant.
+
+    Args:
+        folder: Gets one project per variant and seed, ablation.json and ablation.csv.
+        settings: Of "full"; its seed is replaced.
+        n_clips: From the first.
+        metrics: "quick" or "all", see engine.metrics.picture.measure_picture.
+    Returns:
+        JSON-able: schema, capture, holdout, clip_length, n_clips, seeds, lines (`summarize`) and results per seed.
+    Raises:
+        ProjectError, CaptureError: Bad input.
+        TrainingError: A clip failed; what was finished is kept.
+        KeyboardInterrupt: Likewise.
+    """
+    results: list[VariantResult] = []
+    document: dict[str, Any] = {}
+    todo = [(variant, seed) for seed in seeds for variant in variants]
+    for n_done, (variant, seed) in enumerate(todo):
+        callbacks.on_variant(variant.name, seed, n_done, len(todo))
+        figures = _figures_of(folder, capture, settings, variant, seed, n_clips, metrics, launch, callbacks)
+        results.append(VariantResult(variant.name, seed, figures))
+        document = {
+            "schema": ABLATION_SCHEMA,
+            "capture": str(capture.path),
+            "holdout": list(settings.holdout),
+            "clip_length": settings.clip_length,
+            "n_clips": n_clips,
+            "seeds": list(seeds),
+            "words": {item.name: item.words for item in variants},
+            "lines": summarize(results),
+            "results": [{"variant": r.variant, "seed": r.seed, **r.figures} for r in results],
+        }
+        _write(folder / RESULT_FILE, json.dumps(document, indent=1, allow_nan=False) + "\n")
+        _write(folder / TABLE_FILE, as_csv(document["lines"]))
+    return document
+
+
+def project_folder(folder: Path, name: str, seed: int) -> Path:
+    """Where a variant lies."""
+    return folder / f"{name}-seed{seed}"
+
+
+def _figures_of(
+    folder: Path,
+    capture: Capture,
+    base: ProjectSettings,
+    variant: Variant,
+    seed: int,
+    n_clips: int,
+    metrics: Any,
+    launch: Launch,
+    callbacks: Callbacks,
+) -> dict[str, float | None]:
+    n_training = len(capture.rig) - len(base.holdout)
+    overrides, clip_length, clips = settings_of(
+        variant,
+        base.overrides,
+        clip_length=base.clip_length,
+        clips=range(n_clips),
+        n_pictures_per_frame=n_training,
+    )
+    settings = ProjectSettings(
+        capture=base.capture,
+        fingerprint=base.fingerprint,
+        scale=base.scale,
+        clip_length=clip_length,
+        holdout=base.holdout,
+        seed=seed,
+        overrides=overrides,
+        reference_clip=base.reference_clip if variant.cut == "clips" else clips.start,
+    )
+    check_settings(settings, capture)
+    place = project_folder(folder, variant.name, seed)
+    project = _open(place, settings)
+    try:
+        if variant.shares_reference and variant.name != FULL:
+            _take_reference(project, project_folder(folder, FULL, seed))
+        service = TrainingService(
+            project,
+            project.clips(capture.n_frames),
+            holdout=capture.camera_indices(settings.holdout),
+            launch=launch,
+            is_window_open=False,
+        )
+        try:
+            first = settings.reference_clip
+            outcomes = train_clips(
+                service,
+                [first, *(i for i in clips if i != first)],
+                on_status=callbacks.on_status,
+                on_event=callbacks.on_event,
+                on_outcome=callbacks.on_outcome,
+            )
+        finally:
+            service.close()
+        if outcomes[-1].state == "failed":
+            raise TrainingError(f"{variant.name}, seed {seed}: {outcomes[-1].message}", hint=outcomes[-1].hint)
+    finally:
+        project.close()
+    borders = {i * base.clip_length for i in range(1, n_clips)}
+    return _measure(place, list(clips), borders, metrics, callbacks)
+
+
+def _open(place: Path, settings: ProjectSettings) -> Project:
+    if not (place / PROJECT_FILE).is_file():
+        return create_project(place, settings)
+    project = open_project(place)
+    if project.settings != settings:
+        project.close()
+        raise ProjectError(
+            "The folder holds this variant with other settings.", hint="Choose another --project folder.", path=place
+        )
+    return project
+
+
+def _take_reference(project: Project, full: Path) -> None:
+    """Copy the reference clip, and what clips share, of the finished "full"."""
+    source = open_project(full, is_writable=False)
+    if project.is_trained(project.settings.reference_clip) or not source.reference_path.is_file():
+        return
+    project.prep_dir.mkdir(parents=True, exist_ok=True)
+    for path in source.prep_dir.glob("*"):
+        with atomic_path(project.prep_dir / path.name) as partial:
+            shutil.copyfile(path, partial)
+    project.reference_path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_path(project.reference_path) as partial:
+        shutil.copyfile(source.reference_path, partial)
+
+
+def _measure(
+    place: Path, clips: list[int], borders: set[int], metrics: Any, callbacks: Callbacks
+) -> dict[str, float | None]:
+    opened = open_trained(open_project(place, is_writable=False))
+    headers = [opened.header(i) for i in clips]
+    key = {
+        "clips": [header["fingerprint"] for header in headers],
+        "borders": sorted(borders),
+        "metrics": metrics,
+        "schema": ABLATION_SCHEMA,
+    }
+    kept = _read(place / MEASURED_FILE)
+    if kept is not None and kept.get("key") == key:
+        return kept["figures"]
+    holdout = opened.capture.camera_indices(opened.project.settings.holdout)
+    document = evaluate_project(
+        opened,
+        clip_indices=clips,
+        metrics=metrics,
+        cameras=holdout or None,
+        on_progress=callbacks.on_row,
+    )
+    means = document["means"]["held_out"] or document["means"]["trained_on"]
+    figures: dict[str, float | None] = {name: value for name, value in means.items() if not isinstance(value, dict)}
+    figures |= seam_figures(document["seams"]["rows"], borders)
+    times = [header.get("metrics") or {} for header in headers]
+    seconds = [time["preparation_s"] + time["training_s"] for time in times if "training_s" in time]
+    figures["minutes"] = sum(seconds) / 60 if len(seconds) == len(headers) else None
+    figures["megabytes"] = sum(opened.project.clip_path(i).stat().st_size for i in clips) / 1e6
+    _write(place / MEASURED_FILE, json.dumps({"key": key, "figures": figures}, indent=1, allow_nan=False) + "\n")
+    return figures
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return content if isinstance(content, dict) else None
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        with atomic_path(path) as partial:
+            partial.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ProjectError(
+            f"The file could not be written ({error.strerror}).", hint="Free some space and try again.", path=path
+        ) from error
