@@ -14,7 +14,7 @@ from pathlib import Path
 from app.arguments import PlainParser
 from engine.assets import asset_path
 
-COMMANDS = ("train", "eval", "render", "inspect", "doctor")
+COMMANDS = ("train", "eval", "render", "inspect", "doctor", "bench")
 """Subcommands that app.cli serves without a window."""
 
 
