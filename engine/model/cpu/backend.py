@@ -16,17 +16,17 @@ import torch
 from numba import get_num_threads
 from torch import Tensor
 
+from engine.kernels.memory import RecycledMemory
+from engine.kernels.routines import run
+from engine.kernels.workspace import Workspace, WorkspacePool
 from engine.model.cpu import layout as lay
 from engine.model.cpu.backward import WeightSums, differentiate_blocks, write_weight_gradients
 from engine.model.cpu.forward import decode_blocks
 from engine.model.cpu.grid_kernels import Spread, spread_gradient
 from engine.model.cpu.layout import BLOCK, Job, Sizes
-from engine.model.cpu.memory import RecycledMemory
-from engine.model.cpu.routines import run
 from engine.model.cpu.rows import Copy, copy_rows
 from engine.model.decoder import HEADS, Decoder
 from engine.model.field import SpatioTemporalField
-from engine.raster.cpu.workspace import Workspace, WorkspacePool
 from engine.raster.gaussians import Gaussians
 
 if TYPE_CHECKING:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.kernels.routines import WORKER, ints, load_float, load_int, routine, store_float, take_next
 from engine.model.cpu import activation as act
 from engine.model.cpu import layout as lay
 from engine.model.cpu.grid_kernels import interpolate, interpolate_any
 from engine.model.cpu.layout import BLOCK, HEAD_WIDTHS, ROW_BYTES, read_job
 from engine.model.cpu.products import PLAIN, RELU, multiply
-from engine.model.cpu.routines import WORKER, ints, load_float, load_int, routine, store_float
 from engine.model.cpu.rows import threes_to_lanes, to_lanes, to_rows
-from engine.raster.cpu.tile import take_next
 
 _FIRST, _FIRST_BIAS, _SECOND, _SECOND_BIAS = lay.FIRST, lay.FIRST_BIAS, lay.SECOND, lay.SECOND_BIAS
 _FIELD_HIDDEN, _FIELD_OUT = lay.FIELD_HIDDEN, lay.FIELD_OUT

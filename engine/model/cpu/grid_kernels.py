@@ -12,9 +12,17 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from engine.model.cpu.routines import WORKER, load_float, load_int, load_int32, routine, store_float, tuple_reader
-from engine.raster.cpu.lanes import FLOAT, INT32, INT64, LaneBuilder, kernel_intrinsic
-from engine.raster.cpu.tile import take_next
+from engine.kernels.lanes import FLOAT, INT32, INT64, LaneBuilder, kernel_intrinsic
+from engine.kernels.routines import (
+    WORKER,
+    load_float,
+    load_int,
+    load_int32,
+    routine,
+    store_float,
+    take_next,
+    tuple_reader,
+)
 
 _FOUR = ir.VectorType(FLOAT, 4)
 _N_CORNERS = 8

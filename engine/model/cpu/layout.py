@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.model.cpu.routines import tuple_reader
-from engine.raster.cpu.lanes import N_LANES, kernel_intrinsic
+from engine.kernels.lanes import N_LANES, kernel_intrinsic
+from engine.kernels.routines import tuple_reader
 
 BLOCK = 64
 """Anchors per block."""

@@ -9,9 +9,10 @@ import pytest
 import torch
 from numba import cfunc, get_num_threads, set_num_threads, types
 
+from engine.kernels import routines
+from engine.kernels.memory import RecycledMemory
 from engine.model.anchors import AnchorSet
-from engine.model.cpu import activation, routines
-from engine.model.cpu.memory import RecycledMemory
+from engine.model.cpu import activation
 from engine.model.decoder import Decoder
 from engine.model.decoding import ChosenAnchors, decode_anchors
 from engine.model.field import FieldShape, SpatioTemporalField
