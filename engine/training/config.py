@@ -40,7 +40,10 @@ class TrainConfig:
     field_max_levels: int = 7
     """Levels are added until a cell is about 1.5 anchor spacings, at most this many."""
     field_log2_entries: int = 0
-    """log2 of the entries per level and knot; 0 derives it from the anchors alive in a frame."""
+    """log2 of the entries per level and table; 0 derives it from the anchors alive in a frame."""
+    field_tables: str = "per_frame"
+    """per_frame: a hash table for every frame of the clip, of which a step touches one. shared: one table for all
+    frames, with time as fourth coordinate of the hash, as published."""
 
     # sizes of the clouds
     max_static_points: int = 22_000
@@ -94,6 +97,8 @@ class TrainConfig:
                 raise ProjectError(f"{name} is {value}; it has to lie between {low} and {high}.")
         if self.gate not in ("hull", "off"):
             raise ProjectError(f"gate is '{self.gate}'; it has to be 'hull' or 'off'.")
+        if self.field_tables not in ("per_frame", "shared"):
+            raise ProjectError(f"field_tables is '{self.field_tables}'; it has to be 'per_frame' or 'shared'.")
 
     def difference(self) -> dict[str, Any]:
         """Only the values that differ from the defaults."""

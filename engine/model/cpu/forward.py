@@ -30,14 +30,16 @@ def encode_block(arguments, first, n_lanes, encoded):
         for knot in range(2):
             table = job.table if knot == 0 else job.next_table
             scale = load_float(job.knot_weights + 4 * knot)
+            keys = job.knot_keys + 4 * job.n_levels * knot
             if table != 0 and job.n_channels == 4:
                 interpolate(
-                    corner, job.corner_indices, job.corner_weights, table, job.n_levels, job.n_entries, scale, knot, out
-                )
+                    corner, job.corner_indices, job.corner_weights, keys, table, job.n_levels, job.n_entries, scale,
+                    knot, out,
+                )  # fmt: skip
             elif table != 0:
                 interpolate_any(
-                    corner, job.corner_indices, job.corner_weights, table, job.n_levels, job.n_entries, job.n_channels,
-                    scale, knot, out,
+                    corner, job.corner_indices, job.corner_weights, keys, table, job.n_levels, job.n_entries,
+                    job.n_channels, scale, knot, out,
                 )  # fmt: skip
         for column in range(job.n_encoded, width):
             store_float(out + 4 * column, np.float32(0))
