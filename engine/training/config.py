@@ -43,9 +43,9 @@ class TrainConfig:
     """log2 of the entries per level and table; 0 derives it from the anchors alive in a frame."""
     field_tables: str = "shared"
     """shared: one table for all frames, with time as fourth coordinate of the hash, as published. per_frame: a table
-    for every frame, of which a step touches one. Moving pixels of validation cameras, shared against per_frame, 1000 steps:
-    half-size sample, two seeds, reference clip 22.1 against 21.8 dB, source clip 19.7 against 19.1; basketball, one
-    seed, 25.5 against 25.2 and 23.5 against 22.7."""
+    for every frame, of which a step touches one. Moving pixels of validation cameras after 1000 steps, shared against
+    per_frame: half-size sample, two seeds, reference clip 22.1 against 21.8 dB, source clip 19.7 against 19.1;
+    basketball, one seed, 25.5 against 25.2 and 23.5 against 22.7."""
 
     # sizes of the clouds
     max_static_points: int = 22_000
