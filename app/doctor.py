@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from app.kernels import use_threads
 from app.project import data_dir
 from app.training.worker import n_cores, n_training_threads
-from engine.kernel_cache import UNWRITABLE, cache_root, cache_state
+from engine.kernels.cache import UNWRITABLE, cache_root, cache_state
 
 PACKAGES = ("torch", "numpy", "numba", "scipy", "av", "open3d-cpu", "open3d", "pycolmap", "pyglet", "moderngl")
 PACKAGES += ("imgui-bundle", "safetensors")
@@ -100,7 +100,7 @@ def _kernels() -> Finding:
 
 
 def _vectors() -> Finding:
-    from engine.raster.cpu.lanes import N_LANES
+    from engine.kernels.lanes import N_LANES
 
     name, width, cpu = host_vectors()
     n_registers = -(-N_LANES // width)
@@ -135,7 +135,7 @@ def _threads() -> Finding:
     n_threads = use_threads(None)
     from numba.np.ufunc.parallel import threading_layer
 
-    from engine.raster.cpu.threads import parallel_guard
+    from engine.kernels.threads import parallel_guard
 
     with parallel_guard():  # starts the threads, so that the layer is known
         layer = threading_layer()

@@ -1,6 +1,6 @@
 """The compiled kernels, as the program uses them: compiling them where no window waits, and threads to run them on.
 
-Compiling holds the interpreter lock for seconds, so it happens in processes of its own (`engine.kernel_warm`).
+Compiling holds the interpreter lock for seconds, so it happens in processes of its own (`engine.kernels.warm`).
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import logging
 import os
 
 from engine.conventions import SPIN_COUNT
-from engine.kernel_cache import is_cache_warm
-from engine.kernel_warm import compile_all, warm_up_all
+from engine.kernels.cache import is_cache_warm
+from engine.kernels.warm import compile_all, warm_up_all
 from engine.training.report import Progress, ReportProgress
 
 logger = logging.getLogger(__name__)
@@ -49,7 +49,7 @@ def use_threads(n_threads: int | None) -> int:
     the spin count is set here and not only in configure_threads, whose module imports torch.
     """
     os.environ.setdefault("GOMP_SPINCOUNT", str(SPIN_COUNT))
-    from engine.raster.cpu.threads import configure_threads
+    from engine.kernels.threads import configure_threads
 
     return configure_threads(n_threads)
 

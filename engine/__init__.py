@@ -1,5 +1,5 @@
-"""Numbers and files of ClipGStream Studio; see ARCHITECTURE.md. Kernels are kept where `engine.kernel_cache` says."""
+"""Numbers and files of ClipGStream Studio; see ARCHITECTURE.md. Kernels are kept where `engine.kernels.cache` says."""
 
-from engine.kernel_cache import use_kernel_cache
+from engine.kernels.cache import use_kernel_cache
 
 use_kernel_cache()  # numba asks for the folder when the decorator of a kernel runs

@@ -138,7 +138,7 @@ def measure_decode(
 
 def prepare_memory(scene: DecodeScene) -> Callable[[], object]:
     """For `peak_extra_mb`: kernels loaded, model made; the call is one forward and backward pass."""
-    from engine.raster.cpu import configure_threads
+    from engine.kernels.threads import configure_threads
 
     configure_threads()
     DecodeRun(replace(scene, recipe=replace(scene.recipe, n_anchors=64)), torch.float32, "cpu")()

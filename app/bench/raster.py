@@ -125,7 +125,8 @@ def limit_shares(row: KernelRow, fma_per_s: float) -> tuple[float, float] | None
 
 def prepare_memory(recipe: Recipe) -> Callable[[], object]:
     """For `peak_extra_mb`: kernels loaded, tensors made; the call is one forward and backward pass."""
-    from engine.raster.cpu import configure_threads, warm_up
+    from engine.kernels.threads import configure_threads
+    from engine.raster.cpu.warm import warm_up
 
     configure_threads()
     warm_up()

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from engine.model.grid import CornerTable, corner_table, encode
+from engine.model.grid import CornerTable, corner_table, encode, time_keys
 
 _TABLE_INIT = 1e-3  # uniform half-width of the start; small enough that the field starts at zero look
 
@@ -25,7 +25,7 @@ class FieldShape:
     """Sizes of a field, saved beside it.
 
     Attributes:
-        n_knots: Frames of the clip, one table set each.
+        n_knots: Frames of the clip.
         cells: Cells along the longest side per level.
         n_entries: Table entries per level, a power of two.
         channels: Values per entry.
@@ -33,6 +33,7 @@ class FieldShape:
         feature_dim: Width of the dynamic feature.
         bounds_min: Lower corner of the cube, scene units. [3]
         side: Length of the cube's side, scene units.
+        is_shared: Whether all knots share one table, as in the published 4D hash, instead of one each.
     """
 
     n_knots: int
@@ -43,6 +44,7 @@ class FieldShape:
     feature_dim: int
     bounds_min: tuple[float, float, float]
     side: float
+    is_shared: bool = False
 
     def as_dict(self) -> dict:
         """JSON-able copy."""
@@ -68,13 +70,23 @@ def derive_cells(*, side: float, spacing: float, base: int, growth: float, max_l
     return tuple(cells)
 
 
-def derive_log2_entries(n_alive: int) -> int:
-    """log2 of the table entries per level and knot for this many anchors alive in one frame."""
+def derive_log2_entries(n_alive: int, *, n_shared_knots: int = 1) -> int:
+    """log2 of the table entries per level for this many anchors alive in one frame, in a table of so many knots.
+
+    A knot's own table has two entries per anchor; in a shared one half an anchor's entry per knot is enough, because
+    most of what moves stays near where it was.
+    """
+    if n_shared_knots > 1:
+        return min(max(math.ceil(math.log2(max(0.5 * n_alive * n_shared_knots, 1))), 12), 17)
     return min(max(math.ceil(math.log2(max(2 * n_alive, 1))), 10), 15)
 
 
 class SpatioTemporalField(nn.Module):
-    """(anchor rows, clip time) to f_d. Owns its tables and network; corner constants belong to the caller."""
+    """(anchor rows, clip time) to f_d. Owns its tables and network; corner constants belong to the caller.
+
+    Attributes:
+        keys: Per knot and level what entries are combined with; zeros where every knot has a table. [n_knots, L] int32
+    """
 
     def __init__(self, shape: FieldShape, generator: torch.Generator | None = None) -> None:
         super().__init__()
@@ -82,8 +94,11 @@ class SpatioTemporalField(nn.Module):
         size = (len(shape.cells), shape.n_entries, shape.channels)
         # One parameter per knot: knots without gradient are left alone by the optimiser, which makes it lazy for free.
         self.tables = nn.ParameterList(
-            nn.Parameter((torch.rand(size, generator=generator) * 2 - 1) * _TABLE_INIT) for _ in range(shape.n_knots)
+            nn.Parameter((torch.rand(size, generator=generator) * 2 - 1) * _TABLE_INIT)
+            for _ in range(1 if shape.is_shared else shape.n_knots)
         )
+        keys = np.zeros((shape.n_knots, len(shape.cells)), np.int32)
+        self.keys = time_keys(shape.cells, shape.n_entries, shape.n_knots) if shape.is_shared else keys
         n_in = len(shape.cells) * shape.channels
         self.hidden = nn.Linear(n_in, shape.hidden, bias=False)
         self.out = nn.Linear(shape.hidden, shape.feature_dim, bias=False)
@@ -91,6 +106,10 @@ class SpatioTemporalField(nn.Module):
             bound = 1.0 / math.sqrt(layer.in_features)
             with torch.no_grad():
                 layer.weight.copy_((torch.rand(layer.weight.shape, generator=generator) * 2 - 1) * bound)
+
+    def table(self, knot: int) -> nn.Parameter:
+        """The table of a knot, whose entries are combined with `keys[knot]`. [L, T, C]"""
+        return self.tables[0 if self.shape.is_shared else knot]
 
     def corners(self, positions: Tensor) -> CornerTable:
         """Interpolation constants of fixed positions, scene units. [A, 3]"""
@@ -115,5 +134,5 @@ class SpatioTemporalField(nn.Module):
             corners: From `corners`.
             knots: From `knots`.
         """
-        encoded = sum(weight * encode(self.tables[knot], rows, corners) for knot, weight in knots)
+        encoded = sum(weight * encode(self.table(knot), rows, corners, self.keys[knot]) for knot, weight in knots)
         return self.out(torch.relu(self.hidden(encoded)))

@@ -1,8 +1,10 @@
 """Spatial hash grid of the field: corner indices, weights and the interpolation.
 
 Anchors do not move, so the eight corners of every level and their weights are constants of an anchor; they are
-computed once (`corner_table`) and reused at every step. Time is not a grid axis: each frame of the clip is a knot with
-tables of its own, so a picture touches the eight spatial corners of one knot only.
+computed once (`corner_table`) and reused at every step. Time is the fourth axis, with its knots exactly on the frames
+of the clip, so a picture of a frame touches the eight spatial corners of one knot only. Either each knot has tables of
+its own, or all knots share one table, as in the published 4D hash: the hash is the XOR of the coordinates' products, so
+the entry at a knot is that of space XOR a key of that knot and level (`time_keys`), and the corners stay constants.
 
 Letters: n rows, L levels, T entries per level, C channels. `encode` is plain torch; the fused decode has it as a kernel
 (engine.model.cpu.grid_kernels).
@@ -16,11 +18,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-_PRIMES = (
-    1,
-    2654435761,
-    805459861,
-)  # the usual spatial hash primes (Teschner et al. 2003; Mueller et al. 2022)
+_PRIMES = (1, 2654435761, 805459861, 3674653429)
+"""The usual hash primes, of x, y, z and time (Teschner et al. 2003; Mueller et al. 2022)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,17 +72,39 @@ def corner_table(unit_positions: np.ndarray, cells: tuple[int, ...], n_entries: 
     return CornerTable(indices, weights, n_entries)
 
 
-def encode(table: Tensor, rows: Tensor, corners: CornerTable) -> Tensor:
-    """Interpolate one knot's table at the chosen anchors, by torch indexing: the slow truth, any dtype.
+def time_keys(cells: tuple[int, ...], n_entries: int, n_knots: int) -> np.ndarray:
+    """What the entries of each knot and level are combined with by XOR, where all knots share a table.
+
+    Knots of a level that fits the table n_knots times lie side by side; otherwise they are spread by the hash.
+
+    Args:
+        cells: Cells per axis of each level. L entries
+        n_entries: Table entries per level, a power of two.
+    Returns:
+        Keys below n_entries. [n_knots, L] int32
+    """
+    keys = np.empty((n_knots, len(cells)), np.int32)
+    knots = np.arange(n_knots, dtype=np.uint64)
+    for level, n_cells in enumerate(cells):
+        block = 1 << ((n_cells + 1) ** 3 - 1).bit_length()  # entries of one knot, rounded up to a power of two
+        step = block if block * n_knots <= n_entries else _PRIMES[3]
+        keys[:, level] = (knots * np.uint64(step) & np.uint64(n_entries - 1)).astype(np.int32)
+    return keys
+
+
+def encode(table: Tensor, rows: Tensor, corners: CornerTable, keys: np.ndarray | None = None) -> Tensor:
+    """Interpolate one knot at the chosen anchors, by torch indexing: the slow truth, any dtype.
 
     Args:
         table: [L, T, C]
         rows: Rows of the corner table. [n] int64
         corners: Constants of all anchors.
+        keys: Of this knot, from `time_keys`; None for a table of its own. [L] int32
     Returns:
         [n, L * C], levels first. Differentiable in `table`.
     """
-    indices = torch.from_numpy(corners.indices[rows.numpy()].astype(np.int64))  # [n, L, 8]
+    entries = corners.indices[rows.numpy()].astype(np.int64)  # [n, L, 8]
+    indices = torch.from_numpy(entries if keys is None else entries ^ keys[:, None])
     weights = torch.from_numpy(corners.weights[rows.numpy()]).to(table.dtype)
     levels = torch.arange(table.shape[0])[None, :, None]
     values = table[levels, indices]  # [n, L, 8, C]

@@ -19,7 +19,7 @@ from numba import njit, prange, types
 from numba.np.numpy_support import carray
 from torch import Tensor
 
-from engine.raster.cpu.lanes import kernel_intrinsic
+from engine.kernels.lanes import kernel_intrinsic
 
 BETA1, BETA2 = 0.9, 0.999
 EPSILON = 1e-15

@@ -157,7 +157,9 @@ def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generato
     lower, upper = positions.quantile(0.005, dim=0), positions.quantile(0.995, dim=0)
     side = max(float((upper - lower).max()), 4 * spacing) + 2 * spacing
     n_levels = config.field_levels or config.field_max_levels
-    log2_entries = config.field_log2_entries or derive_log2_entries(n_alive)
+    is_shared = config.field_tables == "shared"
+    n_shared = model.n_frames if is_shared else 1
+    log2_entries = config.field_log2_entries or derive_log2_entries(n_alive, n_shared_knots=n_shared)
     cells = derive_cells(
         side=side,
         spacing=0.0 if config.field_levels else spacing,  # a fixed number of levels does not look at the anchors
@@ -175,11 +177,12 @@ def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generato
         feature_dim=config.dynamic_feature_dim,
         bounds_min=(x, y, z),
         side=side,
+        is_shared=is_shared,
     )
     model.attach_field(SpatioTemporalField(shape, generator))
     return (
         f"{len(cells)} levels up to {cells[-1]} cells (anchors {spacing:.3g} apart), "
-        f"2^{log2_entries} entries ({n_alive} anchors alive)"
+        f"2^{log2_entries} entries {'in all' if is_shared else 'per frame'} ({n_alive} anchors alive)"
     )
 
 

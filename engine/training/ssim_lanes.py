@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from engine.raster.cpu.lanes import VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
+from engine.kernels.lanes import VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 
 RADIUS = 5
 _samples = np.exp(-((np.arange(2 * RADIUS + 1) - RADIUS) ** 2) / (2 * 1.5**2))

@@ -8,7 +8,7 @@ import pytest
 
 from app import doctor, kernels
 from app.doctor import vector_width
-from engine.kernel_cache import UNWRITABLE, CacheState
+from engine.kernels.cache import UNWRITABLE, CacheState
 from engine.training.report import Progress
 
 FOLDER = Path("somewhere") / "kernels-0"

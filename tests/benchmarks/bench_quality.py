@@ -24,13 +24,13 @@ from PIL import Image
 
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips
+from engine.kernels.threads import configure_threads
 from engine.metrics.evaluate import evaluate_clip
 from engine.metrics.psnr import psnr
 from engine.metrics.summary import means
 from engine.model.clip_model import load_clip_model
 from engine.model.clip_state import ClipState
 from engine.model.view import REACH_SPACINGS, View, render_model
-from engine.raster.cpu.threads import configure_threads
 from engine.synthetic.raycast import make_truth
 from engine.synthetic.scene import make_scene
 from engine.training.clip_training import ClipTraining

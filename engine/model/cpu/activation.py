@@ -15,8 +15,8 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
+from engine.kernels.lanes import FLOATS, INTS, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 from engine.model.cpu.layout import BLOCK_VECTORS
-from engine.raster.cpu.lanes import FLOATS, INTS, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 
 _LN2_HIGH = 0.693359375  # ln 2 in two parts: the first has few bits, so k * high is exact
 _LN2_LOW = math.log(2) - _LN2_HIGH

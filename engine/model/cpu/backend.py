@@ -16,17 +16,17 @@ import torch
 from numba import get_num_threads
 from torch import Tensor
 
+from engine.kernels.memory import RecycledMemory
+from engine.kernels.routines import run
+from engine.kernels.workspace import Workspace, WorkspacePool
 from engine.model.cpu import layout as lay
 from engine.model.cpu.backward import WeightSums, differentiate_blocks, write_weight_gradients
 from engine.model.cpu.forward import decode_blocks
 from engine.model.cpu.grid_kernels import Spread, spread_gradient
 from engine.model.cpu.layout import BLOCK, Job, Sizes
-from engine.model.cpu.memory import RecycledMemory
-from engine.model.cpu.routines import run
 from engine.model.cpu.rows import Copy, copy_rows
 from engine.model.decoder import HEADS, Decoder
 from engine.model.field import SpatioTemporalField
-from engine.raster.cpu.workspace import Workspace, WorkspacePool
 from engine.raster.gaussians import Gaussians
 
 if TYPE_CHECKING:
@@ -66,6 +66,7 @@ class _Plan:
         n_anchors: Of all sets.
         sizes: Widths.
         knot_weights: One or two.
+        knot_keys: Of these knots, see engine.model.grid.time_keys. [2, L] int32
     """
 
     chosen: list[ChosenAnchors]
@@ -73,6 +74,7 @@ class _Plan:
     n_anchors: int
     sizes: Sizes
     knot_weights: list[float]
+    knot_keys: np.ndarray
 
     @property
     def n_own(self) -> int:
@@ -117,7 +119,7 @@ def decode_cpu(
     for kind in (decoder.first, decoder.first_bias, decoder.second, decoder.second_bias):
         tensors += [kind[head] for head in HEADS]
     if field is not None:
-        tensors += [field.hidden.weight, field.out.weight, *(field.tables[knot] for knot, _ in knots)]
+        tensors += [field.hidden.weight, field.out.weight, *(field.table(knot) for knot, _ in knots)]
     needs = [tensor.requires_grad for tensor in tensors]
     if torch.is_grad_enabled() and any(any(plan.wanted(index, needs)) for index in range(len(plan.chosen))):
         columns = _Decode.apply(plan, *tensors)
@@ -144,7 +146,10 @@ def _plan(
         n_encoded=0 if field is None else len(field.shape.cells) * field.shape.channels,
         n_field_hidden=0 if field is None else field.shape.hidden,
     )
-    return _Plan(filled, starts[:-1], starts[-1], sizes, [weight for _, weight in knots])
+    keys = np.zeros((2, 0 if field is None else len(field.shape.cells)), np.int32)
+    if field is not None:
+        keys[: len(knots)] = field.keys[[knot for knot, _ in knots]]
+    return _Plan(filled, starts[:-1], starts[-1], sizes, [weight for _, weight in knots], keys)
 
 
 def _frozen_rows(plan: _Plan) -> Tensor | None:
@@ -280,6 +285,7 @@ class _Kernels:
             "table": tables[0] if tables else 0,
             "next_table": tables[1] if len(tables) > 1 else 0,
             "knot_weights": self._knot_weights.ctypes.data,
+            "knot_keys": plan.knot_keys.ctypes.data,
             "n_levels": 0 if table is None else table.shape[0],
             "n_entries": 0 if table is None else table.shape[1],
             "n_channels": 0 if table is None else table.shape[2],
@@ -340,6 +346,7 @@ class _Kernels:
             n_rows=job.n_rows,
             corner_indices=job.corner_indices,
             corner_weights=job.corner_weights,
+            keys=self.plan.knot_keys[knot].ctypes.data,
             d_encoded=job.d_encoded,
             row_bytes=4 * lay.padded(job.n_encoded),
             scale=self._knot_weights[knot:].ctypes.data,

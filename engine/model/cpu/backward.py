@@ -6,15 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from engine.kernels.lanes import kernel_intrinsic
+from engine.kernels.routines import WORKER, ints, load_float, load_int, routine, store_float, take_next, tuple_reader
 from engine.model.cpu import activation as act
 from engine.model.cpu import layout as lay
 from engine.model.cpu.forward import first_layer, load_inputs, second_layer
 from engine.model.cpu.layout import BLOCK, HEAD_WIDTHS, ROW_BYTES, read_job
 from engine.model.cpu.products import ADD, PLAIN, WHERE_POSITIVE, multiply
-from engine.model.cpu.routines import WORKER, ints, load_float, load_int, routine, store_float, tuple_reader
 from engine.model.cpu.rows import threes_to_lanes, to_lanes, to_rows, transpose_block
-from engine.raster.cpu.lanes import kernel_intrinsic
-from engine.raster.cpu.tile import take_next
 
 _FIRST, _FIRST_BIAS, _SECOND, _SECOND_BIAS = lay.FIRST, lay.FIRST_BIAS, lay.SECOND, lay.SECOND_BIAS
 _FIELD_HIDDEN, _FIELD_OUT, _N_WEIGHTS = lay.FIELD_HIDDEN, lay.FIELD_OUT, lay.N_WEIGHTS

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.kernels.routines import WORKER, ints, load_float, load_int, routine, store_float, take_next
 from engine.model.cpu import activation as act
 from engine.model.cpu import layout as lay
 from engine.model.cpu.grid_kernels import interpolate, interpolate_any
 from engine.model.cpu.layout import BLOCK, HEAD_WIDTHS, ROW_BYTES, read_job
 from engine.model.cpu.products import PLAIN, RELU, multiply
-from engine.model.cpu.routines import WORKER, ints, load_float, load_int, routine, store_float
 from engine.model.cpu.rows import threes_to_lanes, to_lanes, to_rows
-from engine.raster.cpu.tile import take_next
 
 _FIRST, _FIRST_BIAS, _SECOND, _SECOND_BIAS = lay.FIRST, lay.FIRST_BIAS, lay.SECOND, lay.SECOND_BIAS
 _FIELD_HIDDEN, _FIELD_OUT = lay.FIELD_HIDDEN, lay.FIELD_OUT
@@ -31,14 +30,16 @@ def encode_block(arguments, first, n_lanes, encoded):
         for knot in range(2):
             table = job.table if knot == 0 else job.next_table
             scale = load_float(job.knot_weights + 4 * knot)
+            keys = job.knot_keys + 4 * job.n_levels * knot
             if table != 0 and job.n_channels == 4:
                 interpolate(
-                    corner, job.corner_indices, job.corner_weights, table, job.n_levels, job.n_entries, scale, knot, out
-                )
+                    corner, job.corner_indices, job.corner_weights, keys, table, job.n_levels, job.n_entries, scale,
+                    knot, out,
+                )  # fmt: skip
             elif table != 0:
                 interpolate_any(
-                    corner, job.corner_indices, job.corner_weights, table, job.n_levels, job.n_entries, job.n_channels,
-                    scale, knot, out,
+                    corner, job.corner_indices, job.corner_weights, keys, table, job.n_levels, job.n_entries,
+                    job.n_channels, scale, knot, out,
                 )  # fmt: skip
         for column in range(job.n_encoded, width):
             store_float(out + 4 * column, np.float32(0))

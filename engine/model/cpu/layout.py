@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.model.cpu.routines import tuple_reader
-from engine.raster.cpu.lanes import N_LANES, kernel_intrinsic
+from engine.kernels.lanes import N_LANES, kernel_intrinsic
+from engine.kernels.routines import tuple_reader
 
 BLOCK = 64
 """Anchors per block."""
@@ -118,6 +118,7 @@ class Job(NamedTuple):
         corner_indices, corner_weights: Of all its anchors, or 0 for a set without dynamic feature. [A, L, 8]
         table, next_table: Of the one or two knots; 0 for none. [L, T, C] float32
         knot_weights: [2] float32
+        knot_keys: What entries of each knot and level are combined with. [2, L] int32
         n_levels, n_entries, n_channels: L, T, C.
         encoded: Grid values, one row of padded width per chosen anchor. [blocks * 64, ..] float32, or one block per
             worker if not `keeps_encoded`.
@@ -168,6 +169,7 @@ class Job(NamedTuple):
     table: int
     next_table: int
     knot_weights: int
+    knot_keys: int
     n_levels: int
     n_entries: int
     n_channels: int

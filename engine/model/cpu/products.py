@@ -17,8 +17,8 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from engine.model.cpu.routines import ints, routine
-from engine.raster.cpu.lanes import FLOATS, INT64, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
+from engine.kernels.lanes import FLOATS, INT64, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
+from engine.kernels.routines import ints, routine
 
 PLAIN, RELU, WHERE_POSITIVE, ADD = range(4)
 """What happens to a finished product: nothing; max with 0; 0 wherever the mask is not above 0; added to `out`."""

@@ -9,9 +9,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
-from engine.model.cpu.layout import BLOCK, ROW_BYTES
-from engine.model.cpu.routines import WORKER, ints, load_int, routine, tuple_reader
-from engine.raster.cpu.lanes import (
+from engine.kernels.lanes import (
     FLOATS,
     INT32,
     INT64,
@@ -21,7 +19,8 @@ from engine.raster.cpu.lanes import (
     Lanes,
     kernel_intrinsic,
 )
-from engine.raster.cpu.tile import take_next
+from engine.kernels.routines import WORKER, ints, load_int, routine, take_next, tuple_reader
+from engine.model.cpu.layout import BLOCK, ROW_BYTES
 
 _BOOLS = ir.VectorType(ir.IntType(1), N_LANES)
 _POINTER = FLOATS.as_pointer()

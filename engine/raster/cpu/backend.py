@@ -19,12 +19,12 @@ import torch
 from numba import get_num_threads
 from torch import Tensor
 
+from engine.kernels.threads import parallel_guard
+from engine.kernels.workspace import Workspace, WorkspacePool
 from engine.raster.cpu import binning, blend, blend_backward, project, project_backward, sort
 from engine.raster.cpu.camera_row import camera_row
 from engine.raster.cpu.record import BLUE, GREEN, PAIR_FLOATS, RECORD_FLOATS, RED, TILE
-from engine.raster.cpu.threads import parallel_guard
 from engine.raster.cpu.tile import SCRATCH_FLOATS
-from engine.raster.cpu.workspace import Workspace, WorkspacePool
 from engine.raster.gaussians import Gaussians
 from engine.raster.rendering import Rendering
 from engine.raster.view import PinholeView

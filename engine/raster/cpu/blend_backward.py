@@ -18,11 +18,12 @@ from numba import njit, prange, types
 from numba.core import cgutils
 
 from engine.conventions import ALPHA_MAX
+from engine.kernels.lanes import LaneBuilder, Lanes, kernel_intrinsic
+from engine.kernels.routines import take_next
 from engine.raster.cpu import record as rec
 from engine.raster.cpu import tile as tl
-from engine.raster.cpu.lanes import LaneBuilder, Lanes, kernel_intrinsic
 from engine.raster.cpu.record import f4
-from engine.raster.cpu.tile import prefetch, take_next, write_block_centers
+from engine.raster.cpu.tile import prefetch, write_block_centers
 
 _TILE, _BLOCK, _BLOCKS, _BLOCKS_PER_ROW = rec.TILE, rec.BLOCK, rec.BLOCKS, rec.BLOCKS_PER_ROW
 _RECORD_BYTES, _PAIR_BYTES, _PAIR_FLOATS = rec.RECORD_BYTES, 4 * rec.PAIR_FLOATS, rec.PAIR_FLOATS

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from engine.raster.cpu.lanes import LaneBuilder, Lanes
+from engine.kernels.lanes import LaneBuilder, Lanes
 from engine.raster.view import PinholeView
 
 _NAMES = (

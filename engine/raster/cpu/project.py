@@ -9,9 +9,9 @@ from llvmlite import ir
 from numba import njit, prange, types
 
 from engine.conventions import ALPHA_MIN
+from engine.kernels.lanes import INTS, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 from engine.raster.cpu import record as rec
 from engine.raster.cpu.camera_row import CameraLanes
-from engine.raster.cpu.lanes import INTS, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 from engine.raster.cpu.projection_math import Projection, cholesky, covariance, project_lanes
 from engine.raster.limits import EXTENT_MAX_PX, QUAT_NORM_SQUARED_MAX, QUAT_NORM_SQUARED_MIN, VALUE_MAX
 

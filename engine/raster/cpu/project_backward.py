@@ -11,9 +11,9 @@ import numpy as np
 from numba import njit, prange, types
 from numba.core import cgutils
 
+from engine.kernels.lanes import N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 from engine.raster.cpu import record as rec
 from engine.raster.cpu.camera_row import CameraLanes
-from engine.raster.cpu.lanes import N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 from engine.raster.cpu.project import gather_rows
 from engine.raster.cpu.projection_math import Projection, Row, cholesky, covariance, dot, project_lanes
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from engine.conventions import EPS2D_PX2
+from engine.kernels.lanes import Lanes
 from engine.raster.cpu.camera_row import CameraLanes
-from engine.raster.cpu.lanes import Lanes
 
 Row = tuple[Lanes, ...]
 """Three values, a row of a matrix or a vector."""

@@ -12,8 +12,8 @@ from llvmlite import ir
 from numba import types
 
 from engine.conventions import TRANSMITTANCE_MIN
+from engine.kernels.lanes import INT64, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 from engine.raster.cpu import record as rec
-from engine.raster.cpu.lanes import INT64, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 
 _PLANE = rec.BLOCKS * VECTOR_BYTES
 TRANSMITTANCE, PLANE_R, PLANE_G, PLANE_B, REMAINDER = (plane * _PLANE for plane in range(5))
@@ -138,18 +138,6 @@ def exp2_eighth(log_alphas: Lanes) -> Lanes:
     for _ in range(3):
         value = value * value
     return value
-
-
-@kernel_intrinsic
-def take_next(typing_context, counter_address):
-    """Atomically add one to the int64 at an address and return its old value: tiles for whichever thread is free."""
-    signature = types.int64(types.int64)
-
-    def generate(context, builder, signature, arguments):
-        pointer = builder.inttoptr(arguments[0], INT64.as_pointer())
-        return builder.atomic_rmw("add", pointer, ir.Constant(INT64, 1), "monotonic")
-
-    return signature, generate
 
 
 @kernel_intrinsic

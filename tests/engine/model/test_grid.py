@@ -5,7 +5,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.model.grid import corner_table, encode
+from engine.model.grid import corner_table, encode, time_keys
 
 
 @settings(max_examples=30, deadline=None)
@@ -26,3 +26,24 @@ def test_dense_levels_interpolate_a_linear_function_exactly():
     positions = np.random.default_rng(0).uniform(0, 1, (50, 3))
     out = encode(torch.from_numpy(table), torch.arange(50), corner_table(positions, (n_cells,), 256))
     assert np.abs(out[:, 0].numpy() - positions @ [1.0, 2.0, 3.0]).max() < 1e-5
+
+
+def test_knots_of_a_small_level_do_not_share_entries_and_others_are_spread_over_the_table():
+    n_entries, n_knots, cells = 1 << 12, 10, (4, 40)
+    keys = time_keys(cells, n_entries, n_knots)
+    assert keys.shape == (n_knots, 2)
+    assert keys.min() >= 0
+    assert keys.max() < n_entries
+    corners = corner_table(np.random.default_rng(0).uniform(0, 1, (500, 3)), cells, n_entries)
+    small = [set((corners.indices[:, 0] ^ key).ravel().tolist()) for key in keys[:, 0]]
+    assert len(set.union(*small)) == sum(len(entries) for entries in small)  # 10 x 125 knots of space fit into 4096
+    assert len(set(keys[:, 1].tolist())) == n_knots
+
+
+def test_a_shared_table_at_knot_zero_is_that_of_space():
+    table = torch.randn(2, 256, 3)
+    corners = corner_table(np.random.default_rng(1).uniform(0, 1, (20, 3)), (3, 30), 256)
+    keys = time_keys((3, 30), 256, 5)
+    at_zero, later = (encode(table, torch.arange(20), corners, keys[knot]) for knot in (0, 3))
+    assert torch.equal(at_zero, encode(table, torch.arange(20), corners))
+    assert not torch.equal(later, at_zero)

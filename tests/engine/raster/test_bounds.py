@@ -1,4 +1,4 @@
-"""No kernel reads or writes outside its arrays: every array ends, or begins, at a page that may not be touched.
+"""No kernel reads or writes outside its arrays: every array ends at a page that may not be touched.
 
 The intrinsics compute raw addresses, which numba's bounds checking does not see. A spawned child therefore places
 every input, output and workspace buffer directly in front of an inaccessible page and renders; a stray access ends it
@@ -23,8 +23,10 @@ def _render_beside_forbidden_pages() -> None:
     import numpy as np
     import torch
 
+    from engine.kernels import workspace
     from engine.raster import Gaussians, rasterize
-    from engine.raster.cpu import backend, warm_up, workspace
+    from engine.raster.cpu import backend
+    from engine.raster.cpu.warm import warm_up
     from tests.raster_scenes import layered_scene
 
     warm_up()

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from engine import kernel_cache, kernel_warm
-from engine.kernel_cache import (
+from engine.kernels import cache, warm
+from engine.kernels.cache import (
     MARKER,
     MAX_FOLDERS,
     UNWRITABLE,
@@ -27,7 +27,7 @@ from engine.kernel_cache import (
     write_marker,
 )
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 @pytest.fixture(autouse=True)
@@ -47,7 +47,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def package(tmp_path: Path) -> Path:
-    """A small engine: a kernel, a helper it imports, a package that re-exports one more, and a stranger."""
+    """A small engine: a kernel, a helper it imports, a package that re-exports one more, routines, and a stranger."""
     folder = tmp_path / "engine"
     sources = {
         "__init__.py": "",
@@ -57,6 +57,11 @@ def package(tmp_path: Path) -> Path:
         "b/__init__.py": "from engine.b.inner import (\n    g,\n)\n",
         "b/inner.py": "g = 1\n",
         "constants.py": "X = 1\n",
+        "a/warm.py": "from engine.stranger import k\n",
+        "c/cpu/backend.py": "from engine.c.cpu.routines import r\n",
+        "c/cpu/routines.py": "from engine.c.layout import N\n@routine(N)\ndef r(): 0\n",
+        "c/layout.py": "N = 1\n",
+        "kernels/memory.py": "",
         "stranger.py": "from engine.a.kernel import k\n",
     }
     for name, text in sources.items():
@@ -81,11 +86,15 @@ def marked_folder(root: Path, name: str, key: CacheKey, *, age_s: float) -> Path
 
 
 def test_sources_are_the_kernels_and_what_they_import(package):
-    expected = ["a/helper.py", "a/kernel.py", "b/__init__.py", "b/inner.py", "constants.py"]
-    assert list(kernel_sources(package)) == expected
+    expected = {"a/helper.py", "a/kernel.py", "a/warm.py", "b/__init__.py", "b/inner.py", "constants.py"}
+    expected |= {"c/cpu/backend.py", "c/cpu/routines.py", "c/layout.py", "kernels/memory.py"}
+    assert list(kernel_sources(package)) == sorted(expected)
 
 
-@pytest.mark.parametrize("name", ["a/kernel.py", "a/helper.py", "b/inner.py", "constants.py"])
+@pytest.mark.parametrize(
+    "name",
+    ["a/kernel.py", "a/helper.py", "a/warm.py", "b/inner.py", "constants.py", "c/cpu/routines.py", "c/layout.py"],
+)
 def test_a_changed_source_changes_the_key(package, name):
     before = sources_hash(package)
     with (package / name).open("a") as file:
@@ -99,17 +108,40 @@ def test_what_no_kernel_imports_does_not_change_the_key(package):
     assert sources_hash(package) == before
 
 
-def test_all_real_kernels_and_their_vector_helpers_are_sources():
-    found = set(kernel_sources(ROOT / "engine"))
-    assert {"raster/cpu/blend.py", "raster/cpu/lanes.py", "raster/cpu/tile.py", "raster/cpu/record.py"} <= found
-    assert "conventions.py" in found
-    assert "cloud/hull.py" in found
-    with_kernels = {
-        path.relative_to(ROOT / "engine").as_posix()
-        for path in (ROOT / "engine").rglob("*.py")
-        if any(f"\n@{name}" in path.read_text("utf-8") for name in ("njit", "routine(", "kernel_intrinsic"))
+def real_kernel_files() -> list[str]:
+    """Files of the engine that hold kernels, and all files beside them in the folders of kernels."""
+    engine = ROOT / "engine"
+    decorators = ("njit", "routine(", "kernel_intrinsic", "intrinsic")
+    held = {
+        path for path in engine.rglob("*.py") if any(f"\n@{name}" in path.read_text("utf-8") for name in decorators)
     }
-    assert with_kernels <= found
+    for folder in ("kernels", "raster/cpu", "model/cpu"):
+        held.update((engine / folder).glob("*.py"))
+    return sorted(path.relative_to(engine).as_posix() for path in held)
+
+
+def test_a_change_of_any_real_kernel_file_changes_the_key(monkeypatch):
+    changed = ""
+    texts_on_disk = cache._python_texts
+
+    def texts(package: str) -> dict[str, bytes]:
+        found = texts_on_disk(package)
+        return {**found, changed: found[changed] + b"# changed\n"} if changed else found
+
+    monkeypatch.setattr(cache, "_python_texts", texts)
+    before = sources_hash(ROOT / "engine")
+    names = real_kernel_files()
+    assert {"kernels/lanes.py", "model/cpu/forward.py", "model/cpu/backward.py", "cloud/hull.py"} <= set(names)
+    assert {"training/fused_loss.py", "training/ssim_lanes.py", "training/adam.py"} <= set(names)
+    unnoticed = []
+    for changed in [*names, "conventions.py", "model/warm.py"]:
+        if sources_hash(ROOT / "engine") == before:
+            unnoticed.append(changed)
+    assert not unnoticed
+
+
+def test_the_package_is_the_engine():
+    assert current_key().sources == sources_hash(ROOT / "engine")
 
 
 def test_settings_of_numba_that_change_code_change_the_key(monkeypatch):
@@ -158,7 +190,7 @@ def test_an_unwritable_home_falls_back_to_a_temporary_folder(tmp_path):
 
 def test_a_temporary_folder_that_others_may_write_to_is_not_taken(tmp_path):
     (tmp_path / "cache").write_text("a file where the folder should be")
-    shared = kernel_cache.fallback_root()
+    shared = cache.fallback_root()
     shared.chmod(0o777)
     folder = use_kernel_cache()
     assert folder.parent != shared
@@ -167,9 +199,9 @@ def test_a_temporary_folder_that_others_may_write_to_is_not_taken(tmp_path):
 
 
 def test_no_home_at_all_is_no_failure(monkeypatch):
-    monkeypatch.setattr(kernel_cache, "_home", lambda: Path("/nonexistent/home"))
+    monkeypatch.setattr(cache, "_home", lambda: Path("/nonexistent/home"))
     monkeypatch.delenv("XDG_CACHE_HOME")
-    monkeypatch.setattr(kernel_cache, "_is_writable", lambda folder: False)
+    monkeypatch.setattr(cache, "_is_writable", lambda folder: False)
     assert use_kernel_cache().is_relative_to(tempfile.gettempdir())
 
 
@@ -254,7 +286,7 @@ def small_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
             (folder / f"warm_{name}.py").write_text(f"def warm_up():\n    {body}\n")
         monkeypatch.setenv("PYTHONPATH", str(folder))
         monkeypatch.syspath_prepend(str(folder))
-        monkeypatch.setattr(kernel_warm, "GROUPS", tuple((name, f"warm_{name}") for name in bodies))
+        monkeypatch.setattr(warm, "GROUPS", tuple((name, f"warm_{name}") for name in bodies))
 
     return make
 
@@ -266,24 +298,24 @@ def test_compiling_runs_every_group_and_leaves_a_marker(small_groups, tmp_path):
         three="pass",
     )
     said = []
-    assert kernel_warm.compile_all(lambda done, n, what: said.append((done, n)), n_processes=2)
+    assert warm.compile_all(lambda done, n, what: said.append((done, n)), n_processes=2)
     assert (tmp_path / "1").exists()
     assert (tmp_path / "2").exists()
     assert is_cache_warm()
     assert said[0] == (0, 3)
     assert said[-1] == (3, 3)
-    assert not (use_kernel_cache() / kernel_warm.LOCK).exists()
+    assert not (use_kernel_cache() / warm.LOCK).exists()
 
 
 def test_a_warm_cache_starts_no_process(small_groups):
     small_groups(never="raise SystemExit(1)")
     write_marker(use_kernel_cache())
-    assert kernel_warm.compile_all(lambda *said: pytest.fail("there was nothing to compile"))
+    assert warm.compile_all(lambda *said: pytest.fail("there was nothing to compile"))
 
 
 def test_a_group_that_fails_leaves_no_marker(small_groups, caplog):
     small_groups(good="pass", bad="raise ValueError('no such kernel')")
-    assert not kernel_warm.compile_all()
+    assert not warm.compile_all()
     assert not is_cache_warm()
     assert "no such kernel" in caplog.text
 
@@ -299,16 +331,16 @@ def test_cancelling_ends_the_processes(small_groups, tmp_path):
             raise Cancelled
 
     with pytest.raises(Cancelled):
-        kernel_warm.compile_all(report)
+        warm.compile_all(report)
     with pytest.raises(ProcessLookupError):
         os.kill(int((tmp_path / "pid").read_text()), 0)
-    assert not (use_kernel_cache() / kernel_warm.LOCK).exists()
+    assert not (use_kernel_cache() / warm.LOCK).exists()
     assert not is_cache_warm()
 
 
 def test_whoever_waits_for_another_program_compiles_nothing(small_groups):
     small_groups(never="raise SystemExit(1)")
-    lock = use_kernel_cache() / kernel_warm.LOCK
+    lock = use_kernel_cache() / warm.LOCK
     lock.parent.mkdir(parents=True)
     lock.touch()
     said = []
@@ -318,21 +350,21 @@ def test_whoever_waits_for_another_program_compiles_nothing(small_groups):
         write_marker(use_kernel_cache())  # the other program is done
         lock.unlink(missing_ok=True)
 
-    assert kernel_warm.compile_all(report)
+    assert warm.compile_all(report)
     assert said == ["another program compiles"]
 
 
 def test_the_lock_of_a_dead_program_is_broken(small_groups):
     small_groups(one="pass")
-    lock = use_kernel_cache() / kernel_warm.LOCK
+    lock = use_kernel_cache() / warm.LOCK
     lock.parent.mkdir(parents=True)
     lock.touch()
     os.utime(lock, (1, 1))
-    assert kernel_warm.compile_all()
+    assert warm.compile_all()
 
 
 def test_every_group_has_a_warm_up():
     from importlib import import_module
 
-    for _, module in kernel_warm.GROUPS:
+    for _, module in warm.GROUPS:
         assert callable(import_module(module).warm_up)

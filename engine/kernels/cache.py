@@ -3,7 +3,7 @@
 numba looks at a kernel's own file only; a change in a helper that it imports leaves stale machine code behind. So the
 folder's name is a hash of every source that ends up in a kernel, of the versions of numba, llvmlite and Python, and of
 the processor. Machine code itself is still checked by numba against the exact processor, so a folder can never hold
-code that does not run. A completed warm-up leaves a marker that says what was compiled (`engine.kernel_warm`).
+code that does not run. A completed warm-up leaves a marker that says what was compiled (`engine.kernels.warm`).
 
 Importing `engine` calls `use_kernel_cache`, before any decorator of a kernel can run. It imports neither numba nor
 torch, takes a few milliseconds (what only a warm-up needs is imported there), and never fails. NUMBA_CACHE_DIR wins
@@ -34,11 +34,15 @@ UNWRITABLE = "folder not writable"
 
 _ROOT_NAME = "ClipGStream"
 _PREFIX = "kernels-"
-_PACKAGE = Path(__file__).resolve().parent
+_PACKAGE = Path(__file__).resolve().parents[1]
 _DECORATORS = tuple(
     f"@{name}".encode()
-    for name in ("njit", "jit", "numba.", "vectorize", "guvectorize", "intrinsic", "kernel_intrinsic")
+    for name in ("njit", "jit", "numba.", "vectorize", "guvectorize", "intrinsic", "kernel_intrinsic", "routine(")
 )
+_WHOLE_FOLDERS = ("kernels/", "cpu/")
+"""Folders that hold nothing but kernels and what calls them: all their files count."""
+_WARM_UP = "warm.py"
+"""Files of this name say which kernels are compiled, and for which types."""
 _FROM = re.compile(rb"from (engine[\w.]*) import (\([^)]*\)|[^\n#]*)")
 _RENAMED = re.compile(rb"\s+as\s+\w+")
 _CODE_VARIABLES = (
@@ -145,7 +149,7 @@ def current_key() -> CacheKey:
 
 
 def kernel_sources(package: Path) -> dict[str, bytes]:
-    """Sources of the engine that hold kernels, and everything of the engine that these import.
+    """Sources of the engine that hold, call or warm up kernels, and everything of the engine that kernels import.
 
     Args:
         package: The folder `engine`.
@@ -160,6 +164,7 @@ def kernel_sources(package: Path) -> dict[str, bytes]:
         if path not in found:
             found.add(path)
             waiting += _imported(texts[path], texts)
+    found.update(path for path in texts if _counts_by_place(path))
     return {path: texts[path] for path in sorted(found)}
 
 
@@ -273,6 +278,11 @@ def _python_texts(package: str) -> dict[str, bytes]:
                 elif entry.name != "__pycache__" and entry.is_dir():
                     folders.append(f"{folder}{entry.name}/")
     return texts
+
+
+def _counts_by_place(path: str) -> bool:
+    """Whether a source counts wherever it is imported: it may call kernels with other types than before."""
+    return path.endswith(f"/{_WARM_UP}") or any(f"/{folder}" in f"/{path}" for folder in _WHOLE_FOLDERS)
 
 
 def _imported(text: bytes, texts: dict[str, bytes]) -> list[str]:

@@ -1,9 +1,9 @@
 """Compiled routines that call each other by symbol, and the one loop that runs them on several threads.
 
 numba links every jitted helper into each of its callers, and into theirs, and optimises the whole again each time; with
-a parallel loop on top once more. For the many helpers of the decode that is half a minute of compiling. A routine is
-compiled once by itself and called through its symbol, so compiling takes time in proportion to the code. Routines take
-and return plain numbers; memory is passed as int64 addresses.
+a parallel loop on top once more. For the many helpers of the decode that would be half a minute of compiling. A routine
+is compiled once by itself and called through its symbol, so compiling takes time in proportion to the code. Routines
+take and return plain numbers; memory is passed as int64 addresses.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ import numpy as np
 from llvmlite import ir
 from numba import cfunc, get_num_threads, njit, prange, types
 
-from engine.raster.cpu.lanes import FLOAT, INT64, kernel_intrinsic
-from engine.raster.cpu.threads import parallel_guard
+from engine.kernels.lanes import FLOAT, INT64, kernel_intrinsic
+from engine.kernels.threads import parallel_guard
 
 OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
-"""numba options of all kernels of the decode."""
+"""numba options of all kernels."""
 
 _waiting: dict[str, tuple[Callable[..., Any], Any]] = {}
 _compiled: dict[str, Any] = {}
@@ -149,3 +149,15 @@ def store_float(typing_context, address, value):
         return context.get_dummy_value()
 
     return types.void(types.int64, types.float32), generate
+
+
+@kernel_intrinsic
+def take_next(typing_context, counter_address):
+    """Atomically add one to the int64 at an address and return its old value: work for whichever thread is free."""
+    signature = types.int64(types.int64)
+
+    def generate(context, builder, signature, arguments):
+        pointer = builder.inttoptr(arguments[0], INT64.as_pointer())
+        return builder.atomic_rmw("add", pointer, ir.Constant(INT64, 1), "monotonic")
+
+    return signature, generate

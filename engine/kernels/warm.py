@@ -17,7 +17,7 @@ from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 
-from engine.kernel_cache import is_cache_warm, use_kernel_cache, write_marker
+from engine.kernels.cache import is_cache_warm, use_kernel_cache, write_marker
 
 logger = logging.getLogger(__name__)
 
@@ -107,7 +107,7 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
 
 
 def _start(module: str) -> subprocess.Popen[bytes]:
-    root = str(Path(__file__).resolve().parent.parent)
+    root = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
     return subprocess.Popen(
         # a compiler makes millions of objects that live on: looking for garbage among them takes a fifth of the time
