@@ -122,8 +122,8 @@ def build_parser() -> argparse.ArgumentParser:
         help="train variants of the method and compare them",
         description="Train the method, its ablations and baselines on a capture, and write the table.",
     )
-    ablate.add_argument("capture", type=Path, help="capture folder")
-    ablate.add_argument("--project", type=Path, required=True, help="folder for one project per variant and the table")
+    ablate.add_argument("capture", type=Path, nargs="?", help="capture folder")
+    ablate.add_argument("--project", type=Path, help="folder for one project per variant and the table")
     ablate.add_argument("--variants", metavar="NAMES", help="separated by commas (default: all; --list names them)")
     ablate.add_argument("--list", action="store_true", help="say what the variants are and end")
     ablate.add_argument("--n-clips", type=int, metavar="N", help="clips from the first (default: up to 4)")
@@ -623,12 +623,16 @@ def _ablate(options: argparse.Namespace, launch: Launch) -> int:
         for variant in VARIANTS:
             print(f"{variant.name:<{width}}  {'baseline: ' if variant.is_baseline else ''}{variant.words}")
         return EXIT_OK
+    if options.capture is None or options.project is None:
+        raise ProjectError("A capture folder and --project are needed.", hint="Only --list does without.")
     names = None if options.variants is None else [name.strip() for name in options.variants.split(",")]
     variants = chosen_variants(names)
     try:
         seeds = [int(seed) for seed in options.seeds.split(",")]
     except ValueError as error:
         raise ProjectError(f"--seeds is '{options.seeds}'; write whole numbers separated by commas.") from error
+    if len(set(seeds)) < len(seeds):
+        raise ProjectError(f"--seeds is '{options.seeds}'; a seed counts only once.")
     capture = open_capture(options.capture, scale=options.scale if options.scale is not None else 1.0)
     settings = default_settings(
         capture,
@@ -637,6 +641,8 @@ def _ablate(options: argparse.Namespace, launch: Launch) -> int:
         seed=seeds[0],
         overrides=_overrides(options),
     )
+    for seed in seeds[1:]:
+        check_settings(replace(settings, seed=seed), capture)
     most = len(settings.clips(capture.n_frames))
     n_clips = min(most, 4) if options.n_clips is None else options.n_clips
     if not 1 <= n_clips <= most:

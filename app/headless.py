@@ -177,7 +177,8 @@ class TrainedProject:
         base = state if state.is_reference or self.reference is None else self.reference
         model = load_clip_model(state, self.reference)
         if self.project.settings.config().field == "continue":  # one field for all clips: as the last one left it
-            last = read_clip_state(self.project.clip_path(self.trained[-1]))
+            order = [i for i in self.project.training_order(len(self.clips)) if i in self.trained]
+            last = read_clip_state(self.project.clip_path(order[-1]))
             if last.header["field"] and model.field is not None:
                 model.attach_field(read_field(last).requires_grad_(requires_grad=False))
         return TrainedClip(self.clips[clip_index], model, base)

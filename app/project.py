@@ -144,6 +144,11 @@ class Project:
         base = self.base_index(clip_index)
         return None if base == clip_index else base
 
+    def training_order(self, n_clips: int) -> list[int]:
+        """Indices of that many clips as they are trained: the reference, then the others from the first."""
+        first = self.settings.reference_clip
+        return [first, *(i for i in range(n_clips) if i != first)]
+
     def update(self, settings: ProjectSettings) -> None:
         """Replace the settings, on disk first.
 

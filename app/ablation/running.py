@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from app.status import TrainingStatus
 from app.training.messages import Event
 from app.training.service import Launch, TrainingService
 from engine.capture.capture import Capture
+from engine.capture.clip import Clip
 from engine.errors import ProjectError, TrainingError
 from engine.files import atomic_path
 
@@ -76,10 +77,14 @@ def run_ablation(
     """
     results: list[VariantResult] = []
     document: dict[str, Any] = {}
-    todo = [(variant, seed) for seed in seeds for variant in variants]
-    for n_done, (variant, seed) in enumerate(todo):
+    if settings.config().field == "joint":
+        raise ProjectError("field=joint leaves no clips to compare.", hint="Take the variant field-joint.")
+    clips = settings.clips(capture.n_frames)[:n_clips]
+    todo = [_Task(capture, settings, variant, seed, clips) for seed in seeds for variant in variants]
+    for n_done, task in enumerate(todo):
+        variant, seed = task.variant, task.settings.seed
         callbacks.on_variant(variant.name, seed, n_done, len(todo))
-        figures = _figures_of(folder, capture, settings, variant, seed, n_clips, metrics, launch, callbacks)
+        figures = _figures_of(folder, task, clips, metrics, launch, callbacks)
         results.append(VariantResult(variant.name, seed, figures))
         document = {
             "schema": ABLATION_SCHEMA,
@@ -102,36 +107,26 @@ def project_folder(folder: Path, name: str, seed: int) -> Path:
     return folder / f"{name}-seed{seed}"
 
 
+class _Task:
+    """One variant with one seed, its settings checked: nothing is trained before all of them are right."""
+
+    def __init__(
+        self, capture: Capture, base: ProjectSettings, variant: Variant, seed: int, clips: Sequence[Clip]
+    ) -> None:
+        n_cameras = len(capture.rig) - len(base.holdout)
+        overrides, clip_length, chosen = settings_of(variant, base.overrides, clips=clips, n_cameras=n_cameras)
+        reference_clip = base.reference_clip if variant.cut == "clips" else 0
+        self.variant, self.chosen, self.capture = variant, chosen, capture
+        self.settings = replace(
+            base, seed=seed, overrides=overrides, clip_length=clip_length, reference_clip=reference_clip
+        )
+        check_settings(self.settings, capture)
+
+
 def _figures_of(
-    folder: Path,
-    capture: Capture,
-    base: ProjectSettings,
-    variant: Variant,
-    seed: int,
-    n_clips: int,
-    metrics: Any,
-    launch: Launch,
-    callbacks: Callbacks,
+    folder: Path, task: _Task, clips: Sequence[Clip], metrics: Any, launch: Launch, callbacks: Callbacks
 ) -> dict[str, float | None]:
-    n_training = len(capture.rig) - len(base.holdout)
-    overrides, clip_length, clips = settings_of(
-        variant,
-        base.overrides,
-        clip_length=base.clip_length,
-        clips=range(n_clips),
-        n_pictures_per_frame=n_training,
-    )
-    settings = ProjectSettings(
-        capture=base.capture,
-        fingerprint=base.fingerprint,
-        scale=base.scale,
-        clip_length=clip_length,
-        holdout=base.holdout,
-        seed=seed,
-        overrides=overrides,
-        reference_clip=base.reference_clip if variant.cut == "clips" else clips.start,
-    )
-    check_settings(settings, capture)
+    variant, settings, capture, seed = task.variant, task.settings, task.capture, task.settings.seed
     place = project_folder(folder, variant.name, seed)
     project = _open(place, settings)
     try:
@@ -145,10 +140,9 @@ def _figures_of(
             is_window_open=False,
         )
         try:
-            first = settings.reference_clip
             outcomes = train_clips(
                 service,
-                [first, *(i for i in clips if i != first)],
+                project.training_order(len(task.chosen)),
                 on_status=callbacks.on_status,
                 on_event=callbacks.on_event,
                 on_outcome=callbacks.on_outcome,
@@ -159,8 +153,7 @@ def _figures_of(
             raise TrainingError(f"{variant.name}, seed {seed}: {outcomes[-1].message}", hint=outcomes[-1].hint)
     finally:
         project.close()
-    borders = {i * base.clip_length for i in range(1, n_clips)}
-    return _measure(place, list(clips), borders, metrics, callbacks)
+    return _measure(place, list(task.chosen), {clip.start for clip in clips[1:]}, metrics, callbacks)
 
 
 def _open(place: Path, settings: ProjectSettings) -> Project:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from engine.capture.clip import Clip
 from engine.errors import ProjectError
 
 
@@ -36,6 +37,8 @@ class Variant:
 
 
 FULL = "full"
+MIN_STEPS_PER_FRAME = 20
+"""Of a stream, also where the clips of "full" have fewer."""
 VARIANTS = (
     Variant(FULL, "the settings as they are"),
     Variant("decoder-new", "without decoder inheritance: new heads in every source clip", {"decoder": "new"}),
@@ -99,29 +102,29 @@ def chosen_variants(names: Sequence[str] | None) -> list[Variant]:
 
 
 def settings_of(
-    variant: Variant, base: dict[str, Any], *, clip_length: int, clips: range, n_pictures_per_frame: int
+    variant: Variant, base: dict[str, Any], *, clips: Sequence[Clip], n_cameras: int
 ) -> tuple[dict[str, Any], int, range]:
     """Training settings, clip length and clips to train of a variant.
 
     Args:
         base: Settings of "full" that differ from the defaults.
-        clip_length, clips: Of "full".
-        n_pictures_per_frame: Training cameras; a single long clip gets as many steps as all its parts together.
+        clips: Those of "full", from the first on; the last one may be shorter.
+        n_cameras: Training cameras. A single long clip, and all frames of a stream together, get as many steps as all
+            clips of "full" together.
     """
     overrides = base | variant.overrides
     if variant.cut == "clips":
-        return overrides, clip_length, clips
+        return overrides, clips[0].clip_length, range(len(clips))
     from engine.training.config import TrainConfig
 
     config = TrainConfig(**base)
-    per_clip = n_pictures_per_frame * clip_length
-    n_steps = config.n_joint_steps(per_clip) + (len(clips) - 1) * config.n_source_steps(per_clip)
-    first, stop = clips.start * clip_length, clips.stop * clip_length
+    n_frames = clips[-1].stop
+    n_first, *n_others = (n_cameras * clip.n_frames for clip in clips)
+    joint_steps = config.n_joint_steps(n_first)
+    rest = sum(config.n_source_steps(n) for n in n_others)
     if variant.cut == "whole":
-        return overrides | {"joint_steps": n_steps}, stop - first, range(1)
-    n_frames = stop - first
+        return overrides | {"joint_steps": joint_steps + rest}, n_frames, range(1)
+    overrides |= {"joint_steps": joint_steps}  # the first frame as thoroughly as a clip
     if variant.cut == "first":
-        return overrides, 1, range(first, first + 1)
-    # streaming: the first frame as thoroughly as a clip, the rest of the steps for the others
-    rest = max((n_steps - config.n_joint_steps(per_clip)) // max(n_frames - 1, 1), 20)
-    return overrides | {"source_steps": rest}, 1, range(first, stop)
+        return overrides, 1, range(1)
+    return overrides | {"source_steps": max(rest // max(n_frames - 1, 1), MIN_STEPS_PER_FRAME)}, 1, range(n_frames)

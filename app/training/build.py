@@ -62,10 +62,10 @@ def _read_previous(project: Project, clip_index: int) -> ClipState:
     Raises:
         ProjectError: It is not trained.
     """
-    order = [project.settings.reference_clip, *(i for i in range(clip_index) if i != project.settings.reference_clip)]
-    if not project.is_trained(order[-1]):
+    before = project.training_order(clip_index)[-1]
+    if not project.is_trained(before):
         raise ProjectError(
-            f"Clip {clip_index} goes on where clip {order[-1]} ends, which is not trained.",
-            hint=f"Train clip {order[-1]} first.",
+            f"Clip {clip_index} goes on where clip {before} ends, which is not trained.",
+            hint=f"Train clip {before} first.",
         )
-    return read_clip_state(project.clip_path(order[-1]))
+    return read_clip_state(project.clip_path(before))

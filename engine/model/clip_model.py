@@ -93,6 +93,11 @@ class ClipModel(nn.Module):
         """Add anchors of a new role; a field attached later covers them."""
         self.sets[role] = anchors
 
+    def replace_sets(self, sets: dict[str, AnchorSet]) -> None:
+        """These sets take the place of all others; a field attached later covers them."""
+        self.sets = nn.ModuleDict(sets)
+        self._corners, self._frozen = {}, {}
+
     def attach_field(self, field: SpatioTemporalField) -> None:
         """Set the field and compute the interpolation constants of every dynamic set."""
         self.field = field

@@ -46,13 +46,12 @@ def static_anchors(cloud: StaticCloud, config: TrainConfig) -> AnchorSet:
     )
 
 
-def inheriting_model(
-    reference: ClipState, clip: Clip, config: TrainConfig, generator: torch.Generator
-) -> tuple[ClipModel, str]:
+def inheriting_model(reference: ClipState, clip: Clip, config: TrainConfig) -> tuple[ClipModel, str]:
     """A source clip before its motion is known: what it inherits, and no moving anchor alive yet; says what learns.
 
-    `config.inherit` and `config.decoder` say what of it may learn; by default nothing. With inherit=off the anchors
-    are there all the same, because the clip's backgrounds are corrected with them; `drop_inherited` removes them.
+    `config.inherit` says whether anchors may learn. The decoder is the reference's and with inherit=off the anchors
+    are there all the same, because the clip's backgrounds are corrected with a render of both; `choose_decoder` and
+    `drop_inherited` come after that.
     """
     absent = {
         role: torch.zeros(len(reference.arrays[f"sets.{role}.positions"]), clip.n_frames, dtype=torch.bool)
@@ -60,13 +59,21 @@ def inheriting_model(
         if f"sets.{role}.presence" in reference.arrays
     }
     sets, decoder = inherit(reference, absent, is_trainable=config.inherit == "trainable")
-    if config.decoder == "new":
-        decoder = Decoder(**decoder_sizes(decoder), generator=generator)
-    decoder.requires_grad_(config.decoder != "frozen")
     model = ClipModel(sets=sets, decoder=decoder, field=None, clip_length=clip.clip_length, n_frames=clip.n_frames)
     words = {"frozen": "kept as they are", "trainable": "learning on", "off": "left out"}
     heads = {"frozen": "kept as it is", "finetune": "learning on", "new": "new"}
     return model, f"inherited anchors {words[config.inherit]}, decoder {heads[config.decoder]}"
+
+
+def choose_decoder(model: ClipModel, config: TrainConfig, *, seed: int) -> None:
+    """`config.decoder`: the inherited heads as they are, the same heads learning on, or new ones.
+
+    Args:
+        seed: Of new heads, which have a generator of their own: what else starts at random is the same for any choice.
+    """
+    if config.decoder == "new":
+        model.decoder = Decoder(**decoder_sizes(model.decoder), generator=torch.Generator().manual_seed(seed))
+    model.decoder.requires_grad_(config.decoder != "frozen")
 
 
 def merged(state: ClipState) -> ClipState:
@@ -82,9 +89,7 @@ def merged(state: ClipState) -> ClipState:
 
 def drop_inherited(model: ClipModel, cloud: StaticCloud, config: TrainConfig) -> None:
     """inherit=off: static anchors of the clip's own take the place of all inherited ones."""
-    for role in model.roles():
-        del model.sets[role]
-    model.add_set("static", static_anchors(cloud, config))
+    model.replace_sets({"static": static_anchors(cloud, config)})
 
 
 def moving_anchors(cloud: MovingCloud, rows: np.ndarray, config: TrainConfig) -> AnchorSet:

@@ -20,6 +20,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.cloud.moving_cloud import MovingCloud
 from engine.cloud.range import near_plane
+from engine.cloud.static_cloud import StaticCloud
 from engine.errors import NonFiniteLoss, PreparationError, ProjectError
 from engine.metrics.psnr import psnr
 from engine.model.clip_model import decoder_sizes, load_clip_model, read_field
@@ -27,6 +28,7 @@ from engine.model.clip_state import SCHEMA, ClipState, read_clip_state, write_cl
 from engine.model.view import REACH_SPACINGS, View, render_gaussians, render_model
 from engine.training.building import (
     add_residual,
+    choose_decoder,
     drop_inherited,
     fit_field,
     inheriting_model,
@@ -86,8 +88,10 @@ class ClipTraining:
         is_streaming = reference is None and previous is not None and config.start == "previous"
         # what a clip begins with: the reference it inherits from, or the clip before when it goes on from there
         self._base = merged(previous) if is_streaming and previous is not None else reference
-        if is_streaming:
-            config = replace(config, inherit="trainable", decoder="finetune", field="continue")
+        self._given_config = config
+        if is_streaming:  # everything that a source clip can take over, and all of it learns
+            learning = {"inherit": "trainable", "decoder": "finetune", "field": "continue"}
+            config = replace(config, independent=False, start="scratch", **learning)
         self.capture, self.clip, self.config, self.reference = (capture, clip, config, reference)
         self.holdout = sorted(set(holdout))
         self.camera_indices = [c for c in range(len(capture.rig)) if c not in self.holdout]
@@ -169,6 +173,13 @@ class ClipTraining:
 
     def _prepare_static(self) -> None:
         self.backgrounds = estimate_backgrounds(self.capture, self.camera_indices, self.config, self.report)
+        cloud = self._static_cloud()
+        self.spacing = float(cloud.spacing)
+        self.gains = nn.Parameter(torch.from_numpy(cloud.gains).float())
+        self.model = static_model(cloud, self.clip, self.config, self._generator)
+        self._say("Building the static cloud", f"{len(cloud.points)} static anchors, spacing {self.spacing:.4g}")
+
+    def _static_cloud(self) -> StaticCloud:
         cloud = static_cloud(self.backgrounds, self.rig, self.config, self.report)
         if len(cloud.points) == 0:
             raise PreparationError(
@@ -176,10 +187,7 @@ class ClipTraining:
                 hint="Check the calibration: poses must be world to camera, in OpenCV axes.",
                 path=self.capture.path,
             )
-        self.spacing = float(cloud.spacing)
-        self.gains = nn.Parameter(torch.from_numpy(cloud.gains).float())
-        self.model = static_model(cloud, self.clip, self.config, self._generator)
-        self._say("Building the static cloud", f"{len(cloud.points)} static anchors, spacing {self.spacing:.4g}")
+        return cloud
 
     def _say(self, stage: str, message: str) -> None:
         self.report(Progress(stage, 1.0, message))
@@ -210,8 +218,15 @@ class ClipTraining:
         if self.config.gate == "off":
             remove_gate(self.model)
         if self.config.field == "continue" and self.previous is not None and self.previous.header["field"]:
-            self.model.attach_field(read_field(self.previous))
-            self._say("Sizing the field", f"the field of clip {self.previous.header['clip_index']} goes on")
+            field, index = read_field(self.previous), self.previous.header["clip_index"]
+            if field.shape.n_knots < self.clip.n_frames:
+                raise ProjectError(
+                    f"The field of clip {index} has {field.shape.n_knots} frames, clip {self.clip.clip_index} has "
+                    f"{self.clip.n_frames}, so it cannot go on there.",
+                    hint="Take a clip of full length as reference, or field=per_clip.",
+                )
+            self.model.attach_field(field)
+            self._say("Sizing the field", f"the field of clip {index} goes on")
             return
         spacing = float(cloud.spacing)
         made = fit_field(self.model, spacing=spacing, config=self.config, generator=self._generator)
@@ -225,15 +240,16 @@ class ClipTraining:
                 "The training cameras differ from those of the reference clip.",
                 hint="Use the same hold-out for every clip of a project.",
             )
-        self.model, said = inheriting_model(reference, self.clip, self.config, self._generator)
+        self.model, said = inheriting_model(reference, self.clip, self.config)
         self._say("Taking over the reference", said)
         known = read_backgrounds(self.prep_dir, self._background_key(is_corrected=True))
         if known is None:
             raw = estimate_backgrounds(self.capture, self.camera_indices, self.config, self.report)
             known = correct_backgrounds(raw, self.pictures, self._render_static, self.report)
         self.backgrounds = known
+        choose_decoder(self.model, self.config, seed=self.seed)
         if self.config.inherit == "off":
-            own = static_cloud(self.backgrounds, self.rig, self.config, self.report)
+            own = self._static_cloud()
             drop_inherited(self.model, own, self.config)
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         cloud = self._find_motion()
@@ -371,7 +387,7 @@ class ClipTraining:
             "step": self.steps_done,
             "n_steps": self.n_steps,
             "seed": self.seed,
-            "config": self.config.difference(),
+            "config": self._given_config.difference(),
             "camera_names": list(self.rig.names),
             "near_plane": self.near_plane,
             "spacing": self.spacing,

@@ -1,0 +1,19 @@
+"""Fixtures of the training tests: a tiny capture with a trained reference clip, made once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from tests.engine.training.tiny_training import Tiny
+
+
+@pytest.fixture(scope="session")
+def tiny(tmp_path_factory: pytest.TempPathFactory) -> Tiny:
+    """See tests.engine.training.tiny_training. About two seconds."""
+    # imported here: this file is read before tests/conftest.py has said which threads numba takes
+    from tests.engine.training.tiny_training import make_tiny
+
+    return make_tiny(tmp_path_factory.mktemp("tiny_training"))

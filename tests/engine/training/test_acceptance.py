@@ -1,0 +1,187 @@
+"""The checks by which an implementation of the method is accepted, numbered 1 to 10.
+
+Where another test already is the check it is not written twice:
+1. Frozen tensors are bit-identical before and after a source clip: test_clip_training,
+   test_a_source_clip_adds_residual_anchors_and_leaves_everything_inherited_untouched; for every switch and the decoder
+   as well test_ablations, test_a_switch_trains_and_changes_only_what_it_names.
+5. Clip time is i / M, for partial clips too: tests/engine/capture/test_clip.py,
+   test_clip_time_starts_at_zero_steps_evenly_and_stays_below_one; that training and field follow it: below.
+6. Static pixels do not flicker, at clip borders as inside: of given models tests/engine/metrics/test_seams.py,
+   test_a_static_scene_does_not_flicker_at_all; of trained ones below.
+7. Formats survive a round trip: this program reads two layouts, its sample's and panoptic, and writes neither
+   poses_bounds nor COLMAP files. tests/engine/capture/test_capture.py,
+   test_sample_opens_with_its_cameras_frames_and_rate and test_panoptic_merges_both_files_sorted_by_number.
+8. A saved clip shows the same pixels: test_ablations,
+   test_a_clip_saved_with_a_switch_shows_the_pixels_it_was_trained_to; of a reference clip below.
+9. Each switch changes only what it names: test_ablations.
+Source: ClipGStream; the list is this project's.
+"""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+import torch
+
+from engine.capture.capture import Capture
+from engine.cloud.moving_cloud import MovingCloud
+from engine.metrics.evaluate import Evaluation
+from engine.metrics.features_apart import with_features
+from engine.metrics.seams import PairRow, summarize
+from engine.metrics.trained_clip import TrainedClip
+from engine.model.anchors import AnchorSet
+from engine.model.clip_model import ClipModel, load_clip_model
+from engine.model.clip_state import read_clip_state, write_clip_state
+from engine.model.view import REACH_SPACINGS, View, render_gaussians, render_model
+from engine.training.building import add_residual
+from engine.training.clip_training import ClipTraining
+from engine.training.config import TrainConfig
+from tests.engine.training.tiny_training import Tiny, finish, live_picture, make_training, picture, take_steps
+
+
+def first_view(tiny: Tiny, camera: int = 0) -> View:
+    rig = tiny.capture.rig
+    width, height = (int(v) for v in rig.image_sizes[camera])
+    near_plane = tiny.reference.header["near_plane"]
+    return View.from_arrays(
+        rig.world_to_camera[camera], rig.Ks[camera], width=width, height=height, near_plane=near_plane
+    )
+
+
+def test_2_a_source_clip_starts_as_its_static_features_alone_show_it(tiny):
+    training = tiny.prepared(1)
+    view, reach = first_view(tiny), REACH_SPACINGS * tiny.reference.header["spacing"]
+    times = [frame / training.clip.clip_length for frame in range(training.clip.n_frames)]
+    assert _distance_from_static(training, times, view, reach) < 1 / 255
+    take_steps(training, 6)  # the field has learned by then, so the comparison can fail
+    assert _distance_from_static(training, times, view, reach) > 1 / 255
+
+
+@torch.no_grad()
+def _distance_from_static(training: ClipTraining, times: list[float], view: View, reach: float) -> float:
+    """Largest difference of any pixel between the clip and what its static features alone show."""
+    static = with_features(training.model, "static")
+    pictures = [[render_model(model, view, time, reach=reach) for model in (training.model, static)] for time in times]
+    return max(float((one - other).abs().max()) for one, other in pictures)
+
+
+def model_and_cloud(points: np.ndarray) -> tuple[ClipModel, MovingCloud]:
+    """A source clip that inherits moving anchors on a cube of side one, and a cloud of the clip's own."""
+    corners = np.stack(np.meshgrid(*[np.linspace(0, 1, 4)] * 3), -1).reshape(-1, 3).astype(np.float32)
+    nobody = torch.zeros(len(corners), 2, dtype=torch.bool)
+    moving = AnchorSet.from_cloud(
+        torch.from_numpy(corners), torch.full((len(corners), 3), 0.5), spacing=0.3, feature_dim=16, presence=nobody
+    )
+    model = ClipModel(sets={"moving": moving}, decoder=torch.nn.Module(), field=None, clip_length=2, n_frames=2)  # type: ignore[arg-type]
+    points = (corners if points.size == 0 else corners + points).astype(np.float32)
+    presence = np.tile([True, False], (len(points), 1))
+    return model, MovingCloud(points, np.full_like(points, 0.5), presence, 0.3)
+
+
+@pytest.mark.parametrize(("shift", "n_expected"), [(0.0, 0), (0.05, 0), (100.0, 64)])
+def test_3_residual_anchors_are_none_where_all_is_covered_and_all_where_nothing_is(shift, n_expected):
+    model, cloud = model_and_cloud(np.full(3, shift))
+    add_residual(model, cloud, TrainConfig())
+    n_residual = len(model.anchor_set("residual")) if "residual" in model.roles() else 0
+    assert n_residual == n_expected
+    covering = model.anchor_set("moving").presence
+    assert covering is not None
+    assert covering[:, 0].any() == (n_expected == 0)  # what is covered switches inherited anchors on
+    assert not covering[:, 1].any()
+
+
+def test_4_source_clips_do_not_depend_on_the_order_of_their_training(tiny, tmp_path):
+    found: dict[int, set[str]] = {1: set(), 2: set()}
+    for order in ((1, 2), (2, 1)):
+        prep_dir = tmp_path / str(order[0])
+        shutil.copytree(tiny.prep_dir, prep_dir)
+        for i in order:
+            found[i].add(tiny.trained(i, prep_dir=prep_dir).fingerprint)
+    assert [len(fingerprints) for fingerprints in found.values()] == [1, 1]
+
+
+def test_5_a_partial_clip_is_trained_and_decoded_at_the_times_of_whole_ones(tiny):
+    training = tiny.prepared(7)
+    clip = training.clip
+    assert (clip.n_frames, clip.clip_length, clip.stop) == (2, 4, tiny.capture.n_frames)
+    times: set[float] = set()
+    decode = training.model.decode
+
+    def watched(clip_time, rows=None):
+        times.add(clip_time)
+        return decode(clip_time, rows)
+
+    training.model.decode = watched  # type: ignore[method-assign]
+    take_steps(training, 6)
+    assert times == {0.0, 0.25}
+    assert [training.model.knots(clip.clip_time(frame)) for frame in clip.frame_indices()] == [[(0, 1.0)], [(1, 1.0)]]
+    assert training.model.knots(0.5) == [(1, 1.0)]  # beyond its end it stays at its last frame
+
+
+class StillCapture:
+    """The sample as if it had stood still at its first frame."""
+
+    def __init__(self, capture: Capture) -> None:
+        self._capture = capture
+
+    def __getattr__(self, name: str):
+        return getattr(self._capture, name)
+
+    def frame(self, camera_index: int, frame_index: int) -> np.ndarray:
+        return self._capture.frame(camera_index, 0)
+
+    def frames_of(self, camera_index: int, frame_indices) -> np.ndarray:
+        return self._capture.frames_of(camera_index, [0] * len(frame_indices))
+
+
+def flicker_of_still_clips(tiny: Tiny, prep_dir, **settings) -> list[PairRow]:
+    """Pairs of neighbouring frames of two clips of a still scene."""
+    capture = StillCapture(tiny.capture)
+    arguments = {"prep_dir": prep_dir, **settings}
+    evaluation = Evaluation(capture, cameras=tiny.holdout[:2], holdout=tiny.holdout, metrics="quick")  # type: ignore[arg-type]
+    reference, before, pairs = None, None, []
+    for clip in tiny.clips[:2]:
+        training = make_training(capture, tiny.holdout, clip=clip, reference=reference, **arguments)  # type: ignore[arg-type]
+        training.prepare()
+        state = finish(training)
+        reference = reference or state
+        trained = TrainedClip(clip, load_clip_model(state, reference), reference)
+        evaluation.measure(trained, before=before, on_pair=pairs.append)
+        before = trained
+    return pairs
+
+
+def test_6_a_still_scene_does_not_flicker_at_all_with_the_gate(tiny, tmp_path):
+    pairs = flicker_of_still_clips(tiny, tmp_path)
+    assert sum(pair.is_boundary for pair in pairs) == 2
+    assert {pair.static_share for pair in pairs} == {1.0}
+    assert {pair.change_static for pair in pairs} == {0.0}
+
+
+def test_6_a_still_scene_changes_at_the_border_about_as_much_as_inside_without_the_gate(tiny, tmp_path):
+    pairs = flicker_of_still_clips(tiny, tmp_path, gate="off", joint_steps=40, source_steps=60)
+    means = summarize(pairs)["means"]["all"]
+    assert 0.5 < means["ratio_static"] < 2.0  # 1.4 after so few steps
+    assert means["boundary"]["change_static"] < 1 / 255
+
+
+def test_8_a_reference_clip_shows_the_same_pixels_after_a_trip_to_the_disk(tiny, tmp_path):
+    training = tiny.prepared(0, is_source=False, prep_dir=tmp_path)
+    write_clip_state(tmp_path / "clip.safetensors", finish(training))
+    again = read_clip_state(tmp_path / "clip.safetensors")
+    for frame in range(4):
+        assert np.array_equal(picture(tiny, again, None, frame=frame), live_picture(tiny, training, frame=frame))
+
+
+@pytest.mark.parametrize("clip_index", [0, 1])
+def test_10_gaussians_of_a_frame_taken_out_once_are_what_every_camera_sees(tiny, clip_index):
+    state = tiny.reference if clip_index == 0 else tiny.trained(1)
+    model = load_clip_model(state, tiny.reference)
+    reach = REACH_SPACINGS * tiny.reference.header["spacing"]
+    baked = model.decode(0.5)
+    for camera in (0, 7, 13):
+        view = first_view(tiny, camera)
+        live = render_model(model, view, 0.5, reach=reach)
+        assert (render_gaussians(baked, view).image[0] - live).abs().max() < 1e-6
