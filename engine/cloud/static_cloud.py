@@ -18,7 +18,7 @@ from engine.capture.rig import CameraRig
 from engine.cloud.consistency import Agreement, check_depths
 from engine.cloud.fill import fill_inverse_depth
 from engine.cloud.fusion import Samples, fuse_tiers, keep_inliers
-from engine.cloud.gains import gains_from_observations, gains_from_pictures
+from engine.cloud.gains import gain_spread, gains_from_observations, gains_from_pictures, scene_colors
 from engine.cloud.image_filters import block_mean, erode
 from engine.cloud.parallel import map_ordered
 from engine.cloud.projection import is_in_picture, project, projection_matrices, unproject
@@ -52,8 +52,8 @@ class StaticCloud:
 
     Attributes:
         points: [P, 3] float32, scene units.
-        colors: White-balanced (mean camera) display colour in 0..1. [P, 3] float32
-        gains: camera_colour = gain * scene_colour. [C, 3] float32, geometric mean 1 over cameras.
+        colors: White-balanced (median camera) display colour in 0..1. [P, 3] float32
+        gains: camera_colour = gain * scene_colour. [C, 3] float32, median 1; all 1 where cameras do not differ.
         spacing: Distance between neighbouring points, scene units.
     """
 
@@ -89,6 +89,7 @@ def build_static_cloud(
     *,
     max_points: int = 25_000,
     sparse_points: np.ndarray | None = None,
+    color: str = "auto",
     report: Report,
 ) -> StaticCloud:
     """Points, colours and per-camera gains of the static scene.
@@ -99,6 +100,7 @@ def build_static_cloud(
         rig: Training cameras only, at the size of the backgrounds.
         max_points: The spacing grows until no more than this many points remain.
         sparse_points: Triangulated points [P, 3] that set the depth ranges, if there are any.
+        color: "auto": gains where the cameras differ by more than the estimate errs. "gain": always. "off": never.
         report: Gets one line per step with counts and the reason.
     Raises:
         PreparationError: Fewer than 2 cameras, or nothing could be reconstructed.
@@ -129,7 +131,8 @@ def build_static_cloud(
         f"removed, limit {max_points} ({time.perf_counter() - started:.1f} s)"
     )
     points, colors = points[is_kept], colors[is_kept]
-    gains, seen_colors = _balance(points, backgrounds, is_stable, rig, maps, first_gains)
+    log_colors = _observe(points, backgrounds, is_stable, rig, maps)
+    gains, seen_colors, decision = _balance(points, log_colors, first_gains, color)
     is_colored = np.asarray(np.isfinite(seen_colors).all(axis=1))
     colors = np.where(is_colored[:, None], seen_colors, colors)
     if is_colored.any() and not is_colored.all():
@@ -138,7 +141,7 @@ def build_static_cloud(
         neighbors = np.asarray(KDTree(points[is_colored]).query(points[~is_colored], n_neighbors)[1])
         colors[~is_colored] = np.median(colors[is_colored][neighbors.reshape(len(neighbors), -1)], axis=1)
     report(
-        f"White balance: gains {gains.min():.2f} to {gains.max():.2f}; {is_colored.sum()} of {len(points)} points "
+        f"White balance: {decision}; {is_colored.sum()} of {len(points)} points "
         f"coloured by the median of the cameras that see them, the rest by their neighbours"
     )
     return StaticCloud(
@@ -316,15 +319,10 @@ def _sample_tiers(maps: DepthMaps, pictures: np.ndarray) -> list[Samples]:
     ]
 
 
-def _balance(
-    points: np.ndarray,
-    backgrounds: np.ndarray,
-    is_stable: np.ndarray,
-    rig: CameraRig,
-    maps: DepthMaps,
-    first_gains: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Gains [C, 3] and median scene colours [P, 3] 0..255 of the points, by the cameras that see them unoccluded."""
+def _observe(
+    points: np.ndarray, backgrounds: np.ndarray, is_stable: np.ndarray, rig: CameraRig, maps: DepthMaps
+) -> np.ndarray:
+    """log(colour + 1) of the points in the cameras that see them unoccluded, NaN elsewhere. [C, P, 3] float32"""
     factor = max(1, backgrounds.shape[2] // int(maps.rig.image_sizes[0, 0]))
     log_colors = np.full((len(rig), len(points), 3), np.nan, dtype=np.float32)
     for camera, projection in enumerate(projection_matrices(rig)):
@@ -338,4 +336,22 @@ def _balance(
         is_front = np.abs(depths[rows] / maps.depths[camera, map_y, map_x] - 1.0) < COLOR_DEPTH_TOLERANCE
         is_good = is_front & stable[y, x]
         log_colors[camera, rows[is_good]] = np.log(picture[y[is_good], x[is_good]] + 1.0)
-    return gains_from_observations(log_colors, first_gains)
+    return log_colors
+
+
+def _balance(
+    points: np.ndarray, log_colors: np.ndarray, first_gains: np.ndarray, color: str
+) -> tuple[np.ndarray, np.ndarray, str]:
+    """Gains [C, 3], median scene colours [P, 3] 0..255 and a line that says what was decided and why."""
+    measured = gain_spread(points, log_colors)
+    numbers = (
+        f"gains of the cameras spread by {measured.spread:.2%}, uncertain by {measured.uncertainty:.2%} "
+        f"({measured.n_cameras} of {len(first_gains)} cameras measured)"
+    )
+    if color == "gain" or (color == "auto" and measured.is_real):
+        gains, colors = gains_from_observations(log_colors, first_gains)
+        why = "cameras differ" if color == "auto" else "color=gain"
+        return gains, colors, f"{why}, {numbers}; gains {gains.min():.2f} to {gains.max():.2f}"
+    gains = np.ones_like(first_gains)
+    why = "cameras do not differ" if color == "auto" else "color=off"
+    return gains, scene_colors(log_colors, gains), f"{why}, {numbers}; no gains"

@@ -40,7 +40,7 @@ class TrainedClip:
 
 
 def camera_gain(base: ClipState, camera_name: str) -> np.ndarray:
-    """Colour gain of a training camera, ones for a held-out one. [3] float32"""
+    """Colour gain of a training camera; of a held-out one the best guess, ones: the median camera's. [3] float32"""
     names = list(base.header["camera_names"])
     if camera_name in names:
         return base.arrays["gains"][names.index(camera_name)]

@@ -95,6 +95,7 @@ def static_cloud(
         rig,
         max_points=config.max_static_points,
         sparse_points=sparse.points if len(sparse.points) else None,
+        color=config.color,
         report=say,
     )
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine.capture.rig import CameraRig
-from engine.cloud.gains import gains_from_observations, gains_from_pictures
+from engine.cloud.gains import MIN_SPREAD, GainSpread, gain_spread, gains_from_observations, gains_from_pictures
 from engine.cloud.median import median_over_cameras
 from engine.cloud.range import depth_ranges, near_plane
 from engine.cloud.voxel import voxel_keys, voxel_means
@@ -58,7 +58,7 @@ def test_gains_are_recovered_from_points_seen_by_some_cameras() -> None:
     rng = np.random.default_rng(0)
     scene = rng.uniform(20.0, 200.0, (600, 3))
     gains = np.exp(rng.normal(0.0, 0.15, (6, 3)))
-    gains /= np.exp(np.log(gains).mean(0))
+    gains /= np.exp(np.median(np.log(gains), axis=0))
     seen = np.log(gains[:, None] * scene[None] + 1.0)
     seen[rng.random((6, 600)) < 0.5] = np.nan
     wrong = rng.random((6, 600)) < 0.1
@@ -66,9 +66,60 @@ def test_gains_are_recovered_from_points_seen_by_some_cameras() -> None:
     found, colors = gains_from_observations(seen, np.ones((6, 3)))
     # log(c + 1) bends a pure gain by up to (gain - 1) / 21 for the darkest points; medians over 300 points
     assert np.abs(found / gains - 1.0).max() < 0.02
-    assert np.allclose(np.log(found).mean(0), 0.0, atol=1e-9)
+    assert np.allclose(np.median(np.log(found), axis=0), 0.0, atol=1e-9)
     is_known = np.isfinite(colors[:, 0])
     assert np.median(np.abs(colors[is_known] / scene[is_known] - 1.0)) < 0.02
+
+
+def observe(log_gains: np.ndarray, *, noise: float, tilt: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Points and log colours for cameras of these gains.
+
+    Args:
+        log_gains: [C, 3]
+        noise: RMS of the log colours.
+        tilt: How much brighter each camera sees one end of the scene than the other, at random, in log colour: like
+            shading that depends on the view, no gain explains it.
+    """
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(2000, 3)) * [3.0, 2.0, 1.0]
+    scene = np.log(rng.uniform(20.0, 200.0, (2000, 3)))
+    seen = scene + log_gains[:, None] + rng.normal(0.0, noise, (len(log_gains), 2000, 3))
+    seen += tilt * rng.choice([-1.0, 1.0], (len(log_gains), 1, 1)) * (points[:, :1] > 0)
+    seen[rng.random(seen.shape[:2]) < 0.3] = np.nan
+    return points, seen
+
+
+def test_cameras_that_differ_are_told_from_cameras_that_do_not() -> None:
+    log_gains = np.random.default_rng(1).normal(0.0, 0.1, (8, 3))
+    measured = gain_spread(*observe(log_gains, noise=0.05))
+    assert measured.n_cameras == 8
+    assert measured.spread == pytest.approx(log_gains.std(0, ddof=1).mean(), rel=0.2)
+    assert measured.uncertainty < 0.01
+    assert measured.is_real
+    same = gain_spread(*observe(np.zeros((8, 3)), noise=0.5))
+    assert same.spread < 0.03
+    assert not same.is_real
+
+
+def test_what_differs_from_place_to_place_is_no_gain() -> None:
+    measured = gain_spread(*observe(np.zeros((8, 3)), noise=0.02, tilt=0.3))
+    assert measured.spread > MIN_SPREAD  # it is its own uncertainty that keeps it from being real
+    assert measured.uncertainty > 0.05
+    assert not measured.is_real
+
+
+def test_a_spread_that_nobody_sees_is_left_alone() -> None:
+    log_gains = 0.002 * np.random.default_rng(1).normal(size=(8, 3))
+    measured = gain_spread(*observe(log_gains, noise=1e-4))
+    assert measured.spread > 5 * measured.uncertainty
+    assert not measured.is_real
+
+
+@pytest.mark.parametrize("n_points", [0, 1, 60])
+def test_too_few_points_tell_nothing(n_points: int) -> None:
+    points, seen = observe(np.full((4, 3), 0.1), noise=0.01)
+    assert gain_spread(points[:n_points], seen[:, :n_points]) == GainSpread(0.0, float("inf"), 0)
+    assert not gain_spread(points[:n_points], seen[:, :n_points]).is_real
 
 
 def test_picture_gains_have_geometric_mean_one() -> None:

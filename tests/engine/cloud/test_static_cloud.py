@@ -85,10 +85,37 @@ def test_most_of_what_cameras_see_is_covered(room: Room, cloud: tuple[StaticClou
 
 def test_white_balance_is_found(room: Room, cloud: tuple[StaticCloud, list[str]]) -> None:
     true_gains = camera_gains(len(room[0]))
-    true_gains /= np.exp(np.log(true_gains).mean(0))
-    assert np.allclose(np.exp(np.log(cloud[0].gains.astype(np.float64)).mean(0)), 1.0, atol=1e-5)
+    true_gains /= np.exp(np.median(np.log(true_gains), axis=0))
+    assert np.allclose(np.exp(np.median(np.log(cloud[0].gains.astype(np.float64)), axis=0)), 1.0, atol=1e-5)
+    assert any("White balance: cameras differ, gains of the cameras spread by" in line for line in cloud[1])
     # shading does not depend on the view in this room; what is left is mixed pixels and wrong depths
     assert np.abs(cloud[0].gains / true_gains - 1.0).max() < 0.05
+
+
+def test_without_gains_scene_colors_are_what_the_cameras_saw(room: Room, cloud: tuple[StaticCloud, list[str]]) -> None:
+    rig, pictures, is_stable, _ = room
+    lines: list[str] = []
+    result = build_static_cloud(pictures, is_stable, rig, max_points=6000, color="off", report=lines.append)
+    assert (result.gains == 1.0).all()
+    assert np.array_equal(result.points, cloud[0].points)
+    assert np.abs(result.colors - cloud[0].colors).mean() < 0.05  # the median camera's colours are close to them
+    assert any("White balance: color=off" in line for line in lines)
+
+
+def test_like_cameras_get_no_gains_unless_asked(room: Room) -> None:
+    rig, pictures, is_stable, _ = room
+    even = pictures / camera_gains(len(rig))[:, None, None]
+    even = np.clip(even, 0, 255).astype(np.uint8)
+    lines: list[str] = []
+    result = build_static_cloud(even, is_stable, rig, max_points=6000, report=lines.append)
+    assert (result.gains == 1.0).all(), lines
+    asked = build_static_cloud(even, is_stable, rig, max_points=6000, color="gain", report=lines.append)
+    assert (asked.gains != 1.0).any()
+    assert np.abs(asked.gains - 1.0).max() < 0.05
+    assert [line.split(",")[0] for line in lines if "White" in line] == [
+        "White balance: cameras do not differ",
+        "White balance: color=gain",
+    ]
 
 
 def test_limit_report_and_types(cloud: tuple[StaticCloud, list[str]]) -> None:

@@ -1,7 +1,7 @@
 """ClipTraining from pixels: learning, freezing, resuming, stopping on bad numbers. The sample at half size."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -88,6 +88,28 @@ def test_the_reference_has_static_and_moving_anchors(setting):
     presence = model.anchor_set("moving").presence
     assert presence is not None
     assert presence.any(1).all()  # every moving anchor exists in some frame
+
+
+def test_cameras_that_do_not_differ_get_no_gains(setting):
+    gains = setting.reference.arrays["gains"]  # one renderer drew all cameras of the sample
+    assert gains.shape == (len(setting.capture.rig) - len(setting.holdout), 3)
+    assert (gains == 1.0).all()
+
+
+def test_gains_learn_in_the_reference_clip_and_are_kept_in_the_next(setting, tmp_path):
+    said: list[str] = []
+    config = replace(CONFIG, color="gain", static_steps=4, joint_steps=2, max_static_points=1000)
+    training = start(setting.capture, 0, tmp_path, config=config, report=lambda progress: said.append(progress.message))
+    training.prepare()
+    assert any("White balance: color=gain, gains of the cameras spread by" in line for line in said)
+    estimated = training.gains.detach().clone()
+    reference = finish(training)
+    learned = reference.arrays["gains"]
+    assert (learned != estimated.numpy()).any()
+    source = start(setting.capture, 1, tmp_path, config=config, reference=reference)
+    source.prepare()
+    source.step()
+    assert np.array_equal(source.gains.detach().numpy(), learned)
 
 
 def test_a_source_clip_adds_residual_anchors_and_leaves_everything_inherited_untouched(setting, source):

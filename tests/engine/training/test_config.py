@@ -28,6 +28,11 @@ def test_values_outside_their_range_are_refused_with_the_range():
         TrainConfig(field_log2_entries=40)
 
 
+def test_a_choice_that_does_not_exist_is_refused_with_the_choices():
+    with pytest.raises(ProjectError, match="color is 'matrix'; it has to be 'auto', 'gain' or 'off'"):
+        TrainConfig(color="matrix")
+
+
 def test_difference_lists_only_changes():
     assert TrainConfig().difference() == {}
     assert TrainConfig(joint_steps=5, gate="off").difference() == {"joint_steps": 5, "gate": "off"}
