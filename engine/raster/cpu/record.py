@@ -46,13 +46,14 @@ EXP2_EIGHTH = (0.9999999251, 0.6931422525, 0.2401721884, 0.05527972023, 0.009188
 PAIR_FLOATS = 12
 """Stride of a row of the pair buffer; nine sums are used."""
 
+FASTMATH = {"nsz", "contract", "arcp", "afn", "reassoc"}
+"""NaN and infinity must keep their meaning: rows are dropped by comparisons that NaN fails."""
 KERNEL_OPTIONS = {
-    # NaN and infinity must keep their meaning: rows are dropped by comparisons that NaN fails.
-    "fastmath": {"nsz", "contract", "arcp", "afn", "reassoc"},
+    "fastmath": FASTMATH,
     "nogil": True,
     "cache": True,
     "error_model": "numpy",
 }
-"""Options of every kernel, apart from `parallel`."""
+"""Options of every kernel that is no routine."""
 
 f4 = np.float32
