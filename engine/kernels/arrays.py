@@ -86,7 +86,7 @@ def pack(job: NamedTuple) -> np.ndarray:
 
 
 def address_of(array: np.ndarray) -> int:
-    """Address of the first value, 0 without values; `array.ctypes.data` takes three times as long, and an image has dozens of arrays."""
+    """Address of the first value, 0 without values. `array.ctypes.data` takes three times as long."""
     if array.size == 0:
         return 0
     if not array.flags.writeable:

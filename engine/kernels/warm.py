@@ -22,13 +22,13 @@ from engine.kernels.cache import is_cache_warm, use_kernel_cache, write_marker
 logger = logging.getLogger(__name__)
 
 GROUPS = (
-    ("rasterizer", "engine.raster.cpu.warm"),
     ("point clouds", "engine.cloud.warm"),
+    ("rasterizer", "engine.raster.cpu.warm"),
     ("decoder", "engine.model.warm"),
     ("loss and optimiser", "engine.training.warm"),
 )
 """Name and module of each group, slowest first. Every module has a `warm_up()` that runs each of its kernels once.
-Groups share no cached kernel, or two processes would compile it at the same time."""
+Groups share no cached kernel but the entry of `routines.run`, or two processes would compile it at the same time."""
 
 MAX_PROCESSES = 4
 TIME_LIMIT_S = 180.0
