@@ -74,14 +74,12 @@ def pack(job: NamedTuple) -> np.ndarray:
             continue
         if isinstance(value, Tensor):
             is_fit = value.dtype is kind.torch_dtype and value.is_contiguous()
-            address = value.data_ptr()
         else:
             is_fit = value.dtype is kind.dtype and value.flags.c_contiguous
-            address = address_of(value)
         if not is_fit or value.ndim != kind.n_dimensions:
             wanted = f"contiguous {kind.dtype} with {kind.n_dimensions} dimensions"
             raise TypeError(f"{name} must be {wanted}, got {value.dtype} {list(value.shape)}")
-        table += (address, *value.shape)
+        table += (value.data_ptr() if isinstance(value, Tensor) else address_of(value), *value.shape)
     return np.array(table, np.int64)
 
 
