@@ -19,10 +19,10 @@ from engine.model.field import FieldShape, SpatioTemporalField
 from engine.model.warm import warm_up
 from engine.raster.gaussians import Gaussians
 
-PAPER = {"features": 64, "hidden": 64, "k": 10}
-ODD = {"features": 5, "hidden": 20, "k": 5}
-PRESET = {"features": 16, "hidden": 64, "k": 5}
-SINGLE = {"features": 3, "hidden": 7, "k": 1}
+PAPER: dict[str, Any] = {"features": 64, "hidden": 64, "k": 10}
+ODD: dict[str, Any] = {"features": 5, "hidden": 20, "k": 5}
+PRESET: dict[str, Any] = {"features": 16, "hidden": 64, "k": 5}
+SINGLE: dict[str, Any] = {"features": 3, "hidden": 7, "k": 1}
 
 
 class Scene:
