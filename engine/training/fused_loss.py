@@ -33,7 +33,7 @@ from engine.kernels.arrays import (
     pack,
 )
 from engine.kernels.lanes import kernel_intrinsic
-from engine.kernels.routines import WORKER, ints, load_float, routine, run, store_float
+from engine.kernels.routines import WORKER, ints, load_float, routine, run
 from engine.training.ssim_lanes import (
     N_ROWS,
     RADIUS,
@@ -42,6 +42,7 @@ from engine.training.ssim_lanes import (
     blur_down_rows,
     blur_moments,
     blur_moments_known_truth,
+    clear_lanes,
     gradient_rows,
     ssim_rows,
     ssim_rows_known_truth,
@@ -307,8 +308,8 @@ def _clear_rows(scratch, row_bytes, ring, n_rings, y):
     """Zeros in the slot of row y of rings that follow each other: nothing lies outside the picture."""
     for index in range(n_rings):
         row = scratch + row_bytes * (ring + RING_ROWS * index + (y & (RING_ROWS - 1)))
-        for place in range(0, row_bytes, 4):
-            store_float(row + place, _ZERO)
+        for v in range(row_bytes // 64):
+            clear_lanes(row + 64 * v)
 
 
 @routine(types.float64(types.int64, types.int64))
