@@ -1,43 +1,54 @@
-"""Compiled routines that call each other by symbol, and the one loop that runs them on several threads.
+"""Compiled routines that call each other by symbol, and the one call that runs one of them on several threads.
 
 numba links every jitted helper into each of its callers, and into theirs, and optimises the whole again each time; with
-a parallel loop on top once more. For the many helpers of the decode that would be half a minute of compiling. A routine
-is compiled once by itself and called through its symbol, so compiling takes time in proportion to the code. Routines
-take and return plain numbers; memory is passed as int64 addresses.
+a parallel loop on top once more, whose lowering takes seconds. A routine is compiled once by itself and called through
+its symbol, so compiling takes time in proportion to the code. Routines take and return plain numbers; memory is passed
+as int64 addresses, arrays of a job as `engine.kernels.arrays` packs them.
+
+`run` calls numba's threading layer itself, with the function that numba's own parallel loops call: no loop is compiled.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import ctypes
+from collections.abc import Callable, Iterator
 from functools import cache
 from threading import Lock
+from types import FunctionType, ModuleType
 from typing import Any
 
 import llvmlite.binding as llvm
 import numpy as np
 from llvmlite import ir
-from numba import cfunc, get_num_threads, njit, prange, types
+from numba import cfunc, get_num_threads, types
+from numba.core.dispatcher import Dispatcher
 
+from engine.kernels.arrays import address_of
 from engine.kernels.lanes import FLOAT, INT64, kernel_intrinsic
 from engine.kernels.threads import parallel_guard
 
-OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
-"""numba options of all kernels."""
+OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy"}
+"""numba options of all routines."""
 
-_waiting: dict[str, tuple[Callable[..., Any], Any]] = {}
+_defined: dict[str, tuple[FunctionType, Any, dict[str, Any]]] = {}
 _compiled: dict[str, Any] = {}
 _linking = Lock()
 
 
-def routine(signature: Any) -> Callable[[Callable[..., Any]], Any]:
+def routine(signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """Decorator: make a module-level function a routine. The result can be called from kernels only.
 
-    Nothing is compiled before `run` is first called. A routine must be defined after those that it calls.
+    Nothing is compiled before `run` or `link` needs it.
+
+    Args:
+        signature: Of numbers only.
+        options: numba options beyond OPTIONS, such as fastmath.
     """
 
     def register(function: Callable[..., Any]) -> Any:
+        assert isinstance(function, FunctionType)
         name = f"{function.__module__}.{function.__qualname__}"
-        _waiting[name] = (function, signature)
+        _defined[name] = (function, signature, OPTIONS | options)
         return types.ExternalFunction(name, signature)
 
     return register
@@ -60,21 +71,66 @@ def run(worker_routine: Any, arguments: np.ndarray, n_workers: int | None = None
         arguments: Passed by address. int64
         n_workers: None for as many as there are threads.
     """
-    address = link(worker_routine)
+    job = (ctypes.c_int64 * 2)(link(worker_routine), address_of(arguments))
     with parallel_guard():
-        _run(address, arguments.ctypes.data, get_num_threads() if n_workers is None else n_workers)
+        n_threads = get_num_threads()
+        call, enter = _parallel_for()
+        arrays, lengths, steps, _ = _numbers(n_threads if n_workers is None else n_workers)
+        call(enter, arrays, lengths, steps, job, 0, 1, n_threads)
 
 
 @cache
+def _numbers(n_workers: int) -> tuple[Any, Any, Any, Any]:
+    """Numbers of the workers as a threading layer takes them: arrays (one), their length, bytes a step; and memory."""
+    numbers = (ctypes.c_int64 * n_workers)(*range(n_workers))
+    first = (ctypes.c_int64 * 1)(ctypes.addressof(numbers))
+    return first, (ctypes.c_int64 * 1)(n_workers), (ctypes.c_int64 * 1)(8), numbers
+
+
+@cache
+def _parallel_for() -> tuple[Any, int]:
+    """numba's parallel loop, whose call releases the interpreter lock, and what it is to call in every thread.
+
+    It takes: function, arrays, lengths, steps, data, inner dimensions, number of arrays, threads. The threads have been
+    started, which makes its symbol known.
+    """
+    kinds = [ctypes.c_void_p] * 5 + [ctypes.c_ssize_t] * 3
+    return ctypes.CFUNCTYPE(None, *kinds)(llvm.address_of_symbol("numba_parallel_for")), link(_enter)
+
+
 def link(wanted: Any) -> int:
-    """Address of a routine; compiles, or loads from the cache, every routine that was defined up to now."""
-    with _linking:
-        for name, (function, signature) in list(_waiting.items()):
-            compiled = cfunc(signature, **{key: value for key, value in OPTIONS.items() if key != "nogil"})(function)
-            llvm.add_symbol(name, compiled.address)
-            _compiled[name] = compiled
-            del _waiting[name]
-    return _compiled[wanted.symbol].address
+    """Address of a routine; compiles, or loads from the cache, it and every routine that it calls."""
+    compiled = _compiled.get(wanted.symbol)
+    if compiled is None:
+        with _linking:
+            _compile(wanted.symbol)
+        compiled = _compiled[wanted.symbol]
+    return compiled.address
+
+
+def _compile(name: str) -> None:
+    if name in _compiled:
+        return
+    function, signature, options = _defined[name]
+    for called in _called(function):
+        if called != name:
+            _compile(called)
+    compiled = cfunc(signature, **options)(function)
+    llvm.add_symbol(name, compiled.address)
+    _compiled[name] = compiled
+
+
+def _called(function: FunctionType) -> Iterator[str]:
+    """Names of the routines that a function names, by themselves or in a module, and those of its jitted helpers."""
+    names = function.__code__.co_names
+    values = [function.__globals__[name] for name in names if name in function.__globals__]
+    for module in [value for value in values if isinstance(value, ModuleType)]:
+        values += [vars(module)[name] for name in names if name in vars(module)]
+    for value in values:
+        if isinstance(value, types.ExternalFunction) and value.symbol in _defined:
+            yield value.symbol
+        elif isinstance(value, Dispatcher) and value.py_func is not function:
+            yield from _called(value.py_func)
 
 
 @kernel_intrinsic
@@ -88,12 +144,6 @@ def _call(typing_context, address, worker, arguments):
         return context.get_dummy_value()
 
     return signature, generate
-
-
-@njit(parallel=True, **OPTIONS)
-def _run(address, arguments, n_workers):
-    for worker in prange(n_workers):
-        _call(np.int64(address), np.int64(worker), np.int64(arguments))
 
 
 def tuple_reader(fields: type) -> Any:
@@ -161,3 +211,11 @@ def take_next(typing_context, counter_address):
         return builder.atomic_rmw("add", pointer, ir.Constant(INT64, 1), "monotonic")
 
     return signature, generate
+
+
+@routine(ints(4))
+def _enter(arrays, lengths, steps, data):
+    """What a threading layer calls for a part of the workers: `data` holds the addresses of routine and arguments."""
+    first = load_int(arrays)
+    for part in range(load_int(lengths)):
+        _call(load_int(data), load_int(first + part * load_int(steps)), load_int(data + 8))

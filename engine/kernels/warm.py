@@ -1,4 +1,4 @@
-"""Compile every kernel that training and viewing use: each group in a process of its own, several at a time.
+"""Compile every kernel that training and viewing use, in several processes at once.
 
 Compiling holds the interpreter lock for seconds, so it never happens in a process with a window, and on the first
 start alone. Two programs that start at once do not compile twice: the second one waits for the first.
@@ -11,7 +11,6 @@ import os
 import subprocess
 import sys
 import time
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
@@ -22,13 +21,13 @@ from engine.kernels.cache import is_cache_warm, use_kernel_cache, write_marker
 logger = logging.getLogger(__name__)
 
 GROUPS = (
-    ("rasterizer", "engine.raster.cpu.warm"),
     ("point clouds", "engine.cloud.warm"),
+    ("rasterizer", "engine.raster.cpu.warm"),
     ("decoder", "engine.model.warm"),
     ("loss and optimiser", "engine.training.warm"),
 )
 """Name and module of each group, slowest first. Every module has a `warm_up()` that runs each of its kernels once.
-Groups share no cached kernel, or two processes would compile it at the same time."""
+Groups share no cached kernel but the entry of `routines.run`, or two processes would compile it at the same time."""
 
 MAX_PROCESSES = 4
 TIME_LIMIT_S = 180.0
@@ -57,7 +56,7 @@ def warm_up_all(report: ReportGroups | None = None) -> None:
 
 
 def compile_all(report: ReportGroups | None = None, *, n_processes: int | None = None) -> bool:
-    """Compile every group in processes of their own, unless that was done. Returns whether all of them succeeded.
+    """Compile every group in other processes, unless that was done. Returns whether all of them succeeded.
 
     Args:
         report: See `warm_up_all`.
@@ -67,33 +66,30 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
         return True
     report = report or (lambda done, n, what: None)
     folder = use_kernel_cache()
-    waiting = deque(GROUPS)
-    n = len(waiting)
+    n = len(GROUPS)
     lock = folder / LOCK
     while not _take(lock):
         report(0, n, "another program compiles")
         time.sleep(POLL_S)
-    running: list[tuple[str, subprocess.Popen[bytes], float]] = []
+    running: list[tuple[_Bundle, subprocess.Popen[bytes], float]] = []
     n_done, is_fine = 0, True
     try:
         if is_cache_warm():  # the program we waited for has done it
             return True
-        most = min(n_processes or _n_cores(), MAX_PROCESSES)
-        while waiting or running:
-            while waiting and len(running) < most:
-                name, module = waiting.popleft()
-                running.append((name, _start(module), time.monotonic()))
-            report(n_done, n, " and ".join(name for name, _, _ in running))
+        for bundle in _bundles(min(n_processes or _n_cores(), MAX_PROCESSES)):
+            running.append((bundle, _start(bundle), time.monotonic()))
+        while running:
+            report(n_done, n, " and ".join(_names(bundle) for bundle, _, _ in running))
             _renew(lock)
             time.sleep(POLL_S)
             for item in list(running):
-                name, process, started_s = item
+                bundle, process, started_s = item
                 seconds = time.monotonic() - started_s
                 if process.poll() is None and seconds < TIME_LIMIT_S:
                     continue
                 running.remove(item)
-                n_done += 1
-                is_fine &= _end(name, process, seconds)
+                n_done += len(bundle)
+                is_fine &= _end(_names(bundle), process, seconds)
         report(n_done, n, "")
         if is_fine:
             write_marker(folder)
@@ -106,12 +102,27 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
             lock.unlink(missing_ok=True)
 
 
-def _start(module: str) -> subprocess.Popen[bytes]:
+_Bundle = tuple[tuple[str, str], ...]
+"""Groups that one process compiles, one after the other."""
+
+
+def _bundles(n_processes: int) -> list[_Bundle]:
+    """The first groups, which take longest, alone; the rest together: importing torch and numba takes two seconds."""
+    n_alone = max(0, min(n_processes, len(GROUPS)) - 1)
+    return [*((group,) for group in GROUPS[:n_alone]), tuple(GROUPS[n_alone:])]
+
+
+def _names(bundle: _Bundle) -> str:
+    return ", ".join(name for name, _ in bundle)
+
+
+def _start(bundle: _Bundle) -> subprocess.Popen[bytes]:
     root = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
+    calls = "; ".join(f"import_module({module!r}).warm_up()" for _, module in bundle)
     return subprocess.Popen(
         # a compiler makes millions of objects that live on: looking for garbage among them takes a fifth of the time
-        [sys.executable, "-c", f"import gc; gc.disable(); from {module} import warm_up; warm_up()"],
+        [sys.executable, "-c", f"import gc; gc.disable(); from importlib import import_module; {calls}"],
         env={**os.environ, "PYTHONPATH": path},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,

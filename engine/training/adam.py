@@ -10,16 +10,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import torch
 from llvmlite import ir
-from numba import njit, prange, types
+from numba import get_num_threads, njit, types
 from numba.np.numpy_support import carray
 from torch import Tensor
 
+from engine.kernels.arrays import Doubles1, Floats2, Ints2, job_reader, pack
 from engine.kernels.lanes import kernel_intrinsic
+from engine.kernels.routines import WORKER, routine, run
 
 BETA1, BETA2 = 0.9, 0.999
 EPSILON = 1e-15
@@ -116,14 +118,38 @@ def _adam(values, gradients, means, squares, scale, step_size, root_scale):
         values[i] -= step_size * (mean / (np.sqrt(square) * root_scale + _EPSILON))
 
 
-@njit(parallel=True, cache=True, nogil=True, error_model="numpy")
-def _adam_kernel(chunks, factors, is_update, scale, sums):
-    """Every chunk [n, 6] int64: addresses of values, gradient, both moments and touched flags, number of values.
+class ChunkJob(NamedTuple):
+    """Arguments of `work_on_chunks`.
 
-    With `is_update`: Adam of the touched blocks, factors [n, 2] as in `_adam`. Without: flags blocks with a gradient
-    and writes the sum of squares of each chunk, float64.
+    Attributes:
+        chunks: Addresses of values, gradient, both moments and touched flags, and number of values. [n, 6]
+        is_update: 1 for Adam of the touched blocks; 0 for flags of blocks with a gradient and sums of squares.
+        scale: Factor of the gradients.
+        factors: step_size and root_scale of `_adam` for each chunk, read for an update. [n, 2]
+        sums: Sum of squares of each chunk, written unless it is an update. [n]
+        n_workers: How many workers share the chunks.
     """
-    for c in prange(chunks.shape[0]):
+
+    chunks: Ints2
+    is_update: int
+    scale: float
+    factors: Floats2
+    sums: Doubles1
+    n_workers: int
+
+
+@kernel_intrinsic
+def _read_chunk_job(typing_context, address):
+    """The ChunkJob at an address."""
+    return job_reader(ChunkJob)
+
+
+@routine(WORKER)
+def work_on_chunks(worker, arguments):
+    """See ChunkJob."""
+    job = _read_chunk_job(arguments)
+    chunks, scale = job.chunks, np.float32(job.scale)
+    for c in range(len(chunks) * worker // job.n_workers, len(chunks) * (worker + 1) // job.n_workers):
         n = chunks[c, 5]
         n_blocks = (n + 63) // 64
         gradients = carray(_pointer(chunks[c, 1]), (n,), np.float32)
@@ -134,7 +160,7 @@ def _adam_kernel(chunks, factors, is_update, scale, sums):
         total = 0.0
         for block in range(n_blocks):
             first, end = 64 * block, min(64 * block + 64, n)
-            if not is_update:
+            if not job.is_update:
                 part = _sum_squares(gradients[first:end])
                 if part != 0.0:
                     touched[block] = 1
@@ -146,11 +172,16 @@ def _adam_kernel(chunks, factors, is_update, scale, sums):
                     means[first:end],
                     squares[first:end],
                     scale,
-                    factors[c, 0],
-                    factors[c, 1],
+                    job.factors[c, 0],
+                    job.factors[c, 1],
                 )
-        if not is_update:
-            sums[c] = total
+        if not job.is_update:
+            job.sums[c] = total
+
+
+def _work_on_chunks(chunks: np.ndarray, is_update: bool, scale: float, factors: np.ndarray, sums: np.ndarray) -> None:
+    n_workers = max(1, min(get_num_threads(), len(chunks)))
+    run(work_on_chunks, pack(ChunkJob(chunks, int(is_update), scale, factors, sums, n_workers)), n_workers)
 
 
 class FusedAdam:
@@ -192,7 +223,7 @@ class FusedAdam:
         """See AdamState. Also notes which blocks have a gradient, so `update` must follow it."""
         _kept, chunks = self._table(gradients)
         sums = np.zeros(len(chunks))
-        _adam_kernel(chunks, np.empty((0, 2), np.float32), False, np.float32(1), sums)
+        _work_on_chunks(chunks, False, 1.0, np.empty((0, 2), np.float32), sums)
         total = float(sums.sum())
         return math.sqrt(total) if total >= 0.0 else total  # NaN stays NaN
 
@@ -207,7 +238,7 @@ class FusedAdam:
             factors[first:end, 0] = rates[name] / (1.0 - BETA1 ** self._steps[name])
             factors[first:end, 1] = 1.0 / math.sqrt(1.0 - BETA2 ** self._steps[name])
             first = end
-        _adam_kernel(chunks, factors, True, np.float32(scale), np.empty(0))
+        _work_on_chunks(chunks, True, scale, factors, np.empty(0))
 
     def arrays(self) -> dict[str, dict[str, np.ndarray]]:
         """See AdamState."""

@@ -13,13 +13,27 @@ from __future__ import annotations
 
 import weakref
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import torch
-from numba import get_num_threads, njit, prange
+from numba import get_num_threads, types
 from torch import Tensor
 
+from engine.kernels.arrays import (
+    Bytes2,
+    Doubles3,
+    Flags2,
+    Floats1,
+    Floats2,
+    Floats3,
+    Ints1,
+    Ints3,
+    job_reader,
+    pack,
+)
+from engine.kernels.lanes import kernel_intrinsic
+from engine.kernels.routines import WORKER, ints, load_float, routine, run
 from engine.training.ssim_lanes import (
     N_ROWS,
     RADIUS,
@@ -28,6 +42,7 @@ from engine.training.ssim_lanes import (
     blur_down_rows,
     blur_moments,
     blur_moments_known_truth,
+    clear_lanes,
     gradient_rows,
     ssim_rows,
     ssim_rows_known_truth,
@@ -58,11 +73,76 @@ _N_SUMS = 4 * N_ROWS
 
 _BYTE = np.float32(1.0 / 255.0)
 _ZERO, _ONE = np.float32(0), np.float32(1)
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
-_INNER: dict[str, Any] = _OPTIONS | {
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-}  # only kernels call these: compiles faster
+_FASTMATH = {"contract", "nsz", "arcp"}
+
+
+class LossJob(NamedTuple):
+    """Arguments of `loss_band`: a picture in rows of 3 W values, cut into bands and strips.
+
+    Attributes:
+        image: a before gain and replacement. [H, 3 W]
+        truth, truth_bytes: b as numbers or as bytes, the other one empty: compiled once for both. [H, 3 W]
+        gains: Of the channels, for a row. [3 W]
+        has_gain: Whether their gradient is wanted.
+        is_counted: Pixels that count; empty for all. [H, W]
+        active: Tiles that count. [rows, columns]
+        moments: Of `blurred_truth`, or empty.
+        scales: Weights of |a - b| and of SSIM in the loss. [2]
+        band_rows: Rows at which bands start, and the end. [n_bands + 1]
+        scratch: [n_bands, rows, floats of a row]
+        lane_sums: Sums in vectors. [n_bands, 16 * sums]
+        runs: [n_bands, tile columns + 1, 2]
+        gradient: By the image, written. [H, 3 W]
+        sums: |a - b|, (a - b)^2 and 1 - SSIM by row and strip, written. [H, strips, 3]
+        gain_sums: Gradient by the gains of four rows, added to. [ceil(H / 4), strips, 3]
+    """
+
+    image: Floats2
+    truth: Floats2
+    truth_bytes: Bytes2
+    gains: Floats1
+    has_gain: int
+    is_counted: Flags2
+    active: Flags2
+    moments: Floats3
+    scales: Floats1
+    band_rows: Ints1
+    scratch: Floats3
+    lane_sums: Floats2
+    runs: Ints3
+    gradient: Floats2
+    sums: Doubles3
+    gain_sums: Doubles3
+
+
+class MomentJob(NamedTuple):
+    """Arguments of `blur_truth`.
+
+    Attributes:
+        truth, truth_bytes: As in `LossJob`.
+        height, n_values: Rows, and values of a row.
+        scratch: Of one band. [rows, floats of a row]
+        moments: Written. [2, H + 16, floats of a row]
+    """
+
+    truth: Floats2
+    truth_bytes: Bytes2
+    height: int
+    n_values: int
+    scratch: Floats2
+    moments: Floats3
+
+
+@kernel_intrinsic
+def _read_job(typing_context, address):
+    """The LossJob at an address."""
+    return job_reader(LossJob)
+
+
+@kernel_intrinsic
+def _read_moment_job(typing_context, address):
+    """The MomentJob at an address."""
+    return job_reader(MomentJob)
 
 
 def _row_floats(width: int) -> int:
@@ -70,12 +150,14 @@ def _row_floats(width: int) -> int:
     return 2 * _PAD + -(-3 * width // 16) * 16
 
 
-@njit(**_INNER)
-def _find_runs(active, first_row, last_row, height, dilation, lower, upper, runs):
+@routine(types.int64(*[types.int64] * 7), fastmath=_FASTMATH)
+def _find_runs(arguments, band, first_row, last_row, dilation, lower, upper):
     """Runs of vectors to work on: tiles active anywhere in the rows, widened by `dilation` vectors, clipped.
 
-    Fills runs [n, 2] (first, end) and returns their number.
+    Fills runs [n, 2] (first, end) of the band and returns their number.
     """
+    job = _read_job(arguments)
+    active, runs, height = job.active, job.runs[band], len(job.image)
     first_row, last_row = max(first_row, 0), min(last_row, height - 1)
     n_runs = 0
     if first_row > last_row:
@@ -96,9 +178,12 @@ def _find_runs(active, first_row, last_row, height, dilation, lower, upper, runs
     return n_runs
 
 
-@njit(**_INNER)
-def _load_row(image, truth, truth_bytes, gains, is_counted, active, y, first, end, scratch):
+@routine(ints(5), fastmath=_FASTMATH)
+def _load_row(arguments, band, y, first, end):
     """Values first .. end of one row into the rings of a and b. Both limits lie between pixels."""
+    job = _read_job(arguments)
+    truth, truth_bytes, is_counted, active = job.truth, job.truth_bytes, job.is_counted, job.active
+    scratch = job.scratch[band]
     slot = y & (RING_ROWS - 1)
     a, b = scratch[_A + slot, _PAD + first : _PAD + end], scratch[_B + slot, _PAD + first : _PAD + end]
     # numba vectorises loops that start at zero: elsewhere it has to expect negative indices
@@ -110,7 +195,7 @@ def _load_row(image, truth, truth_bytes, gains, is_counted, active, y, first, en
         values = truth[y, first:end]
         for x in range(a.shape[0]):
             b[x] = values[x]
-    values, factors = image[y, first:end], gains[first:end]
+    values, factors = job.image[y, first:end], job.gains[first:end]
     for x in range(a.shape[0]):
         a[x] = values[x] * factors[x]
     if is_counted.shape[1]:
@@ -125,30 +210,33 @@ def _load_row(image, truth, truth_bytes, gains, is_counted, active, y, first, en
                 a[x] = b[x]
 
 
-@njit(**_INNER)
-def _finish_row(image, gains, has_gain, is_counted, y, first, end, by_a, gain_total, gradient):
+@routine(ints(5), fastmath=_FASTMATH)
+def _finish_row(arguments, band, y, first, end):
     """Gradient by a, in scratch, to that by the image and by the gains, values first .. end of one row."""
+    job = _read_job(arguments)
+    is_counted, scratch = job.is_counted, job.scratch[band]
+    by_a = scratch[_GRADIENT + y % N_ROWS, _PAD + first : _PAD + end]
     if is_counted.shape[1]:
         counted = is_counted[y, first // 3 : end // 3]
         for pixel in range(counted.shape[0]):
             if not counted[pixel]:
                 for x in range(3 * pixel, 3 * pixel + 3):
                     by_a[x] = _ZERO
-    out, factors = gradient[y, first:end], gains[first:end]
+    out, factors = job.gradient[y, first:end], job.gains[first:end]
     for x in range(by_a.shape[0]):
         out[x] = by_a[x] * factors[x]
-    if has_gain:
-        values = image[y, first:end]
+    if job.has_gain:
+        gain_total = scratch[_GAIN_SUM, first:end]
+        values = job.image[y, first:end]
         for x in range(by_a.shape[0]):
             slope = by_a[x]  # a slope of zero takes nothing from the image, not even NaN
             gain_total[x] += slope * values[x] if slope != _ZERO else _ZERO
 
 
-@njit(**_INNER)
-def _moment_stage(scratch, y, first, end, has_moments):
-    """Stage 1 of one row: products, and blur along the row."""
-    row_bytes = scratch.shape[1] * 4
-    base = np.int64(scratch.ctypes.data) + _PAD * 4
+@routine(ints(6), fastmath=_FASTMATH)
+def _moment_stage(scratch, row_bytes, y, first, end, has_moments):
+    """Stage 1 of one row: products, and blur along the row. `scratch` is the address of a band's."""
+    base = scratch + _PAD * 4
     slot = y & (RING_ROWS - 1)
     a, b, target = base + (_A + slot) * row_bytes, base + (_B + slot) * row_bytes, base + (_MOMENTS + slot) * row_bytes
     ring_bytes = RING_ROWS * row_bytes
@@ -160,9 +248,11 @@ def _moment_stage(scratch, y, first, end, has_moments):
             blur_moments(a + v * 64, b + v * 64, target + v * 64, ring_bytes)
 
 
-@njit(**_INNER)
-def _ssim_stage(scratch, lane_sums, first_row, first, end, lower, upper, moments):
+@routine(ints(7), fastmath=_FASTMATH)
+def _ssim_stage(arguments, band, first_row, first, end, lower, upper):
     """Stage 2 of four rows: SSIM, its derivatives in temporary rows, and sums of 1 - SSIM."""
+    job = _read_job(arguments)
+    scratch, lane_sums, moments = job.scratch[band], job.lane_sums[band], job.moments
     row_bytes = scratch.shape[1] * 4
     base = np.int64(scratch.ctypes.data) + _PAD * 4
     rings, terms, inside = base + _MOMENTS * row_bytes, base + _TERMS * row_bytes, base + _INSIDE * row_bytes
@@ -190,11 +280,10 @@ def _ssim_stage(scratch, lane_sums, first_row, first, end, lower, upper, moments
         )
 
 
-@njit(**_INNER)
-def _term_stage(scratch, first_row, first, end):
+@routine(ints(5), fastmath=_FASTMATH)
+def _term_stage(scratch, row_bytes, first_row, first, end):
     """End of stage 2 of four rows: derivatives blurred along the row, into their rings."""
-    row_bytes = scratch.shape[1] * 4
-    base = np.int64(scratch.ctypes.data) + _PAD * 4
+    base = scratch + _PAD * 4
     for index in range(3):
         for row in range(N_ROWS):
             source = base + (_TERMS + N_ROWS * index + row) * row_bytes
@@ -204,59 +293,45 @@ def _term_stage(scratch, first_row, first, end):
                 blur_along(source + v * 64, target + v * 64)
 
 
-@njit(**_INNER)
-def _gradient_stage(scratch, lane_sums, first_row, first, end, scales):
+@routine(ints(7), fastmath=_FASTMATH)
+def _gradient_stage(scratch, row_bytes, first_row, first, end, sums, scales):
     """Stage 3 of four rows: gradient by a in temporary rows, and sums of |a - b| and (a - b)^2."""
-    row_bytes = scratch.shape[1] * 4
-    base = np.int64(scratch.ctypes.data) + _PAD * 4
+    base = scratch + _PAD * 4
     partials, target = base + _PARTIALS * row_bytes, base + _GRADIENT * row_bytes
-    sums, scales_address = np.int64(lane_sums.ctypes.data), np.int64(scales.ctypes.data)
     for v in range(first, end):
         offset = v * 64
-        gradient_rows(partials, base, row_bytes, first_row, offset, scales_address, target + offset, sums)
+        gradient_rows(partials, base, row_bytes, first_row, offset, scales, target + offset, sums)
 
 
-@njit(**_INNER)
-def _clear_rows(scratch, ring, n_rings, y):
+@routine(ints(5), fastmath=_FASTMATH)
+def _clear_rows(scratch, row_bytes, ring, n_rings, y):
     """Zeros in the slot of row y of rings that follow each other: nothing lies outside the picture."""
     for index in range(n_rings):
-        row = ring + RING_ROWS * index + (y & (RING_ROWS - 1))
-        for x in range(scratch.shape[1]):
-            scratch[row, x] = _ZERO
+        row = scratch + row_bytes * (ring + RING_ROWS * index + (y & (RING_ROWS - 1)))
+        for v in range(row_bytes // 64):
+            clear_lanes(row + 64 * v)
 
 
-@njit(**_INNER)
+@routine(types.float64(types.int64, types.int64))
 def _sum_lanes(vectors, index):
     """One of the sums, in float64."""
     total = 0.0
     for lane in range(16):
-        total += vectors[16 * index + lane]
+        total += load_float(vectors + 64 * index + 4 * lane)
     return total
 
 
-@njit(**_INNER)
-def _loss_band(
-    image,
-    truth,
-    truth_bytes,
-    gains,
-    has_gain,
-    is_counted,
-    active,
-    moments,
-    scales,
-    strip,
-    first_row,
-    end_row,
-    scratch,
-    lane_sums,
-    runs,
-    gradient,
-    sums,
-    gain_sums,
-):
-    """One strip of the rows first_row .. end_row; see the module docstring."""
-    height, n_values = image.shape
+@routine(ints(3), fastmath=_FASTMATH)
+def _loss_strip(arguments, band, strip):
+    """One strip of a band; see the module docstring."""
+    job = _read_job(arguments)
+    sums, gain_sums, runs, gradient = job.sums, job.gain_sums, job.runs[band], job.gradient
+    scratch, lane_sums = job.scratch[band], job.lane_sums[band]
+    first_row, end_row = job.band_rows[band], job.band_rows[band + 1]
+    has_moments = np.int64(len(job.moments) > 0)
+    address, row_bytes = np.int64(scratch.ctypes.data), 4 * scratch.shape[1]
+    sums_address, scales_address = np.int64(lane_sums.ctypes.data), np.int64(job.scales.ctypes.data)
+    height, n_values = job.image.shape
     n_vectors = (scratch.shape[1] - 2 * _PAD) // 16
     lower = strip * _STRIP_TILES * _TILE_VECTORS
     upper = min(lower + _STRIP_TILES * _TILE_VECTORS, n_vectors)
@@ -265,44 +340,43 @@ def _loss_band(
         # stage 1, rows c + 10 .. c + 13: rows up to c + 25 of the picture may look at them
         for dilation in (3, 2):
             near, far = max(lower - dilation, 0), min(upper + dilation, n_vectors)
-            n_runs = _find_runs(active, c, c + 25, height, dilation, near, far, runs)
+            n_runs = _find_runs(arguments, band, c, c + 25, dilation, near, far)
             for y in range(c + 2 * RADIUS, c + 2 * RADIUS + N_ROWS):
                 if y < 0 or y >= height:
-                    _clear_rows(scratch, _MOMENTS, 4, y)
+                    _clear_rows(address, row_bytes, _MOMENTS, 4, y)
                     continue
-                for run in range(n_runs):
-                    first, end = runs[run, 0], runs[run, 1]
+                for index in range(n_runs):
+                    first, end = runs[index, 0], runs[index, 1]
                     if dilation == 3:
-                        end = min(16 * end, n_values)
-                        _load_row(image, truth, truth_bytes, gains, is_counted, active, y, 16 * first, end, scratch)
+                        _load_row(arguments, band, y, 16 * first, min(16 * end, n_values))
                     else:
-                        _moment_stage(scratch, y, first, end, moments.shape[0] > 0)
+                        _moment_stage(address, row_bytes, y, first, end, has_moments)
         if c < first_row - 3 * N_ROWS:
             continue
         # stage 2, rows c + 5 .. c + 8
         for index in range(16 * _N_SUMS):
             lane_sums[index] = _ZERO
         near, far = max(lower - 1, 0), min(upper + 1, n_vectors)
-        n_runs = _find_runs(active, c, c + 13, height, 1, near, far, runs)
-        for run in range(n_runs):
-            _ssim_stage(scratch, lane_sums, c + RADIUS, runs[run, 0], runs[run, 1], lower, upper, moments)
-        n_runs = _find_runs(active, c, c + 13, height, 0, lower, upper, runs)
-        for run in range(n_runs):
-            _term_stage(scratch, c + RADIUS, runs[run, 0], runs[run, 1])
+        n_runs = _find_runs(arguments, band, c, c + 13, 1, near, far)
+        for index in range(n_runs):
+            _ssim_stage(arguments, band, c + RADIUS, runs[index, 0], runs[index, 1], lower, upper)
+        n_runs = _find_runs(arguments, band, c, c + 13, 0, lower, upper)
+        for index in range(n_runs):
+            _term_stage(address, row_bytes, c + RADIUS, runs[index, 0], runs[index, 1])
         for row in range(N_ROWS):
             y = c + RADIUS + row
             if y < 0 or y >= height:
-                _clear_rows(scratch, _PARTIALS, 3, y)
+                _clear_rows(address, row_bytes, _PARTIALS, 3, y)
             elif first_row <= y < end_row:
-                sums[y, strip, 2] = _sum_lanes(lane_sums, 2 * N_ROWS + row)
+                sums[y, strip, 2] = _sum_lanes(sums_address, 2 * N_ROWS + row)
         if c < first_row:
             continue
         # stage 3, rows c .. c + 3
-        n_runs = _find_runs(active, c, c + 3, height, 0, lower, upper, runs)
-        for run in range(n_runs):
-            _gradient_stage(scratch, lane_sums, c, runs[run, 0], runs[run, 1], scales)
+        n_runs = _find_runs(arguments, band, c, c + 3, 0, lower, upper)
+        for index in range(n_runs):
+            _gradient_stage(address, row_bytes, c, runs[index, 0], runs[index, 1], sums_address, scales_address)
         gain_total = scratch[_GAIN_SUM]
-        if has_gain:
+        if job.has_gain:
             for x in range(gain_total.shape[0]):
                 gain_total[x] = _ZERO
         is_whole = n_runs == 1 and runs[0, 0] == lower and runs[0, 1] == upper
@@ -312,80 +386,45 @@ def _loss_band(
                 out = gradient[y, first_value:end_value]
                 for x in range(out.shape[0]):
                     out[x] = _ZERO
-            for run in range(n_runs):
-                first, end = 16 * runs[run, 0], min(16 * runs[run, 1], n_values)
-                by_a = scratch[_GRADIENT + row, _PAD + first : _PAD + end]
-                total = gain_total[first:end]
-                _finish_row(image, gains, has_gain, is_counted, y, first, end, by_a, total, gradient)
-            sums[y, strip, 0] = _sum_lanes(lane_sums, row)
-            sums[y, strip, 1] = _sum_lanes(lane_sums, N_ROWS + row)
-        if has_gain:
+            for index in range(n_runs):
+                _finish_row(arguments, band, y, 16 * runs[index, 0], min(16 * runs[index, 1], n_values))
+            sums[y, strip, 0] = _sum_lanes(sums_address, row)
+            sums[y, strip, 1] = _sum_lanes(sums_address, N_ROWS + row)
+        if job.has_gain:
             for pixel in range(first_value // 3, end_value // 3):
                 for channel in range(3):
                     gain_sums[c // N_ROWS, strip, channel] += gain_total[3 * pixel + channel]
 
 
-@njit(parallel=True, cache=True, **_OPTIONS)
-def _loss_kernel(
-    image,
-    truth,
-    truth_bytes,
-    gains,
-    has_gain,
-    is_counted,
-    active,
-    moments,
-    scales,
-    band_rows,
-    scratch,
-    lane_sums,
-    runs,
-    gradient,
-    sums,
-    gain_sums,
-):
-    for band in prange(band_rows.shape[0] - 1):
-        for strip in range(sums.shape[1]):
-            _loss_band(
-                image,
-                truth,
-                truth_bytes,
-                gains,
-                has_gain,
-                is_counted,
-                active,
-                moments,
-                scales,
-                strip,
-                band_rows[band],
-                band_rows[band + 1],
-                scratch[band],
-                lane_sums[band],
-                runs[band],
-                gradient,
-                sums,
-                gain_sums,
-            )
+@routine(WORKER)
+def loss_band(worker, arguments):
+    """One band, strip by strip, since strips share its scratch; see LossJob."""
+    for strip in range(_read_job(arguments).sums.shape[1]):
+        _loss_strip(arguments, worker, strip)
 
 
-@njit(cache=True, **_OPTIONS)
-def _moment_kernel(truth, truth_bytes, height, n_values, scratch, moments):
+@routine(WORKER, fastmath=_FASTMATH)
+def blur_truth(worker, arguments):
     """Blurred b and b^2 of a picture, on one thread: it is done once per picture."""
+    job = _read_moment_job(arguments)
+    truth, truth_bytes, scratch, moments = job.truth, job.truth_bytes, job.scratch, job.moments
+    height, n_values = job.height, job.n_values
+    address = np.int64(scratch.ctypes.data)
     row_bytes = scratch.shape[1] * 4
-    rings = np.int64(scratch.ctypes.data) + (_PAD + (_MOMENTS + RING_ROWS) * scratch.shape[1]) * 4
+    rings = address + (_PAD + (_MOMENTS + RING_ROWS) * scratch.shape[1]) * 4
     target = np.int64(moments.ctypes.data) + (_PAD + _MARGIN_ROWS * scratch.shape[1]) * 4
     n_vectors = (scratch.shape[1] - 2 * _PAD) // 16
     for c in range(-2 * N_ROWS, height, N_ROWS):
         for y in range(c + RADIUS, c + RADIUS + N_ROWS):
             if y < 0 or y >= height:
-                _clear_rows(scratch, _MOMENTS, 4, y)
+                _clear_rows(address, row_bytes, _MOMENTS, 4, y)
                 continue
             slot = y & (RING_ROWS - 1)
             for x in range(n_values):
                 b = np.float32(truth_bytes[y, x]) * _BYTE if truth_bytes.shape[1] else truth[y, x]
                 scratch[_A + slot, _PAD + x] = _ZERO
                 scratch[_B + slot, _PAD + x] = b
-            _moment_stage(scratch, y, 0, n_vectors, False)
+            _moment_stage(address, row_bytes, y, 0, n_vectors, 0)
         if c >= 0:
             for v in range(n_vectors):
                 for index in range(2):
@@ -462,11 +501,11 @@ def loss_terms(
     gradient = workspace.gradient()
     sums = np.zeros((height, workspace.n_strips, 3))
     gain_sums = np.zeros((-(-height // N_ROWS), workspace.n_strips, 3))
-    _loss_kernel(
+    job = LossJob(
         image.reshape(height, -1),
         *_two_truths(truth),
         np.tile(gains, width),
-        gain is not None,
+        int(gain is not None),
         np.empty((height, 0), bool) if is_counted is None else is_counted,
         active,
         np.empty((0, 0, 0), np.float32) if moments is None else moments,
@@ -475,10 +514,11 @@ def loss_terms(
         workspace.rows(n_bands),
         _aligned_zeros((n_bands, 16 * _N_SUMS)),
         np.empty((n_bands, active.shape[1] + 1, 2), np.int64),
-        gradient.numpy().reshape(height, -1),
+        gradient.view(height, -1),
         sums,
         gain_sums,
     )
+    run(loss_band, pack(job), n_bands)
     l1, square, dissimilarity = (float(total) for total in sums.sum((0, 1)))
     return LossTerms(l1, square, dissimilarity, gradient, gain_sums.sum((0, 1)))
 
@@ -491,7 +531,8 @@ def blurred_truth(truth: np.ndarray) -> np.ndarray:
     """
     height, width = truth.shape[:2]
     moments = _aligned_zeros((2, height + 2 * _MARGIN_ROWS, _row_floats(width)))
-    _moment_kernel(*_two_truths(truth), height, 3 * width, LossWorkspace(height, width).rows(1)[0], moments)
+    job = MomentJob(*_two_truths(truth), height, 3 * width, LossWorkspace(height, width).rows(1)[0], moments)
+    run(blur_truth, pack(job), n_workers=1)
     return moments
 
 

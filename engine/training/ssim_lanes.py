@@ -255,3 +255,16 @@ def gradient_rows(typing_context, partial_rings, image_ring, row_bytes, first_ro
         return context.get_dummy_value()
 
     return signature, generate
+
+
+@kernel_intrinsic
+def clear_lanes(typing_context, target):
+    """Zeros in sixteen values."""
+    signature = types.void(types.int64)
+
+    def generate(context, builder, signature, arguments):
+        build = LaneBuilder(builder)
+        build.store(build.constant(0.0), arguments[0])
+        return context.get_dummy_value()
+
+    return signature, generate

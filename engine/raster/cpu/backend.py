@@ -19,6 +19,8 @@ import torch
 from numba import get_num_threads
 from torch import Tensor
 
+from engine.kernels.arrays import pack
+from engine.kernels.routines import run
 from engine.kernels.threads import parallel_guard
 from engine.kernels.workspace import Workspace, WorkspacePool
 from engine.raster.cpu import binning, blend, blend_backward, project, project_backward, sort
@@ -195,9 +197,8 @@ def _background_gradient(grad_image: Tensor | None, transmittance: Tensor, tile_
 def _draw(request: _Request, parameters: Sequence[Tensor], centers: np.ndarray | None, has_backward: bool) -> _Drawing:
     """Project, sort and bin: everything that does not depend on colours."""
     workspace = POOL.take()
-    means, quats, scales, opacities, colors = (tensor.detach().numpy() for tensor in parameters)
     view, tile_mask = request.view, request.tile_mask
-    n_rows = len(means)
+    n_rows = len(parameters[0])
     n_threads = get_num_threads()
     camera = camera_row(view)
     n_columns, n_tile_rows = -(-view.width // TILE), -(-view.height // TILE)
@@ -208,7 +209,8 @@ def _draw(request: _Request, parameters: Sequence[Tensor], centers: np.ndarray |
     depths = workspace.array("depths", (n_padded,), np.float32)
     mask_sums = binning.mask_sums(tile_mask) if tile_mask.size else _NO_MASK_SUMS
     if n_rows:
-        project.project(
+        means, quats, scales, opacities, colors = parameters
+        job = project.ProjectJob(
             means,
             quats,
             scales,
@@ -217,9 +219,12 @@ def _draw(request: _Request, parameters: Sequence[Tensor], centers: np.ndarray |
             camera,
             mask_sums,
             unsorted,
+            unsorted.view(np.int32),
             depths,
             _NO_CENTERS if centers is None else centers,
+            n_threads,
         )
+        run(project.project, pack(job), n_threads)
 
     order = workspace.array("order", (n_padded,), np.uint32)
     scratch = [workspace.array(name, (n_padded,), np.uint32) for name in ("key_a", "key_b", "order_b")]
@@ -232,7 +237,8 @@ def _draw(request: _Request, parameters: Sequence[Tensor], centers: np.ndarray |
     pairs_of_row.fill(0)
     tile_starts = workspace.array("tile_starts", (n_tiles + 1,), np.int64)
     flat_mask = tile_mask.reshape(-1)
-    binning.gather_and_count(unsorted, order, n_kept, n_columns, flat_mask, records, packed, counts, pairs_of_row)
+    job = binning.CountJob(unsorted, order, n_kept, n_columns, flat_mask, records, packed, counts, pairs_of_row)
+    run(binning.gather_and_count, pack(job), n_threads)
     n_pairs = binning.place_pairs(counts, tile_starts)
     if n_pairs > _MAX_PAIRS:
         raise MemoryError(f"{n_kept} Gaussians cover {n_pairs} tiles of {TILE} px; at most {_MAX_PAIRS} are possible")
@@ -244,9 +250,10 @@ def _draw(request: _Request, parameters: Sequence[Tensor], centers: np.ndarray |
         n_trained, n_slots = binning.place_slots(pairs_of_row, request.is_frozen, trained, row_slots)
         pair_slots = workspace.array("pair_slots", (n_pairs,), np.int32)
     pair_records = workspace.array("pair_records", (n_pairs,), np.int32)
-    binning.fill_pairs(
+    job = binning.FillJob(
         records, packed, order, n_kept, n_columns, flat_mask, counts, row_slots, pair_records, pair_slots
     )
+    run(binning.fill_pairs, pack(job), n_threads)
     return _Drawing(
         workspace=workspace,
         view=view,
@@ -281,19 +288,21 @@ def _blend(drawing: _Drawing, background: Tensor) -> tuple[Tensor, Tensor, Tenso
     image = torch.empty(view.height, view.width, 3)
     transmittance = torch.empty(view.height, view.width)
     alpha = torch.empty(view.height, view.width, 1)
-    blend.blend_tiles(
+    n_threads = get_num_threads()
+    job = blend.BlendJob(
         drawing.records,
         drawing.tile_starts,
         drawing.pair_records,
         drawing.n_columns,
-        background.detach().numpy(),
-        image.numpy(),
-        transmittance.numpy(),
-        alpha.numpy()[..., 0],
+        background,
+        image,
+        transmittance,
+        alpha[..., 0],
         drawing.pair_blocks,
-        drawing.workspace.array("scratch", (get_num_threads(), SCRATCH_FLOATS), np.float32),
+        drawing.workspace.array("scratch", (n_threads, SCRATCH_FLOATS), np.float32),
         np.zeros(1, np.int64),
     )
+    run(blend.blend_tiles, pack(job), n_threads)
     return image, transmittance, alpha
 
 
@@ -311,29 +320,31 @@ def _differentiate(
     if grad_image is None:
         grad_image = torch.zeros_like(image)
     workspace = drawing.workspace
-    scratch = workspace.array("scratch", (get_num_threads(), SCRATCH_FLOATS), np.float32)
+    n_threads = get_num_threads()
+    scratch = workspace.array("scratch", (n_threads, SCRATCH_FLOATS), np.float32)
     # one row more than is used: a row of twelve floats is read as sixteen
     pair_sums = workspace.array(_EARLY_AND_LATE, (drawing.n_slots + 1, PAIR_FLOATS), np.float32)
-    blend_backward.replay_tiles(
+    job = blend_backward.ReplayJob(
         drawing.records,
         drawing.tile_starts,
         drawing.pair_records,
         drawing.pair_slots,
         drawing.n_columns,
-        image.numpy(),
-        transmittance.numpy(),
-        grad_image.contiguous().numpy(),
-        _NO_PIXELS if grad_alpha is None else grad_alpha[..., 0].contiguous().numpy(),
+        image,
+        transmittance,
+        grad_image.contiguous(),
+        _NO_PIXELS if grad_alpha is None else grad_alpha[..., 0].contiguous(),
         drawing.pair_blocks,
         pair_sums,
         scratch,
         np.zeros(1, np.int64),
     )
-    means, quats, scales, opacities, _ = (tensor.detach().numpy() for tensor in parameters)
+    run(blend_backward.replay_tiles, pack(job), n_threads)
+    means, quats, scales, opacities, _ = parameters
     grads = [torch.empty_like(tensor) for tensor in parameters]
-    grad_means, grad_quats, grad_scales, grad_opacities, grad_colors = (grad.numpy() for grad in grads)
+    grad_means, grad_quats, grad_scales, grad_opacities, grad_colors = grads
     grad_centers = torch.empty(len(means), 2)
-    project_backward.project_backward(
+    job = project_backward.BackwardJob(
         drawing.trained,
         drawing.n_trained,
         drawing.pairs_of_row,
@@ -350,6 +361,7 @@ def _differentiate(
         grad_scales,
         grad_opacities,
         grad_colors,
-        grad_centers.numpy(),
+        grad_centers,
     )
+    run(project_backward.project_backward, pack(job), n_threads)
     return grads, grad_centers

@@ -8,10 +8,14 @@ number of threads. A Gaussian's span of tiles is exact per tile row where its bo
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
+from engine.kernels.arrays import Flags1, Floats2, Ints2, Rows1, SmallInts1, SmallInts2, job_reader
+from engine.kernels.lanes import kernel_intrinsic
+from engine.kernels.routines import WORKER, routine
 from engine.raster.cpu import record as rec
 from engine.raster.cpu.record import f4
 from engine.raster.cpu.tile import prefetch
@@ -79,43 +83,70 @@ def mask_sums(tile_mask: np.ndarray) -> np.ndarray:
     return np.pad(tile_mask.cumsum(0, np.int32).cumsum(1, np.int32), ((1, 0), (1, 0)))
 
 
-@njit(parallel=True, **rec.KERNEL_OPTIONS)
-def gather_and_count(unsorted, order, n_records, n_columns, tile_mask, records, packed, counts, pairs_of_row):
-    """Put the records into depth order, so that blending reads them almost in order, and count their tiles.
+class CountJob(NamedTuple):
+    """Arguments of `gather_and_count`, one worker a chunk.
 
-    Args:
-        unsorted: Records by row. order: Rows by depth. [n_records] uint32
+    It puts the records into depth order, so that blending reads them almost in order, and counts their tiles.
+
+    Attributes:
+        unsorted: Records by row.
+        order: Rows by depth. [n_records]
         n_columns: Tiles per image row.
-        tile_mask: Tiles that are wanted, empty for all. [tiles] bool
-        records: Sorted records, written; `packed` is the same memory as int32.
-        counts: Pairs per chunk and tile, written. [chunks, tiles] int64
-        pairs_of_row: Tiles of each row with a record, written. [N] int32
+        tile_mask: Tiles that are wanted, empty for all. [tiles]
+        records: Sorted records, written.
+        packed: The same memory as int32.
+        counts: Pairs per chunk and tile, written. [chunks, tiles]
+        pairs_of_row: Tiles of each row with a record, written. [N]
     """
-    n_chunks = len(counts)
+
+    unsorted: Floats2
+    order: Rows1
+    n_records: int
+    n_columns: int
+    tile_mask: Flags1
+    records: Floats2
+    packed: SmallInts2
+    counts: Ints2
+    pairs_of_row: SmallInts1
+
+
+@kernel_intrinsic
+def _read_gather_and_count(typing_context, address):
+    """The CountJob at an address."""
+    return job_reader(CountJob)
+
+
+@routine(WORKER, fastmath=rec.FASTMATH)
+def gather_and_count(worker, arguments):
+    """See CountJob."""
+    job = _read_gather_and_count(arguments)
+    unsorted, order, n_records, n_columns = job.unsorted, job.order, job.n_records, job.n_columns
+    tile_mask, records, packed, counts = job.tile_mask, job.records, job.packed, job.counts
+    pairs_of_row = job.pairs_of_row
+    chunk, n_chunks = worker, len(counts)
     has_mask = len(tile_mask) > 0
-    for chunk in prange(n_chunks):
-        for tile in range(counts.shape[1]):
-            counts[chunk, tile] = 0
-        address = np.int64(unsorted.ctypes.data)
-        end = n_records * (chunk + 1) // n_chunks
-        for i in range(n_records * chunk // n_chunks, end):
-            prefetch(address + np.int64(order[min(i + _AHEAD, end - 1)]) * _RECORD_BYTES)
-            row = order[i]
-            for column in range(rec.RECORD_FLOATS):
-                records[i, column] = unsorted[row, column]
-            first_column, last_column = packed[i, _COLUMNS] & 0xFFFF, packed[i, _COLUMNS] >> 16
-            first_row, last_row = packed[i, _ROWS] & 0xFFFF, packed[i, _ROWS] >> 16
-            is_box = first_column == last_column or first_row == last_row
-            total = 0
-            for tile_row in range(first_row, last_row + 1):
-                left, right = first_column, last_column
-                if not is_box:
-                    left, right = _span_of_row(records, i, tile_row, first_column, last_column)
-                for tile in range(tile_row * n_columns + left, tile_row * n_columns + right + 1):
-                    if not has_mask or tile_mask[tile]:
-                        counts[chunk, tile] += 1
-                        total += 1
-            pairs_of_row[row] = total
+    for tile in range(counts.shape[1]):
+        counts[chunk, tile] = 0
+    address = np.int64(unsorted.ctypes.data)
+    end = n_records * (chunk + 1) // n_chunks
+    for i in range(n_records * chunk // n_chunks, end):
+        prefetch(address + np.int64(order[min(i + _AHEAD, end - 1)]) * _RECORD_BYTES)
+        row = order[i]
+        for column in range(rec.RECORD_FLOATS):
+            records[i, column] = unsorted[row, column]
+        first_column, last_column = packed[i, _COLUMNS] & 0xFFFF, packed[i, _COLUMNS] >> 16
+        first_row, last_row = packed[i, _ROWS] & 0xFFFF, packed[i, _ROWS] >> 16
+        is_box = first_column == last_column or first_row == last_row
+        total = 0
+        for tile_row in range(first_row, last_row + 1):
+            left, right = first_column, last_column
+            if not is_box:
+                left, right = _span_of_row(records, i, tile_row, first_column, last_column)
+            for tile in range(tile_row * n_columns + left, tile_row * n_columns + right + 1):
+                if not has_mask or tile_mask[tile]:
+                    counts[chunk, tile] += 1
+                    total += 1
+        pairs_of_row[row] = total
 
 
 @njit(**rec.KERNEL_OPTIONS)
@@ -160,39 +191,63 @@ def place_slots(pairs_of_row, is_frozen, trained, row_slots):
     return n_trained, n_slots
 
 
-@njit(parallel=True, **rec.KERNEL_OPTIONS)
-def fill_pairs(records, packed, order, n_records, n_columns, tile_mask, counts, row_slots, pair_records, pair_slots):
-    """Write the lists.
+class FillJob(NamedTuple):
+    """Arguments of `fill_pairs`, one worker a chunk. It writes the lists.
 
-    Args:
+    Attributes:
         counts: Start positions from `place_pairs`; advanced.
         row_slots: Of `place_slots`; empty where no gradient is wanted.
-        pair_records: Record of each pair, tile by tile in depth order. [pairs] int32
-        pair_slots: Row of each pair in the buffer of sums, -1 without. [pairs] int32, left alone without row_slots
-        Others: As in `gather_and_count`.
+        pair_records: Record of each pair, tile by tile in depth order. [pairs]
+        pair_slots: Row of each pair in the buffer of sums, -1 without; left alone without row_slots. [pairs]
+        Others: As in `CountJob`.
     """
-    n_chunks = len(counts)
+
+    records: Floats2
+    packed: SmallInts2
+    order: Rows1
+    n_records: int
+    n_columns: int
+    tile_mask: Flags1
+    counts: Ints2
+    row_slots: SmallInts1
+    pair_records: SmallInts1
+    pair_slots: SmallInts1
+
+
+@kernel_intrinsic
+def _read_fill_pairs(typing_context, address):
+    """The FillJob at an address."""
+    return job_reader(FillJob)
+
+
+@routine(WORKER, fastmath=rec.FASTMATH)
+def fill_pairs(worker, arguments):
+    """See FillJob."""
+    job = _read_fill_pairs(arguments)
+    records, packed, order, n_records = job.records, job.packed, job.order, job.n_records
+    n_columns, tile_mask, counts, row_slots = job.n_columns, job.tile_mask, job.counts, job.row_slots
+    pair_records, pair_slots = job.pair_records, job.pair_slots
+    chunk, n_chunks = worker, len(counts)
     has_mask = len(tile_mask) > 0
     has_slots = len(row_slots) > 0
-    for chunk in prange(n_chunks):
-        for i in range(n_records * chunk // n_chunks, n_records * (chunk + 1) // n_chunks):
-            first_column, last_column = packed[i, _COLUMNS] & 0xFFFF, packed[i, _COLUMNS] >> 16
-            first_row, last_row = packed[i, _ROWS] & 0xFFFF, packed[i, _ROWS] >> 16
-            is_box = first_column == last_column or first_row == last_row
-            slot = np.int32(-1)
-            if has_slots:
-                slot = row_slots[order[i]]
-            for tile_row in range(first_row, last_row + 1):
-                left, right = first_column, last_column
-                if not is_box:
-                    left, right = _span_of_row(records, i, tile_row, first_column, last_column)
-                for tile in range(tile_row * n_columns + left, tile_row * n_columns + right + 1):
-                    if has_mask and not tile_mask[tile]:
-                        continue
-                    pair = counts[chunk, tile]
-                    counts[chunk, tile] = pair + 1
-                    pair_records[pair] = i
-                    if has_slots:
-                        pair_slots[pair] = slot
-                        if slot >= 0:
-                            slot += np.int32(1)
+    for i in range(n_records * chunk // n_chunks, n_records * (chunk + 1) // n_chunks):
+        first_column, last_column = packed[i, _COLUMNS] & 0xFFFF, packed[i, _COLUMNS] >> 16
+        first_row, last_row = packed[i, _ROWS] & 0xFFFF, packed[i, _ROWS] >> 16
+        is_box = first_column == last_column or first_row == last_row
+        slot = np.int32(-1)
+        if has_slots:
+            slot = row_slots[order[i]]
+        for tile_row in range(first_row, last_row + 1):
+            left, right = first_column, last_column
+            if not is_box:
+                left, right = _span_of_row(records, i, tile_row, first_column, last_column)
+            for tile in range(tile_row * n_columns + left, tile_row * n_columns + right + 1):
+                if has_mask and not tile_mask[tile]:
+                    continue
+                pair = counts[chunk, tile]
+                counts[chunk, tile] = pair + 1
+                pair_records[pair] = i
+                if has_slots:
+                    pair_slots[pair] = slot
+                    if slot >= 0:
+                        slot += np.int32(1)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from numba import njit, prange, types
+from numba import types
 from numba.core import cgutils
 
 from engine.conventions import ALPHA_MAX, TRANSMITTANCE_MIN
+from engine.kernels.arrays import Floats1, Floats2, Floats3, Ints1, SmallInts1, job_reader
 from engine.kernels.lanes import LaneBuilder, kernel_intrinsic
-from engine.kernels.routines import take_next
+from engine.kernels.routines import WORKER, routine, take_next
 from engine.raster.cpu import record as rec
 from engine.raster.cpu import tile as tl
 from engine.raster.cpu.record import f4
@@ -75,95 +78,108 @@ def _find_open_blocks(typing_context, scratch):
     return signature, generate
 
 
-@njit(parallel=True, **rec.KERNEL_OPTIONS)
-def blend_tiles(
-    records,
-    tile_starts,
-    pair_records,
-    n_columns,
-    background,
-    image,
-    transmittance,
-    alpha,
-    pair_blocks,
-    scratch,
-    counter,
-):
-    """Render all tiles; one without pairs holds the background.
+class BlendJob(NamedTuple):
+    """Arguments of `blend_tiles`, which renders all tiles; one without pairs holds the background.
 
-    Args:
-        records: Sorted records. [R, 16] float32, 64-byte aligned
+    Attributes:
+        records: Sorted records. [R, 16] 64-byte aligned
         tile_starts, pair_records: Lists of `fill_pairs`.
         n_columns: Tiles per image row.
-        background: [3] float32
-        image: Written. [H, W, 3] float32
-        transmittance, alpha: What is let through behind the last Gaussian, and one minus it, written. [H, W] float32
-        pair_blocks: Blocks changed by each pair, written; the backward pass visits only these. [pairs] int64
-        scratch: One row per thread. [threads, SCRATCH_FLOATS] float32, 64-byte aligned
-        counter: [1] int64, zero: the next tile. Which thread renders a tile does not change its result.
+        background: [3]
+        image: Written. [H, W, 3]
+        transmittance, alpha: What is let through behind the last Gaussian, and one minus it, written. [H, W]
+        pair_blocks: Blocks of the tile that each pair changed, one bit each, written. [pairs]
+        scratch: One row per worker, 64-byte aligned. [workers, SCRATCH_FLOATS]
+        counter: Next tile, zero. [1]
     """
+
+    records: Floats2
+    tile_starts: Ints1
+    pair_records: SmallInts1
+    n_columns: int
+    background: Floats1
+    image: Floats3
+    transmittance: Floats2
+    alpha: Floats2
+    pair_blocks: Ints1
+    scratch: Floats2
+    counter: Ints1
+
+
+@kernel_intrinsic
+def _read_blend_tiles(typing_context, address):
+    """The BlendJob at an address."""
+    return job_reader(BlendJob)
+
+
+@routine(WORKER, fastmath=rec.FASTMATH)
+def blend_tiles(worker, arguments):
+    """See BlendJob."""
+    job = _read_blend_tiles(arguments)
+    records, tile_starts, pair_records, n_columns = job.records, job.tile_starts, job.pair_records, job.n_columns
+    background, image, transmittance, alpha = job.background, job.image, job.transmittance, job.alpha
+    pair_blocks, scratch, counter = job.pair_blocks, job.scratch, job.counter
     height, width = transmittance.shape
     n_tiles = len(tile_starts) - 1
-    for worker in prange(len(scratch)):
-        row = scratch[worker]
-        address = np.int64(row.ctypes.data)
-        records_address = np.int64(records.ctypes.data)
-        counter_address = np.int64(counter.ctypes.data)
-        write_block_centers(address)
-        tile = take_next(counter_address)
-        while tile < n_tiles:
-            tile_x = (tile % n_columns) * _TILE
-            tile_y = (tile // n_columns) * _TILE
-            end_x, end_y = min(tile_x + _TILE, width), min(tile_y + _TILE, height)
-            pair = tile_starts[tile]
-            end = tile_starts[tile + 1]
-            if pair == end:
-                for y in range(tile_y, end_y):
-                    for x in range(tile_x, end_x):
-                        transmittance[y, x] = f4(1.0)
-                        alpha[y, x] = f4(0.0)
-                        image[y, x, 0] = background[0]
-                        image[y, x, 1] = background[1]
-                        image[y, x, 2] = background[2]
-                tile = take_next(counter_address)
-                continue
-            if tile_x + _TILE <= width and tile_y + _TILE <= height:
-                for place in range(_T, _T + _PLANE):
-                    row[place] = f4(1.0)
-            else:
-                for block in range(_BLOCKS):
-                    block_x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
-                    block_y = tile_y + _BLOCK * (block // _BLOCKS_PER_ROW)
-                    for lane in range(16):
-                        inside = block_x + (lane & 3) < width and block_y + (lane >> 2) < height
-                        row[_T + block * 16 + lane] = f4(1.0) if inside else f4(0.0)
-            for place in range(_R, _R + 3 * _PLANE):
-                row[place] = f4(0.0)
-            open_blocks = _find_open_blocks(address)
-            while pair < end and open_blocks != 0:
-                stop = min(end, pair + _RECHECK_EVERY)
-                while pair < stop:
-                    prefetch(records_address + np.int64(pair_records[min(pair + _AHEAD, end - 1)]) * _RECORD_BYTES)
-                    pair_blocks[pair] = _blend_record(
-                        address,
-                        records_address + np.int64(pair_records[pair]) * _RECORD_BYTES,
-                        f4(tile_x),
-                        f4(tile_y),
-                        open_blocks,
-                    )
-                    pair += 1
-                open_blocks = _find_open_blocks(address)
-            while pair < end:
-                pair_blocks[pair] = 0
-                pair += 1
+    row = scratch[worker]
+    address = np.int64(row.ctypes.data)
+    records_address = np.int64(records.ctypes.data)
+    counter_address = np.int64(counter.ctypes.data)
+    write_block_centers(address)
+    tile = take_next(counter_address)
+    while tile < n_tiles:
+        tile_x = (tile % n_columns) * _TILE
+        tile_y = (tile // n_columns) * _TILE
+        end_x, end_y = min(tile_x + _TILE, width), min(tile_y + _TILE, height)
+        pair = tile_starts[tile]
+        end = tile_starts[tile + 1]
+        if pair == end:
             for y in range(tile_y, end_y):
                 for x in range(tile_x, end_x):
-                    block = ((y - tile_y) >> 2) * _BLOCKS_PER_ROW + ((x - tile_x) >> 2)
-                    place = block * 16 + (y & 3) * 4 + (x & 3)
-                    left_over = row[_T + place]
-                    transmittance[y, x] = left_over
-                    alpha[y, x] = f4(1.0) - left_over
-                    image[y, x, 0] = row[_R + place] + left_over * background[0]
-                    image[y, x, 1] = row[_G + place] + left_over * background[1]
-                    image[y, x, 2] = row[_B + place] + left_over * background[2]
+                    transmittance[y, x] = f4(1.0)
+                    alpha[y, x] = f4(0.0)
+                    image[y, x, 0] = background[0]
+                    image[y, x, 1] = background[1]
+                    image[y, x, 2] = background[2]
             tile = take_next(counter_address)
+            continue
+        if tile_x + _TILE <= width and tile_y + _TILE <= height:
+            for place in range(_T, _T + _PLANE):
+                row[place] = f4(1.0)
+        else:
+            for block in range(_BLOCKS):
+                block_x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
+                block_y = tile_y + _BLOCK * (block // _BLOCKS_PER_ROW)
+                for lane in range(16):
+                    inside = block_x + (lane & 3) < width and block_y + (lane >> 2) < height
+                    row[_T + block * 16 + lane] = f4(1.0) if inside else f4(0.0)
+        for place in range(_R, _R + 3 * _PLANE):
+            row[place] = f4(0.0)
+        open_blocks = _find_open_blocks(address)
+        while pair < end and open_blocks != 0:
+            stop = min(end, pair + _RECHECK_EVERY)
+            while pair < stop:
+                prefetch(records_address + np.int64(pair_records[min(pair + _AHEAD, end - 1)]) * _RECORD_BYTES)
+                pair_blocks[pair] = _blend_record(
+                    address,
+                    records_address + np.int64(pair_records[pair]) * _RECORD_BYTES,
+                    f4(tile_x),
+                    f4(tile_y),
+                    open_blocks,
+                )
+                pair += 1
+            open_blocks = _find_open_blocks(address)
+        while pair < end:
+            pair_blocks[pair] = 0
+            pair += 1
+        for y in range(tile_y, end_y):
+            for x in range(tile_x, end_x):
+                block = ((y - tile_y) >> 2) * _BLOCKS_PER_ROW + ((x - tile_x) >> 2)
+                place = block * 16 + (y & 3) * 4 + (x & 3)
+                left_over = row[_T + place]
+                transmittance[y, x] = left_over
+                alpha[y, x] = f4(1.0) - left_over
+                image[y, x, 0] = row[_R + place] + left_over * background[0]
+                image[y, x, 1] = row[_G + place] + left_over * background[1]
+                image[y, x, 2] = row[_B + place] + left_over * background[2]
+        tile = take_next(counter_address)

@@ -11,15 +11,16 @@ which is all the projection backward needs (moments of the Cholesky form: no can
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange, types
+from numba import types
 from numba.core import cgutils
 
 from engine.conventions import ALPHA_MAX
+from engine.kernels.arrays import Floats2, Floats3, Ints1, SmallInts1, job_reader
 from engine.kernels.lanes import LaneBuilder, Lanes, kernel_intrinsic
-from engine.kernels.routines import take_next
+from engine.kernels.routines import WORKER, routine, take_next
 from engine.raster.cpu import record as rec
 from engine.raster.cpu import tile as tl
 from engine.raster.cpu.record import f4
@@ -109,78 +110,93 @@ def _replay_record(typing_context, scratch, record, tile_x, tile_y, changed_bloc
     return signature, generate
 
 
-@njit(parallel=True, **rec.KERNEL_OPTIONS)
-def replay_tiles(
-    records,
-    tile_starts,
-    pair_records,
-    pair_slots,
-    n_columns,
-    image,
-    transmittance,
-    grad_image,
-    grad_alpha,
-    pair_blocks,
-    pair_sums,
-    scratch,
-    counter,
-):
-    """Fill pair_sums [slots, 12] float32 for all tiles.
+class ReplayJob(NamedTuple):
+    """Arguments of `replay_tiles`, which fills `pair_sums` for all tiles.
 
-    Args:
-        pair_slots: Row of pair_sums of each pair, -1 for pairs of frozen Gaussians. [pairs] int32
+    Attributes:
+        pair_slots: Row of pair_sums of each pair, -1 for pairs of frozen Gaussians. [pairs]
         image, transmittance: Results of `blend_tiles`.
-        grad_image: Upstream gradient. [H, W, 3] float32
-        grad_alpha: Upstream gradient, or empty where it is zero. [H, W] float32
-        Others: As in `blend_tiles`; `counter` is zero again.
+        grad_image: Upstream gradient. [H, W, 3]
+        grad_alpha: Upstream gradient, or empty where it is zero. [H, W]
+        pair_sums: Written. [slots, 12]
+        Others: As in `BlendJob`; `counter` is zero again.
     """
+
+    records: Floats2
+    tile_starts: Ints1
+    pair_records: SmallInts1
+    pair_slots: SmallInts1
+    n_columns: int
+    image: Floats3
+    transmittance: Floats2
+    grad_image: Floats3
+    grad_alpha: Floats2
+    pair_blocks: Ints1
+    pair_sums: Floats2
+    scratch: Floats2
+    counter: Ints1
+
+
+@kernel_intrinsic
+def _read_replay_tiles(typing_context, address):
+    """The ReplayJob at an address."""
+    return job_reader(ReplayJob)
+
+
+@routine(WORKER, fastmath=rec.FASTMATH)
+def replay_tiles(worker, arguments):
+    """See ReplayJob."""
+    job = _read_replay_tiles(arguments)
+    records, tile_starts, pair_records, pair_slots = job.records, job.tile_starts, job.pair_records, job.pair_slots
+    n_columns, image, transmittance, grad_image = job.n_columns, job.image, job.transmittance, job.grad_image
+    grad_alpha, pair_blocks, pair_sums, scratch = job.grad_alpha, job.pair_blocks, job.pair_sums, job.scratch
+    counter = job.counter
     height, width = transmittance.shape
     n_tiles = len(tile_starts) - 1
     has_grad_alpha = len(grad_alpha) > 0
-    for worker in prange(len(scratch)):
-        row = scratch[worker]
-        address = np.int64(row.ctypes.data)
-        records_address = np.int64(records.ctypes.data)
-        sums_address = np.int64(pair_sums.ctypes.data)
-        counter_address = np.int64(counter.ctypes.data)
-        write_block_centers(address)
-        tile = take_next(counter_address)
-        while tile < n_tiles:
-            tile_x = (tile % n_columns) * _TILE
-            tile_y = (tile // n_columns) * _TILE
-            first, end = tile_starts[tile], tile_starts[tile + 1]
-            if first == end:
-                tile = take_next(counter_address)
-                continue
-            if tile_x + _TILE > width or tile_y + _TILE > height:
-                for place in range(5 * _BLOCKS * 16):
-                    row[place] = f4(0.0)
-            for y in range(tile_y, min(tile_y + _TILE, height)):
-                for x in range(tile_x, min(tile_x + _TILE, width)):
-                    block = ((y - tile_y) >> 2) * _BLOCKS_PER_ROW + ((x - tile_x) >> 2)
-                    place = block * 16 + (y & 3) * 4 + (x & 3)
-                    red, green, blue = grad_image[y, x, 0], grad_image[y, x, 1], grad_image[y, x, 2]
-                    remainder = red * image[y, x, 0] + green * image[y, x, 1] + blue * image[y, x, 2]
-                    if has_grad_alpha:
-                        remainder -= grad_alpha[y, x] * transmittance[y, x]
-                    row[_T + place] = f4(1.0)
-                    row[_R + place] = red
-                    row[_G + place] = green
-                    row[_B + place] = blue
-                    row[_E + place] = remainder
-            for pair in range(first, end):
-                ahead = min(pair + _AHEAD, end - 1)
-                prefetch(records_address + np.int64(pair_records[ahead]) * _RECORD_BYTES)
-                changed = pair_blocks[pair]
-                slot = pair_slots[pair]
-                record_address = records_address + np.int64(pair_records[pair]) * _RECORD_BYTES
-                if slot < 0:
-                    if changed != 0:
-                        _pass_record(address, record_address, f4(tile_x), f4(tile_y), changed)
-                elif changed != 0:
-                    sums = sums_address + np.int64(slot) * _PAIR_BYTES
-                    _replay_record(address, record_address, f4(tile_x), f4(tile_y), changed, sums)
-                else:
-                    for index in range(_PAIR_FLOATS):
-                        pair_sums[slot, index] = f4(0.0)
+    row = scratch[worker]
+    address = np.int64(row.ctypes.data)
+    records_address = np.int64(records.ctypes.data)
+    sums_address = np.int64(pair_sums.ctypes.data)
+    counter_address = np.int64(counter.ctypes.data)
+    write_block_centers(address)
+    tile = take_next(counter_address)
+    while tile < n_tiles:
+        tile_x = (tile % n_columns) * _TILE
+        tile_y = (tile // n_columns) * _TILE
+        first, end = tile_starts[tile], tile_starts[tile + 1]
+        if first == end:
             tile = take_next(counter_address)
+            continue
+        if tile_x + _TILE > width or tile_y + _TILE > height:
+            for place in range(5 * _BLOCKS * 16):
+                row[place] = f4(0.0)
+        for y in range(tile_y, min(tile_y + _TILE, height)):
+            for x in range(tile_x, min(tile_x + _TILE, width)):
+                block = ((y - tile_y) >> 2) * _BLOCKS_PER_ROW + ((x - tile_x) >> 2)
+                place = block * 16 + (y & 3) * 4 + (x & 3)
+                red, green, blue = grad_image[y, x, 0], grad_image[y, x, 1], grad_image[y, x, 2]
+                remainder = red * image[y, x, 0] + green * image[y, x, 1] + blue * image[y, x, 2]
+                if has_grad_alpha:
+                    remainder -= grad_alpha[y, x] * transmittance[y, x]
+                row[_T + place] = f4(1.0)
+                row[_R + place] = red
+                row[_G + place] = green
+                row[_B + place] = blue
+                row[_E + place] = remainder
+        for pair in range(first, end):
+            ahead = min(pair + _AHEAD, end - 1)
+            prefetch(records_address + np.int64(pair_records[ahead]) * _RECORD_BYTES)
+            changed = pair_blocks[pair]
+            slot = pair_slots[pair]
+            record_address = records_address + np.int64(pair_records[pair]) * _RECORD_BYTES
+            if slot < 0:
+                if changed != 0:
+                    _pass_record(address, record_address, f4(tile_x), f4(tile_y), changed)
+            elif changed != 0:
+                sums = sums_address + np.int64(slot) * _PAIR_BYTES
+                _replay_record(address, record_address, f4(tile_x), f4(tile_y), changed, sums)
+            else:
+                for index in range(_PAIR_FLOATS):
+                    pair_sums[slot, index] = f4(0.0)
+        tile = take_next(counter_address)

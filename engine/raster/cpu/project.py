@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, prange, types
+from numba import njit, types
 
 from engine.conventions import ALPHA_MIN
+from engine.kernels.arrays import Floats1, Floats2, SmallInts2, job_reader
 from engine.kernels.lanes import INTS, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
+from engine.kernels.routines import WORKER, routine
 from engine.raster.cpu import record as rec
 from engine.raster.cpu.camera_row import CameraLanes
 from engine.raster.cpu.projection_math import Projection, cholesky, covariance, project_lanes
@@ -134,30 +136,65 @@ def _packed_tiles(build: LaneBuilder, first: Lanes, last: Lanes, size: Lanes) ->
     return Lanes(build, build.ir.bitcast(packed, build.constant(0.0).value.type))
 
 
-@njit(parallel=True, **rec.KERNEL_OPTIONS)
-def project(means, quats, scales, opacities, colors, camera, mask_sums, records, keys, centers):
-    """Fill records and keys: camera depth, or a number <= 0 for rows that need not be drawn.
+@njit(inline="always")
+def _touches_wanted_tile(packed, row, mask_sums):
+    """Whether any tile under the bounding box of a record is wanted."""
+    columns, rows = packed[row, rec.TILE_COLUMNS], packed[row, rec.TILE_ROWS]
+    left, right = columns & 0xFFFF, (columns >> 16) + 1
+    top, bottom = rows & 0xFFFF, (rows >> 16) + 1
+    return mask_sums[bottom, right] - mask_sums[top, right] - mask_sums[bottom, left] + mask_sums[top, left] > 0
 
-    Args:
-        mask_sums: [tile rows + 1, tile columns + 1] int32, see `binning.mask_sums`; empty where all tiles are wanted.
-        records: [>= N rounded up to 16, 16] float32
-        keys: [>= N rounded up to 16] float32
-        centers: Centres of the rows that can be drawn, 0 of others, pixels, written unless empty. [N, 2] float32
+
+class ProjectJob(NamedTuple):
+    """Arguments of `project`, which fills records and keys: camera depth, or a number <= 0 for rows not to be drawn.
+
+    Attributes:
+        mask_sums: [tile rows + 1, tile columns + 1], see `binning.mask_sums`; empty where all tiles are wanted.
+        records: [>= N rounded up to 16, 16]
+        packed: The same memory as int32.
+        keys: [>= N rounded up to 16]
+        centers: Centres of the rows that can be drawn, 0 of others, pixels, written unless empty. [N, 2]
+        n_workers: How many workers share the rows.
     """
-    n_rows = len(means)
-    has_mask = len(mask_sums) > 0
-    packed = records.view(np.int32)
-    for group in prange((n_rows + 15) // 16):
-        first = np.int64(group) * 16
+
+    means: Floats2
+    quats: Floats2
+    scales: Floats2
+    opacities: Floats1
+    colors: Floats2
+    camera: Floats1
+    mask_sums: SmallInts2
+    records: Floats2
+    packed: SmallInts2
+    keys: Floats1
+    centers: Floats2
+    n_workers: int
+
+
+@kernel_intrinsic
+def _read_project(typing_context, address):
+    """The ProjectJob at an address."""
+    return job_reader(ProjectJob)
+
+
+@routine(WORKER, fastmath=rec.FASTMATH)
+def project(worker, arguments):
+    """See ProjectJob."""
+    job = _read_project(arguments)
+    keys, records, packed, centers, mask_sums = job.keys, job.records, job.packed, job.centers, job.mask_sums
+    n_rows = len(job.means)
+    n_groups = (n_rows + 15) // 16
+    for group in range(n_groups * worker // job.n_workers, n_groups * (worker + 1) // job.n_workers):
+        first = 16 * group
         _project_sixteen(
             first,
-            np.int64(n_rows),
-            np.int64(means.ctypes.data),
-            np.int64(quats.ctypes.data),
-            np.int64(scales.ctypes.data),
-            np.int64(opacities.ctypes.data),
-            np.int64(colors.ctypes.data),
-            np.int64(camera.ctypes.data),
+            n_rows,
+            np.int64(job.means.ctypes.data),
+            np.int64(job.quats.ctypes.data),
+            np.int64(job.scales.ctypes.data),
+            np.int64(job.opacities.ctypes.data),
+            np.int64(job.colors.ctypes.data),
+            np.int64(job.camera.ctypes.data),
             np.int64(records.ctypes.data) + first * 64,
             np.int64(keys.ctypes.data) + first * 4,
         )
@@ -166,16 +203,7 @@ def project(means, quats, scales, opacities, colors, camera, mask_sums, records,
                 is_drawn = keys[row] > _ZERO
                 centers[row, 0] = records[row, rec.CENTER_X] if is_drawn else _ZERO
                 centers[row, 1] = records[row, rec.CENTER_Y] if is_drawn else _ZERO
-        if has_mask:
+        if len(mask_sums) > 0:
             for row in range(first, min(first + 16, n_rows)):
                 if keys[row] > _ZERO and not _touches_wanted_tile(packed, row, mask_sums):
                     keys[row] = _ZERO
-
-
-@njit(inline="always")
-def _touches_wanted_tile(packed, row, mask_sums):
-    """Whether any tile under the bounding box of a record is wanted."""
-    columns, rows = packed[row, rec.TILE_COLUMNS], packed[row, rec.TILE_ROWS]
-    left, right = columns & 0xFFFF, (columns >> 16) + 1
-    top, bottom = rows & 0xFFFF, (rows >> 16) + 1
-    return mask_sums[bottom, right] - mask_sums[top, right] - mask_sums[bottom, left] + mask_sums[top, left] > 0

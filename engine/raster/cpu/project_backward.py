@@ -7,11 +7,15 @@ are taken in the same order in every run.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
-from numba import njit, prange, types
+from numba import njit, types
 from numba.core import cgutils
 
+from engine.kernels.arrays import Floats1, Floats2, SmallInts1, job_reader
 from engine.kernels.lanes import N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
+from engine.kernels.routines import WORKER, routine
 from engine.raster.cpu import record as rec
 from engine.raster.cpu.camera_row import CameraLanes
 from engine.raster.cpu.project import gather_rows
@@ -156,83 +160,98 @@ def _mean_gradient(
     return [row_x[k] * grad_camera[0] + row_y[k] * grad_camera[1] + row_z[k] * grad_camera[2] for k in range(3)]
 
 
-@njit(parallel=True, **rec.KERNEL_OPTIONS)
-def project_backward(
-    trained,
-    n_trained,
-    pairs_of_row,
-    row_slots,
-    pair_sums,
-    means,
-    quats,
-    scales,
-    opacities,
-    camera,
-    scratch,
-    grad_means,
-    grad_quats,
-    grad_scales,
-    grad_opacities,
-    grad_colors,
-    grad_centers,
-):
-    """Write all gradients; those of rows that are not in `trained` are zero.
+class BackwardJob(NamedTuple):
+    """Arguments of `project_backward`, which writes all gradients; those of rows that are not in `trained` are zero.
 
-    Args:
+    Attributes:
         trained, pairs_of_row, row_slots: Of `place_slots`.
         pair_sums: Of `replay_tiles`.
-        scratch: One row per thread of at least 272 floats, 64-byte aligned.
+        scratch: One row per worker of at least 272 floats, 64-byte aligned.
         grad_centers: Gradient of the centres in pixels. [N, 2]
         Others: As in the forward kernels.
     """
+
+    trained: SmallInts1
+    n_trained: int
+    pairs_of_row: SmallInts1
+    row_slots: SmallInts1
+    pair_sums: Floats2
+    means: Floats2
+    quats: Floats2
+    scales: Floats2
+    opacities: Floats1
+    camera: Floats1
+    scratch: Floats2
+    grad_means: Floats2
+    grad_quats: Floats2
+    grad_scales: Floats2
+    grad_opacities: Floats1
+    grad_colors: Floats2
+    grad_centers: Floats2
+
+
+@kernel_intrinsic
+def _read_project_backward(typing_context, address):
+    """The BackwardJob at an address."""
+    return job_reader(BackwardJob)
+
+
+@routine(WORKER, fastmath=rec.FASTMATH)
+def project_backward(worker, arguments):
+    """See BackwardJob."""
+    job = _read_project_backward(arguments)
+    trained, n_trained, pairs_of_row, row_slots = job.trained, job.n_trained, job.pairs_of_row, job.row_slots
+    pair_sums, means, quats, scales = job.pair_sums, job.means, job.quats, job.scales
+    opacities, camera, scratch = job.opacities, job.camera, job.scratch
+    grad_means, grad_quats, grad_scales = job.grad_means, job.grad_quats, job.grad_scales
+    grad_opacities, grad_colors, grad_centers = job.grad_opacities, job.grad_colors, job.grad_centers
     n_workers = len(scratch)
     n_rows = len(means)
     n_groups = (n_trained + 15) // 16
-    for worker in prange(n_workers):
-        sums = scratch[worker]
-        rows = sums[256:272].view(np.int32)
-        sums_address = np.int64(sums.ctypes.data)
-        pair_sums_address = np.int64(pair_sums.ctypes.data)
-        first_group, end_group = n_groups * worker // n_workers, n_groups * (worker + 1) // n_workers
-        next_row = 0 if first_group == 0 else trained[first_group * 16 - 1] + 1
-        for group in range(first_group, end_group):
-            first = group * 16
-            n_valid = min(16, n_trained - first)
-            for lane in range(16):
-                row = trained[first + min(lane, n_valid - 1)]
-                rows[lane] = row
-                _sum_pairs(
-                    pair_sums_address + np.int64(row_slots[row]) * _PAIR_BYTES,
-                    np.int64(pairs_of_row[row]),
-                    sums_address + np.int64(lane) * 64,
-                )
-            _backward_sixteen(
-                sums_address,
-                np.int64(rows.ctypes.data),
-                np.int64(means.ctypes.data),
-                np.int64(quats.ctypes.data),
-                np.int64(scales.ctypes.data),
-                np.int64(opacities.ctypes.data),
-                np.int64(camera.ctypes.data),
+    sums = scratch[worker]
+    rows = sums[256:272].view(np.int32)
+    sums_address = np.int64(sums.ctypes.data)
+    pair_sums_address = np.int64(pair_sums.ctypes.data)
+    first_group, end_group = n_groups * worker // n_workers, n_groups * (worker + 1) // n_workers
+    next_row = 0 if first_group == 0 else trained[first_group * 16 - 1] + 1
+    for group in range(first_group, end_group):
+        first = group * 16
+        n_valid = min(16, n_trained - first)
+        for lane in range(16):
+            row = trained[first + min(lane, n_valid - 1)]
+            rows[lane] = row
+            _sum_pairs(
+                pair_sums_address + np.int64(row_slots[row]) * _PAIR_BYTES,
+                np.int64(pairs_of_row[row]),
+                sums_address + np.int64(lane) * 64,
             )
-            for lane in range(n_valid):
-                row = rows[lane]
-                for gap in range(next_row, row):
-                    _clear(gap, grad_means, grad_quats, grad_scales, grad_opacities, grad_colors, grad_centers)
-                next_row = row + 1
-                source = lane * 16
-                for column in range(3):
-                    grad_means[row, column] = sums[source + column]
-                    grad_scales[row, column] = sums[source + 7 + column]
-                    grad_colors[row, column] = sums[source + 11 + column]
-                for column in range(4):
-                    grad_quats[row, column] = sums[source + 3 + column]
-                grad_opacities[row] = sums[source + 10]
-                grad_centers[row, 0] = sums[source + 14]
-                grad_centers[row, 1] = sums[source + 15]
-        if worker == n_workers - 1:
-            for gap in range(next_row, n_rows):
+        _backward_sixteen(
+            sums_address,
+            np.int64(rows.ctypes.data),
+            np.int64(means.ctypes.data),
+            np.int64(quats.ctypes.data),
+            np.int64(scales.ctypes.data),
+            np.int64(opacities.ctypes.data),
+            np.int64(camera.ctypes.data),
+        )
+        for lane in range(n_valid):
+            row = rows[lane]
+            for gap in range(next_row, row):
                 _clear(gap, grad_means, grad_quats, grad_scales, grad_opacities, grad_colors, grad_centers)
+            next_row = row + 1
+            source = lane * 16
+            for column in range(3):
+                grad_means[row, column] = sums[source + column]
+                grad_scales[row, column] = sums[source + 7 + column]
+                grad_colors[row, column] = sums[source + 11 + column]
+            for column in range(4):
+                grad_quats[row, column] = sums[source + 3 + column]
+            grad_opacities[row] = sums[source + 10]
+            grad_centers[row, 0] = sums[source + 14]
+            grad_centers[row, 1] = sums[source + 15]
+    if worker == n_workers - 1:
+        for gap in range(next_row, n_rows):
+            _clear(gap, grad_means, grad_quats, grad_scales, grad_opacities, grad_colors, grad_centers)
 
 
 @njit(inline="always")

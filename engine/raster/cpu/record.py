@@ -43,16 +43,17 @@ LOG_ALPHA_MIN = math.log2(ALPHA_MIN) / 8.0
 EXP2_EIGHTH = (0.9999999251, 0.6931422525, 0.2401721884, 0.05527972023, 0.009188609153, 0.0009387873374)
 """Minimax polynomial of 2^x on [-1, 0], constant term first; to the 8th power the relative error is 6e-7."""
 
-PAIR_FLOATS = 12
-"""Stride of a row of the pair buffer; nine sums are used."""
+PAIR_FLOATS = 9
+"""Floats of a row of the pair buffer, one per sum. Rows are read sixteen floats wide, so the buffer has a row more."""
 
+FASTMATH = {"nsz", "contract", "arcp", "afn", "reassoc"}
+"""NaN and infinity must keep their meaning: rows are dropped by comparisons that NaN fails."""
 KERNEL_OPTIONS = {
-    # NaN and infinity must keep their meaning: rows are dropped by comparisons that NaN fails.
-    "fastmath": {"nsz", "contract", "arcp", "afn", "reassoc"},
+    "fastmath": FASTMATH,
     "nogil": True,
     "cache": True,
     "error_model": "numpy",
 }
-"""Options of every kernel, apart from `parallel`."""
+"""Options of every kernel that is no routine."""
 
 f4 = np.float32
