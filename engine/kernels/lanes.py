@@ -65,10 +65,6 @@ class LaneBuilder:
         """A float constant."""
         return ir.Constant(FLOAT, float(np.float32(value)))
 
-    def scalar_of(self, integer: Any) -> Any:
-        """A signed integer as a float."""
-        return self.ir.sitofp(integer, FLOAT)
-
     # ---- memory
     def address(self, base: Any, offset: Any) -> Any:
         """`base` plus `offset` bytes; the offset may be a Python int or an int64 value."""
