@@ -114,8 +114,12 @@ class _Task:
         self, capture: Capture, base: ProjectSettings, variant: Variant, seed: int, clips: Sequence[Clip]
     ) -> None:
         n_cameras = len(capture.rig) - len(base.holdout)
-        overrides, clip_length, chosen = settings_of(variant, base.overrides, clips=clips, n_cameras=n_cameras)
+        overrides, clip_length, chosen = settings_of(
+            variant, base.overrides, clips=clips, n_cameras=n_cameras, n_capture_frames=capture.n_frames
+        )
         reference_clip = base.reference_clip if variant.cut == "clips" else 0
+        if variant.is_reference_moved:
+            reference_clip = len(clips) // 2
         self.variant, self.chosen, self.capture = variant, chosen, capture
         self.settings = replace(
             base, seed=seed, overrides=overrides, clip_length=clip_length, reference_clip=reference_clip

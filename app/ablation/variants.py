@@ -23,9 +23,11 @@ class Variant:
         words: What it is.
         overrides: Training settings that it changes.
         is_baseline: Another way, not the method without a part.
-        cut: How the chosen frames are cut: "clips" as the others are, "frames" into clips of one frame, "whole" into a
-            single clip with all steps, "first" only the first frame.
+        cut: How the chosen frames are cut: "clips" as the others are, "shorter" or "longer" into clips of about half or
+            twice that length, "frames" into clips of one frame, "whole" into a single clip with all steps, "first" only
+            the first frame.
         shares_reference: Whether its reference clip is that of "full": only source clips differ.
+        is_reference_moved: Whether the clip in the middle is the one that others inherit from.
     """
 
     name: str
@@ -34,6 +36,7 @@ class Variant:
     is_baseline: bool = False
     cut: str = "clips"
     shares_reference: bool = True
+    is_reference_moved: bool = False
 
 
 FULL = "full"
@@ -57,6 +60,14 @@ VARIANTS = (
         "one field goes on from clip to clip, its last state shows all",
         {"field": "continue"},
         shares_reference=True,
+    ),
+    Variant("clips-shorter", "clips of half the length", cut="shorter", shares_reference=False),
+    Variant("clips-longer", "clips of twice the length", cut="longer", shares_reference=False),
+    Variant(
+        "reference-middle",
+        "the clip in the middle is the reference",
+        shares_reference=False,
+        is_reference_moved=True,
     ),
     Variant("gate-off", "every anchor at every time, as published", {"gate": "off"}, shares_reference=False),
     Variant("independent", "clips share nothing", {"independent": True}, is_baseline=True, shares_reference=False),
@@ -102,7 +113,7 @@ def chosen_variants(names: Sequence[str] | None) -> list[Variant]:
 
 
 def settings_of(
-    variant: Variant, base: dict[str, Any], *, clips: Sequence[Clip], n_cameras: int
+    variant: Variant, base: dict[str, Any], *, clips: Sequence[Clip], n_cameras: int, n_capture_frames: int
 ) -> tuple[dict[str, Any], int, range]:
     """Training settings, clip length and clips to train of a variant.
 
@@ -110,7 +121,9 @@ def settings_of(
         base: Settings of "full" that differ from the defaults.
         clips: Those of "full", from the first on; the last one may be shorter.
         n_cameras: Training cameras. A single long clip, and all frames of a stream together, get as many steps as all
-            clips of "full" together.
+            clips of "full" together, and clips of another length as many per frame.
+        n_capture_frames: Where the chosen frames end before the capture does, they are cut without a remainder, because
+            the last clip would go on beyond them.
     """
     overrides = base | variant.overrides
     if variant.cut == "clips":
@@ -122,9 +135,26 @@ def settings_of(
     n_first, *n_others = (n_cameras * clip.n_frames for clip in clips)
     joint_steps = config.n_joint_steps(n_first)
     rest = sum(config.n_source_steps(n) for n in n_others)
+    if variant.cut in {"shorter", "longer"}:
+        clip_length = clips[0].clip_length
+        length = _other_length(
+            clip_length, n_frames, is_shorter=variant.cut == "shorter", is_end=n_frames == n_capture_frames
+        )
+        source_steps = config.n_source_steps(n_first)
+        steps = {"joint_steps": joint_steps, "source_steps": source_steps}
+        overrides |= {name: max(round(n * length / clip_length), 1) for name, n in steps.items()}
+        return overrides, length, range(-(-n_frames // length))
     if variant.cut == "whole":
         return overrides | {"joint_steps": joint_steps + rest}, n_frames, range(1)
     overrides |= {"joint_steps": joint_steps}  # the first frame as thoroughly as a clip
     if variant.cut == "first":
         return overrides, 1, range(1)
     return overrides | {"source_steps": max(rest // max(n_frames - 1, 1), MIN_STEPS_PER_FRAME)}, 1, range(n_frames)
+
+
+def _other_length(clip_length: int, n_frames: int, *, is_shorter: bool, is_end: bool) -> int:
+    """Half or twice a clip length, or what comes nearest beyond that and cuts the frames without a remainder."""
+    lengths = [length for length in range(1, n_frames + 1) if is_end or n_frames % length == 0]
+    if is_shorter:
+        return max((length for length in lengths if length <= clip_length / 2), default=1)
+    return min((length for length in lengths if length >= 2 * clip_length), default=n_frames)

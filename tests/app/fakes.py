@@ -133,7 +133,8 @@ def make_fake(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining
     project = open_project(job.project, is_writable=False)
     capture = open_capture(job.capture, scale=job.scale)
     clip = project.clips(capture.n_frames)[job.clip_index]
-    reference = None if job.clip_index == 0 else read_clip_state(project.clip_path(0))
+    first = project.settings.reference_clip
+    reference = None if job.clip_index == first else read_clip_state(project.clip_path(first))
     return FakeTraining(
         capture,
         clip,

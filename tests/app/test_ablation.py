@@ -54,7 +54,7 @@ def test_variants_are_named_once_and_their_settings_are_valid():
 
 def test_only_variants_whose_reference_clip_is_trained_alike_share_it():
     for variant in VARIANTS:
-        is_source_only = variant.cut == "clips" and variant.overrides.keys() <= {
+        is_source_only = variant.cut == "clips" and not variant.is_reference_moved and variant.overrides.keys() <= {
             "decoder", "residual", "inherit", "field"}  # fmt: skip
         assert variant.shares_reference == is_source_only, variant.name
 
@@ -71,7 +71,7 @@ def test_variants_are_chosen_by_name_in_the_order_of_the_table_with_full_beside_
 @pytest.mark.parametrize("variant", VARIANTS, ids=lambda variant: variant.name)
 def test_a_variant_changes_what_it_names_and_trains_as_long_as_full(variant):
     clips = split_clips(10, 4)  # the last one has two frames
-    overrides, clip_length, chosen = settings_of(variant, {}, clips=clips, n_cameras=100)
+    overrides, clip_length, chosen = settings_of(variant, {}, clips=clips, n_cameras=100, n_capture_frames=10)
     config, full = TrainConfig(**overrides), TrainConfig()
     joint, source = full.n_joint_steps(400), [full.n_source_steps(400), full.n_source_steps(200)]
     n_steps = joint + sum(source)
@@ -88,6 +88,11 @@ def test_a_variant_changes_what_it_names_and_trains_as_long_as_full(variant):
             assert (changed, clip_length, chosen) == ({"joint_steps", "source_steps"}, 1, range(10))
             assert config.n_joint_steps(100) == joint
             assert n_steps - 9 < config.n_joint_steps(100) + 9 * config.n_source_steps(100) <= n_steps
+        case "shorter" | "longer":
+            length = {"shorter": 2, "longer": 8}[variant.cut]
+            assert (changed, clip_length, chosen) == ({"joint_steps", "source_steps"}, length, range(-(-10 // length)))
+            assert config.joint_steps == joint * length / 4
+            assert config.source_steps == source[0] * length / 4
         case "first":
             assert (changed, clip_length, chosen) == ({"joint_steps"}, 1, range(1))
             assert config.n_joint_steps(100) == joint
@@ -97,12 +102,31 @@ def test_a_variant_changes_what_it_names_and_trains_as_long_as_full(variant):
 def test_settings_of_full_stay_in_every_variant_and_a_frame_has_its_least_steps():
     clips = split_clips(8, 4)
     for variant in VARIANTS:
-        assert settings_of(variant, {"passes": 2.0}, clips=clips, n_cameras=3)[0]["passes"] == 2.0
-    overrides, _, _ = settings_of(BY_NAME["frame-stream"], {"passes": 2.0}, clips=clips, n_cameras=3)
+        assert settings_of(variant, {"passes": 2.0}, clips=clips, n_cameras=3, n_capture_frames=8)[0]["passes"] == 2.0
+    overrides, _, _ = settings_of(
+        BY_NAME["frame-stream"], {"passes": 2.0}, clips=clips, n_cameras=3, n_capture_frames=8
+    )
     assert overrides["joint_steps"] == 24  # two passes over three cameras and four frames, for the first frame alone
     assert overrides["source_steps"] == MIN_STEPS_PER_FRAME
-    alone, _, _ = settings_of(BY_NAME["frame-stream"], {}, clips=split_clips(1, 1), n_cameras=3)
+    alone, _, _ = settings_of(BY_NAME["frame-stream"], {}, clips=split_clips(1, 1), n_cameras=3, n_capture_frames=1)
     assert alone["source_steps"] >= MIN_STEPS_PER_FRAME
+
+
+@pytest.mark.parametrize(("n_frames", "length", "n_capture_frames", "shorter", "longer"), [
+    (40, 10, 150, 5, 20), (30, 10, 150, 5, 30), (30, 10, 30, 5, 20), (28, 7, 150, 2, 14), (3, 1, 3, 1, 2),
+])  # fmt: skip
+def test_other_clip_lengths_cover_the_same_frames(n_frames, length, n_capture_frames, shorter, longer):
+    clips = split_clips(n_frames, length)
+    for cut, expected in (("shorter", shorter), ("longer", longer)):
+        variant = BY_NAME[f"clips-{cut}"]
+        _, got, chosen = settings_of(variant, {}, clips=clips, n_cameras=3, n_capture_frames=n_capture_frames)
+        assert got == expected
+        assert split_clips(n_capture_frames, got)[chosen[-1]].stop == n_frames
+
+
+def test_the_reference_in_the_middle_is_trained_first(runner):
+    runner.run(["reference-middle"])
+    assert [clip for name, clip in runner.launched if name == "reference-middle-seed0"] == [1, 0]
 
 
 # ---------------------------------------------------------------- the table
@@ -236,7 +260,7 @@ def test_every_variant_is_a_project_and_a_line_of_the_table(runner):
     )
     for name, variant in BY_NAME.items():
         settings = read_settings(project_folder(runner.folder, name, 0))
-        n_clips = {"clips": 2, "whole": 1, "frames": 6, "first": 1}[variant.cut]
+        n_clips = {"clips": 2, "shorter": 3, "longer": 1, "whole": 1, "frames": 6, "first": 1}[variant.cut]
         trained = sorted((project_folder(runner.folder, name, 0) / "clips").iterdir())
         assert len(trained) == n_clips, name
         assert settings.overrides | variant.overrides == settings.overrides
