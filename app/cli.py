@@ -392,6 +392,8 @@ def _show_status(line: ProgressLine, status: TrainingStatus) -> None:
             parts += [f"{status.steps_per_s:.1f} steps/s", f"{duration_text(status.eta_s)} left"]
         if status.loss_history:
             parts.append(f"loss {status.loss_history[-1][1]:.4f}")
+        if status.gradient_norm is not None:
+            parts.append(f"gradient {status.gradient_norm:.2g}")
         if status.psnr_history:
             parts.append(f"held-out PSNR {status.psnr_history[-1][1]:.2f} dB")
         line.update(f"Clip {status.clip_index}: training", status.progress, ", ".join(parts))
