@@ -1,11 +1,14 @@
-"""PlainParser: argparse that says what is wrong in one line. Knows no option of any command."""
+"""What subcommands share: argparse that says what is wrong in one line, training settings, ranges, cameras, codes."""
 
 from __future__ import annotations
 
 import argparse
-from typing import NoReturn
+from typing import Any, NoReturn
 
-EXIT_BAD_INPUT = 2
+from engine.capture.capture import Capture
+from engine.errors import ProjectError
+
+EXIT_OK, EXIT_BAD_INPUT = 0, 2
 
 
 class PlainParser(argparse.ArgumentParser):
@@ -14,3 +17,68 @@ class PlainParser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """End the program with exit code 2 and one line."""
         self.exit(EXIT_BAD_INPUT, f"{self.prog}: {message}. See `{self.prog} --help`.\n")
+
+
+def add_training_settings(command: argparse.ArgumentParser) -> None:
+    """Arguments of every subcommand that trains."""
+    command.add_argument("--holdout", metavar="NAMES", help="cameras to leave out, or 'none' (default: the capture's)")
+    command.add_argument("--scale", type=float, help="working size, share of the original in (0, 1] (default: 1)")
+    command.add_argument("--clip-length", type=int, metavar="M", help="frames per clip (default: 10)")
+    command.add_argument("--preset", metavar="NAME", help="toy, small (the default), medium or paper")
+    command.add_argument(
+        "--set",
+        dest="assignments",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a training setting, also one of the preset; may be given several times",
+    )
+
+
+def overrides_of(options: argparse.Namespace) -> dict[str, Any]:
+    """Training settings of the arguments: the preset, and what was set beside it."""
+    from engine.training.config import parse_overrides
+    from engine.training.presets import preset
+
+    return (preset(options.preset) if options.preset else {}) | parse_overrides(options.assignments)
+
+
+def parse_range(text: str, n: int, *, option: str, what: str) -> range:
+    """ "A:B", "A:", ":B", ":" or "A" as a range inside range(n).
+
+    Raises:
+        ProjectError: It is malformed, empty or reaches outside; names what is allowed.
+    """
+    first, colon, last = text.partition(":")
+    allowed = f"The capture has {what} 0 to {n - 1}; write {option} 0:{n} for all of them."
+    try:
+        start = int(first) if first.strip() else 0
+        stop = (int(last) if last.strip() else n) if colon else start + 1
+        if not colon and not first.strip():
+            raise ValueError
+    except ValueError as error:
+        raise ProjectError(f"{option} is '{text}', which is no range A:B.", hint=allowed) from error
+    if not 0 <= start < stop <= n:
+        raise ProjectError(f"{option} is '{text}', which is empty or reaches outside.", hint=allowed)
+    return range(start, stop)
+
+
+def parse_cameras(text: str, capture: Capture) -> tuple[str, ...]:
+    """Camera names separated by commas; numbers that are no names count cameras from 0. "none" is an empty choice.
+
+    Raises:
+        ProjectError: There is no such camera.
+    """
+    names = capture.rig.names
+    chosen = []
+    for part in (part.strip() for part in text.split(",")):
+        if part in names:
+            chosen.append(part)
+        elif part.isdigit() and int(part) < len(names):
+            chosen.append(names[int(part)])
+        elif part and part.lower() != "none":
+            shown = f"{', '.join(names[:6])}, ... {names[-1]}" if len(names) > 7 else ", ".join(names)
+            raise ProjectError(
+                f"There is no camera '{part}'.", hint=f"Cameras are {shown}, or numbers from 0 to {len(names) - 1}."
+            )
+    return tuple(dict.fromkeys(chosen))

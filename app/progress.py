@@ -6,7 +6,9 @@ import shutil
 import sys
 import time
 from collections.abc import Callable
-from typing import TextIO
+from typing import Any, TextIO
+
+from app.training.rate import Rate
 
 BAR_WIDTH = 24
 REDRAW_EVERY_S = 0.1
@@ -79,3 +81,14 @@ class ProgressLine:
 
     def _write(self, text: str) -> None:
         print(text, end="", file=self._stream, flush=True)
+
+
+def row_progress(line: ProgressLine, stage: str) -> Callable[[int, int, Any], None]:
+    """A callback for done, all and what was done last, which shows a stage and how long it will take."""
+    rate = Rate()
+
+    def show(done: int, n: int, _row: Any) -> None:
+        rate.update(done, time.monotonic())
+        line.update(stage, done / max(n, 1), f"{done}/{n}, {duration_text(rate.eta_s(n - done))} left")
+
+    return show

@@ -149,6 +149,13 @@ class Project:
         first = self.settings.reference_clip
         return [first, *(i for i in range(n_clips) if i != first)]
 
+    def previous_index(self, clip_index: int) -> int:
+        """The clip that a clip goes on from where they do: the one before, which is the reference where there is none.
+
+        Not for the reference itself, which goes on from nothing.
+        """
+        return self.training_order(clip_index)[-1]
+
     def update(self, settings: ProjectSettings) -> None:
         """Replace the settings, on disk first.
 

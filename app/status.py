@@ -40,6 +40,7 @@ class TrainingStatus:
         steps_per_s: Smoothed rate; 0 when unknown.
         eta_s: Seconds until the clip is finished; None when unknown.
         curve_clip_index: Clip of the histories: the one that trains, else the one at the playhead; None without one.
+        gradient_norm: Largest norm over all gradients since the last report, before clipping; None when unknown.
         loss_history, psnr_history: (step, value) of that clip; PSNR is of held-out pictures, dB.
         can_train_next: Whether TrainNextClip would start something.
         next_clip_index: The clip that TrainNextClip would train; None when all are trained.
@@ -56,6 +57,7 @@ class TrainingStatus:
     steps_per_s: float = 0.0
     eta_s: float | None = None
     curve_clip_index: int | None = None
+    gradient_norm: float | None = None
     loss_history: Sequence[tuple[int, float]] = ()
     psnr_history: Sequence[tuple[int, float]] = ()
     can_train_next: bool = False
@@ -69,7 +71,8 @@ class ClipStatus:
 
     Attributes:
         state: untrained, queued, preparing, training, paused, trained, failed, or stale (its reference was
-            trained again). A clip that was stopped before its end is paused: training it again goes on there.
+            trained again, or the clip that it goes on from). A clip that was stopped before its end is paused:
+            training it again goes on there.
         progress: Share of its steps, 0..1.
         held_out_psnr: Newest figure, dB; None when not measured.
         n_inherited, n_own: Anchors of the shown model; 0 until it was loaded.

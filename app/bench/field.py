@@ -13,7 +13,7 @@ from torch import Tensor
 
 from app.bench.clips import ClipRecipe, chosen_anchors, make_clip
 from app.bench.raster import relative_errors
-from app.bench.rows import KernelRow, SpeedError
+from app.bench.rows import KernelRow, SpeedError, kernel_row
 from app.bench.timing import interleaved, peak_extra_mb
 from engine.model.clip_model import ClipModel
 from engine.model.decoding import decode_anchors
@@ -121,19 +121,8 @@ def measure_decode(
             gradient_error=relative_errors([gradients[key] for key in truth], list(truth.values())),
         )
     forward, backward = timings["cpu"]
-    row = KernelRow(
-        operation="decode",
-        scene=name,
-        size=size,
-        forward=forward,
-        backward=backward,
-        checked_at=size,
-        value_error=marks["cpu"].value_error,
-        gradient_error=marks["cpu"].gradient_error,
-        reference_ratio=marks["reference"].total_ms / marks["cpu"].total_ms,
-        peak_mb=peak_extra_mb(prepare_memory, scene) if has_memory else None,
-    )
-    return row, list(marks.values())
+    peak_mb = peak_extra_mb(prepare_memory, scene) if has_memory else None
+    return kernel_row(marks, (forward, backward), size=size, peak_mb=peak_mb), list(marks.values())
 
 
 def prepare_memory(scene: DecodeScene) -> Callable[[], object]:

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from app.bench.rows import KernelRow, SpeedError
+from app.bench.rows import KernelRow, SpeedError, kernel_row
 from app.bench.scenes import RECIPES, Recipe, Scene
 from app.bench.timing import interleaved, peak_extra_mb
 from engine.raster import Gaussians, Rendering, rasterize
@@ -91,20 +91,12 @@ def measure_raster(
     checked = recipe.reduced()
     checked_at = f"{checked.n_rows} in {checked.width}x{checked.height}"
     marks = _check(name, checked_at, checked.scene())
-    n_pairs = evaluated_pairs(scene)
-    row = KernelRow(
-        operation="raster",
-        scene=name,
+    row = kernel_row(
+        marks,
+        (forward, backward),
         size=f"{recipe.n_rows} in {recipe.width}x{recipe.height}",
-        forward=forward,
-        backward=backward,
-        checked_at=checked_at,
-        value_error=marks["cpu"].value_error,
-        gradient_error=marks["cpu"].gradient_error,
-        reference_ratio=marks["reference"].total_ms / marks["cpu"].total_ms,
         peak_mb=peak_extra_mb(prepare_memory, recipe) if has_memory else None,
-        forward_pairs_per_s=n_pairs / forward.min_ms * 1e3,
-        backward_pairs_per_s=n_pairs / backward.min_ms * 1e3,
+        pairs=evaluated_pairs(scene),
     )
     return row, list(marks.values())
 

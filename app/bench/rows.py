@@ -60,6 +60,41 @@ class KernelRow:
     backward_pairs_per_s: float | None = None
 
 
+def kernel_row(
+    marks: dict[str, SpeedError],
+    timings: tuple[Timing, Timing],
+    *,
+    size: str,
+    peak_mb: float | None,
+    pairs: int | None = None,
+) -> KernelRow:
+    """The row of a scene from the marks of both back ends.
+
+    Args:
+        marks: "cpu" and "reference".
+        timings: Of our back end at full size, forward and backward.
+        size: What was computed, for people.
+        peak_mb: See KernelRow.
+        pairs: (pixel, Gaussian) evaluations of one pass; None where there are no pixels.
+    """
+    ours = marks["cpu"]
+    forward, backward = timings
+    return KernelRow(
+        operation=ours.operation,
+        scene=ours.scene,
+        size=size,
+        forward=forward,
+        backward=backward,
+        checked_at=ours.size,
+        value_error=ours.value_error,
+        gradient_error=ours.gradient_error,
+        reference_ratio=marks["reference"].total_ms / ours.total_ms,
+        peak_mb=peak_mb,
+        forward_pairs_per_s=None if pairs is None else pairs / forward.min_ms * 1e3,
+        backward_pairs_per_s=None if pairs is None else pairs / backward.min_ms * 1e3,
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class IterationRow:
     """One size and kind of training step.

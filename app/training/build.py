@@ -57,12 +57,12 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
 
 
 def _read_previous(project: Project, clip_index: int) -> ClipState:
-    """The trained clip whose field goes on: the one before, which is the reference where there is none.
+    """The trained clip that this one goes on from.
 
     Raises:
         ProjectError: It is not trained.
     """
-    before = project.training_order(clip_index)[-1]
+    before = project.previous_index(clip_index)
     if not project.is_trained(before):
         raise ProjectError(
             f"Clip {clip_index} goes on where clip {before} ends, which is not trained.",

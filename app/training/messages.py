@@ -96,7 +96,10 @@ class StageReported:
 
 @dataclass(frozen=True, slots=True)
 class StepReported:
-    """Where the training is; sent a few times per second. loss is the mean since the last report."""
+    """Where the training is; sent a few times per second.
+
+    Since the last report, loss is the mean and gradient_norm the largest.
+    """
 
     step: int
     n_steps: int
@@ -105,6 +108,7 @@ class StepReported:
     n_gaussians: int
     stage: str
     steps_per_s: float
+    gradient_norm: float
 
 
 @dataclass(frozen=True, slots=True)

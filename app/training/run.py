@@ -9,6 +9,7 @@ import json
 import logging
 import math
 import os
+import statistics
 import time
 import traceback
 from collections.abc import Callable
@@ -138,6 +139,8 @@ class TrainingRun:
         self._is_checkpointed_in_step = False
         self._reported: tuple[str, str, float] = ("", "", -math.inf)
         self._losses: list[float] = []
+        self._gradient_norms: list[float] = []
+        """Of all steps of this process."""
         self._rate = Rate()
         self._watch = StageWatch(clock)
         self._paused_stage: str | None = None
@@ -211,6 +214,7 @@ class TrainingRun:
                 n_gaussians=0,
                 stage="",
                 steps_per_s=0.0,
+                gradient_norm=math.nan,
             )
         )
         self._measure(training)  # renders, so that every kernel is compiled before a window does the same
@@ -222,11 +226,13 @@ class TrainingRun:
         self._watch.enter(KEEPING)
         now_s = self._clock()
         self._losses.append(stats.loss)
+        self._gradient_norms.append(stats.gradient_norm)
         is_last = training.steps_done >= training.n_steps
         if self._report_cadence.is_due(now_s) or is_last:
             self._report_cadence.done(now_s, now_s)
             self._rate.update(stats.step, now_s)
             loss = sum(self._losses) / len(self._losses)
+            gradient_norm = max(self._gradient_norms[-len(self._losses) :])
             self._losses = []
             self._send(
                 StepReported(
@@ -237,11 +243,13 @@ class TrainingRun:
                     n_gaussians=stats.n_gaussians,
                     stage=stats.stage,
                     steps_per_s=self._rate.per_s,
+                    gradient_norm=gradient_norm,
                 )
             )
             if self._metrics_cadence.is_due(now_s) or is_last:
                 self._metrics_cadence.done(now_s, now_s)
-                self._note({"step": stats.step, "loss": loss, "train_psnr": stats.train_psnr})
+                row = {"step": stats.step, "loss": loss, "train_psnr": stats.train_psnr}
+                self._note(row | {"gradient_norm": gradient_norm})
         is_wanted = self._is_snapshot_wanted or self._snapshot_cadence.is_due(now_s)
         if is_wanted and self._snapshots.is_free and not is_last:
             self._write_snapshot(training)
@@ -257,6 +265,9 @@ class TrainingRun:
         metrics = dict(state.header.get("metrics") or {})
         if value is not None:
             metrics["held_out_psnr"] = value
+        if self._gradient_norms:
+            metrics["gradient_norm_median"] = statistics.median(self._gradient_norms)
+            metrics["gradient_norm_max"] = max(self._gradient_norms)
         times = self._watch.document()
         metrics |= times
         self._note({"step": training.steps_done, **times})

@@ -113,7 +113,7 @@ class TrainingService:
         header = read_clip_header(trained)
         known.state, known.file, known.revision = "untrained", None, ""
         if header is not None:
-            known.state = "stale" if self._is_stale(header) else "trained"
+            known.state = "stale" if self._is_stale(clip_index, header) else "trained"
             known.file, known.revision = trained, f"trained-{header.get('fingerprint', '')}"
         unfinished = read_clip_header(checkpoint)
         if unfinished is not None and (header is None or known.state == "stale"):
@@ -130,11 +130,28 @@ class TrainingService:
         if known.state == "stale":
             known.file, known.revision = None, ""  # it cannot be shown without the reference it was trained on
 
-    def _is_stale(self, header: dict[str, Any]) -> bool:
-        if header.get("role") != "source":
+    def _is_stale(self, clip_index: int, header: dict[str, Any]) -> bool:
+        """Whether what the clip was trained on is not there any more: its reference, or the clip that it goes on from.
+
+        Clips that go on from each other form a chain: one that is stale makes all after it stale.
+        """
+        if header.get("role") == "source":
+            reference = read_clip_header(self.project.reference_path)
+            if reference is None or reference.get("fingerprint") != header.get("reference_fingerprint"):
+                return True
+        if "previous_fingerprint" not in header:
             return False
-        reference = read_clip_header(self.project.reference_path)
-        return reference is None or reference.get("fingerprint") != header.get("reference_fingerprint")
+        before = self.project.previous_index(clip_index)
+        previous = read_clip_header(self.project.clip_path(before))
+        if previous is None or previous.get("fingerprint") != header["previous_fingerprint"]:
+            return True
+        return self._is_stale(before, previous)
+
+    @property
+    def _goes_on(self) -> bool:
+        """Whether clips begin with what the clip before has learned."""
+        config = self.project.settings.config()
+        return config.field == "continue" or config.start == "previous"
 
     # ---------------------------------------------------------------- commands
 
@@ -295,8 +312,8 @@ class TrainingService:
         self._ending = ending
         self._is_paused = self._is_stopping = False
         is_reference = clip_index == self.project.settings.reference_clip
-        for index in range(len(self.clips)) if is_reference else (clip_index,):
-            self.read_clip(index)  # a new reference makes the others stale
+        for index in range(len(self.clips)) if is_reference or self._goes_on else (clip_index,):
+            self.read_clip(index)  # a new reference makes the others stale, a new clip those that went on from it
         if isinstance(ending, TrainingFailed | WorkerDied):
             self.progress[clip_index].state = "failed"
             if is_reference and not self.project.is_trained(clip_index):
@@ -344,6 +361,7 @@ class TrainingService:
             steps_per_s=rate if state == "running" else 0.0,
             eta_s=left / rate if rate > 0 and state == "running" else None,
             curve_clip_index=curve_clip,
+            gradient_norm=step.gradient_norm if step is not None and math.isfinite(step.gradient_norm) else None,
             loss_history=() if curves is None else curves.loss_history,
             psnr_history=() if curves is None else curves.psnr_history,
             can_train_next=self.can_train_next,

@@ -60,11 +60,11 @@ def estimate_background(frames: np.ndarray) -> Background:
     flat = np.ones(N_BRIGHTNESS_BINS, dtype=np.float32)
     # every 16th pixel is plenty for a median noise per brightness; strided like rows below, so compiled once for both
     sampled = frames[:, ::4, ::4]
-    colors, variances, _ = _cluster_rows(sampled, window, flat, 0.0)
+    colors, variances, _ = _clusters(sampled, window, flat, 0.0)
     noise = _noise_by_brightness(colors, variances)
 
     def rows(span: tuple[int, int]):
-        return _cluster_rows(frames[:, span[0] : span[1]], window, noise, TIE_SCORE)
+        return _clusters(frames[:, span[0] : span[1]], window, noise, TIE_SCORE)
 
     parts = map_ordered(rows, row_spans(height))
     colors = np.concatenate([part[0] for part in parts])
@@ -93,16 +93,23 @@ def _noise_by_brightness(colors: np.ndarray, variances: np.ndarray) -> np.ndarra
     return np.maximum(noise, 0.25).astype(np.float32)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def _cluster_rows(frames, window, noise, tie_score):
+def _clusters(
+    frames: np.ndarray, window: int, noise: np.ndarray, tie_score: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Best window per pixel: mean colour [H, W, 3] f32, variance summed over RGB [H, W], share of agreeing frames."""
     n_frames, height, width, _ = frames.shape
     colors = np.empty((height, width, 3), np.float32)
-    variances = np.empty((height, width), np.float32)
-    shares = np.empty((height, width), np.float32)
-    order = np.empty(n_frames, np.int64)
-    keys = np.empty(n_frames, np.int64)
-    sums = np.zeros((n_frames + 1, 4), np.int64)  # prefix sums of R, G, B and of squares, in brightness order
+    variances, shares = np.empty((2, height, width), np.float32)
+    order, keys = np.empty((2, n_frames), np.int64)
+    sums = np.zeros((n_frames + 1, 4), np.int64)
+    _cluster_rows(frames, window, noise, tie_score, order, keys, sums, colors, variances, shares)
+    return colors, variances, shares
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _cluster_rows(frames, window, noise, tie_score, order, keys, sums, colors, variances, shares):
+    """Writes the results of `_clusters`. sums [T + 1, 4]: of R, G, B and squares before each, in brightness order."""
+    n_frames, height, width, _ = frames.shape
     n_bins = len(noise)
     for y in range(height):
         for x in range(width):
@@ -171,4 +178,3 @@ def _cluster_rows(frames, window, noise, tie_score):
             colors[y, x, 2] = mean_b
             variances[y, x] = best_variance
             shares[y, x] = n_agree / n_frames
-    return colors, variances, shares

@@ -41,7 +41,9 @@ def check_depths(
         others: Cameras to ask.
         tolerance: Relative depth difference that still agrees.
     """
-    result = _check(
+    size = depth_maps.shape[1:]
+    result = Agreement(np.zeros(size, np.int32), np.zeros(size, np.int32), np.zeros(size))
+    _check(
         depth_maps,
         np.linalg.inv(rig.Ks),
         rig.Ks,
@@ -49,70 +51,68 @@ def check_depths(
         camera,
         np.asarray(others, dtype=np.int64),
         tolerance,
-        SEE_THROUGH_SHARE,
+        result.n_agree,
+        result.n_see_through,
+        result.depths,
     )
-    return Agreement(*result)
+    return result
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _depth_at(depths, x, y):
+def _depth_at(depth_maps, camera, x, y):
     """Bilinear on one surface, nearest across a depth edge. On a floor at a grazing angle one pixel is 2 % of depth."""
-    height, width = depths.shape
-    nearest = depths[int(y), int(x)]
+    _, height, width = depth_maps.shape
     x0, y0 = min(max(int(x - 0.5), 0), width - 2), min(max(int(y - 0.5), 0), height - 2)
     fx, fy = min(max(x - 0.5 - x0, 0.0), 1.0), min(max(y - 0.5 - y0, 0.0), 1.0)
-    a, b, c, d = depths[y0, x0], depths[y0, x0 + 1], depths[y0 + 1, x0], depths[y0 + 1, x0 + 1]
+    a, b = depth_maps[camera, y0, x0], depth_maps[camera, y0, x0 + 1]
+    c, d = depth_maps[camera, y0 + 1, x0], depth_maps[camera, y0 + 1, x0 + 1]
     if max(max(a, b), max(c, d)) > (1.0 + EDGE_SHARE) * min(min(a, b), min(c, d)):
-        return nearest
+        return depth_maps[camera, int(y), int(x)]
     return (a * (1 - fx) + b * fx) * (1 - fy) + (c * (1 - fx) + d * fx) * fy
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _check(depth_maps, inverse_Ks, Ks, world_to_camera, camera, others, tolerance, see_through):
+def _check(depth_maps, inverse_Ks, Ks, poses, camera, others, tolerance, n_agree, n_through, fused):
+    """Adds to the counts and writes the mean depths."""
     _, height, width = depth_maps.shape
-    n_agree = np.zeros((height, width), np.int32)
-    n_through = np.zeros((height, width), np.int32)
-    fused = np.zeros((height, width), np.float64)
-    own_inverse = inverse_Ks[camera]
-    own_rotation, own_translation = world_to_camera[camera, :3, :3], world_to_camera[camera, :3, 3]
-    forward = own_rotation[2]
-    point = np.empty(3)
     for y in range(height):
         for x in range(width):
             depth = depth_maps[camera, y, x]
             u, v = x + 0.5, y + 0.5
-            for i in range(3):
-                point[i] = (own_inverse[i, 0] * u + own_inverse[i, 1] * v + own_inverse[i, 2]) * depth
-                point[i] -= own_translation[i]
-            wx = own_rotation[0, 0] * point[0] + own_rotation[1, 0] * point[1] + own_rotation[2, 0] * point[2]
-            wy = own_rotation[0, 1] * point[0] + own_rotation[1, 1] * point[1] + own_rotation[2, 1] * point[2]
-            wz = own_rotation[0, 2] * point[0] + own_rotation[1, 2] * point[1] + own_rotation[2, 2] * point[2]
+            px = (inverse_Ks[camera, 0, 0] * u + inverse_Ks[camera, 0, 1] * v + inverse_Ks[camera, 0, 2]) * depth
+            py = (inverse_Ks[camera, 1, 0] * u + inverse_Ks[camera, 1, 1] * v + inverse_Ks[camera, 1, 2]) * depth
+            pz = (inverse_Ks[camera, 2, 0] * u + inverse_Ks[camera, 2, 1] * v + inverse_Ks[camera, 2, 2]) * depth
+            px, py, pz = px - poses[camera, 0, 3], py - poses[camera, 1, 3], pz - poses[camera, 2, 3]
+            wx = poses[camera, 0, 0] * px + poses[camera, 1, 0] * py + poses[camera, 2, 0] * pz
+            wy = poses[camera, 0, 1] * px + poses[camera, 1, 1] * py + poses[camera, 2, 1] * pz
+            wz = poses[camera, 0, 2] * px + poses[camera, 1, 2] * py + poses[camera, 2, 2] * pz
             total = depth
-            for other in others:
-                pose = world_to_camera[other]
-                cx = pose[0, 0] * wx + pose[0, 1] * wy + pose[0, 2] * wz + pose[0, 3]
-                cy = pose[1, 0] * wx + pose[1, 1] * wy + pose[1, 2] * wz + pose[1, 3]
-                cz = pose[2, 0] * wx + pose[2, 1] * wy + pose[2, 2] * wz + pose[2, 3]
+            n_matches = 0
+            for k in range(len(others)):
+                other = others[k]
+                cx = poses[other, 0, 0] * wx + poses[other, 0, 1] * wy + poses[other, 0, 2] * wz + poses[other, 0, 3]
+                cy = poses[other, 1, 0] * wx + poses[other, 1, 1] * wy + poses[other, 1, 2] * wz + poses[other, 1, 3]
+                cz = poses[other, 2, 0] * wx + poses[other, 2, 1] * wy + poses[other, 2, 2] * wz + poses[other, 2, 3]
                 if cz <= 1e-9:
                     continue
-                K = Ks[other]
-                a = (K[0, 0] * cx + K[0, 1] * cy) / cz + K[0, 2]
-                b = K[1, 1] * cy / cz + K[1, 2]
+                a = (Ks[other, 0, 0] * cx + Ks[other, 0, 1] * cy) / cz + Ks[other, 0, 2]
+                b = Ks[other, 1, 1] * cy / cz + Ks[other, 1, 2]
                 if a < 0 or b < 0 or a >= width or b >= height:
                     continue
-                theirs = _depth_at(depth_maps[other], a, b)
+                theirs = _depth_at(depth_maps, other, a, b)
                 relative = (theirs - cz) / cz
-                if relative > see_through:
+                if relative > SEE_THROUGH_SHARE:
                     n_through[y, x] += 1
                 if abs(relative) < tolerance:
-                    n_agree[y, x] += 1
+                    n_matches += 1
                     # their surface point, along their own pixel ray, seen from here
-                    inverse = inverse_Ks[other]
-                    tx = (inverse[0, 0] * a + inverse[0, 1] * b + inverse[0, 2]) * theirs - pose[0, 3]
-                    ty = (inverse[1, 1] * b + inverse[1, 2]) * theirs - pose[1, 3]
-                    tz = theirs - pose[2, 3]
-                    total += own_translation[2]
+                    tx = inverse_Ks[other, 0, 0] * a + inverse_Ks[other, 0, 1] * b + inverse_Ks[other, 0, 2]
+                    tx = tx * theirs - poses[other, 0, 3]
+                    ty = (inverse_Ks[other, 1, 1] * b + inverse_Ks[other, 1, 2]) * theirs - poses[other, 1, 3]
+                    tz = theirs - poses[other, 2, 3]
+                    total += poses[camera, 2, 3]
                     for i in range(3):
-                        total += forward[i] * (pose[0, i] * tx + pose[1, i] * ty + pose[2, i] * tz)
-            fused[y, x] = total / (1 + n_agree[y, x])
-    return n_agree, n_through, fused
+                        along = poses[other, 0, i] * tx + poses[other, 1, i] * ty + poses[other, 2, i] * tz
+                        total += poses[camera, 2, i] * along
+            n_agree[y, x] += n_matches
+            fused[y, x] = total / (1 + n_matches)

@@ -62,19 +62,28 @@ def carve(
     Returns:
         Integer voxels, sorted by block and then x, y, z. [P, 3] int64
     """
-    integrals = np.stack(map_ordered(_integral, masks))
+    integrals = np.zeros((len(masks), masks.shape[1] + 1, masks.shape[2] + 1), np.int32)
+    map_ordered(lambda camera: _integrate(masks[camera], integrals[camera]), range(len(masks)))
     blocks = np.stack(np.meshgrid(*(np.arange(n) for n in grid.n_blocks), indexing="ij"), axis=-1).reshape(-1, 3)
     arguments = (integrals, projections, grid.origin, grid.size, near, n_misses, min_hits)
+    # |d pixel| <= |d point| (|row| + |pixel| |row2|) / depth; rows of K R bound the footprint without knowing K
+    rows = np.sqrt((projections[:, :, :3] ** 2).sum(-1))
+    footprints = np.maximum(rows[:, 0], rows[:, 1]) + max(masks.shape[1:]) * rows[:, 2]
+    is_kept = np.zeros(len(blocks), dtype=bool)
 
-    def coarse(span: tuple[int, int]) -> np.ndarray:
-        return _carve_blocks(blocks[span[0] : span[1]], *arguments)
+    def coarse(span: tuple[int, int]) -> None:
+        part = slice(*span)
+        _carve_blocks(blocks[part], *arguments, footprints, is_kept[part])
 
-    blocks = blocks[np.concatenate(map_ordered(coarse, row_spans(len(blocks))))]
+    map_ordered(coarse, row_spans(len(blocks)))
+    blocks = blocks[is_kept]
     if len(blocks) == 0:
         return np.zeros((0, 3), dtype=np.int64)
 
     def fine(span: tuple[int, int]) -> np.ndarray:
-        return _carve_voxels(blocks[span[0] : span[1]], *arguments)
+        part = blocks[slice(*span)]
+        found = np.empty((len(part) * BLOCK**3, 3), np.int64)
+        return found[: _carve_voxels(part, *arguments, found)].copy()
 
     return np.concatenate(map_ordered(fine, row_spans(len(blocks))))
 
@@ -110,11 +119,21 @@ def hull_visibility(
         is_visible: Seen, and not more than COLOR_SLACK_VOXELS behind the hull's nearest surface. [C, P] bool
     """
 
-    def see(camera: int) -> tuple[np.ndarray, np.ndarray]:
-        return _see_points(points, size, masks[camera], projections[camera], near)
+    height, width = masks.shape[1:]
+    shrink = max(1, width // 160)  # of the buffer for the depth test
+    rows, thirds = projections[:, 0, :3], projections[:, 2, :3]
+    squares = (rows * rows).sum(-1) - (rows * thirds).sum(-1) ** 2
+    focals = np.sqrt(np.maximum(squares, 1e-12))  # |K R row 0| without its cx part
+    pixel = np.full((len(masks), len(points)), -1, np.int64)
+    is_visible = np.zeros(pixel.shape, dtype=bool)
 
-    seen = map_ordered(see, range(len(masks)))
-    return np.stack([pixel for pixel, _ in seen]), np.stack([is_visible for _, is_visible in seen])
+    def see(camera: int) -> None:
+        nearest = np.full((-(-height // shrink), -(-width // shrink)), np.inf)
+        view = projections[camera], near, focals[camera], shrink, nearest, np.empty(len(points))
+        _see_points(points, size, masks[camera], *view, pixel[camera], is_visible[camera])
+
+    map_ordered(see, range(len(masks)))
+    return pixel, is_visible
 
 
 def hull_colors(pictures: np.ndarray, pixel: np.ndarray, is_visible: np.ndarray, gains: np.ndarray) -> np.ndarray:
@@ -138,79 +157,64 @@ def hull_colors(pictures: np.ndarray, pixel: np.ndarray, is_visible: np.ndarray,
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _integral(mask):
-    """Sums of the mask over all pixels left of and above each corner. int32 [H + 1, W + 1]"""
+def _integrate(mask, sums):
+    """Writes sums of the mask over all pixels left of and above each corner. [H + 1, W + 1], zeros before"""
     height, width = mask.shape
-    sums = np.zeros((height + 1, width + 1), np.int32)
     for y in range(height):
         run = 0
         for x in range(width):
             run += mask[y, x]
             sums[y + 1, x + 1] = sums[y, x + 1] + run
-    return sums
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _box_has_foreground(integral, x, y, radius):
+@njit(nogil=True, error_model="numpy")
+def _box_has_foreground(integrals, camera, x, y, radius):
     """Any mask pixel whose area the square around (x, y) touches, after cutting it to the picture."""
-    height, width = integral.shape[0] - 1, integral.shape[1] - 1
+    height, width = integrals.shape[1] - 1, integrals.shape[2] - 1
     x0, x1 = min(max(math.floor(x - radius), 0), width), min(max(math.floor(x + radius) + 1, 0), width)
     y0, y1 = min(max(math.floor(y - radius), 0), height), min(max(math.floor(y + radius) + 1, 0), height)
-    return integral[y1, x1] - integral[y0, x1] - integral[y1, x0] + integral[y0, x0] > 0
-
-
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _is_box_inside(x, y, radius, width, height):
-    return x - radius >= 0 and y - radius >= 0 and x + radius <= width and y + radius <= height
+    total = integrals[camera, y1, x1] - integrals[camera, y0, x1]
+    return total - integrals[camera, y1, x0] + integrals[camera, y0, x0] > 0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _carve_blocks(blocks, integrals, projections, origin, size, near, n_misses, min_hits):
+def _carve_blocks(blocks, integrals, p, origin, size, near, n_misses, min_hits, footprints, is_kept):
     """Blocks that may hold a hull voxel: conservative, a block is dropped only if every voxel of it would be."""
-    n_cameras = len(projections)
     height, width = integrals.shape[1] - 1, integrals.shape[2] - 1
     edge = size * BLOCK
     ball = 0.5 * math.sqrt(3.0) * edge
-    is_kept = np.zeros(len(blocks), np.bool_)
-    focal = np.empty(n_cameras)
-    for c in range(n_cameras):
-        row0, row1, row2 = projections[c, 0, :3], projections[c, 1, :3], projections[c, 2, :3]
-        # |d pixel| <= |d point| (|row| + |pixel| |row2|) / depth; rows of K R bound the footprint without knowing K
-        focal[c] = max(math.sqrt((row0 * row0).sum()), math.sqrt((row1 * row1).sum()))
-        focal[c] += max(width, height) * math.sqrt((row2 * row2).sum())
     for b in range(len(blocks)):
         px = origin[0] + (blocks[b, 0] + 0.5) * edge
         py = origin[1] + (blocks[b, 1] + 0.5) * edge
         pz = origin[2] + (blocks[b, 2] + 0.5) * edge
         misses, hits = 0, 0
-        for c in range(n_cameras):
-            p = projections[c]
-            depth = p[2, 0] * px + p[2, 1] * py + p[2, 2] * pz + p[2, 3]
+        for c in range(len(p)):
+            depth = p[c, 2, 0] * px + p[c, 2, 1] * py + p[c, 2, 2] * pz + p[c, 2, 3]
             if depth + ball < near:
                 continue
             if depth - ball < 0.5 * near:
                 hits += 1  # too close to bound: may be seen
                 continue
-            x = (p[0, 0] * px + p[0, 1] * py + p[0, 2] * pz + p[0, 3]) / depth
-            y = (p[1, 0] * px + p[1, 1] * py + p[1, 2] * pz + p[1, 3]) / depth
-            radius = ball * focal[c] / (depth - ball) + 2.0
+            x = (p[c, 0, 0] * px + p[c, 0, 1] * py + p[c, 0, 2] * pz + p[c, 0, 3]) / depth
+            y = (p[c, 1, 0] * px + p[c, 1, 1] * py + p[c, 1, 2] * pz + p[c, 1, 3]) / depth
+            radius = ball * footprints[c] / (depth - ball) + 2.0
             if x + radius < 0 or y + radius < 0 or x - radius > width or y - radius > height:
                 continue
-            if _box_has_foreground(integrals[c], x, y, radius):
+            if _box_has_foreground(integrals, c, x, y, radius):
                 hits += 1
-            elif _is_box_inside(x, y, radius, width, height) and depth - ball > near:
+                continue
+            is_inside = x - radius >= 0 and y - radius >= 0 and x + radius <= width and y + radius <= height
+            if is_inside and depth - ball > near:
                 misses += 1
                 if misses > n_misses:
                     break
         is_kept[b] = misses <= n_misses and hits >= min_hits
-    return is_kept
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _carve_voxels(blocks, integrals, projections, origin, size, near, n_misses, min_hits):
-    n_cameras = len(projections)
+def _carve_voxels(blocks, integrals, p, origin, size, near, n_misses, min_hits, found):
+    """Writes voxels of the hull and returns how many there are."""
     height, width = integrals.shape[1] - 1, integrals.shape[2] - 1
-    found = np.empty((len(blocks) * BLOCK * BLOCK * BLOCK, 3), np.int64)
     n_found = 0
     for b in range(len(blocks)):
         for i in range(BLOCK):
@@ -221,16 +225,15 @@ def _carve_voxels(blocks, integrals, projections, origin, size, near, n_misses, 
                     py = origin[1] + (vy + 0.5) * size
                     pz = origin[2] + (vz + 0.5) * size
                     misses, hits = 0, 0
-                    for c in range(n_cameras):
-                        p = projections[c]
-                        depth = p[2, 0] * px + p[2, 1] * py + p[2, 2] * pz + p[2, 3]
+                    for c in range(len(p)):
+                        depth = p[c, 2, 0] * px + p[c, 2, 1] * py + p[c, 2, 2] * pz + p[c, 2, 3]
                         if depth < near:
                             continue
-                        x = (p[0, 0] * px + p[0, 1] * py + p[0, 2] * pz + p[0, 3]) / depth
-                        y = (p[1, 0] * px + p[1, 1] * py + p[1, 2] * pz + p[1, 3]) / depth
+                        x = (p[c, 0, 0] * px + p[c, 0, 1] * py + p[c, 0, 2] * pz + p[c, 0, 3]) / depth
+                        y = (p[c, 1, 0] * px + p[c, 1, 1] * py + p[c, 1, 2] * pz + p[c, 1, 3]) / depth
                         if x < 0 or y < 0 or x >= width or y >= height:
                             continue
-                        if _box_has_foreground(integrals[c], x, y, 1.0):
+                        if _box_has_foreground(integrals, c, x, y, 1.0):
                             hits += 1
                         else:
                             misses += 1
@@ -239,23 +242,15 @@ def _carve_voxels(blocks, integrals, projections, origin, size, near, n_misses, 
                     if misses <= n_misses and hits >= min_hits:
                         found[n_found, 0], found[n_found, 1], found[n_found, 2] = vx, vy, vz
                         n_found += 1
-    return found[:n_found].copy()
+    return n_found
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _see_points(points, size, mask, projection, near):
-    """Pixels inside the mask and a depth test against the splatted hull (buffer about 160 wide)."""
+def _see_points(points, size, mask, projection, near, focal, shrink, nearest, depths, pixel, is_visible):
+    """Writes pixels inside the mask, and a depth test against the splatted hull (buffer about 160 wide)."""
     height, width = mask.shape
-    shrink = max(1, width // 160)
-    small_h, small_w = (height + shrink - 1) // shrink, (width + shrink - 1) // shrink
-    nearest = np.full((small_h, small_w), np.inf)
-    row = projection[0, :3]
-    third = projection[2, :3]
-    focal = math.sqrt(max((row * row).sum() - (row * third).sum() ** 2, 1e-12))  # |K R row 0| without its cx part
+    small_h, small_w = nearest.shape
     n_points = len(points)
-    depths = np.empty(n_points)
-    pixel = np.full(n_points, -1, np.int64)
-    is_visible = np.zeros(n_points, np.bool_)
     for i in range(n_points):
         a, b, c = points[i, 0], points[i, 1], points[i, 2]
         depth = projection[2, 0] * a + projection[2, 1] * b + projection[2, 2] * c + projection[2, 3]
@@ -283,4 +278,3 @@ def _see_points(points, size, mask, projection, near):
             continue
         slack = COLOR_SLACK_VOXELS * size + shrink * depths[i] / focal  # one buffer cell of a 45 degree slope
         is_visible[i] = depths[i] <= nearest[y // shrink, x // shrink] + slack
-    return pixel, is_visible

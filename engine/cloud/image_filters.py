@@ -44,15 +44,22 @@ def blurred_difference(frame: np.ndarray, background: np.ndarray, sigma_px: floa
     Returns:
         float32 [H, W] in 0..765.
     """
-    reference = np.ascontiguousarray(background, dtype=np.float32)
-    return _blurred_difference(np.ascontiguousarray(frame), reference, gaussian_taps(sigma_px))
+    height, width, n_channels = frame.shape
+    reference, taps = np.ascontiguousarray(background, dtype=np.float32), gaussian_taps(sigma_px)
+    rows = np.empty((height, width * n_channels), np.float32)
+    line = np.empty((width + len(taps) - 1) * n_channels, np.float32)
+    total = np.empty((height, width), np.float32)
+    _blurred_difference(np.ascontiguousarray(frame), reference, taps, rows, line, total)
+    return total
 
 
 def dilate(mask: np.ndarray, radius_px: int) -> np.ndarray:
     """Grow by a square of half width radius_px. bool [H, W]"""
     if radius_px < 1:
         return mask.copy()
-    return _window_any(np.ascontiguousarray(mask), radius_px)
+    rows, grown = np.zeros((2, *mask.shape), dtype=bool)
+    _window_any(np.ascontiguousarray(mask), radius_px, rows, grown)
+    return grown
 
 
 def erode(mask: np.ndarray, radius_px: int) -> np.ndarray:
@@ -70,24 +77,21 @@ def remove_small_blobs(mask: np.ndarray, min_px: int) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
-def _blurred_difference(frame, background, taps):
+def _blurred_difference(frame, background, taps, rows, line, total):
+    """Writes total [H, W]. rows [H, 3 W] is scratch, so is line, of one row with what the taps reach on both sides."""
     height, width, n_channels = frame.shape
     radius = len(taps) // 2
-    rows = np.empty((height, width * n_channels), np.float32)
-    padded = np.empty((width + 2 * radius) * n_channels, np.float32)
     for y in range(height):
         for i in range(width + 2 * radius):
             x = min(max(i - radius, 0), width - 1)
             for c in range(n_channels):
-                padded[i * n_channels + c] = np.float32(frame[y, x, c]) - background[y, x, c]
+                line[i * n_channels + c] = np.float32(frame[y, x, c]) - background[y, x, c]
         for j in range(width * n_channels):
             rows[y, j] = np.float32(0)
         for k in range(len(taps)):
             tap, shift = taps[k], k * n_channels
             for j in range(width * n_channels):
-                rows[y, j] += tap * padded[j + shift]
-    total = np.empty((height, width), np.float32)
-    line = np.empty(width * n_channels, np.float32)
+                rows[y, j] += tap * line[j + shift]
     for y in range(height):
         for j in range(width * n_channels):
             line[j] = np.float32(0)
@@ -100,13 +104,12 @@ def _blurred_difference(frame, background, taps):
             for c in range(n_channels):
                 value += abs(line[x * n_channels + c])
             total[y, x] = value
-    return total
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _window_any(mask, radius):
+def _window_any(mask, radius, rows, grown):
+    """Sets grown [H, W], which is False before. rows [H, W] is scratch."""
     height, width = mask.shape
-    rows = np.zeros((height, width), np.bool_)
     for y in range(height):
         reach = -1  # last column that a set pixel already seen covers
         for x in range(min(radius, width)):
@@ -116,9 +119,7 @@ def _window_any(mask, radius):
             if x + radius < width and mask[y, x + radius]:
                 reach = x + 2 * radius
             rows[y, x] = x <= reach
-    grown = np.zeros((height, width), np.bool_)
     for y in range(height):
         for source in range(max(0, y - radius), min(height, y + radius + 1)):
             for x in range(width):
                 grown[y, x] |= rows[source, x]
-    return grown

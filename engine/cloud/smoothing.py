@@ -31,19 +31,22 @@ def smooth_inverse_depth(costs: np.ndarray, grey: np.ndarray, inverse_depths: np
     Returns:
         float32 [H, W], within the range of inverse_depths.
     """
+    height, width, n_planes = costs.shape
     totals = np.zeros_like(costs)
+    paths = np.full((2, width, n_planes + 2), np.inf, np.float32)
+    lowest = np.zeros((2, width), np.float32)
     for dy, dx in _DIRECTIONS:
-        _add_path(costs, grey, dy, dx, SMALL_STEP_PENALTY, JUMP_PENALTY, EDGE_GREY_LEVELS, totals)
-    return _parabola_minimum(totals, inverse_depths.astype(np.float32))
+        _add_path(costs, grey, dy, dx, paths, lowest, totals)
+    chosen = np.empty((height, width), np.float32)
+    _parabola_minimum(totals, inverse_depths.astype(np.float32), chosen)
+    return chosen
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def _add_path(costs, grey, dy, dx, small_penalty, jump_penalty, edge_levels, totals):
-    """Aggregate along one direction. Rows carry a border of infinities so that d +- 1 needs no test."""
+def _add_path(costs, grey, dy, dx, paths, lowest, totals):
+    """Aggregate along one direction. Rows of `paths` carry a border of infinities so that d +- 1 needs no test."""
     height, width, n_planes = costs.shape
-    paths = np.full((2, width, n_planes + 2), np.inf, np.float32)
-    lowest = np.zeros((2, width), np.float32)
-    small = np.float32(small_penalty)
+    small = np.float32(SMALL_STEP_PENALTY)
     is_forward = dy > 0 or (dy == 0 and dx > 0)
     for row in range(height):
         y = row if is_forward else height - 1 - row
@@ -60,9 +63,9 @@ def _add_path(costs, grey, dy, dx, small_penalty, jump_penalty, edge_levels, tot
                     totals[y, x, d] += value
                     least = min(least, value)
             else:
-                jump = jump_penalty * math.exp(-abs(grey[y, x] - grey[py, px]) / edge_levels)
+                jump = JUMP_PENALTY * math.exp(-abs(grey[y, x] - grey[py, px]) / EDGE_GREY_LEVELS)
                 base = lowest[there, px]
-                ceiling = base + np.float32(max(jump, 2.0 * small_penalty))
+                ceiling = base + np.float32(max(jump, 2.0 * SMALL_STEP_PENALTY))
                 before = paths[there, px]
                 now = paths[here, x]
                 for d in range(n_planes):
@@ -75,10 +78,9 @@ def _add_path(costs, grey, dy, dx, small_penalty, jump_penalty, edge_levels, tot
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _parabola_minimum(totals, inverse_depths):
+def _parabola_minimum(totals, inverse_depths, chosen):
     height, width, n_planes = totals.shape
     step = inverse_depths[1] - inverse_depths[0]
-    chosen = np.empty((height, width), np.float32)
     for y in range(height):
         for x in range(width):
             best = 0
@@ -92,4 +94,3 @@ def _parabola_minimum(totals, inverse_depths):
                 if bend > 1e-9:
                     offset = min(max(0.5 * (left - right) / bend, -0.5), 0.5)
             chosen[y, x] = inverse_depths[best] + np.float32(offset) * step
-    return chosen

@@ -133,26 +133,18 @@ def matching_costs(
     pairs = [relative_homography(rig, camera, other) for other in sources]
     matrices = np.stack([pair[0] for pair in pairs]).astype(np.float32)
     shifts = np.stack([pair[1] for pair in pairs]).astype(np.float32)
-    rows = np.asarray(sources)
-    _sweep(greys[camera], greys[rows], is_usable[rows], matrices, shifts, inverse_depths, costs)
-    costs[~is_usable[camera]] = UNKNOWN_COST
-    return costs
-
-
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
-def _sweep(reference, sources, is_usable, matrices, shifts, inverse_depths, costs):
-    height, width = reference.shape
-    n_sources = len(sources)
-    moments = np.zeros((6, height, width), np.float32)
-    sums = np.zeros((6, height, width), np.float32)
-    source_costs = np.empty((n_sources, height, width), np.float32)
-    for d in range(len(inverse_depths)):
-        for s in range(n_sources):
-            shift = shifts[s] * inverse_depths[d]
-            _warped_moments(reference, sources[s], is_usable[s], matrices[s], shift, moments)
+    moments, sums = np.empty((2, 6, height, width), np.float32)
+    source_costs = np.empty((len(sources), height, width), np.float32)
+    ranked = np.empty(len(sources), np.float32)
+    for d, inverse_depth in enumerate(inverse_depths):
+        for s, other in enumerate(sources):
+            warp = matrices[s], shifts[s] * inverse_depth
+            _warped_moments(greys[camera], greys[other], is_usable[other], *warp, moments)
             _patch_sums(moments, sums)
             _zncc_cost(sums, source_costs[s])
-        _mean_of_best_half(source_costs, costs, d)
+        _mean_of_best_half(source_costs, ranked, costs, d)
+    costs[~is_usable[camera]] = UNKNOWN_COST
+    return costs
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
@@ -194,7 +186,7 @@ def _warped_moments(reference, source, is_usable, matrix, shift, moments):
 def _patch_sums(moments, sums):
     """Sums over the square patch; patches are cut at the border."""
     _, height, width = moments.shape
-    line = np.empty(width, np.float32)
+    line = np.empty(width, np.float32)  # made here, it is known to overlap with nothing
     for m in range(6):
         for y in range(height):
             for x in range(width):
@@ -234,10 +226,12 @@ def _zncc_cost(sums, costs):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=True)
-def _mean_of_best_half(source_costs, costs, d):
-    """The better half of the voting sources: the others may be occluded. A lone vote counts half."""
+def _mean_of_best_half(source_costs, ranked, costs, d):
+    """The better half of the voting sources: the others may be occluded. A lone vote counts half.
+
+    ranked [sources] is scratch.
+    """
     n_sources, height, width = source_costs.shape
-    ranked = np.empty(n_sources, np.float32)
     for y in range(height):
         for x in range(width):
             n = 0

@@ -10,7 +10,6 @@ from engine.cloud.consistency import check_depths
 from engine.cloud.hull import Grid, carve, hull_colors, hull_visibility
 from engine.cloud.image_filters import dilate
 from engine.cloud.masks import motion_mask
-from engine.cloud.median import median_over_cameras
 from engine.cloud.projection import projection_matrices
 from engine.cloud.smoothing import smooth_inverse_depth
 from engine.cloud.sweep import matching_costs
@@ -37,7 +36,6 @@ def warm_up() -> None:
     costs = matching_costs(greys, is_usable, rig, camera=0, sources=[1], inverse_depths=planes)
     smooth_inverse_depth(costs, greys[0], planes)
     check_depths(np.full(greys.shape, 2.0), rig, camera=0, others=[1], tolerance=0.01)
-    median_over_cameras(np.ones((2, 3, 3)))  # float32 samples come with the colours of the hull
 
     grid, projections = Grid.over(np.array([-0.4, -0.4, 1.6]), np.array([0.4, 0.4, 2.4]), 0.1), projection_matrices(rig)
     voxels = carve(is_usable, projections, grid, near=0.1, n_misses=0, min_hits=1)

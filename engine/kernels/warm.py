@@ -21,13 +21,17 @@ from engine.kernels.cache import is_cache_warm, use_kernel_cache, write_marker
 logger = logging.getLogger(__name__)
 
 GROUPS = (
-    ("point clouds", "engine.cloud.warm"),
-    ("rasterizer", "engine.raster.cpu.warm"),
-    ("decoder", "engine.model.warm"),
-    ("loss and optimiser", "engine.training.warm"),
+    ("point clouds", "engine.cloud.warm", 5.0),
+    ("decoder", "engine.model.warm", 4.5),
+    ("rasterizer", "engine.raster.cpu.warm", 4.0),
+    ("loss and optimiser", "engine.training.warm", 3.5),
+    ("figures", "engine.metrics.window", 0.5),
 )
-"""Name and module of each group, slowest first. Every module has a `warm_up()` that runs each of its kernels once.
-Groups share no cached kernel but the entry of `routines.run`, or two processes would compile it at the same time."""
+"""Name, module, and about how long compiling takes, of each group. Every module has a `warm_up()` that runs each of its
+kernels once. Groups share no cached kernel but the entry of `routines.run`, or two processes would compile it at the
+same time."""
+_FOR_LATER = ("point clouds", "figures")
+"""Groups that are not part of a training step, and quick to load at their first use."""
 
 MAX_PROCESSES = 4
 TIME_LIMIT_S = 180.0
@@ -50,8 +54,8 @@ def warm_up_all(report: ReportGroups | None = None) -> None:
         report: Told about the progress; what it raises ends the compiling processes and passes on.
     """
     compile_all(report)
-    for name, module in GROUPS:
-        if name != "point clouds":  # not part of a step, and quick to load when clouds are built
+    for name, module, _ in GROUPS:
+        if name not in _FOR_LATER:
             import_module(module).warm_up()
 
 
@@ -102,24 +106,27 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
             lock.unlink(missing_ok=True)
 
 
-_Bundle = tuple[tuple[str, str], ...]
+_Bundle = tuple[tuple[str, str, float], ...]
 """Groups that one process compiles, one after the other."""
 
 
 def _bundles(n_processes: int) -> list[_Bundle]:
-    """The first groups, which take longest, alone; the rest together: importing torch and numba takes two seconds."""
-    n_alone = max(0, min(n_processes, len(GROUPS)) - 1)
-    return [*((group,) for group in GROUPS[:n_alone]), tuple(GROUPS[n_alone:])]
+    """Longest first, each to the process that has least to do."""
+    bundles: list[_Bundle] = [()] * min(n_processes, len(GROUPS))
+    for group in sorted(GROUPS, key=lambda group: -group[2]):
+        least = min(range(len(bundles)), key=lambda i: sum(seconds for _, _, seconds in bundles[i]))
+        bundles[least] = (*bundles[least], group)
+    return bundles
 
 
 def _names(bundle: _Bundle) -> str:
-    return ", ".join(name for name, _ in bundle)
+    return ", ".join(name for name, _, _ in bundle)
 
 
 def _start(bundle: _Bundle) -> subprocess.Popen[bytes]:
     root = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
-    calls = "; ".join(f"import_module({module!r}).warm_up()" for _, module in bundle)
+    calls = "; ".join(f"import_module({module!r}).warm_up()" for _, module, _ in bundle)
     return subprocess.Popen(
         # a compiler makes millions of objects that live on: looking for garbage among them takes a fifth of the time
         [sys.executable, "-c", f"import gc; gc.disable(); from importlib import import_module; {calls}"],

@@ -10,11 +10,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
 
-_RADIUS = 5
-_TAPS = np.exp(-((np.arange(2 * _RADIUS + 1) - _RADIUS) ** 2) / (2 * 1.5**2))
-WINDOW = (_TAPS / _TAPS.sum()).astype(np.float32)
+from engine.metrics.window import RADIUS, blur_along_rows, similarity_of_rows
+
 K1, K2 = 0.01, 0.03
 """Constants of SSIM, as shares of the data range: C1 = (K1 L)^2, C2 = (K2 L)^2."""
 MS_WEIGHTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
@@ -32,17 +30,17 @@ class Moments:
 
     def __init__(self, image: np.ndarray, truth: np.ndarray) -> None:
         height, width, _ = image.shape
-        self.rows = np.zeros((5, height + 2 * _RADIUS, 3 * width), np.float32)
+        self.rows = np.zeros((5, height + 2 * RADIUS, 3 * width), np.float32)
         a, b = (np.clip(p, 0.0, 1.0).astype(np.float32, copy=False) for p in (image, truth))
         a, b = (np.ascontiguousarray(p).reshape(height, 3 * width) for p in (a, b))
-        _blur_rows(a, b, WINDOW, self.rows)
+        blur_along_rows(a, b, self.rows)
 
     def maps(self, data_range: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """SSIM, and its contrast-structure factor, of each pixel and channel. Both [H, W, 3] float32"""
-        height, width3 = self.rows.shape[1] - 2 * _RADIUS, self.rows.shape[2]
+        height, width3 = self.rows.shape[1] - 2 * RADIUS, self.rows.shape[2]
         ssim, structure = np.empty((height, width3), np.float32), np.empty((height, width3), np.float32)
         c1, c2 = ((k * data_range) ** 2 for k in (K1, K2))
-        _similarity_rows(self.rows, WINDOW, np.float32(c1), np.float32(c2), ssim, structure)
+        similarity_of_rows(self.rows, c1, c2, ssim, structure)
         return ssim.reshape(height, -1, 3), structure.reshape(height, -1, 3)
 
 
@@ -97,7 +95,7 @@ def dssim_ms_of(image: np.ndarray, truth: np.ndarray, moments: Moments) -> float
         return math.nan
     a, b = (np.clip(p, 0.0, 1.0).astype(np.float32, copy=False) for p in (image, truth))
     product = 1.0
-    inside = slice(_RADIUS, -_RADIUS)
+    inside = slice(RADIUS, -RADIUS)
     for scale, weight in enumerate(MS_WEIGHTS):
         is_coarsest = scale == len(MS_WEIGHTS) - 1
         if scale:
@@ -111,7 +109,7 @@ def dssim_ms_of(image: np.ndarray, truth: np.ndarray, moments: Moments) -> float
 
 def _mirrored(image: np.ndarray) -> np.ndarray:
     """The picture continued over its border by as much as a window reaches. [H + 10, W + 10, 3]"""
-    return np.pad(image, ((_RADIUS, _RADIUS), (_RADIUS, _RADIUS), (0, 0)), mode="reflect")
+    return np.pad(image, ((RADIUS, RADIUS), (RADIUS, RADIUS), (0, 0)), mode="reflect")
 
 
 def masked_mean(values: np.ndarray, mask: np.ndarray | None) -> float:
@@ -126,50 +124,3 @@ def _halve(image: np.ndarray) -> np.ndarray:
     top, bottom = image[0:height:2], image[1:height:2]
     total = top[:, 0:width:2] + top[:, 1:width:2] + bottom[:, 0:width:2] + bottom[:, 1:width:2]
     return total * np.float32(0.25)
-
-
-@njit(cache=True, nogil=True, parallel=True, error_model="numpy", fastmath={"contract"})
-def _blur_rows(a, b, taps, rows):
-    """a, b [H, 3W]; writes rows [5, H + 10, 3W]. Horizontal neighbours lie 3 apart."""
-    height, width3 = a.shape
-    for y in prange(height):
-        padded = np.zeros((5, width3 + 30), np.float32)
-        for x in range(width3):
-            va, vb = a[y, x], b[y, x]
-            padded[0, x + 15] = va
-            padded[1, x + 15] = vb
-            padded[2, x + 15] = va * va
-            padded[3, x + 15] = vb * vb
-            padded[4, x + 15] = va * vb
-        for m in range(5):
-            source, target = padded[m], rows[m, y + 5]
-            for x in range(width3):
-                target[x] = taps[5] * source[x + 15]
-            for j in range(5):
-                weight = taps[j]
-                for x in range(width3):
-                    target[x] += weight * (source[x + 3 * j] + source[x + 30 - 3 * j])
-
-
-@njit(cache=True, nogil=True, parallel=True, error_model="numpy", fastmath={"contract"})
-def _similarity_rows(rows, taps, c1, c2, ssim, structure):
-    """rows [5, H + 10, 3W] to ssim and structure [H, 3W]; each row is written by one thread, nothing is summed."""
-    height, width3 = ssim.shape
-    two = np.float32(2)
-    for y in prange(height):
-        mean = np.empty((5, width3), np.float32)
-        for m in range(5):
-            target = mean[m]
-            for x in range(width3):
-                target[x] = taps[5] * rows[m, y + 5, x]
-            for j in range(5):
-                weight = taps[j]
-                for x in range(width3):
-                    target[x] += weight * (rows[m, y + j, x] + rows[m, y + 10 - j, x])
-        for x in range(width3):
-            mu_a, mu_b = mean[0, x], mean[1, x]
-            product = mu_a * mu_b
-            squares = mu_a * mu_a + mu_b * mu_b
-            contrast = (two * (mean[4, x] - product) + c2) / (mean[2, x] + mean[3, x] - squares + c2)
-            structure[y, x] = contrast
-            ssim[y, x] = contrast * (two * product + c1) / (squares + c1)

@@ -311,7 +311,7 @@ class ClipTraining:
         if loss.requires_grad:
             loss.backward()
         try:
-            self._optimizer.step()
+            gradient_norm = self._optimizer.step()
         except NonFiniteLoss as error:
             raise NonFiniteLoss(f"{error.message} ({where})", hint="The last good state was kept.") from error
         self.steps_done += 1
@@ -322,6 +322,7 @@ class ClipTraining:
             train_psnr=-10.0 * float(np.log10(max(compared.mean_square, 1e-10))),
             n_gaussians=len(gaussians),
             stage=stage,
+            gradient_norm=gradient_norm,
         )
 
     def _rows(self, camera_row: int, clip_time: float) -> dict[str, Tensor]:
@@ -400,6 +401,8 @@ class ClipTraining:
             arrays["gains"] = self.gains.detach().numpy().copy()
         else:
             header["reference_fingerprint"] = self.reference.header["fingerprint"]
+        if self.previous is not None:
+            header["previous_fingerprint"] = self.previous.header["fingerprint"]
         state = ClipState(arrays, header)
         header["fingerprint"] = state.fingerprint
         return state

@@ -142,6 +142,17 @@ class TrainConfig:
             raise ProjectError(
                 "independent clips cannot continue each other's field.", hint="Leave out field=continue."
             )
+        shared = [name for name in _SHARING if getattr(self, name) != _CHOICES[name][0]]
+        if self.independent and shared:
+            listed = ", ".join(f"{name}={getattr(self, name)}" for name in shared)
+            raise ProjectError(
+                f"independent clips take over nothing, so {listed} would change nothing.", hint=f"Leave out {listed}."
+            )
+        if self.inherit == "off" and self.residual == "none":
+            raise ProjectError(
+                "inherit=off with residual=none leaves a source clip without anything that moves.",
+                hint="Leave out one of them.",
+            )
         if self.start == "previous" and not self.independent:
             raise ProjectError("start=previous needs independent=true.", hint="Add it, or leave out start=previous.")
 
@@ -211,6 +222,8 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "field": ("per_clip", "continue", "joint"),
     "start": ("scratch", "previous"),
 }
+_SHARING = ("decoder", "residual", "inherit")
+"""Settings of what a source clip takes over. The first choice of each is the default."""
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 

@@ -32,6 +32,7 @@ class StepStats:
         train_psnr: PSNR of the picture that was trained on, dB.
         n_gaussians: Gaussians rendered.
         stage: "static", "joint" or "source".
+        gradient_norm: Euclidean norm over all gradients, before `max_gradient_norm` clips it.
     """
 
     step: int
@@ -40,6 +41,7 @@ class StepStats:
     train_psnr: float
     n_gaussians: int
     stage: str
+    gradient_norm: float
 
 
 ReportProgress = Callable[[Progress], None]

@@ -76,6 +76,7 @@ class FakeTraining:
     fails_at: int | None = None
     steps_done: int = 0
     value: float = 0.0
+    previous: ClipState | None = None
 
     def prepare(self) -> None:
         for share in (0.0, 0.5, 1.0):
@@ -86,7 +87,9 @@ class FakeTraining:
             raise NonFiniteLoss(f"The loss became nan at step {self.steps_done + 1}.", hint="Lower the rates.")
         self.steps_done += 1
         self.value = self.value * 0.5 + self.steps_done
-        return StepStats(self.steps_done, self.n_steps, 1.0 / self.steps_done, 20.0, 12, "joint")
+        return StepStats(
+            self.steps_done, self.n_steps, 1.0 / self.steps_done, 20.0, 12, "joint", float(self.steps_done)
+        )
 
     def state(self) -> ClipState:
         header = {
@@ -104,6 +107,8 @@ class FakeTraining:
         }
         if self.reference is not None:
             header["reference_fingerprint"] = self.reference.header["fingerprint"]
+        if self.previous is not None:
+            header["previous_fingerprint"] = self.previous.header["fingerprint"]
         points = np.linspace(0, 1, 36, dtype=np.float32).reshape(12, 3)
         arrays = {
             "sets.static.positions": points,
@@ -135,6 +140,8 @@ def make_fake(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining
     clip = project.clips(capture.n_frames)[job.clip_index]
     first = project.settings.reference_clip
     reference = None if job.clip_index == first else read_clip_state(project.clip_path(first))
+    goes_on = job.clip_index > 0 and job.overrides.get("field") == "continue"
+    previous = read_clip_state(project.clip_path(project.previous_index(job.clip_index))) if goes_on else None
     return FakeTraining(
         capture,
         clip,
@@ -142,6 +149,7 @@ def make_fake(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining
         report,
         n_steps=job.overrides.get("joint_steps") or N_STEPS,
         fails_at=job.overrides.get("static_steps"),
+        previous=previous,
     )
 
 

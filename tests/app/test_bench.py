@@ -16,6 +16,7 @@ from PIL import Image
 from app.bench import raster, suite
 from app.bench.chart import draw_speed_error
 from app.bench.clips import ClipRecipe
+from app.bench.command import CHART_FILE
 from app.bench.field import SCENES, DecodeScene, measure_decode
 from app.bench.fma_limit import measure_fma_limit
 from app.bench.iteration import SIZES, STAGES, measure_iteration
@@ -26,7 +27,7 @@ from app.bench.scenes import RECIPES, Recipe
 from app.bench.suite import FULL, QUICK, Plan, document
 from app.bench.table import report_text
 from app.bench.timing import Timing, interleaved, peak_extra_mb
-from app.cli import CHART_FILE, main
+from app.cli import main
 
 ROOT = Path(__file__).resolve().parents[2]
 TINY = Recipe(100, 32, 24, 3.0)

@@ -12,9 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.cli import check_writable, main, parse_range
+from app.arguments import parse_range
+from app.cli import main
 from app.progress import ProgressLine, duration_text
 from app.project import open_project, read_settings
+from app.results import check_writable
 from app.video import write_pictures, write_video
 from engine.errors import ProjectError
 from engine.model.clip_state import read_clip_state

@@ -31,7 +31,7 @@ def test_decoding_inverts_encoding(kind, data):
 
 
 def test_numbers_that_are_not_finite_travel_too():
-    back = decode(encode(StepReported(1, 2, math.nan, math.inf, 3, "joint", 0.0)))
+    back = decode(encode(StepReported(1, 2, math.nan, math.inf, 3, "joint", 0.0, 1.0)))
     assert isinstance(back, StepReported)
     assert math.isnan(back.loss)
     assert back.train_psnr == math.inf

@@ -238,7 +238,7 @@ def test_the_rate_follows_and_leaves_pauses_out():
     assert rate.eta_s(10) == pytest.approx(10.0, rel=0.01)
 
 
-def test_a_finished_clip_says_how_long_its_stages_took(bench):
+def test_a_finished_clip_says_how_long_its_stages_took_and_how_large_gradients_were(bench):
     def take_time(it):
         def prepare():
             it.now_s += 2.0
@@ -268,6 +268,9 @@ def test_a_finished_clip_says_how_long_its_stages_took(bench):
         {"Starting": 2.0, "Carving": 30.0, "Sizing": 4.0, "Measuring and keeping": 0.0, "Training": 2.0}
     )
     assert metrics["preparation_s"] == pytest.approx(36.0)
+    norms = range(1, read_clip_state(it.project.clip_path(0)).header["n_steps"] + 1)  # of the fake: its step
+    assert metrics["gradient_norm_median"] == pytest.approx(sum(norms) / len(norms))
+    assert metrics["gradient_norm_max"] == norms[-1]
     assert metrics["training_s"] == pytest.approx(2.0)
     assert read_metrics(it.project.metrics_path(0))[-1]["training_s"] == pytest.approx(2.0)
 

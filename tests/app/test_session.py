@@ -179,6 +179,24 @@ def test_training_the_reference_again_makes_source_clips_stale(make_session):
     assert session.training.next_clip_index == 1
 
 
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_training_a_clip_again_makes_those_stale_that_went_on_from_it(make_session, goes_on):
+    session = make_session()
+    session.dispatch(c.SetClipLength(2))
+    overrides: dict[str, object] = {"field": "continue"} if goes_on else {}
+    session.project.update(replace(session.project.settings, overrides=overrides))
+    n_clips = len(session.clip_states)
+    assert n_clips >= 3
+    for _ in range(n_clips):
+        train_next(session)
+    assert {state.state for state in session.clip_states} == {"trained"}
+    session.project.update(replace(session.project.settings, overrides=overrides | {"joint_steps": 9}))
+    session.dispatch(c.TrainClip(1))
+    poll_until(session, lambda: session.training.state == "idle")
+    later = "stale" if goes_on else "trained"
+    assert [state.state for state in session.clip_states] == ["trained", "trained"] + [later] * (n_clips - 2)
+
+
 def test_what_was_learned_fixes_clip_length_and_hold_out(make_session):
     session = make_session()
     session.dispatch(c.SetHoldout((1,)))

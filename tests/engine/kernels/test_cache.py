@@ -286,7 +286,7 @@ def small_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
             (folder / f"warm_{name}.py").write_text(f"def warm_up():\n    {body}\n")
         monkeypatch.setenv("PYTHONPATH", str(folder))
         monkeypatch.syspath_prepend(str(folder))
-        monkeypatch.setattr(warm, "GROUPS", tuple((name, f"warm_{name}") for name in bodies))
+        monkeypatch.setattr(warm, "GROUPS", tuple((name, f"warm_{name}", 1.0) for name in bodies))
 
     return make
 
@@ -366,5 +366,5 @@ def test_the_lock_of_a_dead_program_is_broken(small_groups):
 def test_every_group_has_a_warm_up():
     from importlib import import_module
 
-    for _, module in warm.GROUPS:
+    for _, module, _ in warm.GROUPS:
         assert callable(import_module(module).warm_up)

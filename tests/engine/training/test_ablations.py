@@ -278,6 +278,9 @@ def test_merging_makes_residual_anchors_moving_ones(streamed):
     ("settings", "expected"),
     [
         ({"independent": True, "field": "continue"}, "cannot continue"),
+        ({"independent": True, "decoder": "new", "inherit": "off"}, "decoder=new, inherit=off would change nothing"),
+        ({"independent": True, "residual": "full"}, "residual=full would change nothing"),
+        ({"inherit": "off", "residual": "none"}, "without anything that moves"),
         ({"start": "previous"}, "needs independent=true"),
         ({"decoder": "fresh"}, "'frozen', 'finetune' or 'new'"),
         ({"residual": "some"}, "'dedup', 'none' or 'full'"),

@@ -85,10 +85,15 @@ def test_picture_fills_only_its_rectangle(ctx: moderngl.Context, keep: Keep) -> 
     np.testing.assert_array_equal(target.read_color()[..., 3], expected)
 
 
-def test_released_target_can_be_released_again(ctx: moderngl.Context) -> None:
+def test_released_target_can_be_released_again_and_gives_nothing_out(ctx: moderngl.Context) -> None:
     target = Target(ctx, (4, 4))
     target.release()
     target.release()
+    with pytest.raises(AssertionError, match="was released"):
+        _ = target.framebuffer
+    with pytest.raises(AssertionError, match="was released"):
+        _ = target.texture
+    assert ctx.error == "GL_NO_ERROR"
 
 
 def test_a_direct_target_shows_marks_over_its_background(ctx: moderngl.Context, keep: Keep) -> None:

@@ -1,0 +1,86 @@
+"""clipgstream ablate: arguments to variants, settings and seeds; progress, and the table."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import replace
+
+from app.arguments import EXIT_OK, overrides_of, parse_cameras
+from app.progress import ProgressLine, row_progress
+from app.project import check_settings, default_settings
+from app.results import check_writable
+from app.training.lines import show_outcome, show_status
+from app.training.service import Launch
+from engine.capture.capture import open_capture
+from engine.errors import ProjectError
+
+
+def ablate(options: argparse.Namespace, launch: Launch) -> int:
+    """clipgstream ablate: train variants and compare them; prints the table. Returns the exit code."""
+    from app.ablation.running import RESULT_FILE, TABLE_FILE, Callbacks, run_ablation
+    from app.ablation.table import as_text
+    from app.ablation.variants import VARIANTS, chosen_variants
+
+    if options.list:
+        width = max(len(variant.name) for variant in VARIANTS)
+        for variant in VARIANTS:
+            print(f"{variant.name:<{width}}  {'baseline: ' if variant.is_baseline else ''}{variant.words}")
+        return EXIT_OK
+    if options.capture is None or options.project is None:
+        raise ProjectError("A capture folder and --project are needed.", hint="Only --list does without.")
+    names = None if options.variants is None else [name.strip() for name in options.variants.split(",")]
+    variants = chosen_variants(names)
+    try:
+        seeds = [int(seed) for seed in options.seeds.split(",")]
+    except ValueError as error:
+        raise ProjectError(f"--seeds is '{options.seeds}'; write whole numbers separated by commas.") from error
+    if len(set(seeds)) < len(seeds):
+        raise ProjectError(f"--seeds is '{options.seeds}'; a seed counts only once.")
+    capture = open_capture(options.capture, scale=options.scale if options.scale is not None else 1.0)
+    settings = default_settings(
+        capture,
+        clip_length=options.clip_length,
+        holdout=None if options.holdout is None else parse_cameras(options.holdout, capture),
+        seed=seeds[0],
+        overrides=overrides_of(options),
+    )
+    for seed in seeds[1:]:
+        check_settings(replace(settings, seed=seed), capture)
+    most = len(settings.clips(capture.n_frames))
+    n_clips = min(most, 4) if options.n_clips is None else options.n_clips
+    if not 1 <= n_clips <= most:
+        raise ProjectError(f"--n-clips is {n_clips}; the capture has {most} clips of {settings.clip_length} frames.")
+    check_writable(options.project / RESULT_FILE)
+    line = ProgressLine(is_quiet=options.quiet)
+
+    def show_variant(name: str, seed: int, n_done: int, n: int) -> None:
+        line.say(f"{name}, seed {seed} ({n_done + 1} of {n})")
+
+    callbacks = Callbacks(
+        on_variant=show_variant,
+        on_status=lambda status: show_status(line, status),
+        on_event=lambda event: None,
+        on_outcome=lambda outcome: show_outcome(line, outcome),
+        on_row=row_progress(line, "Measuring"),
+    )
+    try:
+        document = run_ablation(
+            options.project,
+            capture,
+            settings,
+            variants=variants,
+            n_clips=n_clips,
+            seeds=seeds,
+            metrics=options.metrics,
+            launch=launch,
+            callbacks=callbacks,
+        )
+    finally:
+        line.finish()
+    if options.json:
+        print(json.dumps(document, indent=1, allow_nan=False))
+    else:
+        print(as_text(document["lines"]))
+    line.say(f"All figures: {options.project / RESULT_FILE} and {TABLE_FILE}")
+    return EXIT_OK

@@ -1,0 +1,50 @@
+"""clipgstream bench: the table of the kernels, their figures as JSON, and the picture of speed against error."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from app.arguments import EXIT_OK
+from app.progress import ProgressLine
+from app.results import check_writable, named_failure, write_text
+from app.training.service import Launch
+from engine.errors import ProjectError
+from engine.files import atomic_path
+
+CHART_FILE = "speed_error.png"
+
+
+def bench(options: argparse.Namespace, launch: Launch) -> int:
+    """clipgstream bench: measure the kernels; prints the table. Returns the exit code."""
+    chart = None if options.out is None else options.out / CHART_FILE
+    table_file = None if options.json in (None, "-") else Path(options.json)
+    for path in (chart, table_file):  # said before a minute is spent
+        if path is not None:
+            check_writable(path)
+    if options.threads is not None and options.threads < 1:
+        raise ProjectError(f"--threads is {options.threads}; at least one is needed.")
+    from app.bench.suite import FULL, QUICK, document, run_plan
+    from app.bench.table import report_text
+
+    line = ProgressLine(is_quiet=options.quiet)
+    try:
+        report = run_plan(
+            FULL if options.full else QUICK,
+            n_threads=options.threads,
+            say=lambda what, done: line.update(f"Measuring: {what}", done),
+        )
+    finally:
+        line.finish()
+    text = json.dumps(document(report), indent=1, allow_nan=False)
+    print(text if options.json == "-" else report_text(report))
+    if table_file is not None:
+        write_text(table_file, text + "\n")
+    if chart is not None:
+        from app.bench.chart import draw_speed_error
+
+        with named_failure(chart), atomic_path(chart) as partial:
+            draw_speed_error(report.marks, partial, footer=str(report.machine))
+        line.say(f"Speed against error: {chart}")
+    return EXIT_OK

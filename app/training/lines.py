@@ -1,0 +1,47 @@
+"""A training on the command line: its status as a progress line, its events and outcomes as plain lines."""
+
+from __future__ import annotations
+
+from app.headless import ClipOutcome
+from app.progress import ProgressLine, duration_text
+from app.status import TrainingStatus
+from app.training.messages import Event, StageReported, WarningRaised
+
+
+def show_status(line: ProgressLine, status: TrainingStatus) -> None:
+    """Show where a training is."""
+    if status.state == "running":
+        parts = [f"step {status.step}/{status.n_steps}"]
+        if status.steps_per_s:
+            parts += [f"{status.steps_per_s:.1f} steps/s", f"{duration_text(status.eta_s)} left"]
+        if status.loss_history:
+            parts.append(f"loss {status.loss_history[-1][1]:.4f}")
+        if status.gradient_norm is not None:
+            parts.append(f"gradient {status.gradient_norm:.2g}")
+        if status.psnr_history:
+            parts.append(f"held-out PSNR {status.psnr_history[-1][1]:.2f} dB")
+        line.update(f"Clip {status.clip_index}: training", status.progress, ", ".join(parts))
+    elif status.state in ("starting", "preparing"):
+        stage = status.stage.lower() if status.stage else "starting"
+        line.update(f"Clip {status.clip_index}: {stage}", status.progress, "")
+
+
+def show_event(line: ProgressLine, event: Event) -> None:
+    """Say what a training reports beside its progress."""
+    match event:
+        case StageReported(message=message) if message:
+            line.say(f"  {message}")
+        case WarningRaised(title=title, detail=detail, hint=hint):
+            line.say(". ".join(part for part in (title, detail, hint) if part))
+        case _:
+            pass
+
+
+def show_outcome(line: ProgressLine, outcome: ClipOutcome) -> None:
+    """Say how a clip ended."""
+    figure = "" if outcome.held_out_psnr is None else f", held-out PSNR {outcome.held_out_psnr:.2f} dB"
+    if outcome.state == "skipped":
+        line.say(f"Clip {outcome.clip_index} is trained already: {outcome.step} steps{figure}")
+    elif outcome.state == "trained":
+        took = duration_text(outcome.seconds)
+        line.say(f"Clip {outcome.clip_index} is trained: {outcome.step} steps in {took}{figure}")
