@@ -26,6 +26,7 @@ from engine.metrics.psnr import psnr
 from engine.model.clip_model import decoder_sizes, load_clip_model, read_field
 from engine.model.clip_state import SCHEMA, ClipState, read_clip_state, write_clip_state
 from engine.model.view import REACH_SPACINGS, View, render_gaussians, render_model
+from engine.training.active_tiles import ActivePicture, ActiveTiles
 from engine.training.building import (
     add_residual,
     choose_decoder,
@@ -119,6 +120,7 @@ class ClipTraining:
         self._views = [self._view(camera) for camera in range(len(capture.rig))]
         self._workspace = LossWorkspace(self.height, self.width)
         self._static_sight: dict[tuple[str, int], Tensor] = {}
+        self._tiles: ActiveTiles | None = None
 
     # ---------------------------------------------------------------- where we are
 
@@ -268,6 +270,8 @@ class ClipTraining:
         n_items = len(self.camera_indices) if name == "static" else len(self.pictures)
         self._order = ShuffledOrder(n_items, seed=self.seed + index)
         self._phase_index = index
+        has_rest = name == "source" and self.config.tiles == "active" and ActiveTiles.applies(self.model)
+        self._tiles = ActiveTiles(self.model) if has_rest else None
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self.phases[index] = (name, steps_in_phase)
 
@@ -291,18 +295,22 @@ class ClipTraining:
             clip_time = frame / self.clip.clip_length
             truth, is_counted = self.pictures.raw(camera_row, frame), None
         view = self._views[self.camera_indices[camera_row]]
-        gaussians = self.model.decode(clip_time, self._rows(camera_row, clip_time))
+        active = self._active_picture(camera_row, view, clip_time)
         compared = photometric_loss(
-            render_gaussians(gaussians, view).image[0],
+            render_gaussians(active.gaussians, view, tile_mask=active.tile_mask).image[0],
             truth,
             ssim_weight=self.config.ssim_weight,
             gain=self.gains[camera_row],
             is_counted=is_counted,  # unstable pixels of a background do not
+            tile_mask=active.tile_mask,
+            rest=active.rest,
             workspace=self._workspace,
         )
-        loss = compared.loss
-        if self.config.volume_weight and len(gaussians):
-            volume = (gaussians.scales / self.spacing).prod(1).mean()
+        loss, mean_square = compared.loss, compared.mean_square
+        if self._tiles is not None:
+            mean_square += self._tiles.square_outside(active, item, truth, self.gains[camera_row])
+        if self.config.volume_weight and active.n_all:
+            volume = (active.learning.scales / self.spacing).prod(1).sum() / active.n_all
             loss = loss + self.config.volume_weight * volume
         value = float(loss.detach())
         where = f"step {self.steps_done + 1}, camera {self.rig.names[camera_row]}"
@@ -319,10 +327,17 @@ class ClipTraining:
             step=self.steps_done,
             n_steps=self.n_steps,
             loss=value,
-            train_psnr=-10.0 * float(np.log10(max(compared.mean_square, 1e-10))),
-            n_gaussians=len(gaussians),
+            train_psnr=-10.0 * float(np.log10(max(mean_square, 1e-10))),
+            n_gaussians=active.n_all,
             stage=stage,
         )
+
+    def _active_picture(self, camera_row: int, view: View, clip_time: float) -> ActivePicture:
+        rows = self._rows(camera_row, clip_time)
+        if self._tiles is not None:
+            return self._tiles.split(camera_row, view, clip_time, rows)
+        gaussians = self.model.decode(clip_time, rows)
+        return ActivePicture(gaussians, gaussians, len(gaussians))
 
     def _rows(self, camera_row: int, clip_time: float) -> dict[str, Tensor]:
         """Rows to decode for a training view; what a camera can see of fixed anchors never changes."""

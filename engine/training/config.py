@@ -109,6 +109,11 @@ class TrainConfig:
     """hull: static anchors have no dynamic feature, moving ones are decoded only at times where that frame's hull
     has them. off: the published method, every anchor is evaluated at every time."""
 
+    # what a step of a source clip looks at
+    tiles: str = "active"
+    """active: only tiles that a learning Gaussian touches are drawn, compared and differentiated. all: whole pictures.
+    What is learned is the same, bit for bit."""
+
     # what a source clip takes over; every value but the first is an ablation (ClipGStream, ablation studies)
     decoder: str = "frozen"
     """frozen: the heads of the reference clip as they are. finetune: they go on learning in every source clip.
@@ -210,6 +215,7 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "inherit": ("frozen", "trainable", "off"),
     "field": ("per_clip", "continue", "joint"),
     "start": ("scratch", "previous"),
+    "tiles": ("active", "all"),
 }
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
