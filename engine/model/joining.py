@@ -1,4 +1,4 @@
-"""Frozen Gaussians in front of learning ones: one set for the rasterizer, of which only the learning part is copied back.
+"""Frozen Gaussians in front of learning ones: one set for the rasterizer; gradients go to the learning part alone.
 
 The frozen part is chosen Gaussian by Gaussian, finer than the anchors of `decode_anchors`.
 """

@@ -80,6 +80,7 @@ class ActiveTiles:
         self._views: dict[int, _FrozenView] = {}
         self._squares: dict[int, np.ndarray] = {}
         self.n_bytes = 0
+        self._is_full = False
 
     @staticmethod
     def applies(model: ClipModel) -> bool:
@@ -123,7 +124,7 @@ class ActiveTiles:
 
     def _frozen_view(self, camera_row: int, view: View, rows: dict[str, Tensor]) -> _FrozenView | None:
         known = self._views.get(camera_row)
-        if known is None and self.n_bytes < self._max_bytes:
+        if known is None and not self._is_full:
             (role,) = self._constant
             k = self._model.decoder.gaussians_per_anchor
             seen = (rows[role][:, None] * k + torch.arange(k)).reshape(-1)
@@ -134,8 +135,8 @@ class ActiveTiles:
             drawn = boxes.drawn()
             kept = TileBoxes(boxes.packed[drawn], boxes.shape)
             known = _FrozenView(picture, seen.numpy()[drawn], kept, len(seen))
-            if self.n_bytes + known.n_bytes > self._max_bytes:
-                self.n_bytes = self._max_bytes  # full: this camera and later ones are drawn with all tiles
+            self._is_full = self.n_bytes + known.n_bytes > self._max_bytes
+            if self._is_full:
                 return None
             self.n_bytes += known.n_bytes
             self._views[camera_row] = known
@@ -148,6 +149,4 @@ def _starts(size: int) -> range:
 
 
 def _boxes(gaussians: Gaussians, view: View) -> TileBoxes:
-    return tile_boxes(
-        gaussians, view.world_to_camera, view.K, view.width, view.height, near_plane=view.near_plane
-    )
+    return tile_boxes(gaussians, view.world_to_camera, view.K, view.width, view.height, near_plane=view.near_plane)

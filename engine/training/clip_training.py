@@ -42,7 +42,8 @@ from engine.training.config import TrainConfig
 from engine.training.fused_loss import LossWorkspace
 from engine.training.losses import photometric_loss
 from engine.training.optimizer import PhaseOptimizer, named_parameters
-from engine.training.pictures import ShuffledOrder, TrainingPictures, shared_image_size
+from engine.training.order import ErrorOrder, Order, ShuffledOrder
+from engine.training.pictures import TrainingPictures, shared_image_size
 from engine.training.preparation import (
     Backgrounds,
     correct_backgrounds,
@@ -268,10 +269,11 @@ class ClipTraining:
         self._optimizer = PhaseOptimizer(parameters, n_steps=n_steps, config=self.config)
         self._optimizer.steps_done = steps_in_phase
         n_items = len(self.camera_indices) if name == "static" else len(self.pictures)
-        self._order = ShuffledOrder(n_items, seed=self.seed + index)
+        is_by_error = name == "source" and self.config.sampling == "error"
+        self._order: Order = (ErrorOrder if is_by_error else ShuffledOrder)(n_items, seed=self.seed + index)
         self._phase_index = index
-        has_rest = name == "source" and self.config.tiles == "active" and ActiveTiles.applies(self.model)
-        self._tiles = ActiveTiles(self.model) if has_rest else None
+        has_rest = name == "source" and self.config.tiles == "active" and not self.gains.requires_grad
+        self._tiles = ActiveTiles(self.model) if has_rest and ActiveTiles.applies(self.model) else None
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self.phases[index] = (name, steps_in_phase)
 
@@ -286,7 +288,7 @@ class ClipTraining:
             self._add_moving()
             self._start_phase(index, 0)
         stage = self.phases[index][0]
-        item = self._order.draw()
+        item, weight = self._order.draw()
         if stage == "static":
             camera_row, clip_time = item, 0.0
             truth, is_counted = self.backgrounds.images[camera_row], self.backgrounds.is_stable[camera_row]
@@ -316,8 +318,9 @@ class ClipTraining:
         where = f"step {self.steps_done + 1}, camera {self.rig.names[camera_row]}"
         if not np.isfinite(value):
             raise NonFiniteLoss(f"The loss became {value} at {where}.", hint="The last good state was kept.")
+        self._order.saw(item, value)
         if loss.requires_grad:
-            loss.backward()
+            (loss if weight == 1.0 else loss * weight).backward()
         try:
             self._optimizer.step()
         except NonFiniteLoss as error:

@@ -113,6 +113,9 @@ class TrainConfig:
     tiles: str = "active"
     """active: only tiles that a learning Gaussian touches are drawn, compared and differentiated. all: whole pictures.
     What is learned is the same, bit for bit."""
+    sampling: str = "even"
+    """even: every picture once a pass. error: half of the draws go to pictures by their loss, and a picture's loss
+    weighs the less the more often it is drawn, so that on average the gradient is that of even passes."""
 
     # what a source clip takes over; every value but the first is an ablation (ClipGStream, ablation studies)
     decoder: str = "frozen"
@@ -216,6 +219,7 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "field": ("per_clip", "continue", "joint"),
     "start": ("scratch", "previous"),
     "tiles": ("active", "all"),
+    "sampling": ("even", "error"),
 }
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 

@@ -139,11 +139,22 @@ def tile_boxes_cpu(gaussians: Gaussians, view: PinholeView) -> np.ndarray:
     n_padded = -(-n_rows // 16) * 16
     records = workspace.array("records", (n_padded, rec.RECORD_FLOATS), np.float32)
     keys = workspace.array("keys", (n_padded,), np.float32)
-    columns = [tensor.detach().contiguous() for tensor in gaussians.tensors()]
+    means, quats, scales, opacities, colors = (tensor.detach().contiguous() for tensor in gaussians.tensors())
     packed = records.view(np.int32)
     job = project.ProjectJob(
-        *columns, camera_row(view), _NO_MASK_SUMS, records, packed, keys, _NO_CENTERS, n_threads
-    )  # fmt: skip
+        means,
+        quats,
+        scales,
+        opacities,
+        colors,
+        camera_row(view),
+        _NO_MASK_SUMS,
+        records,
+        packed,
+        keys,
+        _NO_CENTERS,
+        n_threads,
+    )
     run(project.project, pack(job), n_threads)
     run(read_boxes, pack(BoxJob(packed, keys, boxes, n_threads)), n_threads)
     POOL.give_back(workspace)

@@ -29,7 +29,9 @@ def test_joined_rows_are_the_same_and_only_the_learning_ones_learn(rows, n_learn
         assert torch.equal(found, wanted)
     assert joined.frozen_rows().tolist() == [True] * len(rows) + [False] * n_learning
     weights = [torch.rand(tensor.shape) for tensor in joined.tensors()]
-    torch.stack([(tensor * weight).sum() for tensor, weight in zip(joined.tensors(), weights, strict=True)]).sum().backward()
+    torch.stack(
+        [(tensor * weight).sum() for tensor, weight in zip(joined.tensors(), weights, strict=True)]
+    ).sum().backward()
     for tensor, weight in zip(learning.tensors(), weights, strict=True):
         assert tensor.grad is not None
         assert torch.equal(tensor.grad, weight[len(rows) :])

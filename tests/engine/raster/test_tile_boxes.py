@@ -78,7 +78,9 @@ def test_meeting_rows_are_those_over_a_wanted_tile():
     tile_mask = np.random.default_rng(0).random(boxes.shape) < 0.2
     rows = np.arange(1000, 1300)
     expected = [
-        1000 + row for row in range(300) if (TileBoxes(boxes.packed[row : row + 1], boxes.shape).mask() & tile_mask).any()
+        1000 + row
+        for row in range(300)
+        if (TileBoxes(boxes.packed[row : row + 1], boxes.shape).mask() & tile_mask).any()
     ]
     assert 0 < len(expected) < 300
     assert boxes.meeting(tile_mask, rows).tolist() == expected

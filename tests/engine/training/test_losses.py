@@ -313,8 +313,8 @@ def test_loss_of_active_tiles_and_a_rest_is_the_full_loss_up_to_a_constant(backe
 )
 def test_fused_matches_reference_with_a_rest(size, seed, has):
     has_gain, has_counted, has_moments = has
-    truth = make_truth(*size, seed)
-    tile_mask, _, rest, image = composed(*size, seed)
+    truth = make_truth(size[0], size[1], seed)
+    tile_mask, _, rest, image = composed(size[0], size[1], seed)
     gain = torch.tensor([0.8, 1.1, 1.0]) if has_gain else None
     is_counted = np.random.default_rng(seed).random(size) < 0.7 if has_counted else None
     options = {"tile_mask": tile_mask, "is_counted": is_counted}
