@@ -120,7 +120,7 @@ class ClipTraining:
         self._generator = torch.Generator().manual_seed(seed)
         self._views = [self._view(camera) for camera in range(len(capture.rig))]
         self._workspace = LossWorkspace(self.height, self.width)
-        self._static_sight: dict[tuple[str, int], Tensor] = {}
+        self._sight: dict[tuple[str, int], Tensor] = {}  # rows of static sets, flags of dynamic ones
         self._tiles: ActiveTiles | None = None
 
     # ---------------------------------------------------------------- where we are
@@ -272,6 +272,7 @@ class ClipTraining:
         is_by_error = name == "source" and self.config.sampling == "error"
         self._order: Order = (ErrorOrder if is_by_error else ShuffledOrder)(n_items, seed=self.seed + index)
         self._phase_index = index
+        self._sight = {}  # a set may have become dynamic
         has_rest = name == "source" and self.config.tiles == "active" and not self.gains.requires_grad
         self._tiles = ActiveTiles(self.model) if has_rest and ActiveTiles.applies(self.model) else None
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
@@ -346,17 +347,15 @@ class ClipTraining:
         """Rows to decode for a training view; what a camera can see of fixed anchors never changes."""
         rows = {}
         for role in self.model.roles():
-            key = (role, camera_row)
-            if key not in self._static_sight:
+            key, anchors = (role, camera_row), self.model.anchor_set(role)
+            if key not in self._sight:
                 view = self._views[self.camera_indices[camera_row]]
-                positions = self.model.anchor_set(role).positions
-                self._static_sight[key] = view.sees(positions, reach=self._reach)
-            is_seen = self._static_sight[key]
-            presence = self.model.anchor_set(role).presence
-            if presence is not None:
+                is_seen = view.sees(anchors.positions, reach=self._reach)
+                self._sight[key] = is_seen if anchors.is_dynamic else is_seen.nonzero()[:, 0]
+            rows[role] = self._sight[key]
+            if anchors.presence is not None:
                 frames = [knot for knot, _ in self.model.knots(clip_time)]
-                is_seen = is_seen & presence[:, frames].any(1)
-            rows[role] = is_seen.nonzero()[:, 0]
+                rows[role] = (rows[role] & anchors.presence[:, frames].any(1)).nonzero()[:, 0]
         return rows
 
     @property
