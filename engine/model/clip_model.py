@@ -140,14 +140,14 @@ class ClipModel(nn.Module):
                 anchors=self.anchor_set(role),
                 rows=self.alive(role, clip_time) if rows is None else rows[role],
                 corners=self._corners.get(role),
-                decoded=self._constant_gaussians(role) if self.is_constant(role) else None,
+                decoded=self.constant_gaussians(role) if self.is_constant(role) else None,
             )
             for role in self.roles()
         ]
         return decode_anchors(chosen, self.decoder, self.field, knots)
 
-    def _constant_gaussians(self, role: str) -> Gaussians:
-        """Gaussians of a whole set that never change, decoded at the first call."""
+    def constant_gaussians(self, role: str) -> Gaussians:
+        """Gaussians of a whole set that `is_constant`, K per anchor, decoded at the first call."""
         if role not in self._frozen:
             anchors = self.anchor_set(role)
             everything = ChosenAnchors(anchors=anchors, rows=torch.arange(len(anchors)))

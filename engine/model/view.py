@@ -82,8 +82,14 @@ def visible_rows(model: ClipModel, view: View, clip_time: float, *, reach: float
     return rows
 
 
-def render_gaussians(gaussians: Gaussians, view: View, *, background: Tensor | None = None) -> Rendering:
-    """Rasterize through one view; tensors of the rendering have a leading camera axis of 1."""
+def render_gaussians(
+    gaussians: Gaussians, view: View, *, background: Tensor | None = None, tile_mask: np.ndarray | None = None
+) -> Rendering:
+    """Rasterize through one view; tensors of the rendering have a leading camera axis of 1.
+
+    Args:
+        tile_mask: Tiles that are wanted, None for all. [rows, columns] bool
+    """
     return rasterize(
         gaussians,
         view.world_to_camera[None],
@@ -92,6 +98,7 @@ def render_gaussians(gaussians: Gaussians, view: View, *, background: Tensor | N
         view.height,
         background=background,
         near_plane=view.near_plane,
+        tile_mask=None if tile_mask is None else torch.from_numpy(tile_mask),
     )
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
 from engine.model.decoder import Decoder
 from engine.model.field import FieldShape, SpatioTemporalField
+from engine.model.joining import join_frozen
 
 
 def warm_up() -> None:
@@ -43,4 +45,6 @@ def _decode_tiny_clip() -> None:
         sets=sets, decoder=decoder, field=SpatioTemporalField(shape, generator), clip_length=1, n_frames=1
     )
     # a scalar: giving torch the gradients of several tensors makes it import half a second of symbolic mathematics
-    torch.stack([tensor.sum() for tensor in model.decode(0.0).tensors()]).sum().backward()
+    gaussians = model.decode(0.0)
+    torch.stack([tensor.sum() for tensor in gaussians.tensors()]).sum().backward()
+    join_frozen(gaussians.detach(), np.zeros(1, np.int64), gaussians.detach())

@@ -3,6 +3,7 @@
 from engine.raster.gaussians import Gaussians
 from engine.raster.rasterize import rasterize
 from engine.raster.rendering import Rendering
+from engine.raster.tile_boxes import TileBoxes, tile_boxes
 from engine.raster.view import TILE_PX
 
-__all__ = ["TILE_PX", "Gaussians", "Rendering", "rasterize"]
+__all__ = ["TILE_PX", "Gaussians", "Rendering", "TileBoxes", "rasterize", "tile_boxes"]

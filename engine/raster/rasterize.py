@@ -74,7 +74,7 @@ def rasterize(
         TypeError: A dtype or device that does not fit. Names the argument.
         ValueError: A shape or value that does not fit. Names the argument, and both shapes.
     """
-    _check_gaussians(gaussians)
+    check_gaussians(gaussians)
     views = pinhole_views(viewmats, Ks, int(width), int(height), near_plane)
     means = gaussians.means
     if background is None:
@@ -114,7 +114,8 @@ def _checked_mask(tile_mask: Tensor, n_views: int, width: int, height: int) -> T
     return tile_mask.cpu().expand(n_views, *shape)
 
 
-def _check_gaussians(gaussians: Gaussians) -> None:
+def check_gaussians(gaussians: Gaussians) -> None:
+    """Shapes, dtypes and device fit each other. TypeError or ValueError that names the tensor."""
     means = gaussians.means
     if means.ndim != 2 or means.shape[1] != 3:
         raise ValueError(f"means must be [N, 3], got {list(means.shape)}")

@@ -123,10 +123,7 @@ def drawable_rows(gaussians: Gaussians, view: PinholeView) -> Tensor:
     centers, covariances, depths = project(gaussians, view)
     norms_squared = gaussians.quats.square().sum(-1)
     opacities = gaussians.opacities
-    size = torch.tensor([view.width, view.height]).to(centers)
-    half_extents = torch.sqrt(
-        2 * torch.log(opacities / ALPHA_MIN)[:, None] * covariances.diagonal(dim1=-2, dim2=-1)
-    )  # where alpha falls to ALPHA_MIN; NaN below that opacity
+    first_pixels, last_pixels, half_extents = pixel_boxes(centers, covariances, opacities, view)
     keep = (
         (depths > view.near_plane)
         & (depths < VALUE_MAX)
@@ -138,11 +135,20 @@ def drawable_rows(gaussians: Gaussians, view: PinholeView) -> Tensor:
         & (centers.abs() < VALUE_MAX).all(-1)
         & (gaussians.colors.abs() < VALUE_MAX).all(-1)
     )
-    first_pixels = torch.ceil(centers - half_extents - 0.5).clamp_min(0)  # whose centres lie in the bounding box
-    last_pixels = torch.minimum(torch.floor(centers + half_extents - 0.5), size - 1)
     keep &= (first_pixels <= last_pixels).all(-1)
     rows = torch.nonzero(keep)[:, 0]
     return rows[torch.argsort(depths[rows].float(), stable=True)]
+
+
+def pixel_boxes(
+    centers: Tensor, covariances: Tensor, opacities: Tensor, view: PinholeView
+) -> tuple[Tensor, Tensor, Tensor]:
+    """First and last pixel (x, y) whose centre lies in the bounding box, cut to the image, and half extents. [N, 2]"""
+    # where alpha falls to ALPHA_MIN; NaN below that opacity
+    half_extents = torch.sqrt(2 * torch.log(opacities / ALPHA_MIN)[:, None] * covariances.diagonal(dim1=-2, dim2=-1))
+    size = torch.tensor([view.width, view.height]).to(centers)
+    first = torch.ceil(centers - half_extents - 0.5).clamp_min(0)
+    return first, torch.minimum(torch.floor(centers + half_extents - 0.5), size - 1), half_extents
 
 
 def _blend(

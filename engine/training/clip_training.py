@@ -26,6 +26,7 @@ from engine.metrics.psnr import psnr
 from engine.model.clip_model import decoder_sizes, load_clip_model, read_field
 from engine.model.clip_state import SCHEMA, ClipState, read_clip_state, write_clip_state
 from engine.model.view import REACH_SPACINGS, View, render_gaussians, render_model
+from engine.training.active_tiles import ActivePicture, ActiveTiles
 from engine.training.building import (
     add_residual,
     choose_decoder,
@@ -41,7 +42,8 @@ from engine.training.config import TrainConfig
 from engine.training.fused_loss import LossWorkspace
 from engine.training.losses import photometric_loss
 from engine.training.optimizer import PhaseOptimizer, named_parameters
-from engine.training.pictures import ShuffledOrder, TrainingPictures, shared_image_size
+from engine.training.order import ErrorOrder, Order, ShuffledOrder
+from engine.training.pictures import TrainingPictures, shared_image_size
 from engine.training.preparation import (
     Backgrounds,
     correct_backgrounds,
@@ -118,7 +120,8 @@ class ClipTraining:
         self._generator = torch.Generator().manual_seed(seed)
         self._views = [self._view(camera) for camera in range(len(capture.rig))]
         self._workspace = LossWorkspace(self.height, self.width)
-        self._static_sight: dict[tuple[str, int], Tensor] = {}
+        self._sight: dict[tuple[str, int], Tensor] = {}  # rows of static sets, flags of dynamic ones
+        self._tiles: ActiveTiles | None = None
 
     # ---------------------------------------------------------------- where we are
 
@@ -266,8 +269,12 @@ class ClipTraining:
         self._optimizer = PhaseOptimizer(parameters, n_steps=n_steps, config=self.config)
         self._optimizer.steps_done = steps_in_phase
         n_items = len(self.camera_indices) if name == "static" else len(self.pictures)
-        self._order = ShuffledOrder(n_items, seed=self.seed + index)
+        is_by_error = name == "source" and self.config.sampling == "error"
+        self._order: Order = (ErrorOrder if is_by_error else ShuffledOrder)(n_items, seed=self.seed + index)
         self._phase_index = index
+        self._sight = {}  # a set may have become dynamic
+        has_rest = name == "source" and self.config.tiles == "active" and not self.gains.requires_grad
+        self._tiles = ActiveTiles(self.model) if has_rest and ActiveTiles.applies(self.model) else None
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self.phases[index] = (name, steps_in_phase)
 
@@ -282,7 +289,7 @@ class ClipTraining:
             self._add_moving()
             self._start_phase(index, 0)
         stage = self.phases[index][0]
-        item = self._order.draw()
+        item, weight = self._order.draw()
         if stage == "static":
             camera_row, clip_time = item, 0.0
             truth, is_counted = self.backgrounds.images[camera_row], self.backgrounds.is_stable[camera_row]
@@ -291,25 +298,30 @@ class ClipTraining:
             clip_time = frame / self.clip.clip_length
             truth, is_counted = self.pictures.raw(camera_row, frame), None
         view = self._views[self.camera_indices[camera_row]]
-        gaussians = self.model.decode(clip_time, self._rows(camera_row, clip_time))
+        active = self._active_picture(camera_row, view, clip_time)
         compared = photometric_loss(
-            render_gaussians(gaussians, view).image[0],
+            render_gaussians(active.gaussians, view, tile_mask=active.tile_mask).image[0],
             truth,
             ssim_weight=self.config.ssim_weight,
             gain=self.gains[camera_row],
             is_counted=is_counted,  # unstable pixels of a background do not
+            tile_mask=active.tile_mask,
+            rest=active.rest,
             workspace=self._workspace,
         )
-        loss = compared.loss
-        if self.config.volume_weight and len(gaussians):
-            volume = (gaussians.scales / self.spacing).prod(1).mean()
+        loss, mean_square = compared.loss, compared.mean_square
+        if self._tiles is not None:
+            mean_square += self._tiles.square_outside(active, item, truth, self.gains[camera_row])
+        if self.config.volume_weight and active.n_all:
+            volume = (active.learning.scales / self.spacing).prod(1).sum() / active.n_all
             loss = loss + self.config.volume_weight * volume
         value = float(loss.detach())
         where = f"step {self.steps_done + 1}, camera {self.rig.names[camera_row]}"
         if not np.isfinite(value):
             raise NonFiniteLoss(f"The loss became {value} at {where}.", hint="The last good state was kept.")
+        self._order.saw(item, value)
         if loss.requires_grad:
-            loss.backward()
+            (loss if weight == 1.0 else loss * weight).backward()
         try:
             gradient_norm = self._optimizer.step()
         except NonFiniteLoss as error:
@@ -319,27 +331,32 @@ class ClipTraining:
             step=self.steps_done,
             n_steps=self.n_steps,
             loss=value,
-            train_psnr=-10.0 * float(np.log10(max(compared.mean_square, 1e-10))),
-            n_gaussians=len(gaussians),
+            train_psnr=-10.0 * float(np.log10(max(mean_square, 1e-10))),
+            n_gaussians=active.n_all,
             stage=stage,
             gradient_norm=gradient_norm,
         )
+
+    def _active_picture(self, camera_row: int, view: View, clip_time: float) -> ActivePicture:
+        rows = self._rows(camera_row, clip_time)
+        if self._tiles is not None:
+            return self._tiles.split(camera_row, view, clip_time, rows)
+        gaussians = self.model.decode(clip_time, rows)
+        return ActivePicture(gaussians, gaussians, len(gaussians))
 
     def _rows(self, camera_row: int, clip_time: float) -> dict[str, Tensor]:
         """Rows to decode for a training view; what a camera can see of fixed anchors never changes."""
         rows = {}
         for role in self.model.roles():
-            key = (role, camera_row)
-            if key not in self._static_sight:
+            key, anchors = (role, camera_row), self.model.anchor_set(role)
+            if key not in self._sight:
                 view = self._views[self.camera_indices[camera_row]]
-                positions = self.model.anchor_set(role).positions
-                self._static_sight[key] = view.sees(positions, reach=self._reach)
-            is_seen = self._static_sight[key]
-            presence = self.model.anchor_set(role).presence
-            if presence is not None:
+                is_seen = view.sees(anchors.positions, reach=self._reach)
+                self._sight[key] = is_seen if anchors.is_dynamic else is_seen.nonzero()[:, 0]
+            rows[role] = self._sight[key]
+            if anchors.presence is not None:
                 frames = [knot for knot, _ in self.model.knots(clip_time)]
-                is_seen = is_seen & presence[:, frames].any(1)
-            rows[role] = is_seen.nonzero()[:, 0]
+                rows[role] = (rows[role] & anchors.presence[:, frames].any(1)).nonzero()[:, 0]
         return rows
 
     @property

@@ -109,6 +109,14 @@ class TrainConfig:
     """hull: static anchors have no dynamic feature, moving ones are decoded only at times where that frame's hull
     has them. off: the published method, every anchor is evaluated at every time."""
 
+    # what a step of a source clip looks at
+    tiles: str = "active"
+    """active: only tiles that a learning Gaussian touches are drawn, compared and differentiated. all: whole pictures.
+    What is learned is the same, bit for bit."""
+    sampling: str = "even"
+    """even: every picture once a pass. error: half of the draws go to pictures by their loss, and a picture's loss
+    weighs the less the more often it is drawn, so that on average the gradient is that of even passes."""
+
     # what a source clip takes over; every value but the first is an ablation (ClipGStream, ablation studies)
     decoder: str = "frozen"
     """frozen: the heads of the reference clip as they are. finetune: they go on learning in every source clip.
@@ -221,6 +229,8 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "inherit": ("frozen", "trainable", "off"),
     "field": ("per_clip", "continue", "joint"),
     "start": ("scratch", "previous"),
+    "tiles": ("active", "all"),
+    "sampling": ("even", "error"),
 }
 _SHARING = ("decoder", "residual", "inherit")
 """Settings of what a source clip takes over. The first choice of each is the default."""

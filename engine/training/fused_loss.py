@@ -86,6 +86,7 @@ class LossJob(NamedTuple):
         has_gain: Whether their gradient is wanted.
         is_counted: Pixels that count; empty for all. [H, W]
         active: Tiles that count. [rows, columns]
+        rest: Like the image, what the other tiles hold; empty for the truth. [H, 3 W]
         moments: Of `blurred_truth`, or empty.
         scales: Weights of |a - b| and of SSIM in the loss. [2]
         band_rows: Rows at which bands start, and the end. [n_bands + 1]
@@ -104,6 +105,7 @@ class LossJob(NamedTuple):
     has_gain: int
     is_counted: Flags2
     active: Flags2
+    rest: Floats2
     moments: Floats3
     scales: Floats1
     band_rows: Ints1
@@ -183,6 +185,7 @@ def _load_row(arguments, band, y, first, end):
     """Values first .. end of one row into the rings of a and b. Both limits lie between pixels."""
     job = _read_job(arguments)
     truth, truth_bytes, is_counted, active = job.truth, job.truth_bytes, job.is_counted, job.active
+    rest, all_gains = job.rest, job.gains
     scratch = job.scratch[band]
     slot = y & (RING_ROWS - 1)
     a, b = scratch[_A + slot, _PAD + first : _PAD + end], scratch[_B + slot, _PAD + first : _PAD + end]
@@ -198,16 +201,16 @@ def _load_row(arguments, band, y, first, end):
     values, factors = job.image[y, first:end], job.gains[first:end]
     for x in range(a.shape[0]):
         a[x] = values[x] * factors[x]
+    for column in range(first // _TILE_VALUES, (end - 1) // _TILE_VALUES + 1):
+        if not active[y // TILE_PX, column]:
+            for x in range(max(column * _TILE_VALUES, first) - first, min((column + 1) * _TILE_VALUES, end) - first):
+                a[x] = rest[y, first + x] * all_gains[first + x] if rest.shape[1] else b[x]
     if is_counted.shape[1]:
         counted = is_counted[y, first // 3 : end // 3]
         for pixel in range(counted.shape[0]):
             if not counted[pixel]:
                 for x in range(3 * pixel, 3 * pixel + 3):
                     a[x] = b[x]
-    for column in range(first // _TILE_VALUES, (end - 1) // _TILE_VALUES + 1):
-        if not active[y // TILE_PX, column]:
-            for x in range(max(column * _TILE_VALUES, first) - first, min((column + 1) * _TILE_VALUES, end) - first):
-                a[x] = b[x]
 
 
 @routine(ints(5), fastmath=_FASTMATH)
@@ -482,13 +485,14 @@ def loss_terms(
     gain: np.ndarray | None,
     is_counted: np.ndarray | None,
     tile_mask: np.ndarray | None,
+    rest: np.ndarray | None,
     moments: np.ndarray | None,
     workspace: LossWorkspace,
 ) -> LossTerms:
     """One pass over contiguous, writable pictures. Arguments as in `engine.training.losses.photometric_loss`.
 
     Args:
-        image: float32. [H, W, 3]
+        image, rest: float32. [H, W, 3]
         truth: float32 or uint8. [H, W, 3]
         moments: From `blurred_truth`.
     """
@@ -508,6 +512,7 @@ def loss_terms(
         int(gain is not None),
         np.empty((height, 0), bool) if is_counted is None else is_counted,
         active,
+        np.empty((1, 0), np.float32) if rest is None else rest.reshape(height, -1),
         np.empty((0, 0, 0), np.float32) if moments is None else moments,
         np.array([(1 - ssim_weight) / n_values, -ssim_weight / n_values], np.float32),
         bands,

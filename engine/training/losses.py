@@ -26,7 +26,8 @@ class PhotometricLoss:
 
     Attributes:
         loss: Scalar, differentiable in image and gain.
-        mean_square: Mean of (image * gain - truth)^2 over the whole picture; what does not count adds zero.
+        mean_square: Mean of (image * gain - truth)^2 over the whole picture; what does not count adds zero, and so do
+            tiles that are not active.
     """
 
     loss: Tensor
@@ -41,6 +42,7 @@ def photometric_loss(
     gain: Tensor | None = None,
     is_counted: np.ndarray | None = None,
     tile_mask: np.ndarray | None = None,
+    rest: Tensor | None = None,
     moments: TruthMoments | None = None,
     workspace: LossWorkspace | None = None,
     backend: str = "auto",
@@ -52,6 +54,11 @@ def photometric_loss(
     picture after this replacement: divided by all its pixels, with SSIM also in the 5 px of a replaced region whose
     windows reach into a counted one. So it equals the full loss where the replaced pixels really are right.
 
+    With `rest`, tiles that are not active hold a picture that cannot change, and it stands there in place of the truth.
+    The gradient by the image is that of the loss of both together, in active tiles, because SSIM sees `rest` up to 5 px
+    beyond them. The value leaves out what depends on rest, truth, gain and mask alone: of two images under one mask,
+    the losses differ by what the losses of the whole pictures differ by.
+
     Args:
         image: Rendered. [H, W, 3]
         truth: Values in 0..1 of the image's dtype, or uint8, read as value / 255. No gradient. [H, W, 3]
@@ -59,6 +66,8 @@ def photometric_loss(
         gain: Colour gain of the camera, multiplied onto the image. [3]
         is_counted: Pixels that count; None means all. [H, W] bool
         tile_mask: Active tiles of 32 px, the last ones cut off by the picture; None means all. [rows, columns] bool
+        rest: What tiles hold that are not active, like the image; None for the truth. No gradient, neither by it nor,
+            in its tiles, by the gain. [H, W, 3]
         moments: `truth_moments(truth)` in place of blurring the truth; only "fused" uses them.
         workspace: Scratch for this picture size, kept between calls; None makes one.
         backend: "auto", "fused" (float32 on the CPU) or "reference".
@@ -71,10 +80,10 @@ def photometric_loss(
         backend = "fused" if image.dtype == torch.float32 and image.device.type == "cpu" else "reference"
     if backend not in _BACKENDS:
         raise ValueError(f"backend must be auto or one of {', '.join(sorted(_BACKENDS))}, got {backend!r}")
-    _check(image, truth, gain, is_counted, tile_mask, moments, workspace)
+    _check(image, truth, gain, is_counted, tile_mask, rest, moments, workspace)
     if backend == "fused" and image.dtype != torch.float32:
         raise TypeError(f"backend 'fused' needs a float32 image, got {image.dtype}")
-    return _BACKENDS[backend](image, truth, ssim_weight, gain, is_counted, tile_mask, moments, workspace)
+    return _BACKENDS[backend](image, truth, ssim_weight, gain, is_counted, tile_mask, rest, moments, workspace)
 
 
 def ssim_map(image: Tensor, truth: Tensor) -> Tensor:
@@ -91,18 +100,20 @@ def ssim_map(image: Tensor, truth: Tensor) -> Tensor:
     return (numerator / denominator).permute(1, 2, 0)
 
 
-def _reference(image, truth, ssim_weight, gain, is_counted, tile_mask, _moments, _workspace) -> PhotometricLoss:
+def _reference(image, truth, ssim_weight, gain, is_counted, tile_mask, rest, _moments, _workspace) -> PhotometricLoss:
     truth = torch.as_tensor(truth)
     truth = truth.to(image.dtype) / 255 if truth.dtype == torch.uint8 else truth.to(image.dtype)
     shown = image if gain is None else image * gain
-    counts = np.ones(image.shape[:2], bool) if is_counted is None else is_counted
+    counts = torch.from_numpy(np.ones(image.shape[:2], bool) if is_counted is None else is_counted)[..., None]
+    active = torch.ones_like(counts)
     if tile_mask is not None:
         pixels = tile_mask.repeat(TILE_PX, 0).repeat(TILE_PX, 1)
-        counts = counts & pixels[: image.shape[0], : image.shape[1]]
-    shown = torch.where(torch.from_numpy(counts)[..., None], shown, truth)
-    l1 = (shown - truth).abs().mean()
+        active = torch.from_numpy(pixels[: image.shape[0], : image.shape[1], None])
+    frozen = truth if rest is None else (rest if gain is None else rest * gain).detach()
+    shown = torch.where(counts, torch.where(active, shown, frozen), truth)
+    l1 = torch.where(active, (shown - truth).abs(), 0).mean()
     loss = (1 - ssim_weight) * l1 + ssim_weight * (1 - ssim_map(shown, truth).mean())
-    return PhotometricLoss(loss, float(((shown.detach() - truth) ** 2).mean()))
+    return PhotometricLoss(loss, float((torch.where(active, shown.detach() - truth, 0) ** 2).mean()))
 
 
 class _Fused(torch.autograd.Function):
@@ -123,7 +134,7 @@ class _Fused(torch.autograd.Function):
         return image_grad, gain_grad, None
 
 
-def _fused(image, truth, ssim_weight, gain, is_counted, tile_mask, moments, workspace) -> PhotometricLoss:
+def _fused(image, truth, ssim_weight, gain, is_counted, tile_mask, rest, moments, workspace) -> PhotometricLoss:
     height, width = image.shape[:2]
     pixels = writable_picture(truth)
     scratch = workspace or LossWorkspace(height, width)
@@ -138,6 +149,7 @@ def _fused(image, truth, ssim_weight, gain, is_counted, tile_mask, moments, work
             gain=None if gain is None else gain.contiguous().numpy(),
             is_counted=None if is_counted is None else np.require(is_counted, requirements=["C", "W"]),
             tile_mask=None if tile_mask is None else np.require(tile_mask, requirements=["C", "W"]),
+            rest=None if rest is None else rest.detach().contiguous().numpy(),
             moments=None if moments is None else moments.blurred,
             workspace=scratch,
         )
@@ -152,7 +164,7 @@ def _fused(image, truth, ssim_weight, gain, is_counted, tile_mask, moments, work
 _BACKENDS: dict[str, Callable[..., PhotometricLoss]] = {"reference": _reference, "fused": _fused}
 
 
-def _check(image, truth, gain, is_counted, tile_mask, moments, workspace) -> None:
+def _check(image, truth, gain, is_counted, tile_mask, rest, moments, workspace) -> None:
     if image.ndim != 3 or image.shape[2] != 3 or image.numel() == 0:
         raise ValueError(f"image must be [H, W, 3] with at least one pixel, got {list(image.shape)}")
     if not image.is_floating_point():
@@ -163,6 +175,7 @@ def _check(image, truth, gain, is_counted, tile_mask, moments, workspace) -> Non
         ("gain", gain, (3,)),
         ("is_counted", is_counted, (height, width)),
         ("tile_mask", tile_mask, tile_grid(height, width)),
+        ("rest", rest, (height, width, 3)),
         ("moments", moments, (height, width)),
     ]
     for name, value, shape in expected:
@@ -174,8 +187,9 @@ def _check(image, truth, gain, is_counted, tile_mask, moments, workspace) -> Non
     kinds = ("torch.uint8", "uint8", str(image.dtype), str(image.dtype).removeprefix("torch."))
     if str(truth.dtype) not in kinds:
         raise TypeError(f"truth must be uint8 or {image.dtype} like the image, got {truth.dtype}")
-    if gain is not None and gain.dtype != image.dtype:
-        raise TypeError(f"gain must be {image.dtype} like the image, got {gain.dtype}")
+    for name, value in (("gain", gain), ("rest", rest)):
+        if value is not None and value.dtype != image.dtype:
+            raise TypeError(f"{name} must be {image.dtype} like the image, got {value.dtype}")
     if workspace is not None and (workspace.height, workspace.width) != (height, width):
         size = f"{workspace.width} x {workspace.height}"
         raise ValueError(f"workspace was made for {size}, the image is {width} x {height}")

@@ -1,4 +1,4 @@
-"""Training pictures: the pixels of one clip's training cameras, and the order in which they are drawn.
+"""Training pictures: the pixels of one clip's training cameras.
 
 Pictures stay uint8 in memory (a clip of 27 cameras x 10 frames at 640 x 360 is 187 MB); the loss reads them like that.
 """
@@ -52,30 +52,3 @@ class TrainingPictures:
     def raw(self, camera_row: int, frame_in_clip: int) -> np.ndarray:
         """One picture as decoded. [H, W, 3] uint8"""
         return self._pixels[camera_row][frame_in_clip]
-
-
-class ShuffledOrder:
-    """Draws items of range(n) without replacement, reshuffled after each pass. Owns its random state."""
-
-    def __init__(self, n_items: int, seed: int) -> None:
-        self.n_items = n_items
-        self._generator = np.random.default_rng(seed)
-        self._left: list[int] = []
-
-    def draw(self) -> int:
-        """The next item."""
-        if not self._left:
-            self._left = self._generator.permutation(self.n_items).tolist()
-        return self._left.pop()
-
-    def state(self) -> dict:
-        """JSON-able state, to go on exactly here."""
-        return {
-            "left": list(self._left),
-            "generator": self._generator.bit_generator.state,
-        }
-
-    def restore(self, state: dict) -> None:
-        """Inverse of `state`."""
-        self._left = list(state["left"])
-        self._generator.bit_generator.state = state["generator"]

@@ -28,7 +28,7 @@ class StepStats:
     Attributes:
         step: Steps done, this one included.
         n_steps: Steps of the whole clip.
-        loss: Training loss of the picture.
+        loss: Training loss of the picture; with active tiles without the part that nothing can change.
         train_psnr: PSNR of the picture that was trained on, dB.
         n_gaussians: Gaussians rendered.
         stage: "static", "joint" or "source".

@@ -13,6 +13,7 @@ def warm_up() -> None:
     About ten seconds of one core when nothing is cached (holding the interpreter lock), a fraction of a second after.
     """
     from engine.raster.rasterize import rasterize
+    from engine.raster.tile_boxes import tile_boxes
 
     n_rows = 4
     gaussians = Gaussians(
@@ -27,3 +28,5 @@ def warm_up() -> None:
     K = torch.tensor([[[8.0, 0.0, 4.0], [0.0, 8.0, 4.0], [0.0, 0.0, 1.0]]])
     rendering = rasterize(gaussians, torch.eye(4)[None], K, 8, 8, backend="cpu")
     rendering.image.sum().backward()
+    boxes = tile_boxes(gaussians, torch.eye(4), K[0], 8, 8, backend="cpu")
+    boxes.meeting(boxes.mask(), boxes.drawn())

@@ -230,6 +230,8 @@ def test_read_only_and_strided_pictures_are_taken():
         ({"is_counted": np.ones((8, 9), bool)}, "is_counted"),
         ({"is_counted": np.ones((8, 8), np.uint8)}, "is_counted"),
         ({"tile_mask": np.ones((2, 1), bool)}, "tile_mask"),
+        ({"rest": torch.zeros(9, 8, 3)}, "rest"),
+        ({"rest": torch.zeros(8, 8, 3, dtype=torch.float64)}, "rest"),
         ({"moments": truth_moments(np.zeros((9, 8, 3), np.uint8))}, "moments"),
         ({"workspace": LossWorkspace(9, 8)}, "workspace"),
         ({"backend": "quick"}, "backend"),
@@ -266,3 +268,78 @@ def test_ssim_agrees_with_scikit_image_away_from_the_border():
         full=True,
     )[1]
     assert np.abs(ours - theirs[5:-5, 5:-5]).max() < 1e-9
+
+
+def composed(height: int, width: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, torch.Tensor, torch.Tensor]:
+    """A tile mask, its pixels [H, W, 1], a picture that stays in the other tiles and an image that holds it there."""
+    tile_mask = np.random.default_rng(seed).random(tile_grid(height, width)) < 0.35
+    pixels = tile_mask.repeat(TILE_PX, 0).repeat(TILE_PX, 1)[:height, :width, None]
+    rest = torch.rand(height, width, 3, generator=torch.Generator().manual_seed(seed))
+    image = torch.where(torch.from_numpy(pixels), make_image(make_truth(height, width, seed)), rest)
+    return tile_mask, pixels, rest, image
+
+
+@pytest.mark.parametrize("backend", ["fused", "reference"])
+@pytest.mark.parametrize(("height", "width"), [(100, 130), (37, 50), (70, 700)])
+@pytest.mark.parametrize("has_gain", [False, True])
+def test_loss_of_active_tiles_and_a_rest_is_the_full_loss_up_to_a_constant(backend, height, width, has_gain):
+    truth = make_truth(height, width)
+    tile_mask, pixels, rest, image = composed(height, width)
+    gain = torch.tensor([0.9, 1.0, 1.1]) if has_gain else None
+    drawn = torch.where(torch.from_numpy(pixels), image, torch.tensor(torch.nan))  # whatever other tiles hold
+    masked, gradient, _ = differentiate(drawn, truth, gain, tile_mask=tile_mask, rest=rest, backend=backend)
+    full, full_gradient, _ = differentiate(image, truth, gain, backend=backend)
+    masked_rest, _, _ = differentiate(rest, truth, gain, tile_mask=tile_mask, rest=rest, backend=backend)
+    full_rest, _, _ = differentiate(rest, truth, gain, backend=backend)
+    change, full_change = (float((a.loss - b.loss).detach()) for a, b in ((masked, masked_rest), (full, full_rest)))
+    assert abs(full_change) > 1e-3
+    # losses around 0.5 in float32: 3e-8 of rounding each, and sums of 1e5 values in different order
+    assert abs(change - full_change) < 5e-7
+    square_change = masked.mean_square - masked_rest.mean_square
+    assert abs(square_change - (full.mean_square - full_rest.mean_square)) < 1e-7
+    inside = torch.from_numpy(pixels).expand_as(image)
+    assert not gradient[~inside].any()
+    if backend == "fused":
+        assert torch.equal(gradient[inside], full_gradient[inside])
+    else:
+        assert relative_error(gradient[inside], full_gradient[inside].double()) < 1e-6
+
+
+@settings(deadline=None, max_examples=20)
+@given(
+    size=st.tuples(st.integers(1, 120), st.integers(1, 120)),
+    seed=st.integers(0, 99),
+    has=st.tuples(*[st.booleans()] * 3),
+)
+def test_fused_matches_reference_with_a_rest(size, seed, has):
+    has_gain, has_counted, has_moments = has
+    truth = make_truth(size[0], size[1], seed)
+    tile_mask, _, rest, image = composed(size[0], size[1], seed)
+    gain = torch.tensor([0.8, 1.1, 1.0]) if has_gain else None
+    is_counted = np.random.default_rng(seed).random(size) < 0.7 if has_counted else None
+    options = {"tile_mask": tile_mask, "is_counted": is_counted}
+    fast, fast_grad, fast_gain = differentiate(
+        image, truth, gain, rest=rest, moments=truth_moments(truth) if has_moments else None, backend="fused", **options
+    )
+    slow, slow_grad, slow_gain = differentiate(
+        image.double(), truth, gain, rest=rest.double(), backend="reference", **options
+    )
+    assert abs(fast.mean_square - slow.mean_square) < 1e-7
+    assert relative_error(fast_grad, slow_grad) < 5e-5
+    if gain is not None:
+        assert relative_error(fast_gain, slow_gain) < 5e-5
+
+
+@pytest.mark.parametrize("backend", ["fused", "reference"])
+def test_what_does_not_count_is_right_in_the_rest_too(backend):
+    truth = make_truth(60, 80)
+    tile_mask, pixels, rest, image = composed(60, 80, seed=3)
+    assert tile_mask.any()
+    assert not tile_mask.all()
+    is_counted = pixels[..., 0].copy()  # nothing of the rest counts: as if it were the truth
+    found, found_grad, _ = differentiate(
+        image, truth, tile_mask=tile_mask, rest=rest, is_counted=is_counted, backend=backend
+    )
+    expected, expected_grad, _ = differentiate(image, truth, tile_mask=tile_mask, backend=backend)
+    assert float(found.loss.detach()) == float(expected.loss.detach())
+    assert torch.equal(found_grad, expected_grad)

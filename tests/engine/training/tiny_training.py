@@ -74,9 +74,9 @@ def make_training(capture: Capture, holdout: list[int], *, clip: Clip, **argumen
     return ClipTraining(capture, clip, config=TrainConfig(**(SIZES | arguments)), holdout=holdout, **given)
 
 
-def make_tiny(prep_dir: Path) -> Tiny:
-    """Open the sample and train its first clip as the reference."""
-    capture = open_capture(asset_path("sample"), scale=0.25)
+def make_tiny(prep_dir: Path, *, scale: float = 0.25) -> Tiny:
+    """Open the sample, at a part of its size, and train its first clip as the reference."""
+    capture = open_capture(asset_path("sample"), scale=scale)
     others = [camera for camera in range(len(capture.rig)) if camera % 5 in (1, 3, 4)]
     holdout = others[: len(capture.rig) - N_CAMERAS]
     clips = split_clips(capture.n_frames, CLIP_LENGTH)
