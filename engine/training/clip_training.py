@@ -25,6 +25,7 @@ from engine.errors import NonFiniteLoss, PreparationError, ProjectError
 from engine.metrics.psnr import psnr
 from engine.model.clip_model import decoder_sizes, load_clip_model, read_field
 from engine.model.clip_state import SCHEMA, ClipState, read_clip_state, write_clip_state
+from engine.model.compact import CompactClip, compact_clip
 from engine.model.view import REACH_SPACINGS, View, render_gaussians, render_model
 from engine.training.building import (
     add_residual,
@@ -403,6 +404,18 @@ class ClipTraining:
         state = ClipState(arrays, header)
         header["fingerprint"] = state.fingerprint
         return state
+
+    def finish(self) -> CompactClip:
+        """The trained clip as it is stored. The model takes its values over: what is measured from here on is that.
+
+        Raises:
+            NonFiniteLoss: An array holds numbers that are not finite.
+        """
+        # with field=continue the last field shows every clip, so also entries that only others read
+        is_last_word = self.config.field != "continue"
+        compact = compact_clip(self.state(), self.model.entries_in_use() if is_last_word else None)
+        self.model = load_clip_model(compact.state, self.reference, is_learning=True)
+        return compact
 
     def write_checkpoint(self, path: Path | str) -> None:
         """State, optimiser, order of pictures and random state: enough to go on exactly."""
