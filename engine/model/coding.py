@@ -101,12 +101,15 @@ def decode_array(payload: np.ndarray, spec: dict[str, Any]) -> np.ndarray:
         raw = unpacker.decompress(np.ascontiguousarray(payload, np.uint8).tobytes(), max_length=n_bytes + 1)
     except lzma.LZMAError as error:
         raise CodingError(f"the bytes cannot be unpacked ({error})") from error
-    if len(raw) != n_bytes or zlib.crc32(raw) != spec.get("crc32"):
+    is_whole = unpacker.eof and not unpacker.unused_data and len(raw) == n_bytes
+    if not is_whole or zlib.crc32(raw) != spec.get("crc32"):
         raise CodingError(f"{len(raw)} of {n_bytes} bytes are there, or others than were written")
     try:
         array = unpack(raw, dtype, shape, spec)
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise CodingError(f"the bytes do not fit shape {shape} ({error})") from error
+    if (array.shape, array.dtype) != (shape, dtype):
+        raise CodingError(f"{spec['codec']} gives {array.dtype} {array.shape}, not {dtype} {shape}")
     return array
 
 
@@ -131,7 +134,7 @@ def _pack_half(array: np.ndarray) -> Packed:
 
 
 def _unpack_half(raw: bytes, dtype: np.dtype, shape: tuple[int, ...], spec: dict[str, Any]) -> np.ndarray:
-    return _from_planes(raw, np.dtype("<f2")).astype(dtype).reshape(shape)
+    return _from_planes(raw, np.dtype("<f2")).astype(np.float32).reshape(shape)
 
 
 def _pack_bits(array: np.ndarray) -> Packed:
