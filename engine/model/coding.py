@@ -92,7 +92,7 @@ def decode_array(payload: np.ndarray, spec: dict[str, Any]) -> np.ndarray:
         dtype, shape = np.dtype(spec["dtype"]), tuple(int(n) for n in spec["shape"])
         n_bytes, unpack = int(spec["n_bytes"]), _CODECS[spec["codec"]][1]
         n_values = math.prod(shape)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise CodingError(f"the description is incomplete ({error})") from error
     if dtype not in _DTYPES or min((*shape, n_bytes)) < 0 or max(n_values * dtype.itemsize, n_bytes) > MAX_BYTES:
         raise CodingError(f"shape {shape} of {dtype} in {n_bytes} bytes is no array of a clip")
@@ -183,6 +183,8 @@ def _pack_steps(array: np.ndarray, *, bits: int = 8) -> Packed:
 
 
 def _unpack_steps(raw: bytes, dtype: np.dtype, shape: tuple[int, ...], spec: dict[str, Any]) -> np.ndarray:
+    if dtype != np.float32:
+        raise CodingError(f"{dtype} has no steps")
     groups = np.zeros(_group_shape(shape), np.float32)
     n_groups, n_rows, n_channels = groups.shape
     code_dtype = _code_dtype(int(spec["bits"]))

@@ -411,9 +411,9 @@ class ClipTraining:
         Raises:
             NonFiniteLoss: An array holds numbers that are not finite.
         """
-        # with field=continue the last field shows every clip, so also entries that only others read
-        is_last_word = self.config.field != "continue"
-        compact = compact_clip(self.state(), self.model.entries_in_use() if is_last_word else None)
+        # a field that goes on in the next clip, and may show this one then, keeps entries that only others read
+        entries = None if self.config.field == "continue" else self.model.entries_in_use()
+        compact = compact_clip(self.state(), entries)
         self.model = load_clip_model(compact.state, self.reference, is_learning=True)
         return compact
 

@@ -148,6 +148,7 @@ def test_what_a_codec_cannot_hold_is_refused():
         {"dtype": "<f8"},
         {"dtype": 7},
         {"n_bytes": 5},
+        {"n_bytes": float("inf")},
         {"n_bytes": MAX_BYTES + 1},
         {"n_bytes": 1 << 20},
         {"crc32": 1},
