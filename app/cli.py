@@ -105,8 +105,12 @@ def build_parser() -> argparse.ArgumentParser:
     )
     render.add_argument("--quiet", action="store_true", help="no progress")
 
-    inspect = commands.add_parser("inspect", help="describe a capture", description="Describe a capture.")
-    inspect.add_argument("capture", type=Path, help="capture folder")
+    inspect = commands.add_parser(
+        "inspect",
+        help="describe a capture or a project",
+        description="Describe a capture, or what the trained clips of a project weigh.",
+    )
+    inspect.add_argument("path", type=Path, help="capture or project folder")
     inspect.add_argument("--json", action="store_true", help="print everything as JSON")
 
     doctor = commands.add_parser("doctor", help="look at this machine", description="Look at this machine.")
@@ -364,11 +368,16 @@ def _render(options: argparse.Namespace, launch: Launch) -> int:
 
 
 def _inspect(options: argparse.Namespace, launch: Launch) -> int:
+    from app.inspection import describe_project, is_project, project_lines
     from engine.capture.inspect import describe
 
-    found = describe(open_capture(options.capture))
+    is_one = is_project(options.path)
+    found = describe_project(options.path) if is_one else describe(open_capture(options.path))
     if options.json:
         print(json.dumps(found, indent=2))
+        return EXIT_OK
+    if is_one:
+        print("\n".join(project_lines(found)))
         return EXIT_OK
     print(
         f"{found['path']}: {found['format']} layout, {found['n_cameras']} cameras, {found['n_frames']} frames at "

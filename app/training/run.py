@@ -43,6 +43,7 @@ from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
 from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch, stages_of
 from engine.errors import EngineError, NonFiniteLoss, ProjectError
 from engine.model.clip_state import ClipState
+from engine.model.compact import CompactClip
 from engine.training.report import Progress, ReportProgress, StepStats
 
 logger = logging.getLogger(__name__)
@@ -81,6 +82,10 @@ class Training(Protocol):
 
     def state(self) -> ClipState:
         """A copy of the model."""
+        ...
+
+    def finish(self) -> CompactClip:
+        """The model as it is stored; what is measured after that is what is stored."""
         ...
 
     def write_checkpoint(self, path: Path | str) -> None:
@@ -260,9 +265,9 @@ class TrainingRun:
 
     def _finish(self, training: Training) -> None:
         assert self._project is not None
+        clip = training.finish()
         value = self._measure(training)
-        state = training.state()
-        metrics = dict(state.header.get("metrics") or {})
+        metrics = dict(clip.state.header.get("metrics") or {})
         if value is not None:
             metrics["held_out_psnr"] = value
         if self._gradient_norms:
@@ -272,7 +277,7 @@ class TrainingRun:
         metrics |= times
         self._note({"step": training.steps_done, **times})
         path = self._project.clip_path(self._job.clip_index)
-        keep_clip(ClipState(state.arrays, state.header | {"metrics": metrics}), path, self._project.live_dir)
+        keep_clip(clip.with_header(metrics=metrics), path, self._project.live_dir)
         with suppress(OSError):
             self._project.checkpoint_path(self._job.clip_index).unlink(missing_ok=True)
         self._snapshots.clear()

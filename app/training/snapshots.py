@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from app.training.messages import SnapshotWritten
-from engine.errors import NonFiniteLoss, ProjectError
+from engine.errors import ProjectError
 from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
+from engine.model.compact import CompactClip, write_compact_clip
 
 
 class Cadence:
@@ -87,22 +88,16 @@ def is_finite(state: ClipState) -> bool:
     return all(np.isfinite(a).all() for a in state.arrays.values() if np.issubdtype(a.dtype, np.floating))
 
 
-def keep_clip(state: ClipState, path: Path, live_dir: Path) -> None:
+def keep_clip(clip: CompactClip, path: Path, live_dir: Path) -> None:
     """Put a finished clip in its place, after it was written elsewhere, read back and found equal.
 
     Raises:
-        NonFiniteLoss: The state holds numbers that are not finite.
         ProjectError: The disk refused, or what was read back differs.
     """
-    if not is_finite(state):
-        raise NonFiniteLoss(
-            "The trained clip holds numbers that are not finite; it was not saved.",
-            hint="Train it again with another seed or smaller learning rates.",
-        )
     draft = live_dir / f"{path.stem}-final{path.suffix}"
-    write_clip_state(draft, state)
+    write_compact_clip(draft, clip)
     try:
-        if read_clip_state(draft).fingerprint != state.fingerprint:
+        if read_clip_state(draft).fingerprint != clip.state.fingerprint:
             raise ProjectError(
                 "The clip read back differs from the clip written; the disk may be damaged.",
                 hint="Check the disk, or move the project to another one.",

@@ -172,6 +172,21 @@ class ClipModel(nn.Module):
 
         return AnchorView(positions(inherited), positions(own), dynamic(own), dynamic(inherited))
 
+    def entries_in_use(self) -> list[np.ndarray]:
+        """Entries of each of the field's tables that some anchor reads in a frame it exists in. [L, T] bool each"""
+        if self.field is None:
+            return []
+        shape = self.field.shape
+        levels = np.arange(len(shape.cells))[None, :, None]
+        used = [np.zeros((len(shape.cells), shape.n_entries), bool) for _ in self.field.tables]
+        for role, corners in self._corners.items():
+            presence = self.anchor_set(role).presence
+            assert presence is not None  # only dynamic sets have corners
+            for knot, is_alive in enumerate(presence.numpy().T):
+                indices = corners.indices[is_alive] ^ self.field.keys[knot][:, None]  # [n, L, 8]
+                used[0 if shape.is_shared else knot][levels, indices] = True
+        return used
+
     def own_arrays(self) -> dict[str, np.ndarray]:
         """Everything this clip must store; inherited sets leave only their presence in this clip. Copies."""
         arrays: dict[str, np.ndarray] = {}

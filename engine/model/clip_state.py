@@ -3,6 +3,9 @@
 One format for the saved clip, the live snapshot and, with the optimiser's arrays added, the checkpoint. Files are
 safetensors; they appear under their final name only when complete. Source clips store what they own, not what they
 inherit; `reference_fingerprint` ties them to the reference they were trained on.
+
+A file holds its arrays as they are (snapshots, checkpoints) or compactly (finished clips, engine.model.compact): then
+each is a run of bytes under its own name, and the metadata say how it is read. Readers of states see no difference.
 """
 
 from __future__ import annotations
@@ -19,8 +22,11 @@ from safetensors.numpy import save_file
 
 from engine.errors import ProjectError
 from engine.files import atomic_path
+from engine.model.coding import CodedArray, CodingError, decode_array
 
-SCHEMA = 1
+SCHEMA = 2
+_READABLE = (1, SCHEMA)
+"""Schema 1 knew no compact form; its files are read like any other that holds its arrays as they are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +64,24 @@ def write_clip_state(path: Path | str, state: ClipState) -> None:
         ProjectError: The disk refused.
     """
     arrays = {name: np.ascontiguousarray(array) for name, array in state.arrays.items()}
+    _write(path, arrays, {"header": json.dumps(state.header)})
+
+
+def write_coded_arrays(path: Path | str, coded: dict[str, CodedArray], header: dict[str, Any]) -> None:
+    """Likewise, with every array in its compact form; `read_clip_state` gives the arrays that these decode to.
+
+    Raises:
+        ProjectError: The disk refused.
+    """
+    specs = {name: array.spec for name, array in coded.items()}
+    metadata = {"header": json.dumps(header), "coding": json.dumps(specs, separators=(",", ":"))}
+    _write(path, {name: array.payload for name, array in coded.items()}, metadata)
+
+
+def _write(path: Path | str, arrays: dict[str, np.ndarray], metadata: dict[str, str]) -> None:
     try:
         with atomic_path(path) as partial:
-            save_file(arrays, partial, metadata={"header": json.dumps(state.header)})
+            save_file(arrays, partial, metadata=metadata)
     except OSError as error:
         raise ProjectError(
             f"The clip could not be written ({error.strerror}).",
@@ -70,7 +91,7 @@ def write_clip_state(path: Path | str, state: ClipState) -> None:
 
 
 def read_clip_state(path: Path | str) -> ClipState:
-    """Read a state written by `write_clip_state`.
+    """Read a state written by `write_clip_state` or `write_coded_arrays`.
 
     Raises:
         ProjectError: The file is missing, damaged, or of a newer schema.
@@ -81,6 +102,8 @@ def read_clip_state(path: Path | str) -> ClipState:
             metadata = file.metadata() or {}
             header = json.loads(metadata["header"])
             arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
+        if "coding" in metadata:
+            arrays = _decoded(arrays, json.loads(metadata["coding"]))
     except FileNotFoundError as error:
         raise ProjectError("The clip file does not exist.", hint="Train the clip first.", path=path) from error
     except (OSError, SafetensorError, KeyError, ValueError) as error:
@@ -89,13 +112,30 @@ def read_clip_state(path: Path | str) -> ClipState:
             hint="Train the clip again.",
             path=path,
         ) from error
-    if header.get("schema") != SCHEMA:
+    if header.get("schema") not in _READABLE:
         raise ProjectError(
-            f"The clip file has schema {header.get('schema')}, this version reads {SCHEMA}.",
+            f"The clip file has schema {header.get('schema')}, this version reads 1 to {SCHEMA}.",
             hint="Use the version that wrote it or train the clip again.",
             path=path,
         )
     return ClipState(arrays, header)
+
+
+def _decoded(payloads: dict[str, np.ndarray], specs: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Arrays of a compact file.
+
+    Raises:
+        CodingError: An array is damaged, missing or not described; names it.
+    """
+    if not isinstance(specs, dict) or specs.keys() != payloads.keys():
+        raise CodingError("its arrays and their description differ")
+    arrays = {}
+    for name, payload in payloads.items():
+        try:
+            arrays[name] = decode_array(payload, specs[name])
+        except CodingError as error:
+            raise CodingError(f"{name}: {error}") from error
+    return arrays
 
 
 def read_clip_header(path: Path) -> dict[str, Any] | None:

@@ -25,6 +25,7 @@ from engine.errors import NonFiniteLoss, PreparationError, ProjectError
 from engine.metrics.psnr import psnr
 from engine.model.clip_model import decoder_sizes, load_clip_model, read_field
 from engine.model.clip_state import SCHEMA, ClipState, read_clip_state, write_clip_state
+from engine.model.compact import CompactClip, compact_clip
 from engine.model.view import REACH_SPACINGS, View, render_gaussians, render_model
 from engine.training.active_tiles import ActivePicture, ActiveTiles
 from engine.training.building import (
@@ -423,6 +424,18 @@ class ClipTraining:
         state = ClipState(arrays, header)
         header["fingerprint"] = state.fingerprint
         return state
+
+    def finish(self) -> CompactClip:
+        """The trained clip as it is stored. The model takes its values over: what is measured from here on is that.
+
+        Raises:
+            NonFiniteLoss: An array holds numbers that are not finite.
+        """
+        # a field that goes on in the next clip, and may show this one then, keeps entries that only others read
+        entries = None if self.config.field == "continue" else self.model.entries_in_use()
+        compact = compact_clip(self.state(), entries)
+        self.model = load_clip_model(compact.state, self.reference, is_learning=True)
+        return compact
 
     def write_checkpoint(self, path: Path | str) -> None:
         """State, optimiser, order of pictures and random state: enough to go on exactly."""

@@ -16,6 +16,7 @@ from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip
 from engine.errors import NonFiniteLoss, ProjectError
 from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
+from engine.model.compact import CompactClip, compact_clip
 from engine.training.report import Progress, StepStats
 
 N_STEPS = 6
@@ -118,6 +119,9 @@ class FakeTraining:
         state = ClipState(arrays, header)
         header["fingerprint"] = state.fingerprint
         return state
+
+    def finish(self) -> CompactClip:
+        return compact_clip(self.state())
 
     def write_checkpoint(self, path: Path | str) -> None:
         write_clip_state(path, self.state())

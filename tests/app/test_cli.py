@@ -3,6 +3,8 @@
 import io
 import json
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -257,6 +259,43 @@ def test_inspecting_prints_stable_json(run, capture_folder):
     code, out, _ = run("inspect", capture_folder)
     assert code == 0
     assert "4 cameras, 6 frames" in out
+
+
+def test_inspecting_a_project_counts_the_bytes_of_its_clips(run, capture_folder, tmp_path):
+    project, capture = tmp_path / "p", tmp_path / "capture"
+    shutil.copytree(capture_folder, capture)
+    assert run("train", capture, "--project", project, "--clip-length", 3)[0] == 0
+    code, out, _ = run("inspect", project, "--json")
+    assert code == 0
+    found = json.loads(out)
+    sizes = [(project / "clips" / f"000{i}.safetensors").stat().st_size for i in range(2)]
+    assert [clip["n_bytes"] for clip in found["clips"]] == sizes
+    assert [sum(clip["components"].values()) for clip in found["clips"]] == sizes
+    assert found["components"]["positions"] == sum(clip["components"]["positions"] for clip in found["clips"]) > 0
+    assert found["reference_share"] == pytest.approx(sizes[0] / sum(sizes))
+    assert found["mb_per_minute"] == pytest.approx(sizes[1] / 3 * found["fps"] * 60 / 1e6)
+    code, out, _ = run("inspect", project)
+    assert code == 0
+    assert f"{found['mb_per_minute']:.1f} MB per minute" in out
+    assert re.search(r"positions +\d", out)
+    capture.rename(tmp_path / "elsewhere")
+    assert json.loads(run("inspect", project, "--json")[1])["mb_per_minute"] is None
+    assert "the capture is not there" in run("inspect", project)[1]
+
+
+def test_inspecting_a_project_without_clips_or_with_a_damaged_one_is_bad_input(run, capture_folder, tmp_path):
+    project = tmp_path / "p"
+    assert run("train", capture_folder, "--project", project, "--clip-length", 3)[0] == 0
+    clip = project / "clips" / "0001.safetensors"
+    clip.write_bytes(clip.read_bytes()[:50])
+    code, out, err = run("inspect", project)
+    assert (code, out) == (2, "")
+    assert "damaged" in err
+    for path in (project / "clips").iterdir():
+        path.unlink()
+    code, out, err = run("inspect", project)
+    assert (code, out) == (2, "")
+    assert "Nothing is trained" in err
 
 
 def test_help_and_nonsense(run):

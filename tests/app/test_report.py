@@ -317,7 +317,7 @@ def test_bytes_and_seconds_add_up(page, made, numbers):
     for clip, row in zip(numbers["projects"][0]["clips"], page.tables["storage"], strict=False):
         path = made / ODD_NAME / "clips" / f"{clip['clip_index']:04d}.safetensors"
         assert sum(clip["storage_bytes"].values()) == path.stat().st_size == int(row[-1])
-        assert clip["storage_bytes"]["static anchors"] == 2 * 12 * 3 * 4
+        assert clip["storage_bytes"]["positions"] == clip["storage_bytes"]["colours"] == 12 * 3 * 4
     assert page.tables["times"][0][1:] == ["6", "0.1", "30.0", "60.0", "0.0", "90.0"]
     assert ["Carving", "30.0", "20.0"] in page.tables["stages"]
 

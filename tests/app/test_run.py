@@ -13,6 +13,7 @@ from app.training.snapshots import Cadence, keep_clip
 from engine.capture.capture import open_capture
 from engine.errors import NonFiniteLoss, ProjectError
 from engine.model.clip_state import ClipState, read_clip_state
+from engine.model.compact import compact_clip
 from engine.training.report import Progress
 from tests.app.fakes import make_fake
 
@@ -196,18 +197,18 @@ def test_a_fault_of_the_program_is_reported_with_its_trace(bench):
 def test_a_clip_with_numbers_that_are_none_is_not_kept(tmp_path, bad):
     state = ClipState({"value": np.array([1.0, bad], np.float32)}, {"schema": 1, "role": "reference"})
     with pytest.raises(NonFiniteLoss):
-        keep_clip(state, tmp_path / "clips" / "0000.safetensors", tmp_path / "live")
+        keep_clip(compact_clip(state), tmp_path / "clips" / "0000.safetensors", tmp_path / "live")
     assert not list(tmp_path.rglob("*.safetensors"))
 
 
 def test_a_clip_that_reads_back_differently_does_not_replace_the_old_one(tmp_path, monkeypatch):
     path = tmp_path / "clips" / "0000.safetensors"
     good = ClipState({"value": np.ones(2, np.float32)}, {"schema": 1, "role": "reference"})
-    keep_clip(good, path, tmp_path / "live")
+    keep_clip(compact_clip(good), path, tmp_path / "live")
     other = ClipState({"value": np.zeros(2, np.float32)}, good.header)
     monkeypatch.setattr("app.training.snapshots.read_clip_state", lambda _path: good)
     with pytest.raises(ProjectError, match="differs"):
-        keep_clip(other, path, tmp_path / "live")
+        keep_clip(compact_clip(other), path, tmp_path / "live")
     monkeypatch.undo()
     assert read_clip_state(path).arrays["value"][0] == 1.0
     assert not list((tmp_path / "live").iterdir())

@@ -99,7 +99,7 @@ def train(
         "median_step_ms": {stage: float(np.median(values)) for stage, values in durations_ms.items()},
         "steps": training.n_steps,
     }
-    return training.state(), timing
+    return training.finish().state, timing  # as stored: what is measured and what the next clip is trained on
 
 
 def write_pictures(
