@@ -1,5 +1,6 @@
-"""The command line without a window: train, eval, render, inspect, doctor, bench, report. Parser and dispatch; larger commands lie with what they run.
+"""The command line without a window: train, eval, render, inspect, doctor, bench, ablate, report.
 
+Parser and dispatch; larger commands lie with what they run.
 Exit codes: 0 done, 1 failed, 2 bad input, 130 interrupted. One plain message each, details in the log file. Results
 go to standard output, progress and messages to standard error.
 """

@@ -20,7 +20,7 @@ _SIZE_PX = 16
 def warm_up() -> None:
     """Run every kernel once on pictures of a few pixels, with the types and layouts of a real preparation.
 
-    About ten seconds of one core when nothing is cached (holding the interpreter lock), a fraction of a second after.
+    About five seconds of one core when nothing is cached (holding the interpreter lock), a fraction of a second after.
     """
     rng = np.random.default_rng(0)
     rig = _two_cameras()
