@@ -10,12 +10,12 @@ from numba.core import cgutils
 
 from engine.conventions import ALPHA_MAX, TRANSMITTANCE_MIN
 from engine.kernels.arrays import Floats1, Floats2, Floats3, Ints1, SmallInts1, job_reader
-from engine.kernels.lanes import LaneBuilder, kernel_intrinsic
+from engine.kernels.lanes import VECTOR_BYTES, LaneBuilder, kernel_intrinsic
 from engine.kernels.routines import WORKER, routine, take_next
 from engine.raster.cpu import record as rec
 from engine.raster.cpu import tile as tl
 from engine.raster.cpu.record import f4
-from engine.raster.cpu.tile import prefetch, write_block_centers
+from engine.raster.cpu.tile import prefetch
 
 _TILE, _BLOCK, _BLOCKS, _BLOCKS_PER_ROW = rec.TILE, rec.BLOCK, rec.BLOCKS, rec.BLOCKS_PER_ROW
 _RECORD_BYTES = rec.RECORD_BYTES
@@ -27,15 +27,27 @@ _AHEAD = tl.PREFETCH_AHEAD
 
 
 @kernel_intrinsic
-def _blend_record(typing_context, scratch, record, tile_x, tile_y, open_blocks):
-    """Blend one record into the open blocks of a tile; returns the blocks in which some pixel changed."""
+def _find_touched_blocks(typing_context, record, tile_x, tile_y):
+    """One bit per block of a tile that a record may touch."""
+    signature = types.int64(types.int64, types.float32, types.float32)
+
+    def generate(context, builder, signature, arguments):
+        record, tile_x, tile_y = arguments
+        build = LaneBuilder(builder)
+        return tl.touched_blocks(build, tl.load_record(build, record), tile_x, tile_y)
+
+    return signature, generate
+
+
+@kernel_intrinsic
+def _blend_record(typing_context, scratch, record, tile_x, tile_y, blocks):
+    """Blend one record into some blocks of a tile; returns those in which some pixel changed."""
     signature = types.int64(types.int64, types.int64, types.float32, types.float32, types.int64)
 
     def generate(context, builder, signature, arguments):
-        scratch, record, tile_x, tile_y, open_blocks = arguments
+        scratch, record, tile_x, tile_y, blocks = arguments
         build = LaneBuilder(builder)
         fields = tl.load_record(build, record)
-        touched = tl.touched_blocks(build, fields, tile_x, tile_y)
         footprint = tl.Footprint(build, scratch, fields, tile_x, tile_y)
         channels = [build.broadcast(fields[column]) for column in (rec.RED, rec.GREEN, rec.BLUE)]
         changed_slot = cgutils.alloca_once_value(builder, build.int64(0))
@@ -55,7 +67,7 @@ def _blend_record(typing_context, scratch, record, tile_x, tile_y, open_blocks):
                 address = footprint.plane(block, plane)
                 build.store(weight.times_plus(channel, build.load(address)), address)
 
-        build.for_each_bit(builder.and_(touched, open_blocks), blend_block)
+        build.for_each_bit(blocks, blend_block)
         return builder.load(changed_slot)
 
     return signature, generate
@@ -68,12 +80,12 @@ def _find_open_blocks(typing_context, scratch):
 
     def generate(context, builder, signature, arguments):
         build = LaneBuilder(builder)
-        result = build.int64(0)
-        for block in range(rec.BLOCKS):
-            transmittance = build.load(arguments[0], tl.TRANSMITTANCE + 64 * block)
-            some = build.some_lane(transmittance.compare(">=", TRANSMITTANCE_MIN))
-            result = builder.or_(result, builder.shl(some, build.int64(block)))
-        return result
+        result = cgutils.alloca_once_value(builder, build.int64(0))
+        with cgutils.for_range(builder, build.int64(rec.BLOCKS)) as loop:
+            plane = builder.add(arguments[0], builder.mul(loop.index, build.int64(VECTOR_BYTES)))
+            some = build.some_lane(build.load(plane, tl.TRANSMITTANCE).compare(">=", TRANSMITTANCE_MIN))
+            builder.store(builder.or_(builder.load(result), builder.shl(some, loop.index)), result)
+        return builder.load(result)
 
     return signature, generate
 
@@ -125,7 +137,6 @@ def blend_tiles(worker, arguments):
     address = np.int64(row.ctypes.data)
     records_address = np.int64(records.ctypes.data)
     counter_address = np.int64(counter.ctypes.data)
-    write_block_centers(address)
     tile = take_next(counter_address)
     while tile < n_tiles:
         tile_x = (tile % n_columns) * _TILE
@@ -158,15 +169,16 @@ def blend_tiles(worker, arguments):
         open_blocks = _find_open_blocks(address)
         while pair < end and open_blocks != 0:
             stop = min(end, pair + _RECHECK_EVERY)
+            # before any of them is blended: the processor looks ahead across records only if their blocks are known
+            for soon in range(pair, stop):
+                prefetch(records_address + np.int64(pair_records[min(soon + _AHEAD, end - 1)]) * _RECORD_BYTES)
+                record_address = records_address + np.int64(pair_records[soon]) * _RECORD_BYTES
+                pair_blocks[soon] = _find_touched_blocks(record_address, f4(tile_x), f4(tile_y)) & open_blocks
             while pair < stop:
-                prefetch(records_address + np.int64(pair_records[min(pair + _AHEAD, end - 1)]) * _RECORD_BYTES)
-                pair_blocks[pair] = _blend_record(
-                    address,
-                    records_address + np.int64(pair_records[pair]) * _RECORD_BYTES,
-                    f4(tile_x),
-                    f4(tile_y),
-                    open_blocks,
-                )
+                blocks = pair_blocks[pair]
+                if blocks != 0:
+                    record_address = records_address + np.int64(pair_records[pair]) * _RECORD_BYTES
+                    pair_blocks[pair] = _blend_record(address, record_address, f4(tile_x), f4(tile_y), blocks)
                 pair += 1
             open_blocks = _find_open_blocks(address)
         while pair < end:

@@ -4,7 +4,7 @@ With F the product of upstream gradient and finished pixel, and P what the Gauss
 contributed to it, the gradient of a Gaussian's alpha is T (color . gradient) - (F - P) / (1 - alpha). F - P is carried
 along per pixel (`REMAINDER`). Nine sums per (Gaussian, tile) go to a buffer row that no one else writes:
 
-    sum v, v u, v dy, v u^2, v u dy, v dy^2 and w gradient_rgb,   v = dL/d(log alpha), u = dx + slope dy, w = alpha T
+    sum g, g u, g v, g u^2, g u v, g v^2 and w gradient_rgb,   g = dL/d(log alpha), u and v of `record`, w = alpha T
 
 which is all the projection backward needs (moments of the Cholesky form: no cancellation for needles).
 """
@@ -24,7 +24,7 @@ from engine.kernels.routines import WORKER, routine, take_next
 from engine.raster.cpu import record as rec
 from engine.raster.cpu import tile as tl
 from engine.raster.cpu.record import f4
-from engine.raster.cpu.tile import prefetch, write_block_centers
+from engine.raster.cpu.tile import prefetch
 
 _TILE, _BLOCK, _BLOCKS, _BLOCKS_PER_ROW = rec.TILE, rec.BLOCK, rec.BLOCKS, rec.BLOCKS_PER_ROW
 _RECORD_BYTES, _PAIR_BYTES, _PAIR_FLOATS = rec.RECORD_BYTES, 4 * rec.PAIR_FLOATS, rec.PAIR_FLOATS
@@ -41,7 +41,7 @@ class _Step:
     """One block of pixels behind one record: values the gradient is made of, and the planes advanced."""
 
     def __init__(self, build: LaneBuilder, footprint: tl.Footprint, channels: list[Lanes], block: Any) -> None:
-        self.u, self.dy, log_alphas = footprint.at(block)
+        self.u, self.v, log_alphas = footprint.at(block)
         plane_t, plane_e = footprint.plane(block, tl.TRANSMITTANCE), footprint.plane(block, tl.REMAINDER)
         self.transmittance = build.load(plane_t)
         is_hit = tl.hits(build, log_alphas, self.transmittance)
@@ -96,10 +96,10 @@ def _replay_record(typing_context, scratch, record, tile_x, tile_y, changed_bloc
             step = _Step(build, footprint, channels, block)
             for index, gradient in enumerate(step.gradients):
                 add(6 + index, step.weight * gradient)
-            v = step.alpha * (step.transmittance * step.gain - step.remainder / (1.0 - step.alpha))
-            v = v.where(step.unclamped.compare("<", ALPHA_MAX))
-            vu, vy = v * step.u, v * step.dy
-            for index, value in enumerate((v, vu, vy, vu * step.u, vu * step.dy, vy * step.dy)):
+            g = step.alpha * (step.transmittance * step.gain - step.remainder / (1.0 - step.alpha))
+            g = g.where(step.unclamped.compare("<", ALPHA_MAX))
+            gu, gv = g * step.u, g * step.v
+            for index, value in enumerate((g, gu, gv, gu * step.u, gu * step.v, gv * step.v)):
                 add(index, value)
 
         build.for_each_bit(changed_blocks, replay_block)
@@ -159,7 +159,6 @@ def replay_tiles(worker, arguments):
     records_address = np.int64(records.ctypes.data)
     sums_address = np.int64(pair_sums.ctypes.data)
     counter_address = np.int64(counter.ctypes.data)
-    write_block_centers(address)
     tile = take_next(counter_address)
     while tile < n_tiles:
         tile_x = (tile % n_columns) * _TILE
