@@ -14,13 +14,12 @@ from engine.kernels.lanes import VECTOR_BYTES, LaneBuilder, kernel_intrinsic
 from engine.kernels.routines import WORKER, routine, take_next
 from engine.raster.cpu import record as rec
 from engine.raster.cpu import tile as tl
+from engine.raster.cpu.pixels import open_block, write_block
 from engine.raster.cpu.record import f4
 from engine.raster.cpu.tile import prefetch
 
 _TILE, _BLOCK, _BLOCKS, _BLOCKS_PER_ROW = rec.TILE, rec.BLOCK, rec.BLOCKS, rec.BLOCKS_PER_ROW
 _RECORD_BYTES = rec.RECORD_BYTES
-_T, _R, _G, _B = (plane // 4 for plane in (tl.TRANSMITTANCE, tl.PLANE_R, tl.PLANE_G, tl.PLANE_B))
-_PLANE = 16 * _BLOCKS
 _RECHECK_EVERY = 16
 """Records between two looks for finished blocks. Looking after every record would make each wait for the last."""
 _AHEAD = tl.PREFETCH_AHEAD
@@ -133,39 +132,22 @@ def blend_tiles(worker, arguments):
     pair_blocks, scratch, counter = job.pair_blocks, job.scratch, job.counter
     height, width = transmittance.shape
     n_tiles = len(tile_starts) - 1
-    row = scratch[worker]
-    address = np.int64(row.ctypes.data)
+    address = np.int64(scratch[worker].ctypes.data)
     records_address = np.int64(records.ctypes.data)
     counter_address = np.int64(counter.ctypes.data)
+    background_address = np.int64(background.ctypes.data)
+    image_address = np.int64(image.ctypes.data)
+    transmittance_address, alpha_address = np.int64(transmittance.ctypes.data), np.int64(alpha.ctypes.data)
     tile = take_next(counter_address)
     while tile < n_tiles:
         tile_x = (tile % n_columns) * _TILE
         tile_y = (tile // n_columns) * _TILE
-        end_x, end_y = min(tile_x + _TILE, width), min(tile_y + _TILE, height)
         pair = tile_starts[tile]
         end = tile_starts[tile + 1]
-        if pair == end:
-            for y in range(tile_y, end_y):
-                for x in range(tile_x, end_x):
-                    transmittance[y, x] = f4(1.0)
-                    alpha[y, x] = f4(0.0)
-                    image[y, x, 0] = background[0]
-                    image[y, x, 1] = background[1]
-                    image[y, x, 2] = background[2]
-            tile = take_next(counter_address)
-            continue
-        if tile_x + _TILE <= width and tile_y + _TILE <= height:
-            for place in range(_T, _T + _PLANE):
-                row[place] = f4(1.0)
-        else:
-            for block in range(_BLOCKS):
-                block_x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
-                block_y = tile_y + _BLOCK * (block // _BLOCKS_PER_ROW)
-                for lane in range(16):
-                    inside = block_x + (lane & 3) < width and block_y + (lane >> 2) < height
-                    row[_T + block * 16 + lane] = f4(1.0) if inside else f4(0.0)
-        for place in range(_R, _R + 3 * _PLANE):
-            row[place] = f4(0.0)
+        for block in range(_BLOCKS):
+            x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
+            y = tile_y + _BLOCK * (block // _BLOCKS_PER_ROW)
+            open_block(address + block * VECTOR_BYTES, x, y, width, height)
         open_blocks = _find_open_blocks(address)
         while pair < end and open_blocks != 0:
             stop = min(end, pair + _RECHECK_EVERY)
@@ -184,14 +166,18 @@ def blend_tiles(worker, arguments):
         while pair < end:
             pair_blocks[pair] = 0
             pair += 1
-        for y in range(tile_y, end_y):
-            for x in range(tile_x, end_x):
-                block = ((y - tile_y) >> 2) * _BLOCKS_PER_ROW + ((x - tile_x) >> 2)
-                place = block * 16 + (y & 3) * 4 + (x & 3)
-                left_over = row[_T + place]
-                transmittance[y, x] = left_over
-                alpha[y, x] = f4(1.0) - left_over
-                image[y, x, 0] = row[_R + place] + left_over * background[0]
-                image[y, x, 1] = row[_G + place] + left_over * background[1]
-                image[y, x, 2] = row[_B + place] + left_over * background[2]
+        for block in range(_BLOCKS):
+            x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
+            y = tile_y + _BLOCK * (block // _BLOCKS_PER_ROW)
+            write_block(
+                address + block * VECTOR_BYTES,
+                x,
+                y,
+                width,
+                height,
+                background_address,
+                image_address,
+                transmittance_address,
+                alpha_address,
+            )
         tile = take_next(counter_address)
