@@ -80,17 +80,22 @@ class LaneBuilder:
         pointer = self.ir.inttoptr(self.address(base, offset), FLOATS.as_pointer())
         self.ir.store(lanes.value, pointer, align=align)
 
-    def store_first(self, lanes: Lanes, n_lanes: int, base: Any, offset: Any = 0) -> None:
-        """Only the first `n_lanes` lanes; nothing behind them is touched. 4-byte alignment is enough."""
+    def load_masked(self, base: Any, keep: Any) -> Lanes:
+        """Consecutive floats in the lanes of a mask, 0 in others; nothing else is read. 4-byte alignment is enough."""
         pointer_type = FLOATS.as_pointer()
-        pointer = self.ir.inttoptr(self.address(base, offset), pointer_type)
-        keep = ir.Constant(_BOOLS, [int(lane < n_lanes) for lane in range(N_LANES)])
-        self._call(
-            "llvm.masked.store.v16f32.p0",
-            ir.VoidType(),
-            [lanes.value, pointer, ir.Constant(INT32, 4), keep],
-            [FLOATS, pointer_type, INT32, _BOOLS],
-        )
+        arguments = [self.ir.inttoptr(base, pointer_type), ir.Constant(INT32, 4), keep, self.constant(0.0).value]
+        types = [pointer_type, INT32, _BOOLS, FLOATS]
+        return Lanes(self, self._call("llvm.masked.load.v16f32.p0", FLOATS, arguments, types))
+
+    def store_masked(self, lanes: Lanes, base: Any, keep: Any) -> None:
+        """The lanes of a mask; nothing else is touched. 4-byte alignment is enough."""
+        pointer_type = FLOATS.as_pointer()
+        arguments = [lanes.value, self.ir.inttoptr(base, pointer_type), ir.Constant(INT32, 4), keep]
+        self._call("llvm.masked.store.v16f32.p0", ir.VoidType(), arguments, [FLOATS, pointer_type, INT32, _BOOLS])
+
+    def store_first(self, lanes: Lanes, n_lanes: int, base: Any) -> None:
+        """Only the first `n_lanes` lanes. 4-byte alignment is enough."""
+        self.store_masked(lanes, base, ir.Constant(_BOOLS, [int(lane < n_lanes) for lane in range(N_LANES)]))
 
     def load_scalar(self, base: Any, offset: Any = 0) -> Any:
         """One float."""

@@ -26,12 +26,12 @@ _TILE = rec.TILE
 _TILE_SPAN = f4(rec.TILE - 1)
 _SLACK_PX = f4(1e-3)
 """Added to each side of a span, pixels, against float32 rounding of the square roots."""
-_CENTER_X, _CENTER_Y, _INVERSE_MAJOR, _SLOPE, _MINOR = (
+_CENTER_X, _CENTER_Y, _INVERSE_ROOT, _SLOPE, _ROOT_MINOR = (
     rec.CENTER_X,
     rec.CENTER_Y,
-    rec.INVERSE_MAJOR,
+    rec.INVERSE_ROOT,
     rec.SLOPE,
-    rec.MINOR,
+    rec.ROOT_MINOR,
 )
 _REACH, _TILT, _HALF_WIDTH, _HALF_HEIGHT = rec.REACH, rec.TILT, rec.HALF_WIDTH, rec.HALF_HEIGHT
 _COLUMNS, _ROWS = rec.TILE_COLUMNS, rec.TILE_ROWS
@@ -56,9 +56,9 @@ def _span_of_row(records, i, tile_row, first, last):
     half_width = records[i, _HALF_WIDTH]
     half_height = records[i, _HALF_HEIGHT]
     slope = records[i, _SLOPE]
-    minor = records[i, _MINOR]
+    root_minor = records[i, _ROOT_MINOR]
     reach = records[i, _REACH]
-    inverse_major = records[i, _INVERSE_MAJOR]
+    inverse_root = records[i, _INVERSE_ROOT]
     top = f4(tile_row * _TILE) + _HALF - records[i, _CENTER_Y]
     bottom = min(top + _TILE_SPAN, half_height)
     top = max(top, -half_height)
@@ -66,8 +66,9 @@ def _span_of_row(records, i, tile_row, first, last):
     widest = records[i, _TILT] * half_width
     right_y = min(max(widest, top), bottom)
     left_y = min(max(-widest, top), bottom)
-    right = -slope * right_y + math.sqrt(max(_ZERO, (reach - minor * right_y * right_y) * inverse_major))
-    left = -slope * left_y - math.sqrt(max(_ZERO, (reach - minor * left_y * left_y) * inverse_major))
+    right_v, left_v = root_minor * right_y, root_minor * left_y
+    right = -slope * right_y + math.sqrt(max(_ZERO, reach - right_v * right_v)) * inverse_root
+    left = -slope * left_y - math.sqrt(max(_ZERO, reach - left_v * left_v)) * inverse_root
     center_x = records[i, _CENTER_X]
     # np.floor stays in float32, math.floor goes through int64 and float64
     first_pixel = np.ceil(center_x + left - _SLACK_PX - _HALF)

@@ -10,32 +10,43 @@ from numba.core import cgutils
 
 from engine.conventions import ALPHA_MAX, TRANSMITTANCE_MIN
 from engine.kernels.arrays import Floats1, Floats2, Floats3, Ints1, SmallInts1, job_reader
-from engine.kernels.lanes import LaneBuilder, kernel_intrinsic
+from engine.kernels.lanes import VECTOR_BYTES, LaneBuilder, kernel_intrinsic
 from engine.kernels.routines import WORKER, routine, take_next
 from engine.raster.cpu import record as rec
 from engine.raster.cpu import tile as tl
+from engine.raster.cpu.pixels import open_block, write_block
 from engine.raster.cpu.record import f4
-from engine.raster.cpu.tile import prefetch, write_block_centers
+from engine.raster.cpu.tile import prefetch
 
 _TILE, _BLOCK, _BLOCKS, _BLOCKS_PER_ROW = rec.TILE, rec.BLOCK, rec.BLOCKS, rec.BLOCKS_PER_ROW
 _RECORD_BYTES = rec.RECORD_BYTES
-_T, _R, _G, _B = (plane // 4 for plane in (tl.TRANSMITTANCE, tl.PLANE_R, tl.PLANE_G, tl.PLANE_B))
-_PLANE = 16 * _BLOCKS
 _RECHECK_EVERY = 16
 """Records between two looks for finished blocks. Looking after every record would make each wait for the last."""
 _AHEAD = tl.PREFETCH_AHEAD
 
 
 @kernel_intrinsic
-def _blend_record(typing_context, scratch, record, tile_x, tile_y, open_blocks):
-    """Blend one record into the open blocks of a tile; returns the blocks in which some pixel changed."""
+def _find_touched_blocks(typing_context, record, tile_x, tile_y):
+    """One bit per block of a tile that a record may touch."""
+    signature = types.int64(types.int64, types.float32, types.float32)
+
+    def generate(context, builder, signature, arguments):
+        record, tile_x, tile_y = arguments
+        build = LaneBuilder(builder)
+        return tl.touched_blocks(build, tl.load_record(build, record), tile_x, tile_y)
+
+    return signature, generate
+
+
+@kernel_intrinsic
+def _blend_record(typing_context, scratch, record, tile_x, tile_y, blocks):
+    """Blend one record into some blocks of a tile; returns those in which some pixel changed."""
     signature = types.int64(types.int64, types.int64, types.float32, types.float32, types.int64)
 
     def generate(context, builder, signature, arguments):
-        scratch, record, tile_x, tile_y, open_blocks = arguments
+        scratch, record, tile_x, tile_y, blocks = arguments
         build = LaneBuilder(builder)
         fields = tl.load_record(build, record)
-        touched = tl.touched_blocks(build, fields, tile_x, tile_y)
         footprint = tl.Footprint(build, scratch, fields, tile_x, tile_y)
         channels = [build.broadcast(fields[column]) for column in (rec.RED, rec.GREEN, rec.BLUE)]
         changed_slot = cgutils.alloca_once_value(builder, build.int64(0))
@@ -55,7 +66,7 @@ def _blend_record(typing_context, scratch, record, tile_x, tile_y, open_blocks):
                 address = footprint.plane(block, plane)
                 build.store(weight.times_plus(channel, build.load(address)), address)
 
-        build.for_each_bit(builder.and_(touched, open_blocks), blend_block)
+        build.for_each_bit(blocks, blend_block)
         return builder.load(changed_slot)
 
     return signature, generate
@@ -68,12 +79,12 @@ def _find_open_blocks(typing_context, scratch):
 
     def generate(context, builder, signature, arguments):
         build = LaneBuilder(builder)
-        result = build.int64(0)
-        for block in range(rec.BLOCKS):
-            transmittance = build.load(arguments[0], tl.TRANSMITTANCE + 64 * block)
-            some = build.some_lane(transmittance.compare(">=", TRANSMITTANCE_MIN))
-            result = builder.or_(result, builder.shl(some, build.int64(block)))
-        return result
+        result = cgutils.alloca_once_value(builder, build.int64(0))
+        with cgutils.for_range(builder, build.int64(rec.BLOCKS)) as loop:
+            plane = builder.add(arguments[0], builder.mul(loop.index, build.int64(VECTOR_BYTES)))
+            some = build.some_lane(build.load(plane, tl.TRANSMITTANCE).compare(">=", TRANSMITTANCE_MIN))
+            builder.store(builder.or_(builder.load(result), builder.shl(some, loop.index)), result)
+        return builder.load(result)
 
     return signature, generate
 
@@ -121,65 +132,52 @@ def blend_tiles(worker, arguments):
     pair_blocks, scratch, counter = job.pair_blocks, job.scratch, job.counter
     height, width = transmittance.shape
     n_tiles = len(tile_starts) - 1
-    row = scratch[worker]
-    address = np.int64(row.ctypes.data)
+    address = np.int64(scratch[worker].ctypes.data)
     records_address = np.int64(records.ctypes.data)
     counter_address = np.int64(counter.ctypes.data)
-    write_block_centers(address)
+    background_address = np.int64(background.ctypes.data)
+    image_address = np.int64(image.ctypes.data)
+    transmittance_address, alpha_address = np.int64(transmittance.ctypes.data), np.int64(alpha.ctypes.data)
     tile = take_next(counter_address)
     while tile < n_tiles:
         tile_x = (tile % n_columns) * _TILE
         tile_y = (tile // n_columns) * _TILE
-        end_x, end_y = min(tile_x + _TILE, width), min(tile_y + _TILE, height)
         pair = tile_starts[tile]
         end = tile_starts[tile + 1]
-        if pair == end:
-            for y in range(tile_y, end_y):
-                for x in range(tile_x, end_x):
-                    transmittance[y, x] = f4(1.0)
-                    alpha[y, x] = f4(0.0)
-                    image[y, x, 0] = background[0]
-                    image[y, x, 1] = background[1]
-                    image[y, x, 2] = background[2]
-            tile = take_next(counter_address)
-            continue
-        if tile_x + _TILE <= width and tile_y + _TILE <= height:
-            for place in range(_T, _T + _PLANE):
-                row[place] = f4(1.0)
-        else:
-            for block in range(_BLOCKS):
-                block_x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
-                block_y = tile_y + _BLOCK * (block // _BLOCKS_PER_ROW)
-                for lane in range(16):
-                    inside = block_x + (lane & 3) < width and block_y + (lane >> 2) < height
-                    row[_T + block * 16 + lane] = f4(1.0) if inside else f4(0.0)
-        for place in range(_R, _R + 3 * _PLANE):
-            row[place] = f4(0.0)
+        for block in range(_BLOCKS):
+            x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
+            y = tile_y + _BLOCK * (block // _BLOCKS_PER_ROW)
+            open_block(address + block * VECTOR_BYTES, x, y, width, height)
         open_blocks = _find_open_blocks(address)
         while pair < end and open_blocks != 0:
             stop = min(end, pair + _RECHECK_EVERY)
+            # before any of them is blended: the processor looks ahead across records only if their blocks are known
+            for soon in range(pair, stop):
+                prefetch(records_address + np.int64(pair_records[min(soon + _AHEAD, end - 1)]) * _RECORD_BYTES)
+                record_address = records_address + np.int64(pair_records[soon]) * _RECORD_BYTES
+                pair_blocks[soon] = _find_touched_blocks(record_address, f4(tile_x), f4(tile_y)) & open_blocks
             while pair < stop:
-                prefetch(records_address + np.int64(pair_records[min(pair + _AHEAD, end - 1)]) * _RECORD_BYTES)
-                pair_blocks[pair] = _blend_record(
-                    address,
-                    records_address + np.int64(pair_records[pair]) * _RECORD_BYTES,
-                    f4(tile_x),
-                    f4(tile_y),
-                    open_blocks,
-                )
+                blocks = pair_blocks[pair]
+                if blocks != 0:
+                    record_address = records_address + np.int64(pair_records[pair]) * _RECORD_BYTES
+                    pair_blocks[pair] = _blend_record(address, record_address, f4(tile_x), f4(tile_y), blocks)
                 pair += 1
             open_blocks = _find_open_blocks(address)
         while pair < end:
             pair_blocks[pair] = 0
             pair += 1
-        for y in range(tile_y, end_y):
-            for x in range(tile_x, end_x):
-                block = ((y - tile_y) >> 2) * _BLOCKS_PER_ROW + ((x - tile_x) >> 2)
-                place = block * 16 + (y & 3) * 4 + (x & 3)
-                left_over = row[_T + place]
-                transmittance[y, x] = left_over
-                alpha[y, x] = f4(1.0) - left_over
-                image[y, x, 0] = row[_R + place] + left_over * background[0]
-                image[y, x, 1] = row[_G + place] + left_over * background[1]
-                image[y, x, 2] = row[_B + place] + left_over * background[2]
+        for block in range(_BLOCKS):
+            x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
+            y = tile_y + _BLOCK * (block // _BLOCKS_PER_ROW)
+            write_block(
+                address + block * VECTOR_BYTES,
+                x,
+                y,
+                width,
+                height,
+                background_address,
+                image_address,
+                transmittance_address,
+                alpha_address,
+            )
         tile = take_next(counter_address)

@@ -4,7 +4,7 @@ With F the product of upstream gradient and finished pixel, and P what the Gauss
 contributed to it, the gradient of a Gaussian's alpha is T (color . gradient) - (F - P) / (1 - alpha). F - P is carried
 along per pixel (`REMAINDER`). Nine sums per (Gaussian, tile) go to a buffer row that no one else writes:
 
-    sum v, v u, v dy, v u^2, v u dy, v dy^2 and w gradient_rgb,   v = dL/d(log alpha), u = dx + slope dy, w = alpha T
+    sum g, g u, g v, g u^2, g u v, g v^2 and w gradient_rgb,   g = dL/d(log alpha), u and v of `record`, w = alpha T
 
 which is all the projection backward needs (moments of the Cholesky form: no cancellation for needles).
 """
@@ -19,16 +19,16 @@ from numba.core import cgutils
 
 from engine.conventions import ALPHA_MAX
 from engine.kernels.arrays import Floats2, Floats3, Ints1, SmallInts1, job_reader
-from engine.kernels.lanes import LaneBuilder, Lanes, kernel_intrinsic
+from engine.kernels.lanes import VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
 from engine.kernels.routines import WORKER, routine, take_next
 from engine.raster.cpu import record as rec
 from engine.raster.cpu import tile as tl
+from engine.raster.cpu.pixels import read_block, subtract_alpha
 from engine.raster.cpu.record import f4
-from engine.raster.cpu.tile import prefetch, write_block_centers
+from engine.raster.cpu.tile import prefetch
 
 _TILE, _BLOCK, _BLOCKS, _BLOCKS_PER_ROW = rec.TILE, rec.BLOCK, rec.BLOCKS, rec.BLOCKS_PER_ROW
-_RECORD_BYTES, _PAIR_BYTES, _PAIR_FLOATS = rec.RECORD_BYTES, 4 * rec.PAIR_FLOATS, rec.PAIR_FLOATS
-_T, _R, _G, _B, _E = (p // 4 for p in (tl.TRANSMITTANCE, tl.PLANE_R, tl.PLANE_G, tl.PLANE_B, tl.REMAINDER))
+_RECORD_BYTES, _PAIR_BYTES = rec.RECORD_BYTES, 4 * rec.PAIR_FLOATS
 _AHEAD = tl.PREFETCH_AHEAD
 _N_SUMS = 9
 
@@ -41,7 +41,7 @@ class _Step:
     """One block of pixels behind one record: values the gradient is made of, and the planes advanced."""
 
     def __init__(self, build: LaneBuilder, footprint: tl.Footprint, channels: list[Lanes], block: Any) -> None:
-        self.u, self.dy, log_alphas = footprint.at(block)
+        self.u, self.v, log_alphas = footprint.at(block)
         plane_t, plane_e = footprint.plane(block, tl.TRANSMITTANCE), footprint.plane(block, tl.REMAINDER)
         self.transmittance = build.load(plane_t)
         is_hit = tl.hits(build, log_alphas, self.transmittance)
@@ -96,15 +96,28 @@ def _replay_record(typing_context, scratch, record, tile_x, tile_y, changed_bloc
             step = _Step(build, footprint, channels, block)
             for index, gradient in enumerate(step.gradients):
                 add(6 + index, step.weight * gradient)
-            v = step.alpha * (step.transmittance * step.gain - step.remainder / (1.0 - step.alpha))
-            v = v.where(step.unclamped.compare("<", ALPHA_MAX))
-            vu, vy = v * step.u, v * step.dy
-            for index, value in enumerate((v, vu, vy, vu * step.u, vu * step.dy, vy * step.dy)):
+            g = step.alpha * (step.transmittance * step.gain - step.remainder / (1.0 - step.alpha))
+            g = g.where(step.unclamped.compare("<", ALPHA_MAX))
+            gu, gv = g * step.u, g * step.v
+            for index, value in enumerate((g, gu, gv, gu * step.u, gu * step.v, gv * step.v)):
                 add(index, value)
 
         build.for_each_bit(changed_blocks, replay_block)
         totals = build.sum_lanes([Lanes(build, builder.load(slot)) for slot in sums])
         build.store_first(totals, rec.PAIR_FLOATS, sums_address)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+@kernel_intrinsic
+def _clear_sums(typing_context, sums_address):
+    """Nine zeros, for a record that changed nothing."""
+    signature = types.void(types.int64)
+
+    def generate(context, builder, signature, arguments):
+        build = LaneBuilder(builder)
+        build.store_first(build.constant(0.0), rec.PAIR_FLOATS, arguments[0])
         return context.get_dummy_value()
 
     return signature, generate
@@ -118,7 +131,7 @@ class ReplayJob(NamedTuple):
         image, transmittance: Results of `blend_tiles`.
         grad_image: Upstream gradient. [H, W, 3]
         grad_alpha: Upstream gradient, or empty where it is zero. [H, W]
-        pair_sums: Written. [slots, 12]
+        pair_sums: Written. [slots + 1, PAIR_FLOATS]
         Others: As in `BlendJob`; `counter` is zero again.
     """
 
@@ -154,12 +167,12 @@ def replay_tiles(worker, arguments):
     height, width = transmittance.shape
     n_tiles = len(tile_starts) - 1
     has_grad_alpha = len(grad_alpha) > 0
-    row = scratch[worker]
-    address = np.int64(row.ctypes.data)
+    address = np.int64(scratch[worker].ctypes.data)
     records_address = np.int64(records.ctypes.data)
     sums_address = np.int64(pair_sums.ctypes.data)
     counter_address = np.int64(counter.ctypes.data)
-    write_block_centers(address)
+    image_address, grad_image_address = np.int64(image.ctypes.data), np.int64(grad_image.ctypes.data)
+    transmittance_address, grad_alpha_address = np.int64(transmittance.ctypes.data), np.int64(grad_alpha.ctypes.data)
     tile = take_next(counter_address)
     while tile < n_tiles:
         tile_x = (tile % n_columns) * _TILE
@@ -168,35 +181,26 @@ def replay_tiles(worker, arguments):
         if first == end:
             tile = take_next(counter_address)
             continue
-        if tile_x + _TILE > width or tile_y + _TILE > height:
-            for place in range(5 * _BLOCKS * 16):
-                row[place] = f4(0.0)
-        for y in range(tile_y, min(tile_y + _TILE, height)):
-            for x in range(tile_x, min(tile_x + _TILE, width)):
-                block = ((y - tile_y) >> 2) * _BLOCKS_PER_ROW + ((x - tile_x) >> 2)
-                place = block * 16 + (y & 3) * 4 + (x & 3)
-                red, green, blue = grad_image[y, x, 0], grad_image[y, x, 1], grad_image[y, x, 2]
-                remainder = red * image[y, x, 0] + green * image[y, x, 1] + blue * image[y, x, 2]
-                if has_grad_alpha:
-                    remainder -= grad_alpha[y, x] * transmittance[y, x]
-                row[_T + place] = f4(1.0)
-                row[_R + place] = red
-                row[_G + place] = green
-                row[_B + place] = blue
-                row[_E + place] = remainder
+        for block in range(_BLOCKS):
+            x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
+            y = tile_y + _BLOCK * (block // _BLOCKS_PER_ROW)
+            planes = address + block * VECTOR_BYTES
+            read_block(planes, x, y, width, height, image_address, grad_image_address)
+            if has_grad_alpha:
+                subtract_alpha(planes, x, y, width, height, transmittance_address, grad_alpha_address)
         for pair in range(first, end):
-            ahead = min(pair + _AHEAD, end - 1)
-            prefetch(records_address + np.int64(pair_records[ahead]) * _RECORD_BYTES)
             changed = pair_blocks[pair]
             slot = pair_slots[pair]
+            sums = sums_address + np.int64(slot) * _PAIR_BYTES
+            if changed == 0:
+                if slot >= 0:
+                    _clear_sums(sums)
+                continue
+            ahead = min(pair + _AHEAD, end - 1)
+            prefetch(records_address + np.int64(pair_records[ahead]) * _RECORD_BYTES)
             record_address = records_address + np.int64(pair_records[pair]) * _RECORD_BYTES
             if slot < 0:
-                if changed != 0:
-                    _pass_record(address, record_address, f4(tile_x), f4(tile_y), changed)
-            elif changed != 0:
-                sums = sums_address + np.int64(slot) * _PAIR_BYTES
-                _replay_record(address, record_address, f4(tile_x), f4(tile_y), changed, sums)
+                _pass_record(address, record_address, f4(tile_x), f4(tile_y), changed)
             else:
-                for index in range(_PAIR_FLOATS):
-                    pair_sums[slot, index] = f4(0.0)
+                _replay_record(address, record_address, f4(tile_x), f4(tile_y), changed, sums)
         tile = take_next(counter_address)

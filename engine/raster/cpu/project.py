@@ -76,6 +76,7 @@ def _record_fields(
     center_y = camera.fy * p.raw_slope_y + camera.cy
     cov = covariance(p)
     precision_u, precision_y, slope = cholesky(cov)
+    root_major = (precision_u * rec.EIGHTH_LOG).sqrt()
     tilt = cov.xy / cov.xx
     log_opacity = opacity.log2() * 0.125
     reach = log_opacity - rec.LOG_ALPHA_MIN
@@ -112,16 +113,16 @@ def _record_fields(
     columns = [
         center_x,
         center_y,
-        precision_u * rec.EIGHTH_LOG,
+        root_major,
         slope,
-        precision_y * rec.EIGHTH_LOG,
+        (precision_y * rec.EIGHTH_LOG).sqrt(),
         log_opacity,
         *color,
         reach,
         tilt,
         half_width,
         half_height,
-        1.0 / (precision_u * rec.EIGHTH_LOG),
+        1.0 / root_major,
         _packed_tiles(build, first_x, last_x, camera.width),
         _packed_tiles(build, first_y, last_y, camera.height),
     ]

@@ -76,13 +76,15 @@ def _gradients(camera: CameraLanes, p: Projection, scale: Row, opacity: Lanes, m
     v, vu, vy, vuu, vuy, vyy, *rest = moments
     grad_color = rest[:3]
     precision_u, precision_y, slope = cholesky(covariance(p))
-    grad_center_x = precision_u * vu
-    grad_center_y = slope * grad_center_x + precision_y * vy
-    uu = precision_u * precision_u * vuu
-    uy = precision_u * precision_y * vuy
+    # moments are of u and v as in `record`
+    weight_u, weight_y = ((precision * (1.0 / rec.EIGHTH_LOG)).sqrt() for precision in (precision_u, precision_y))
+    grad_center_x = weight_u * vu
+    grad_center_y = slope * grad_center_x + weight_y * vy
+    uu = weight_u * weight_u * vuu
+    uy = weight_u * weight_y * vuy
     twice_xx = uu  # gradient of cov_xx, times two
     grad_xy = slope * uu + uy
-    twice_yy = slope * slope * uu + 2.0 * slope * uy + precision_y * precision_y * vyy
+    twice_yy = slope * slope * uu + 2.0 * slope * uy + weight_y * weight_y * vyy
 
     grad_half_x = _combine(twice_xx, p.half_x, grad_xy, p.half_y)
     grad_half_y = _combine(twice_yy, p.half_y, grad_xy, p.half_x)

@@ -3,7 +3,7 @@
 A record is one cache line of sixteen 4-byte fields, so that blending a Gaussian into a tile costs one memory access.
 The footprint is stored as a Cholesky form that cannot cancel: with dx, dy from the centre,
 
-    log2(alpha) / 8 = log_opacity - (major * (dx + slope * dy)^2 + minor * dy^2)
+    log2(alpha) / 8 = log_opacity - (u^2 + v^2),   u = root_major * (dx + slope * dy),   v = root_minor * dy
 
 which stays exact for needles, where the textbook conic a dx^2 + 2 b dx dy + c dy^2 loses every digit. The eighth of a
 binary logarithm is the argument of `exp2_eighth`: a polynomial on a unit interval, squared three times.
@@ -18,11 +18,11 @@ import numpy as np
 from engine.conventions import ALPHA_MIN
 from engine.raster.view import TILE_PX
 
-CENTER_X, CENTER_Y, MAJOR, SLOPE, MINOR, LOG_OPACITY, RED = range(7)
-GREEN, BLUE, REACH, TILT, HALF_WIDTH, HALF_HEIGHT, INVERSE_MAJOR = range(7, 14)
+CENTER_X, CENTER_Y, ROOT_MAJOR, SLOPE, ROOT_MINOR, LOG_OPACITY, RED = range(7)
+GREEN, BLUE, REACH, TILT, HALF_WIDTH, HALF_HEIGHT, INVERSE_ROOT = range(7, 14)
 """Columns of a record. Centre and half extents in pixels; REACH = log_opacity - LOG_ALPHA_MIN is the value of the
-quadratic form at the rim; TILT = cov_xy / cov_xx gives the height at which the ellipse is widest; INVERSE_MAJOR is
-1 / MAJOR."""
+quadratic form at the rim; TILT = cov_xy / cov_xx gives the height at which the ellipse is widest; INVERSE_ROOT is
+1 / ROOT_MAJOR."""
 TILE_COLUMNS, TILE_ROWS = 14, 15
 """int32 columns: first and last tile column (row) the bounding box touches, first | last << 16."""
 RECORD_FLOATS = 16

@@ -18,14 +18,16 @@ from engine.raster.cpu import record as rec
 _PLANE = rec.BLOCKS * VECTOR_BYTES
 TRANSMITTANCE, PLANE_R, PLANE_G, PLANE_B, REMAINDER = (plane * _PLANE for plane in range(5))
 """Byte offsets of the per-pixel planes of a scratch row, [64 blocks, 16 lanes] each."""
-BLOCK_X, BLOCK_Y = (5 * _PLANE + table * 4 * rec.BLOCKS for table in range(2))
-"""Byte offsets of the centre of every block's first pixel, from the corner of the tile. [64] each."""
-SCRATCH_FLOATS = (5 * _PLANE + 2 * 4 * rec.BLOCKS) // 4
+_BLOCK_U = 5 * _PLANE
+_ROW_V = _BLOCK_U + 4 * rec.BLOCKS
+"""Byte offsets of a record's u of every block, [64], and v of every row of blocks, [16], at the first pixel."""
+SCRATCH_FLOATS = (_ROW_V + VECTOR_BYTES) // 4
 """Length of one scratch row; rows start on cache lines."""
 
 _LANE_X = [float(lane % rec.BLOCK) for lane in range(N_LANES)]
 _LANE_Y = [float(lane // rec.BLOCK) for lane in range(N_LANES)]
 _SIDES = N_LANES // 2
+_LOG_BLOCKS_PER_ROW = rec.BLOCKS_PER_ROW.bit_length() - 1
 PREFETCH_AHEAD = 6
 """Pairs between asking for a record and blending it."""
 _SLACK_PX = 1e-3
@@ -35,7 +37,7 @@ _SLACK_PER_PX = 1e-6
 
 def load_record(build: LaneBuilder, address: Any) -> list[Any]:
     """The fourteen float fields of a record as scalars."""
-    return [build.load_scalar(address, 4 * column) for column in range(rec.INVERSE_MAJOR + 1)]
+    return [build.load_scalar(address, 4 * column) for column in range(rec.INVERSE_ROOT + 1)]
 
 
 def touched_blocks(build: LaneBuilder, fields: list[Any], tile_x: Any, tile_y: Any) -> Any:
@@ -52,9 +54,17 @@ def touched_blocks(build: LaneBuilder, fields: list[Any], tile_x: Any, tile_y: A
     builder = build.ir
     to_left = build.broadcast(builder.fsub(tile_x, fields[rec.CENTER_X]))
     to_top = build.broadcast(builder.fsub(tile_y, fields[rec.CENTER_Y]))
-    slope, minor, reach, inverse_major, tilt, half_width, half_height = (
+    slope, root_minor, reach, inverse_root, tilt, half_width, half_height = (
         build.broadcast(fields[column])
-        for column in (rec.SLOPE, rec.MINOR, rec.REACH, rec.INVERSE_MAJOR, rec.TILT, rec.HALF_WIDTH, rec.HALF_HEIGHT)
+        for column in (
+            rec.SLOPE,
+            rec.ROOT_MINOR,
+            rec.REACH,
+            rec.INVERSE_ROOT,
+            rec.TILT,
+            rec.HALF_WIDTH,
+            rec.HALF_HEIGHT,
+        )
     )
     side = build.constants([1.0] * _SIDES + [-1.0] * _SIDES)
     row_top = to_top + build.constants([rec.BLOCK * row + 0.5 for row in range(_SIDES)] * 2)
@@ -62,7 +72,8 @@ def touched_blocks(build: LaneBuilder, fields: list[Any], tile_x: Any, tile_y: A
     is_reached = build.all_of([row_top.compare("<=", half_height), row_bottom.compare(">=", -half_height)])
     y = (tilt * half_width * side).max(row_top.max(-half_height)).min(row_bottom.min(half_height))
     lean = slope * y
-    half_span = ((reach - minor * y * y).max(0.0) * inverse_major).sqrt()
+    v = root_minor * y
+    half_span = (reach - v * v).max(0.0).sqrt() * inverse_root
     # distance to the right of the tile's first pixel, or to the left of the last pixel of the first block
     first_pixel = to_left + 0.5
     offset = build.constants([0.0] * _SIDES + [float(rec.BLOCK - 1)] * _SIDES) - side * first_pixel
@@ -92,31 +103,48 @@ def _bits_of_spans(build: LaneBuilder, ends: Lanes) -> Any:
 
 
 class Footprint:
-    """One Gaussian in the pixels of one tile."""
+    """One Gaussian in the pixels of one tile.
+
+    u and v of a pixel are those of the first pixel of its block plus those of its place in the block. The former are
+    written to the scratch row, so that a block costs four operations instead of seven.
+    """
 
     def __init__(self, build: LaneBuilder, scratch: Any, fields: list[Any], tile_x: Any, tile_y: Any) -> None:
         self._build = build
         self._scratch = scratch
-        self._x = build.constants(_LANE_X) + build.broadcast(build.ir.fsub(tile_x, fields[rec.CENTER_X]))
-        self._y = build.constants(_LANE_Y) + build.broadcast(build.ir.fsub(tile_y, fields[rec.CENTER_Y]))
-        self._major, self._slope, self._minor, self._log_opacity = (
-            build.broadcast(fields[column]) for column in (rec.MAJOR, rec.SLOPE, rec.MINOR, rec.LOG_OPACITY)
+        root_major, slope, root_minor, self._log_opacity = (
+            build.broadcast(fields[column]) for column in (rec.ROOT_MAJOR, rec.SLOPE, rec.ROOT_MINOR, rec.LOG_OPACITY)
         )
+        lane_y = build.constants(_LANE_Y)
+        self._u = root_major * slope.times_plus(lane_y, build.constants(_LANE_X))
+        self._v = root_minor * lane_y
+        first_x = build.broadcast(build.ir.fsub(tile_x, fields[rec.CENTER_X])) + 0.5
+        first_y = build.broadcast(build.ir.fsub(tile_y, fields[rec.CENTER_Y])) + 0.5
+        lean = root_major * slope
+        first_u = root_major * slope.times_plus(first_y, first_x)
+        per_row = rec.BLOCKS_PER_ROW
+        row_u = root_major.times_plus(
+            build.constants([rec.BLOCK * (lane % per_row) for lane in range(N_LANES)]), first_u
+        )
+        for first in range(0, rec.BLOCKS, N_LANES):
+            down = build.constants([rec.BLOCK * (block // per_row) for block in range(first, first + N_LANES)])
+            build.store(lean.times_plus(down, row_u), scratch, _BLOCK_U + 4 * first)
+        down = build.constants([rec.BLOCK * lane for lane in range(N_LANES)])
+        build.store(root_minor * (first_y + down), scratch, _ROW_V)
 
     def at(self, block: Any) -> tuple[Lanes, Lanes, Lanes]:
-        """u = dx + slope dy, dy and log2(alpha) / 8 in the sixteen pixels of a block, an int64."""
-        dx, dy = self._x + self._per_block(block, BLOCK_X), self._y + self._per_block(block, BLOCK_Y)
-        u = self._slope.times_plus(dy, dx)
-        along_y = (-(self._minor * dy)).times_plus(dy, self._log_opacity)
-        return u, dy, (-(self._major * u)).times_plus(u, along_y)
+        """u, v and log2(alpha) / 8 in the sixteen pixels of a block, an int64."""
+        row = self._build.ir.lshr(block, self._build.int64(_LOG_BLOCKS_PER_ROW))
+        u, v = self._u + self._entry(_BLOCK_U, block), self._v + self._entry(_ROW_V, row)
+        return u, v, (-u).times_plus(u, (-v).times_plus(v, self._log_opacity))
 
     def plane(self, block: Any, plane: int) -> Any:
         """Address of a block's sixteen pixels in a plane of the scratch row."""
         offset = self._build.ir.shl(block, self._build.int64(6))
         return self._build.address(self._build.address(self._scratch, offset), plane)
 
-    def _per_block(self, block: Any, table: int) -> Lanes:
-        offset = self._build.ir.shl(block, self._build.int64(2))
+    def _entry(self, table: int, index: Any) -> Lanes:
+        offset = self._build.ir.shl(index, self._build.int64(2))
         return self._build.broadcast(self._build.load_scalar(self._build.address(self._scratch, offset), table))
 
 
@@ -138,24 +166,6 @@ def exp2_eighth(log_alphas: Lanes) -> Lanes:
     for _ in range(3):
         value = value * value
     return value
-
-
-@kernel_intrinsic
-def write_block_centers(typing_context, scratch):
-    """Fill the BLOCK_X and BLOCK_Y tables of a scratch row."""
-    signature = types.void(types.int64)
-
-    def generate(context, builder, signature, arguments):
-        build = LaneBuilder(builder)
-        for group in range(0, rec.BLOCKS, N_LANES):
-            blocks = range(group, group + N_LANES)
-            x = build.constants([rec.BLOCK * (block % rec.BLOCKS_PER_ROW) + 0.5 for block in blocks])
-            y = build.constants([rec.BLOCK * (block // rec.BLOCKS_PER_ROW) + 0.5 for block in blocks])
-            build.store(x, arguments[0], BLOCK_X + 4 * group)
-            build.store(y, arguments[0], BLOCK_Y + 4 * group)
-        return context.get_dummy_value()
-
-    return signature, generate
 
 
 @kernel_intrinsic
