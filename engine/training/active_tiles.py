@@ -18,8 +18,9 @@ from torch import Tensor
 from engine.model.clip_model import ClipModel
 from engine.model.joining import join_frozen
 from engine.model.view import View, render_gaussians
-from engine.raster import TILE_PX, TileBoxes, tile_boxes
+from engine.raster import TileBoxes, tile_boxes
 from engine.raster.gaussians import Gaussians
+from engine.training.tile_squares import tile_squares
 
 MAX_BYTES = 1 << 30
 """Memory for what is kept of cameras; those beyond it are drawn with all tiles. 27 cameras of 640 x 360: 100 MB."""
@@ -117,10 +118,9 @@ class ActiveTiles:
         if picture.tile_mask is None or picture.rest is None:
             return 0.0
         if item not in self._squares:
-            difference = picture.rest.numpy() * gain.detach().numpy() - truth * np.float32(1 / 255)
-            by_row = np.add.reduceat(np.square(difference, out=difference).sum(2), _starts(len(truth)), axis=0)
-            self._squares[item] = np.add.reduceat(by_row, _starts(truth.shape[1]), axis=1)
-        return float(self._squares[item][~picture.tile_mask].sum(dtype=np.float64)) / truth.size
+            pixels = np.ascontiguousarray(truth)
+            self._squares[item] = tile_squares(picture.rest.numpy(), pixels, gain.detach().numpy())
+        return float(self._squares[item][~picture.tile_mask].sum()) / truth.size
 
     def _frozen_view(self, camera_row: int, view: View, rows: dict[str, Tensor]) -> _FrozenView | None:
         known = self._views.get(camera_row)
@@ -141,11 +141,6 @@ class ActiveTiles:
             self.n_bytes += known.n_bytes
             self._views[camera_row] = known
         return known
-
-
-def _starts(size: int) -> range:
-    """First pixels of the tiles along a side."""
-    return range(0, size, TILE_PX)
 
 
 def _boxes(gaussians: Gaussians, view: View) -> TileBoxes:

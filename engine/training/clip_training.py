@@ -56,6 +56,7 @@ from engine.training.preparation import (
     write_backgrounds,
 )
 from engine.training.report import Progress, ReportProgress, StepStats
+from engine.training.volume import volume_sum
 
 
 class ClipTraining:
@@ -314,8 +315,8 @@ class ClipTraining:
         if self._tiles is not None:
             mean_square += self._tiles.square_outside(active, item, truth, self.gains[camera_row])
         if self.config.volume_weight and active.n_all:
-            volume = (active.learning.scales / self.spacing).prod(1).sum() / active.n_all
-            loss = loss + self.config.volume_weight * volume
+            volume = volume_sum(active.learning.scales, self.spacing)
+            loss = loss + (self.config.volume_weight / active.n_all) * volume
         value = float(loss.detach())
         where = f"step {self.steps_done + 1}, camera {self.rig.names[camera_row]}"
         if not np.isfinite(value):
@@ -356,8 +357,11 @@ class ClipTraining:
                 self._sight[key] = is_seen if anchors.is_dynamic else is_seen.nonzero()[:, 0]
             rows[role] = self._sight[key]
             if anchors.presence is not None:
-                frames = [knot for knot, _ in self.model.knots(clip_time)]
-                rows[role] = (rows[role] & anchors.presence[:, frames].any(1)).nonzero()[:, 0]
+                is_seen = np.zeros(len(anchors), bool)  # by numpy: torch would wake its threads for it
+                for knot, _ in self.model.knots(clip_time):
+                    is_seen |= anchors.presence.numpy()[:, knot]
+                is_seen &= self._sight[key].numpy()
+                rows[role] = torch.from_numpy(is_seen.nonzero()[0])
         return rows
 
     @property

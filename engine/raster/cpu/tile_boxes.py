@@ -156,7 +156,8 @@ def tile_boxes_cpu(gaussians: Gaussians, view: PinholeView) -> np.ndarray:
         n_threads,
     )
     run(project.project, pack(job), n_threads)
-    run(read_boxes, pack(BoxJob(packed, keys, boxes, n_threads)), n_threads)
+    box_job = BoxJob(packed, keys, boxes, n_threads)
+    run(read_boxes, pack(box_job), n_threads)
     POOL.give_back(workspace)
     return boxes
 
@@ -164,12 +165,14 @@ def tile_boxes_cpu(gaussians: Gaussians, view: PinholeView) -> np.ndarray:
 def covered_tiles(boxes: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Tiles under a packed box. [rows, columns] bool"""
     tiles = np.zeros(shape, np.int32)
-    run(cover, pack(CoverJob(boxes, tiles)), 1)
+    job = CoverJob(boxes, tiles)
+    run(cover, pack(job), 1)
     return tiles.astype(bool)
 
 
 def meeting_rows(boxes: np.ndarray, tile_mask: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """`rows` [N] int64 of the packed boxes that lie over a wanted tile, in order. [n] int64"""
     found, n_found = np.empty(len(boxes), np.int64), np.zeros(1, np.int64)
-    run(find_meeting, pack(MeetJob(boxes, mask_sums(tile_mask), rows, found, n_found)), 1)
+    job = MeetJob(boxes, mask_sums(tile_mask), rows, found, n_found)  # holds the sums until the kernel is done
+    run(find_meeting, pack(job), 1)
     return found[: n_found[0]]
