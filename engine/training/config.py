@@ -73,8 +73,8 @@ class TrainConfig:
     static_steps: int = 0
     """Steps on the backgrounds before the moving part is added; 0 derives 30 per training camera, 300 to 1000."""
     joint_steps: int = 0
-    """Steps of the reference clip after that; 0 derives 20 per training picture, 1200 to 6000. Validation cameras of the
-    basketball, one seed: 2000 steps gave 29.3 dB and 26.4 on moving pixels, 6000 gave 29.7 and 27.1."""
+    """Steps of the reference clip after that; 0 derives 20 per training picture, 1200 to 6000. Validation cameras of
+    the basketball, one seed: 2000 steps gave 29.3 dB and 26.4 on moving pixels, 6000 gave 29.7 and 27.1."""
     source_steps: int = 0
     """Steps of a source clip; 0 derives 24 per training picture, 1200 to 6000: frozen heads learn more slowly.
     The same cameras: 3000 steps gave 29.2 dB and 24.8 on moving pixels, 6000 gave 29.3 and 25.3."""
