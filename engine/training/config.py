@@ -114,10 +114,13 @@ class TrainConfig:
     # what a step of a source clip looks at
     tiles: str = "active"
     """active: only tiles that a learning Gaussian touches are drawn, compared and differentiated. all: whole pictures.
-    What is learned is the same, bit for bit."""
+    What is learned is the same, bit for bit. Basketball, 640 x 360, a fifth of the tiles active, two shared cores:
+    kernels of a step 9 ms instead of 14, the fastest tenth of the steps 13 ms instead of 19."""
     sampling: str = "even"
     """even: every picture once a pass. error: half of the draws go to pictures by their loss, and a picture's loss
-    weighs the less the more often it is drawn, so that on average the gradient is that of even passes."""
+    weighs the less the more often it is drawn, so that on average the gradient is that of even passes. It gives nothing
+    that could be told from chance (one seed): moving pixels of validation cameras, even against error, basketball after
+    1500 steps 24.02 and 24.06 dB, sample 23.31 and 23.28."""
 
     # what a source clip takes over; every value but the first is an ablation (ClipGStream, ablation studies)
     decoder: str = "frozen"
