@@ -38,7 +38,7 @@ def test_a_reference_and_a_clip_trained_on_it_show_the_stored_pixels(tiny: Tiny,
 
 @pytest.mark.parametrize(
     "settings",
-    [{"inherit": "trainable"}, {"inherit": "off"}, {"decoder": "finetune"}, {"gate": "off"}, {"residual": "none"}],
+    [{"inherit": "trainable"}, {"inherit": "off"}, {"decoder": "finetune"}, {"residual": "none"}],
 )
 def test_whatever_a_clip_owns_is_stored(tiny: Tiny, tmp_path, settings):
     training = take_steps(tiny.prepared(1, **settings), 2)
