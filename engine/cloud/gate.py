@@ -25,7 +25,7 @@ from engine.cloud.median import median_over_cameras
 from engine.cloud.parallel import map_ordered, n_workers
 from engine.cloud.projection import is_in_picture, project, projection_matrices
 
-STILL, CHANGES, LIGHT, ONE_VIEW, UNSEEN, NEAR_MOTION, USER_STATIC, USER_DYNAMIC = range(8)
+STILL, CHANGES, LIGHT, ONE_VIEW, UNSEEN, NEAR_MOTION, USER_STATIC, USER_DYNAMIC, LEARNED_NOTHING = range(9)
 REASONS = (
     "still",
     "changes in several views",
@@ -35,6 +35,7 @@ REASONS = (
     "something moves here, which has anchors of its own",
     "marked as static",
     "marked as dynamic",
+    "had a dynamic feature and learned no change",
 )
 """In words, by code."""
 

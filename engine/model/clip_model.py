@@ -1,7 +1,9 @@
 """ClipModel: everything that is visible in one clip. Reference and source clip are this one class.
 
 What differs is data: which anchor sets there are, which of them are trainable, and whether decoder and static sets are
-inherited. Sets: "static" and "moving" come from the reference clip; "residual" is what a source clip adds.
+inherited. Sets: "static", "moving" and "promoted" come from the reference clip; "residual" is what a source clip adds.
+"promoted" anchors stood still in space but changed in the reference clip, as under a lamp: they exist in all frames of
+all clips. "replacing" ones are the same for one source clip: they take the place of static anchors that the clip hides.
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ _ANCHOR_ARRAYS = (
     "log_base_scales",
     "presence",
 )
+_HIDDEN = ".is_hidden"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +61,8 @@ class ClipModel(nn.Module):
         field: Field of this clip; None while only static anchors exist.
         clip_length: M, the divisor of clip_time.
         n_frames: Frames of this clip.
+        hidden: Rows of the reference clip's sets that this clip leaves out; the sets given are without them already.
+            By role, [A of the reference] bool
     """
 
     def __init__(
@@ -68,9 +73,11 @@ class ClipModel(nn.Module):
         field: SpatioTemporalField | None,
         clip_length: int,
         n_frames: int,
+        hidden: dict[str, Tensor] | None = None,
     ) -> None:
         super().__init__()
         self.sets = nn.ModuleDict(sets)
+        self.hidden = dict(hidden or {})
         self.decoder = decoder
         self.clip_length, self.n_frames = clip_length, n_frames
         self._corners: dict[str, CornerTable] = {}
@@ -96,7 +103,25 @@ class ClipModel(nn.Module):
     def replace_sets(self, sets: dict[str, AnchorSet]) -> None:
         """These sets take the place of all others; a field attached later covers them."""
         self.sets = nn.ModuleDict(sets)
-        self._corners, self._frozen = {}, {}
+        self._corners, self._frozen, self.hidden = {}, {}, {}
+
+    def take_out(self, role: str, is_taken: Tensor) -> AnchorSet:
+        """Take rows out of a set; gives them. Those of an inherited set are hidden in this clip, and stored as such.
+
+        Args:
+            role: Of a static set.
+            is_taken: [A] bool
+        """
+        anchors = self.anchor_set(role)
+        assert not anchors.is_dynamic  # corners of a field would have to follow
+        self.sets[role] = anchors.subset(~is_taken)
+        self._frozen.pop(role, None)
+        if not anchors.is_trainable:
+            before = self.hidden.get(role)
+            hidden = torch.zeros(len(anchors), dtype=torch.bool) if before is None else before.clone()
+            hidden[~hidden] = is_taken
+            self.hidden[role] = hidden
+        return anchors.subset(is_taken)
 
     def attach_field(self, field: SpatioTemporalField) -> None:
         """Set the field and compute the interpolation constants of every dynamic set."""
@@ -200,6 +225,8 @@ class ClipModel(nn.Module):
                 value = getattr(anchors, name)
                 if value is not None:
                     arrays[f"sets.{role}.{name}"] = value.detach().numpy().copy()
+        for role, is_hidden in self.hidden.items():
+            arrays[f"inherited.{role}{_HIDDEN}"] = is_hidden.numpy().copy()
         if any(p.requires_grad for p in self.decoder.parameters()):
             arrays |= {f"decoder.{k}": v.detach().numpy().copy() for k, v in self.decoder.state_dict().items()}
         if self.field is not None:
@@ -218,7 +245,11 @@ def decoder_sizes(decoder: Decoder) -> dict[str, int]:
 
 
 def inherit(
-    reference: ClipState, presence: dict[str, Tensor], *, is_trainable: bool = False
+    reference: ClipState,
+    presence: dict[str, Tensor],
+    *,
+    is_trainable: bool = False,
+    hidden: dict[str, Tensor] | None = None,
 ) -> tuple[dict[str, AnchorSet], Decoder]:
     """Anchor sets and frozen decoder of a reference clip. Copies, so that nothing learned reaches the reference.
 
@@ -226,6 +257,7 @@ def inherit(
         reference: A finished reference clip.
         presence: Gate in time of dynamic sets in the clip that inherits; sets without one are left out. [A, M] bool
         is_trainable: Whether the anchors go on learning (an ablation; they are stored with the clip then).
+        hidden: Rows that are left out, by role. [A] bool
     """
     decoder = _read_decoder(reference)
     decoder.requires_grad_(requires_grad=False)
@@ -236,6 +268,8 @@ def inherit(
             if role not in presence:
                 continue
             anchors.presence = presence[role]
+        if hidden and role in hidden:
+            anchors = anchors.subset(~hidden[role])
         sets[role] = anchors
     return sets, decoder
 
@@ -271,6 +305,7 @@ def read_field(state: ClipState) -> SpatioTemporalField:
 
 def _rebuild(state: ClipState, reference: ClipState | None) -> ClipModel:
     header = state.header
+    hidden: dict[str, Tensor] = {}
     if state.is_reference:
         roles = _roles(state.arrays)
         sets = {role: _read_set(state.arrays, role, is_trainable=True) for role in roles}
@@ -284,21 +319,31 @@ def _rebuild(state: ClipState, reference: ClipState | None) -> ClipModel:
                 f"the project now has {reference.header['fingerprint']}.",
                 hint="Train this clip again.",
             )
-        prefix, suffix = "inherited.", ".presence"
-        presence = {
-            name.removeprefix(prefix).removesuffix(suffix): torch.from_numpy(array)
-            for name, array in state.arrays.items()
-            if name.startswith(prefix)
-        }
-        sets, decoder = inherit(reference, presence)
+        hidden = _of_inherited(state, _HIDDEN)
+        sets, decoder = inherit(reference, _of_inherited(state, ".presence"), hidden=hidden)
         sets |= {role: _read_set(state.arrays, role, is_trainable=True) for role in _roles(state.arrays)}
         sets = {role: sets[role] for role in _ROLE_ORDER if role in sets}
         if any(name.startswith("decoder.") for name in state.arrays):  # it went on learning in this clip
             decoder = _read_decoder(state)
     field = read_field(state) if header.get("field") else None
     return ClipModel(
-        sets=sets, decoder=decoder, field=field, clip_length=header["clip_length"], n_frames=header["n_frames"]
+        sets=sets,
+        decoder=decoder,
+        field=field,
+        clip_length=header["clip_length"],
+        n_frames=header["n_frames"],
+        hidden=hidden,
     )
+
+
+def _of_inherited(state: ClipState, suffix: str) -> dict[str, Tensor]:
+    """What a source clip says of inherited sets, by role."""
+    prefix = "inherited."
+    return {
+        name.removeprefix(prefix).removesuffix(suffix): torch.from_numpy(array.copy())
+        for name, array in state.arrays.items()
+        if name.startswith(prefix) and name.endswith(suffix)
+    }
 
 
 def _roles(arrays: dict[str, np.ndarray]) -> list[str]:
@@ -308,7 +353,7 @@ def _roles(arrays: dict[str, np.ndarray]) -> list[str]:
     )
 
 
-_ROLE_ORDER = ["static", "moving", "residual"]
+_ROLE_ORDER = ["static", "moving", "promoted", "residual", "replacing"]
 
 
 def _read_set(arrays: dict[str, np.ndarray], role: str, *, is_trainable: bool) -> AnchorSet:
