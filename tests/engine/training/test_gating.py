@@ -192,7 +192,7 @@ def test_what_the_user_marks_as_static_is(tiny: Tiny, tmp_path, monkeypatch):
     training = tiny.prepared(1, gate="images", prep_dir=tmp_path, regions=[region])
     assert not training.model.hidden
     assert (training.state().arrays["gate.static"][inside] == USER_STATIC).all()
-    everywhere = GateRegion("static", (-1e6,) * 3, (1e6,) * 3)
+    everywhere = GateRegion("static", (-1e6, -1e6, -1e6), (1e6, 1e6, 1e6))
     still = tiny.prepared(1, prep_dir=tmp_path, regions=[everywhere])
     assert still.is_finished  # nothing moves where nothing may: there is nothing to learn
     assert still.model.roles() == ["static", "moving"]
