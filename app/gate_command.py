@@ -12,6 +12,7 @@ import numpy as np
 from app.arguments import EXIT_OK
 from app.project import Project, open_project
 from app.training.service import Launch
+from engine.cloud.reasons import REASONS
 from engine.cloud.regions import GateRegion, parse_region
 from engine.model.clip_state import ClipState, read_clip_state
 
@@ -96,8 +97,6 @@ def describe_gate(project: Project) -> dict[str, Any]:
 
 
 def _reasons(state: ClipState) -> dict[str, int]:
-    from engine.cloud.gate import REASONS  # brings compiled kernels
-
     codes = [array for name, array in state.arrays.items() if name.startswith("gate.")]
     counts = np.bincount(np.concatenate([np.zeros(0, np.uint8), *codes]), minlength=len(REASONS))
     return {words: int(n) for words, n in zip(REASONS, counts, strict=True) if n}

@@ -24,20 +24,7 @@ from engine.capture.rig import CameraRig
 from engine.cloud.median import median_over_cameras
 from engine.cloud.parallel import map_ordered, n_workers
 from engine.cloud.projection import is_in_picture, project, projection_matrices
-
-STILL, CHANGES, LIGHT, ONE_VIEW, UNSEEN, NEAR_MOTION, USER_STATIC, USER_DYNAMIC, LEARNED_NOTHING = range(9)
-REASONS = (
-    "still",
-    "changes in several views",
-    "lamp or shadow: only the brightness changes",
-    "changes in too few of the views that see it",
-    "seen unhidden by fewer than two views",
-    "something moves here, which has anchors of its own",
-    "marked as static",
-    "marked as dynamic",
-    "had a dynamic feature and learned no change",
-)
-"""In words, by code."""
+from engine.cloud.reasons import CHANGES, LIGHT, NEAR_MOTION, ONE_VIEW, REASONS, STILL, UNSEEN
 
 MIN_CHANGE = 0.06
 """Smallest change that counts, in log colour: 6 %, about what a motion mask asks for on a mid-grey wall."""
@@ -68,7 +55,7 @@ class GateTable:
 
     Attributes:
         is_dynamic: Whether it needs a dynamic feature in this clip. [A] bool
-        reasons: Code, see REASONS. [A] uint8
+        reasons: Code, see engine.cloud.reasons. [A] uint8
         scores: Largest change that enough views agree on, in units of what counts: from 1 up it does. [A] float32
     """
 

@@ -15,6 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from engine.cloud.reasons import NO_REASON
 from engine.errors import ProjectError
 from engine.model.anchors import AnchorSet
 from engine.model.clip_state import ClipState
@@ -22,6 +23,7 @@ from engine.model.decoder import Decoder
 from engine.model.decoding import ChosenAnchors, decode_anchors
 from engine.model.field import FieldShape, SpatioTemporalField
 from engine.model.grid import CornerTable
+from engine.model.roles import ROLES
 from engine.raster.gaussians import Gaussians
 
 _ANCHOR_ARRAYS = (
@@ -44,12 +46,20 @@ class AnchorView:
         own_positions: Anchors this clip trains. [A, 3]
         own_is_dynamic: Whether each own anchor has a dynamic feature. [A] bool
         inherited_is_dynamic: Likewise. [A0] bool
+        own_roles: Role of each own anchor, in engine.model.roles.ROLES. [A] uint8
+        inherited_roles: Likewise. [A0] uint8
+        own_reasons: Why the gate decided so, a code of engine.cloud.reasons. [A] uint8
+        inherited_reasons: Likewise. [A0] uint8
     """
 
     inherited_positions: np.ndarray
     own_positions: np.ndarray
     own_is_dynamic: np.ndarray
     inherited_is_dynamic: np.ndarray
+    own_roles: np.ndarray
+    inherited_roles: np.ndarray
+    own_reasons: np.ndarray
+    inherited_reasons: np.ndarray
 
 
 class ClipModel(nn.Module):
@@ -78,6 +88,7 @@ class ClipModel(nn.Module):
         super().__init__()
         self.sets = nn.ModuleDict(sets)
         self.hidden = dict(hidden or {})
+        self.reasons: dict[str, np.ndarray] = {}  # what the gate said of the anchors of a role, for display
         self.decoder = decoder
         self.clip_length, self.n_frames = clip_length, n_frames
         self._corners: dict[str, CornerTable] = {}
@@ -182,20 +193,33 @@ class ClipModel(nn.Module):
 
     def anchors(self, clip_time: float | None = None) -> AnchorView:
         """Positions for display: all, or those that exist at a time of the clip, in [0, 1)."""
-        inherited, own = [], []
+        nothing = (np.zeros((0, 3), np.float32), np.zeros(0, bool), np.zeros(0, np.uint8), np.zeros(0, np.uint8))
+        inherited, own = [nothing], [nothing]
         for role in self.roles():
             anchors = self.anchor_set(role)
-            rows = slice(None) if clip_time is None else self.alive(role, clip_time)
-            shown = (anchors.positions[rows].numpy(), anchors.is_dynamic)
+            rows = np.arange(len(anchors)) if clip_time is None else self.alive(role, clip_time).numpy()
+            reasons = self.reasons.get(role)
+            shown = (
+                anchors.positions.numpy()[rows],
+                np.full(len(rows), anchors.is_dynamic),
+                np.full(len(rows), ROLES.index(role), np.uint8),
+                np.full(len(rows), NO_REASON, np.uint8) if reasons is None else reasons[rows],
+            )
             (own if anchors.is_trainable else inherited).append(shown)
-
-        def positions(sets: list[tuple[np.ndarray, bool]]) -> np.ndarray:
-            return np.concatenate([np.zeros((0, 3), np.float32), *(points for points, _ in sets)])
-
-        def dynamic(sets: list[tuple[np.ndarray, bool]]) -> np.ndarray:
-            return np.concatenate([np.zeros(0, bool), *(np.full(len(points), flag) for points, flag in sets)])
-
-        return AnchorView(positions(inherited), positions(own), dynamic(own), dynamic(inherited))
+        inherited_points, inherited_flags, inherited_roles, inherited_reasons = map(
+            np.concatenate, zip(*inherited, strict=True)
+        )
+        own_points, own_flags, own_roles, own_reasons = map(np.concatenate, zip(*own, strict=True))
+        return AnchorView(
+            inherited_points,
+            own_points,
+            own_flags,
+            inherited_flags,
+            own_roles=own_roles,
+            inherited_roles=inherited_roles,
+            own_reasons=own_reasons,
+            inherited_reasons=inherited_reasons,
+        )
 
     def entries_in_use(self) -> list[np.ndarray]:
         """Entries of each of the field's tables that some anchor reads in a frame it exists in. [L, T] bool each"""
@@ -322,11 +346,11 @@ def _rebuild(state: ClipState, reference: ClipState | None) -> ClipModel:
         hidden = _of_inherited(state, _HIDDEN)
         sets, decoder = inherit(reference, _of_inherited(state, ".presence"), hidden=hidden)
         sets |= {role: _read_set(state.arrays, role, is_trainable=True) for role in _roles(state.arrays)}
-        sets = {role: sets[role] for role in _ROLE_ORDER if role in sets}
+        sets = {role: sets[role] for role in ROLES if role in sets}
         if any(name.startswith("decoder.") for name in state.arrays):  # it went on learning in this clip
             decoder = _read_decoder(state)
     field = read_field(state) if header.get("field") else None
-    return ClipModel(
+    model = ClipModel(
         sets=sets,
         decoder=decoder,
         field=field,
@@ -334,6 +358,21 @@ def _rebuild(state: ClipState, reference: ClipState | None) -> ClipModel:
         n_frames=header["n_frames"],
         hidden=hidden,
     )
+    model.reasons = _reasons(state, reference, model)
+    return model
+
+
+def _reasons(state: ClipState, reference: ClipState | None, model: ClipModel) -> dict[str, np.ndarray]:
+    """What the gate said of each anchor, by role; the reference speaks where the clip itself was not asked."""
+    known = {} if state.is_reference or reference is None else dict(reference.arrays)
+    known |= state.arrays
+    reasons = {role: known[f"gate.{role}"] for role in model.roles() if f"gate.{role}" in known}
+    is_hidden = model.hidden.get("static")
+    if is_hidden is not None and "static" in reasons:  # the clip was asked about all rows of the reference
+        if "replacing" in model.roles() and len(model.anchor_set("replacing")) == int(is_hidden.sum()):
+            reasons["replacing"] = reasons["static"][is_hidden.numpy()]
+        reasons["static"] = reasons["static"][~is_hidden.numpy()]
+    return {role: codes for role, codes in reasons.items() if len(codes) == len(model.anchor_set(role))}
 
 
 def _of_inherited(state: ClipState, suffix: str) -> dict[str, Tensor]:
@@ -349,11 +388,8 @@ def _of_inherited(state: ClipState, suffix: str) -> dict[str, Tensor]:
 def _roles(arrays: dict[str, np.ndarray]) -> list[str]:
     return sorted(
         {name.split(".")[1] for name in arrays if name.startswith("sets.")},
-        key=_ROLE_ORDER.index,
+        key=ROLES.index,
     )
-
-
-_ROLE_ORDER = ["static", "moving", "promoted", "residual", "replacing"]
 
 
 def _read_set(arrays: dict[str, np.ndarray], role: str, *, is_trainable: bool) -> AnchorSet:

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
-from engine.cloud.gate import LEARNED_NOTHING
+from engine.cloud.reasons import LEARNED_NOTHING
 from engine.model.clip_model import ClipModel, inherit, load_clip_model
 from engine.model.clip_state import ClipState
 from engine.model.decoding import ChosenAnchors, decode_anchors

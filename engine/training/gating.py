@@ -15,8 +15,9 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from engine.cloud.gate import STILL, USER_DYNAMIC, USER_STATIC, GateTable
+from engine.cloud.gate import GateTable
 from engine.cloud.moving_cloud import MovingCloud
+from engine.cloud.reasons import STILL, USER_DYNAMIC, USER_STATIC
 from engine.cloud.regions import GateRegion, marked
 from engine.model.clip_model import ClipModel
 

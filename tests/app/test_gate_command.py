@@ -7,7 +7,7 @@ import pytest
 
 from app.cli import main
 from app.project import ProjectSettings, create_project, open_project
-from engine.cloud.gate import LIGHT, STILL
+from engine.cloud.reasons import LIGHT, STILL
 from engine.cloud.regions import GateRegion
 from engine.errors import ProjectError
 from engine.model.clip_state import ClipState, write_clip_state

@@ -6,17 +6,9 @@ import numpy as np
 import pytest
 
 from engine.capture.rig import CameraRig
-from engine.cloud.gate import (
-    CHANGES,
-    LIGHT,
-    NEAR_MOTION,
-    ONE_VIEW,
-    STILL,
-    UNSEEN,
-    GateTable,
-    measure_gate,
-)
+from engine.cloud.gate import GateTable, measure_gate
 from engine.cloud.projection import pixel_rays
+from engine.cloud.reasons import CHANGES, LIGHT, NEAR_MOTION, ONE_VIEW, STILL, UNSEEN
 from engine.cloud.regions import GateRegion, marked, parse_region
 from engine.errors import ProjectError
 

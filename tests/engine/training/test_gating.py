@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from engine.cloud.gate import LEARNED_NOTHING, LIGHT, STILL, USER_DYNAMIC, USER_STATIC, GateTable
+from engine.cloud.gate import GateTable
+from engine.cloud.reasons import LEARNED_NOTHING, LIGHT, STILL, USER_DYNAMIC, USER_STATIC
 from engine.cloud.regions import GateRegion
 from engine.errors import NonFiniteLoss
 from engine.model.clip_model import ClipModel, load_clip_model
