@@ -16,7 +16,7 @@ REASONS = (
 )
 """In words, by code."""
 NO_REASON = 255
-"""Of an anchor about which the gate was not asked: what hulls gave, and clips trained without a look at the pictures."""
+"""Of an anchor about which the gate was not asked: those of hulls, and clips trained without a look at the pictures."""
 
 
 def reason_text(code: int) -> str:
