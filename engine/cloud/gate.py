@@ -6,6 +6,10 @@ the camera's own noise; for the anchor it counts only where at least two cameras
 of the same change at the same time. So noise, one camera's drift, and people who pass in front of one of them move
 nothing. What lies near a hull is left to the moving anchors, which are there already.
 
+Measured on real pictures at half size (27 and 18 cameras, six frames): a lamp painted into the pictures, 10 to 40 %
+brighter or 20 % darker, on three to four anchor spacings around a point promotes 37 of 37 and 55 to 61 of 61 anchors
+inside and none outside, with and without each camera drifting by up to 4 % a frame; no anchor without the lamp.
+
 A change of the light that covers most of what a camera sees is exposure here: nothing in one camera's pictures can
 tell the two apart.
 Letters: M frames of the clip, C cameras, A anchors.
@@ -24,7 +28,7 @@ from engine.capture.rig import CameraRig
 from engine.cloud.median import median_over_cameras
 from engine.cloud.parallel import map_ordered, n_workers
 from engine.cloud.projection import is_in_picture, project, projection_matrices
-from engine.cloud.reasons import CHANGES, LIGHT, NEAR_MOTION, ONE_VIEW, REASONS, STILL, UNSEEN
+from engine.cloud.reasons import ALONE, CHANGES, LIGHT, NEAR_MOTION, ONE_VIEW, REASONS, STILL, UNSEEN
 
 MIN_CHANGE = 0.06
 """Smallest change that counts, in log colour: 6 %, about what a motion mask asks for on a mid-grey wall."""
@@ -43,6 +47,9 @@ SATURATED = 250.0
 N_NOISE_BINS = 4
 MIN_SAMPLES = 32
 """Fewer anchors in a brightness bin say nothing about its noise, and fewer in a picture nothing about exposure."""
+ALONE_SPACINGS = 2.0
+"""Light falls on more than one anchor: without another one within this, a change is taken for chance. One of 14,724
+anchors of a dome without lamps was such a case."""
 NEAR_SPACINGS = 2.5
 """A moving point this near, in the larger of the two clouds' spacings, takes an anchor over."""
 MAX_RADIUS_PX = 4
@@ -134,9 +141,20 @@ def measure_gate(
     reasons[n_alone >= needed_frames] = ONE_VIEW
     reasons[n_seen == 0] = UNSEEN
     reasons[is_dynamic] = np.where(is_tone, LIGHT, CHANGES)[is_dynamic]
+    is_alone = is_dynamic.copy()
+    is_alone[is_dynamic] = _are_alone(points[is_dynamic], ALONE_SPACINGS * spacing)
+    reasons[is_alone] = ALONE
     is_near = is_dynamic & _is_near(points, moving_points, NEAR_SPACINGS * max(spacing, moving_spacing))
     reasons[is_near] = NEAR_MOTION
-    return GateTable(is_dynamic & ~is_near, reasons, scores)
+    return GateTable(is_dynamic & ~is_near & ~is_alone, reasons, scores)
+
+
+def _are_alone(points: np.ndarray, reach: float) -> np.ndarray:
+    """Points without another one within reach. [P] bool"""
+    if len(points) < 2:
+        return np.ones(len(points), dtype=bool)
+    distances, _ = KDTree(points).query(points, 2, workers=n_workers())
+    return np.asarray(distances[:, 1] > reach)
 
 
 def _is_near(points: np.ndarray, others: np.ndarray, reach: float) -> np.ndarray:

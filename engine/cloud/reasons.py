@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-STILL, CHANGES, LIGHT, ONE_VIEW, UNSEEN, NEAR_MOTION, USER_STATIC, USER_DYNAMIC, LEARNED_NOTHING = range(9)
+STILL, CHANGES, LIGHT, ONE_VIEW, UNSEEN, NEAR_MOTION, USER_STATIC, USER_DYNAMIC, LEARNED_NOTHING, ALONE = range(10)
 REASONS = (
     "still",
     "changes in several views",
@@ -13,6 +13,7 @@ REASONS = (
     "marked as static",
     "marked as dynamic",
     "had a dynamic feature and learned no change",
+    "changes, but nothing beside it does",
 )
 """In words, by code."""
 NO_REASON = 255

@@ -8,7 +8,7 @@ import pytest
 from engine.capture.rig import CameraRig
 from engine.cloud.gate import GateTable, measure_gate
 from engine.cloud.projection import pixel_rays
-from engine.cloud.reasons import CHANGES, LIGHT, NEAR_MOTION, ONE_VIEW, STILL, UNSEEN
+from engine.cloud.reasons import ALONE, CHANGES, LIGHT, NEAR_MOTION, ONE_VIEW, STILL, UNSEEN
 from engine.cloud.regions import GateRegion, marked, parse_region
 from engine.errors import ProjectError
 
@@ -163,6 +163,16 @@ def test_anchors_behind_others_or_out_of_sight_are_not_judged():
     assert (table.reasons[n + central] == UNSEEN).all()
     assert (table.reasons[2 * n :] == UNSEEN).all()
     assert not table.is_dynamic[n + central].any()
+
+
+def test_an_anchor_that_changes_alone_is_taken_for_chance():
+    x, y = POINTS[:, 0], POINTS[:, 1]
+    inside, outside = POINTS[in_spot(x, y, -0.2)], POINTS[~in_spot(x, y, 0.2)]
+    for n, is_believed in ((1, False), (2, True)):
+        table = decide(lamp, points=np.concatenate([outside, inside[:n]]))
+        assert table.is_dynamic[len(outside) :].tolist() == [is_believed] * n
+        assert (table.reasons[len(outside) :] == (LIGHT if is_believed else ALONE)).all()
+        assert (table.scores[len(outside) :] > 1.0).all()
 
 
 def test_anchors_near_motion_are_left_to_the_moving_ones():
