@@ -477,7 +477,8 @@ class ClipTraining:
             NonFiniteLoss: An array holds numbers that are not finite.
         """
         state = self.state()
-        if self.config.gate == "images":
+        # another clip's field may show this one where fields go on: what it would show nobody knows yet
+        if self.config.gate == "images" and self.config.field != "continue":
             views = [self._views[camera] for camera in self.camera_indices]
             state, said = demote(state, self.reference, views, reach=self._reach)
             self._say("Leaving out what is not needed", said)
