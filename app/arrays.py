@@ -51,11 +51,18 @@ class AnchorArrays:
         inherited_positions: From the reference clip; empty in the reference clip itself. [A0, 3]
         own_positions: Trained by this clip: all of the reference clip, the residual ones of a source clip. [A, 3]
         key: Changes when the content does.
+        inherited_roles, own_roles: What each anchor is, in engine.model.roles.ROLES; None where nobody says.
+            [A0], [A] uint8
+        inherited_reasons, own_reasons: Why the gate decided so, codes of engine.cloud.reasons. [A0], [A] uint8
     """
 
     inherited_positions: np.ndarray
     own_positions: np.ndarray
     key: Hashable
+    inherited_roles: np.ndarray | None = None
+    own_roles: np.ndarray | None = None
+    inherited_reasons: np.ndarray | None = None
+    own_reasons: np.ndarray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

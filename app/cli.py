@@ -1,4 +1,4 @@
-"""The command line without a window: train, eval, render, inspect, doctor, bench, ablate, report.
+"""The command line without a window: train, eval, render, inspect, gate, doctor, bench, ablate, report.
 
 Parser and dispatch; larger commands lie with what they run.
 Exit codes: 0 done, 1 failed, 2 bad input, 130 interrupted. One plain message each, details in the log file. Results
@@ -30,6 +30,7 @@ from app.arguments import (
 )
 from app.bench.command import CHART_FILE, bench
 from app.evaluation_command import evaluate
+from app.gate_command import add_gate_arguments, gate
 from app.headless import (
     open_trained,
     render_frames,
@@ -113,6 +114,15 @@ def build_parser() -> argparse.ArgumentParser:
     )
     inspect.add_argument("path", type=Path, help="capture or project folder")
     inspect.add_argument("--json", action="store_true", help="print everything as JSON")
+
+    add_gate_arguments(
+        commands.add_parser(
+            "gate",
+            help="what is static in a project, and why; overrule it",
+            description="Say what the gate decided in each trained clip, and mark regions that clips trained from now "
+            "on take as static or as dynamic.",
+        )
+    )
 
     doctor = commands.add_parser("doctor", help="look at this machine", description="Look at this machine.")
     doctor.add_argument("--json", action="store_true", help="print the findings as JSON")
@@ -414,6 +424,7 @@ _COMMANDS: dict[str, Callable[[argparse.Namespace, Launch], int]] = {
     "eval": evaluate,
     "render": _render,
     "inspect": _inspect,
+    "gate": gate,
     "doctor": _doctor,
     "bench": bench,
     "report": report,

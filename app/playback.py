@@ -217,6 +217,10 @@ def _anchor_arrays(view: AnchorView, key: Hashable) -> AnchorArrays:
         np.ascontiguousarray(view.inherited_positions, np.float32),
         np.ascontiguousarray(view.own_positions, np.float32),
         key,
+        inherited_roles=view.inherited_roles,
+        own_roles=view.own_roles,
+        inherited_reasons=view.inherited_reasons,
+        own_reasons=view.own_reasons,
     )
 
 

@@ -1,6 +1,7 @@
 """Project: the folder that keeps what was learned about one capture. Paths, settings and the lock; no training.
 
 project.json                 settings, see ProjectSettings
+gate.json                    regions in which the user overrules the gate, where there are any
 clips/0000.safetensors       finished clips
 checkpoints/0000.safetensors unfinished clips: everything needed to go on
 live/                        snapshots of the running training; swept when the project is opened for writing
@@ -16,6 +17,7 @@ import logging
 import os
 import shutil
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
@@ -24,6 +26,7 @@ from typing import Any
 from app.lock import ProcessLock
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip, split_clips
+from engine.cloud.regions import GateRegion, parse_region
 from engine.errors import ProjectError
 from engine.files import atomic_path
 from engine.training.config import TrainConfig
@@ -32,6 +35,7 @@ logger = logging.getLogger(__name__)
 
 SCHEMA = 1
 PROJECT_FILE = "project.json"
+GATE_FILE = "gate.json"
 MIN_TRAINING_CAMERAS = 2
 DEFAULT_CLIP_LENGTH = 10
 
@@ -164,8 +168,37 @@ class Project:
         """
         if not self.is_writable:
             raise ProjectError("The project is open for reading only.", path=self.folder)
-        _write_settings(self.folder, settings)
+        _write_json(self.folder / PROJECT_FILE, asdict(settings))
         self.settings = settings
+
+    def gate_regions(self) -> tuple[GateRegion, ...]:
+        """Where the user overrules the gate; later ones overrule earlier ones. Clips trained from now on heed them.
+
+        Raises:
+            ProjectError: The file is damaged or holds something that is no region.
+        """
+        path = self.folder / GATE_FILE
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return ()
+        except (OSError, ValueError) as error:
+            raise ProjectError(
+                f"The regions of the gate cannot be read ({error}).", hint="Correct or remove the file.", path=path
+            ) from error
+        if not isinstance(content, dict) or not isinstance(content.get("regions"), list):
+            raise ProjectError('The file has no list "regions".', hint="Correct or remove the file.", path=path)
+        return tuple(parse_region(values) for values in content["regions"])
+
+    def set_gate_regions(self, regions: Sequence[GateRegion]) -> None:
+        """Replace the regions, on disk.
+
+        Raises:
+            ProjectError: The project is read-only, or the disk refused.
+        """
+        if not self.is_writable:
+            raise ProjectError("The project is open for reading only.", path=self.folder)
+        _write_json(self.folder / GATE_FILE, {"regions": [region.as_dict() for region in regions]})
 
     def discard_progress(self, clip_index: int) -> None:
         """Forget the unfinished training of a clip; a finished clip stays."""
@@ -182,7 +215,8 @@ class Project:
         """Take back a project that has learned nothing: its own files and folders go, other things stay."""
         for name in ("clips", "checkpoints", "live", "prep", "metrics", "logs"):
             shutil.rmtree(self.folder / name, ignore_errors=True)
-        (self.folder / PROJECT_FILE).unlink(missing_ok=True)
+        for name in (PROJECT_FILE, GATE_FILE):
+            (self.folder / name).unlink(missing_ok=True)
 
 
 # ---------------------------------------------------------------- opening
@@ -270,7 +304,7 @@ def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
     lock = ProcessLock(folder / "lock")
     lock.acquire()
     try:
-        _write_settings(folder, settings)
+        _write_json(folder / PROJECT_FILE, asdict(settings))
     except ProjectError:
         lock.release()
         raise
@@ -359,11 +393,10 @@ def read_settings(folder: Path) -> ProjectSettings:
     return settings
 
 
-def _write_settings(folder: Path, settings: ProjectSettings) -> None:
-    path = folder / PROJECT_FILE
+def _write_json(path: Path, content: dict[str, Any]) -> None:
     try:
         with atomic_path(path) as partial:
-            partial.write_text(json.dumps(asdict(settings), indent=2) + "\n", encoding="utf-8")
+            partial.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise ProjectError(
             f"The project could not be saved ({error.strerror}).", hint="Free some space and try again.", path=path

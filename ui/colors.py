@@ -26,6 +26,8 @@ INHERITED = SKY
 """Inherited anchors; drawn as circles."""
 RESIDUAL = ORANGE
 """Residual anchors; drawn as diamonds."""
+ROLE_COLORS = {"static": SKY, "moving": GREEN, "promoted": VERMILLION, "residual": ORANGE, "replacing": VERMILLION}
+"""Anchors by what they are (engine.model.roles); replacing ones are promoted ones of one clip, drawn as diamonds."""
 HELD_OUT = PURPLE
 """Cameras that training never sees."""
 CHOSEN = YELLOW

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import moderngl
 import numpy as np
 
+from app.arrays import AnchorArrays
 from app.render import BACKGROUND
+from ui.anchor_marks import AnchorMarks, anchor_marks
 from ui.gl import (
     INHERITED_ANCHOR_COLOR,
     NEAR,
@@ -86,11 +88,17 @@ class Composed:
 
 @dataclass(frozen=True)
 class AnchorCounts:
-    """Anchors held for the overlays, by origin. Those of the reference clip itself count as inherited."""
+    """Anchors held for the overlays, by origin. Those of the reference clip itself count as inherited.
+
+    Attributes:
+        inherited_roles, residual_roles: Likewise by what they are; empty where nobody says.
+    """
 
     n_inherited: int = 0
     n_residual: int = 0
     is_reference: bool = False
+    inherited_roles: dict[str, int] = field(default_factory=dict)
+    residual_roles: dict[str, int] = field(default_factory=dict)
 
 
 class Scene:
@@ -108,6 +116,8 @@ class Scene:
         self._cloud = PointRenderer(ctx)
         self._inherited = PointRenderer(ctx)
         self._residual = PointRenderer(ctx)
+        self._marks: tuple[AnchorMarks, AnchorMarks] | None = None
+        self._marks_key: Hashable = None
         self._frusta = LineRenderer(ctx)
         self._drawn_key: Hashable = None
         self._asked_size: tuple[int, int] | None = None
@@ -239,19 +249,19 @@ class Scene:
             self._frusta.set(*frusta_lines(session.rig, FRUSTUM_SHARE * radius, held_out), key=frusta_key)
         anchors = session.shown_anchors()
         if anchors is None:
-            self.counts = AnchorCounts()
+            self.counts, self._marks, self._marks_key = AnchorCounts(), None, None
             return (frusta_key, session.view.look_through)
-        inherited, residual = anchors.inherited_positions, anchors.own_positions
-        is_reference = len(inherited) == 0
-        if is_reference:  # what the reference clip learns is what the others inherit
-            inherited, residual = residual, inherited
-        self.counts = AnchorCounts(len(inherited), len(residual), is_reference)
-        if overlays.show_inherited:
-            self._inherited.set(
-                thinned(inherited, MAX_INHERITED_MARKS), np.array(INHERITED_ANCHOR_COLOR), key=anchors.key
-            )
-        if overlays.show_residual:
-            self._residual.set(thinned(residual, MAX_RESIDUAL_MARKS), np.array(RESIDUAL_ANCHOR_COLOR), key=anchors.key)
+        if self._marks is None or anchors.key != self._marks_key:
+            self._sort_anchors(anchors)
+        assert self._marks is not None
+        for is_shown, marks, renderer in zip(
+            (overlays.show_inherited, overlays.show_residual),
+            self._marks,
+            (self._inherited, self._residual),
+            strict=True,
+        ):
+            if is_shown:
+                renderer.set(marks.positions, marks.colors, key=anchors.key)
         return (
             frusta_key,
             session.view.look_through,
@@ -259,6 +269,29 @@ class Scene:
             overlays.show_inherited,
             overlays.show_residual,
         )
+
+    def _sort_anchors(self, anchors: AnchorArrays) -> None:
+        """Marks and counts of what is inherited and of what is the clip's own."""
+        inherited = (anchors.inherited_positions, anchors.inherited_roles, anchors.inherited_reasons)
+        own = (anchors.own_positions, anchors.own_roles, anchors.own_reasons)
+        is_reference = len(inherited[0]) == 0
+        if is_reference:  # what the reference clip learns is what the others inherit
+            inherited, own = own, inherited
+        first = anchor_marks(*inherited, most=MAX_INHERITED_MARKS, color=INHERITED_ANCHOR_COLOR)
+        second = anchor_marks(*own, most=MAX_RESIDUAL_MARKS, color=RESIDUAL_ANCHOR_COLOR)
+        self._marks, self._marks_key = (first, second), anchors.key
+        self.counts = AnchorCounts(len(inherited[0]), len(own[0]), is_reference, first.counts, second.counts)
+
+    def anchor_text(self, session: Any, view: SceneView, x: float, y: float) -> str:
+        """What the anchor under a pixel of the view is and why; empty where none is shown or nobody says."""
+        if self._marks is None:
+            return ""
+        overlays = session.overlays
+        for is_shown, marks in zip((overlays.show_residual, overlays.show_inherited), self._marks[::-1], strict=True):
+            row = marks.at(view.world_to_camera, view.K, x, y, near=self._near) if is_shown else None
+            if row is not None:
+                return marks.text(row)
+        return ""
 
     def _has_marks(self, session: Any) -> bool:
         overlays = session.overlays
@@ -312,13 +345,3 @@ def moving_share(drawn_share: float, took_ms: float) -> float:
     """
     share = drawn_share * math.sqrt(MOVING_MS / max(took_ms, 1e-3))
     return float(np.clip(math.floor(share * 8) / 8, *MOVING_SHARES))
-
-
-def thinned(positions: np.ndarray, most: int) -> np.ndarray:
-    """At most this many rows, chosen by chance but always the same ones. [n <= most, 3]
-
-    By chance, because anchors lie in the order of a grid: every tenth of them would draw stripes.
-    """
-    if len(positions) <= most:
-        return positions
-    return positions[np.random.default_rng(0).choice(len(positions), most, replace=False)]

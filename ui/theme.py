@@ -17,6 +17,7 @@ from ui.colors import GREEN, ORANGE, SKY, VERMILLION, YELLOW, Color, rgb
 from ui.colors import HELD_OUT as HELD_OUT  # looked up as theme.HELD_OUT by the panels, as all colours are
 from ui.colors import INHERITED as INHERITED
 from ui.colors import RESIDUAL as RESIDUAL
+from ui.colors import ROLE_COLORS as ROLE_COLORS
 
 logger = logging.getLogger(__name__)
 

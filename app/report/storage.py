@@ -15,17 +15,19 @@ COMPONENTS = (
     ("scales", "sets.", "_scales"),
     ("colours", "sets.", ".color_logits"),
     ("presence", "", ".presence"),
+    ("presence", "inherited.", ".is_hidden"),
+    ("presence", "gate.", ""),
     ("field tables", "field.tables.", ""),
     ("field network", "field.", ""),
     ("decoder", "decoder.", ""),
     ("gains", "gains", ""),
 )
 """Name of each component, and how the names of its arrays begin and end; the first that fits counts. Presence is of
-inherited anchors too."""
+inherited anchors too, and what the gate decided."""
 OTHER = "other arrays"
 HEADER = "header"
 """Names, shapes, settings and figures: all that is no array."""
-COMPONENT_NAMES = (*(name for name, _, _ in COMPONENTS), OTHER, HEADER)
+COMPONENT_NAMES = (*dict.fromkeys(name for name, _, _ in COMPONENTS), OTHER, HEADER)
 _BYTES = {"F64": 8, "I64": 8, "U64": 8, "F32": 4, "I32": 4, "U32": 4, "F16": 2, "BF16": 2, "I16": 2, "U16": 2}
 
 

@@ -1,4 +1,4 @@
-"""AnchorSet: named rows of anchors that share a role (static, moving, residual).
+"""AnchorSet: named rows of anchors that share a role (static, moving, promoted, residual, replacing).
 
 An anchor is a fixed position with a static feature and two sets of log scales; Gaussians are decoded from it. Sets
 are kept apart by name and never recovered by position in a concatenation. A set whose `presence` is None is static:
@@ -84,6 +84,27 @@ class AnchorSet(nn.Module):
             log_base_scales=log_scales + float(torch.log(torch.tensor(1.2))),
             presence=presence,
             is_trainable=True,
+        )
+
+    def subset(
+        self, is_chosen: Tensor, *, presence: Tensor | None = None, is_trainable: bool | None = None
+    ) -> AnchorSet:
+        """Some of these anchors, in their order. A copy.
+
+        Args:
+            is_chosen: [A] bool
+            presence: Takes the place of what they have. [n, M] bool
+            is_trainable: None leaves it.
+        """
+        own = None if self.presence is None else self.presence[is_chosen]
+        return AnchorSet(
+            positions=self.positions[is_chosen],
+            color_logits=self.color_logits[is_chosen],
+            features=self.features.detach()[is_chosen],
+            log_offset_scales=self.log_offset_scales.detach()[is_chosen],
+            log_base_scales=self.log_base_scales.detach()[is_chosen],
+            presence=own if presence is None else presence,
+            is_trainable=self.is_trainable if is_trainable is None else is_trainable,
         )
 
     def alive(self, frame_in_clip: int) -> Tensor:

@@ -1,7 +1,9 @@
 """ClipModel: everything that is visible in one clip. Reference and source clip are this one class.
 
 What differs is data: which anchor sets there are, which of them are trainable, and whether decoder and static sets are
-inherited. Sets: "static" and "moving" come from the reference clip; "residual" is what a source clip adds.
+inherited. Sets: "static", "moving" and "promoted" come from the reference clip; "residual" is what a source clip adds.
+"promoted" anchors stood still in space but changed in the reference clip, as under a lamp: they exist in all frames of
+all clips. "replacing" ones are the same for one source clip: they take the place of static anchors that the clip hides.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from engine.cloud.reasons import NO_REASON
 from engine.errors import ProjectError
 from engine.model.anchors import AnchorSet
 from engine.model.clip_state import ClipState
@@ -20,6 +23,7 @@ from engine.model.decoder import Decoder
 from engine.model.decoding import ChosenAnchors, decode_anchors
 from engine.model.field import FieldShape, SpatioTemporalField
 from engine.model.grid import CornerTable
+from engine.model.roles import ROLES
 from engine.raster.gaussians import Gaussians
 
 _ANCHOR_ARRAYS = (
@@ -30,6 +34,7 @@ _ANCHOR_ARRAYS = (
     "log_base_scales",
     "presence",
 )
+_HIDDEN = ".is_hidden"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +46,20 @@ class AnchorView:
         own_positions: Anchors this clip trains. [A, 3]
         own_is_dynamic: Whether each own anchor has a dynamic feature. [A] bool
         inherited_is_dynamic: Likewise. [A0] bool
+        own_roles: Role of each own anchor, in engine.model.roles.ROLES. [A] uint8
+        inherited_roles: Likewise. [A0] uint8
+        own_reasons: Why the gate decided so, a code of engine.cloud.reasons. [A] uint8
+        inherited_reasons: Likewise. [A0] uint8
     """
 
     inherited_positions: np.ndarray
     own_positions: np.ndarray
     own_is_dynamic: np.ndarray
     inherited_is_dynamic: np.ndarray
+    own_roles: np.ndarray
+    inherited_roles: np.ndarray
+    own_reasons: np.ndarray
+    inherited_reasons: np.ndarray
 
 
 class ClipModel(nn.Module):
@@ -58,6 +71,8 @@ class ClipModel(nn.Module):
         field: Field of this clip; None while only static anchors exist.
         clip_length: M, the divisor of clip_time.
         n_frames: Frames of this clip.
+        hidden: Rows of the reference clip's sets that this clip leaves out; the sets given are without them already.
+            By role, [A of the reference] bool
     """
 
     def __init__(
@@ -68,9 +83,12 @@ class ClipModel(nn.Module):
         field: SpatioTemporalField | None,
         clip_length: int,
         n_frames: int,
+        hidden: dict[str, Tensor] | None = None,
     ) -> None:
         super().__init__()
         self.sets = nn.ModuleDict(sets)
+        self.hidden = dict(hidden or {})
+        self.reasons: dict[str, np.ndarray] = {}  # what the gate said of the anchors of a role, for display
         self.decoder = decoder
         self.clip_length, self.n_frames = clip_length, n_frames
         self._corners: dict[str, CornerTable] = {}
@@ -96,7 +114,25 @@ class ClipModel(nn.Module):
     def replace_sets(self, sets: dict[str, AnchorSet]) -> None:
         """These sets take the place of all others; a field attached later covers them."""
         self.sets = nn.ModuleDict(sets)
-        self._corners, self._frozen = {}, {}
+        self._corners, self._frozen, self.hidden = {}, {}, {}
+
+    def take_out(self, role: str, is_taken: Tensor) -> AnchorSet:
+        """Take rows out of a set; gives them. Those of an inherited set are hidden in this clip, and stored as such.
+
+        Args:
+            role: Of a static set.
+            is_taken: [A] bool
+        """
+        anchors = self.anchor_set(role)
+        assert not anchors.is_dynamic  # corners of a field would have to follow
+        self.sets[role] = anchors.subset(~is_taken)
+        self._frozen.pop(role, None)
+        if not anchors.is_trainable:
+            before = self.hidden.get(role)
+            hidden = torch.zeros(len(anchors), dtype=torch.bool) if before is None else before.clone()
+            hidden[~hidden] = is_taken
+            self.hidden[role] = hidden
+        return anchors.subset(is_taken)
 
     def attach_field(self, field: SpatioTemporalField) -> None:
         """Set the field and compute the interpolation constants of every dynamic set."""
@@ -157,20 +193,33 @@ class ClipModel(nn.Module):
 
     def anchors(self, clip_time: float | None = None) -> AnchorView:
         """Positions for display: all, or those that exist at a time of the clip, in [0, 1)."""
-        inherited, own = [], []
+        nothing = (np.zeros((0, 3), np.float32), np.zeros(0, bool), np.zeros(0, np.uint8), np.zeros(0, np.uint8))
+        inherited, own = [nothing], [nothing]
         for role in self.roles():
             anchors = self.anchor_set(role)
-            rows = slice(None) if clip_time is None else self.alive(role, clip_time)
-            shown = (anchors.positions[rows].numpy(), anchors.is_dynamic)
+            rows = np.arange(len(anchors)) if clip_time is None else self.alive(role, clip_time).numpy()
+            reasons = self.reasons.get(role)
+            shown = (
+                anchors.positions.numpy()[rows],
+                np.full(len(rows), anchors.is_dynamic),
+                np.full(len(rows), ROLES.index(role), np.uint8),
+                np.full(len(rows), NO_REASON, np.uint8) if reasons is None else reasons[rows],
+            )
             (own if anchors.is_trainable else inherited).append(shown)
-
-        def positions(sets: list[tuple[np.ndarray, bool]]) -> np.ndarray:
-            return np.concatenate([np.zeros((0, 3), np.float32), *(points for points, _ in sets)])
-
-        def dynamic(sets: list[tuple[np.ndarray, bool]]) -> np.ndarray:
-            return np.concatenate([np.zeros(0, bool), *(np.full(len(points), flag) for points, flag in sets)])
-
-        return AnchorView(positions(inherited), positions(own), dynamic(own), dynamic(inherited))
+        inherited_points, inherited_flags, inherited_roles, inherited_reasons = map(
+            np.concatenate, zip(*inherited, strict=True)
+        )
+        own_points, own_flags, own_roles, own_reasons = map(np.concatenate, zip(*own, strict=True))
+        return AnchorView(
+            inherited_points,
+            own_points,
+            own_flags,
+            inherited_flags,
+            own_roles=own_roles,
+            inherited_roles=inherited_roles,
+            own_reasons=own_reasons,
+            inherited_reasons=inherited_reasons,
+        )
 
     def entries_in_use(self) -> list[np.ndarray]:
         """Entries of each of the field's tables that some anchor reads in a frame it exists in. [L, T] bool each"""
@@ -200,6 +249,8 @@ class ClipModel(nn.Module):
                 value = getattr(anchors, name)
                 if value is not None:
                     arrays[f"sets.{role}.{name}"] = value.detach().numpy().copy()
+        for role, is_hidden in self.hidden.items():
+            arrays[f"inherited.{role}{_HIDDEN}"] = is_hidden.numpy().copy()
         if any(p.requires_grad for p in self.decoder.parameters()):
             arrays |= {f"decoder.{k}": v.detach().numpy().copy() for k, v in self.decoder.state_dict().items()}
         if self.field is not None:
@@ -218,7 +269,11 @@ def decoder_sizes(decoder: Decoder) -> dict[str, int]:
 
 
 def inherit(
-    reference: ClipState, presence: dict[str, Tensor], *, is_trainable: bool = False
+    reference: ClipState,
+    presence: dict[str, Tensor],
+    *,
+    is_trainable: bool = False,
+    hidden: dict[str, Tensor] | None = None,
 ) -> tuple[dict[str, AnchorSet], Decoder]:
     """Anchor sets and frozen decoder of a reference clip. Copies, so that nothing learned reaches the reference.
 
@@ -226,6 +281,7 @@ def inherit(
         reference: A finished reference clip.
         presence: Gate in time of dynamic sets in the clip that inherits; sets without one are left out. [A, M] bool
         is_trainable: Whether the anchors go on learning (an ablation; they are stored with the clip then).
+        hidden: Rows that are left out, by role. [A] bool
     """
     decoder = _read_decoder(reference)
     decoder.requires_grad_(requires_grad=False)
@@ -236,6 +292,8 @@ def inherit(
             if role not in presence:
                 continue
             anchors.presence = presence[role]
+        if hidden and role in hidden:
+            anchors = anchors.subset(~hidden[role])
         sets[role] = anchors
     return sets, decoder
 
@@ -271,6 +329,7 @@ def read_field(state: ClipState) -> SpatioTemporalField:
 
 def _rebuild(state: ClipState, reference: ClipState | None) -> ClipModel:
     header = state.header
+    hidden: dict[str, Tensor] = {}
     if state.is_reference:
         roles = _roles(state.arrays)
         sets = {role: _read_set(state.arrays, role, is_trainable=True) for role in roles}
@@ -284,31 +343,53 @@ def _rebuild(state: ClipState, reference: ClipState | None) -> ClipModel:
                 f"the project now has {reference.header['fingerprint']}.",
                 hint="Train this clip again.",
             )
-        prefix, suffix = "inherited.", ".presence"
-        presence = {
-            name.removeprefix(prefix).removesuffix(suffix): torch.from_numpy(array)
-            for name, array in state.arrays.items()
-            if name.startswith(prefix)
-        }
-        sets, decoder = inherit(reference, presence)
+        hidden = _of_inherited(state, _HIDDEN)
+        sets, decoder = inherit(reference, _of_inherited(state, ".presence"), hidden=hidden)
         sets |= {role: _read_set(state.arrays, role, is_trainable=True) for role in _roles(state.arrays)}
-        sets = {role: sets[role] for role in _ROLE_ORDER if role in sets}
+        sets = {role: sets[role] for role in ROLES if role in sets}
         if any(name.startswith("decoder.") for name in state.arrays):  # it went on learning in this clip
             decoder = _read_decoder(state)
     field = read_field(state) if header.get("field") else None
-    return ClipModel(
-        sets=sets, decoder=decoder, field=field, clip_length=header["clip_length"], n_frames=header["n_frames"]
+    model = ClipModel(
+        sets=sets,
+        decoder=decoder,
+        field=field,
+        clip_length=header["clip_length"],
+        n_frames=header["n_frames"],
+        hidden=hidden,
     )
+    model.reasons = _reasons(state, reference, model)
+    return model
+
+
+def _reasons(state: ClipState, reference: ClipState | None, model: ClipModel) -> dict[str, np.ndarray]:
+    """What the gate said of each anchor, by role; the reference speaks where the clip itself was not asked."""
+    known = {} if state.is_reference or reference is None else dict(reference.arrays)
+    known |= state.arrays
+    reasons = {role: known[f"gate.{role}"] for role in model.roles() if f"gate.{role}" in known}
+    is_hidden = model.hidden.get("static")
+    if is_hidden is not None and "static" in reasons:  # the clip was asked about all rows of the reference
+        if "replacing" in model.roles() and len(model.anchor_set("replacing")) == int(is_hidden.sum()):
+            reasons["replacing"] = reasons["static"][is_hidden.numpy()]
+        reasons["static"] = reasons["static"][~is_hidden.numpy()]
+    return {role: codes for role, codes in reasons.items() if len(codes) == len(model.anchor_set(role))}
+
+
+def _of_inherited(state: ClipState, suffix: str) -> dict[str, Tensor]:
+    """What a source clip says of inherited sets, by role."""
+    prefix = "inherited."
+    return {
+        name.removeprefix(prefix).removesuffix(suffix): torch.from_numpy(array.copy())
+        for name, array in state.arrays.items()
+        if name.startswith(prefix) and name.endswith(suffix)
+    }
 
 
 def _roles(arrays: dict[str, np.ndarray]) -> list[str]:
     return sorted(
         {name.split(".")[1] for name in arrays if name.startswith("sets.")},
-        key=_ROLE_ORDER.index,
+        key=ROLES.index,
     )
-
-
-_ROLE_ORDER = ["static", "moving", "residual"]
 
 
 def _read_set(arrays: dict[str, np.ndarray], role: str, *, is_trainable: bool) -> AnchorSet:

@@ -53,12 +53,13 @@ def inheriting_model(reference: ClipState, clip: Clip, config: TrainConfig) -> t
     are there all the same, because the clip's backgrounds are corrected with a render of both; `choose_decoder` and
     `drop_inherited` come after that.
     """
-    absent = {
-        role: torch.zeros(len(reference.arrays[f"sets.{role}.positions"]), clip.n_frames, dtype=torch.bool)
-        for role in ("static", "moving")
+    presence = {
+        # promoted anchors are part of the still scene and exist at all times; what moves is not known yet
+        role: torch.full((len(reference.arrays[f"sets.{role}.positions"]), clip.n_frames), role == "promoted")
+        for role in ("static", "moving", "promoted")
         if f"sets.{role}.presence" in reference.arrays
     }
-    sets, decoder = inherit(reference, absent, is_trainable=config.inherit == "trainable")
+    sets, decoder = inherit(reference, presence, is_trainable=config.inherit == "trainable")
     model = ClipModel(sets=sets, decoder=decoder, field=None, clip_length=clip.clip_length, n_frames=clip.n_frames)
     words = {"frozen": "kept as they are", "trainable": "learning on", "off": "left out"}
     heads = {"frozen": "kept as it is", "finetune": "learning on", "new": "new"}
@@ -77,13 +78,14 @@ def choose_decoder(model: ClipModel, config: TrainConfig, *, seed: int) -> None:
 
 
 def merged(state: ClipState) -> ClipState:
-    """A finished clip as a start for another: its residual anchors count among the moving ones from here on."""
-    prefix = "sets.residual."
-    arrays = {name: array for name, array in state.arrays.items() if not name.startswith(prefix)}
-    for name, array in state.arrays.items():
-        if name.startswith(prefix):
-            moving = f"sets.moving.{name.removeprefix(prefix)}"
-            arrays[moving] = np.concatenate([arrays[moving], array]) if moving in arrays else array
+    """A finished clip as a start for another: its residual anchors count among the moving ones from here on, its
+    replacing ones among the promoted."""
+    arrays = dict(state.arrays)
+    for own, inherited in (("residual", "moving"), ("replacing", "promoted")):
+        prefix = f"sets.{own}."
+        for name in [name for name in arrays if name.startswith(prefix)]:
+            array, target = arrays.pop(name), f"sets.{inherited}.{name.removeprefix(prefix)}"
+            arrays[target] = np.concatenate([arrays[target], array]) if target in arrays else array
     return ClipState(arrays, state.header)
 
 

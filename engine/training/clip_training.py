@@ -18,8 +18,10 @@ from torch import Tensor, nn
 
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.cloud.gate import GateTable, measure_gate
 from engine.cloud.moving_cloud import MovingCloud
 from engine.cloud.range import near_plane
+from engine.cloud.regions import GateRegion
 from engine.cloud.static_cloud import StaticCloud
 from engine.errors import NonFiniteLoss, PreparationError, ProjectError
 from engine.metrics.psnr import psnr
@@ -40,7 +42,9 @@ from engine.training.building import (
     static_model,
 )
 from engine.training.config import TrainConfig
+from engine.training.demotion import demote
 from engine.training.fused_loss import LossWorkspace
+from engine.training.gating import nothing_measured, promote, with_regions, without_static_regions
 from engine.training.losses import photometric_loss
 from engine.training.optimizer import PhaseOptimizer, named_parameters
 from engine.training.order import ErrorOrder, Order, ShuffledOrder
@@ -73,6 +77,7 @@ class ClipTraining:
         seed: Fixes initial values and the order of pictures.
         prep_dir: Folder that keeps backgrounds between clips.
         report: Receives progress of the preparation stages.
+        regions: Where the user overrules the gate; later ones overrule earlier ones.
     """
 
     def __init__(
@@ -87,6 +92,7 @@ class ClipTraining:
         prep_dir: Path,
         report: ReportProgress,
         previous: ClipState | None = None,
+        regions: Sequence[GateRegion] = (),
     ) -> None:
         self.previous = previous
         is_streaming = reference is None and previous is not None and config.start == "previous"
@@ -97,6 +103,7 @@ class ClipTraining:
             learning = {"inherit": "trainable", "decoder": "finetune", "field": "continue"}
             config = replace(config, independent=False, start="scratch", **learning)
         self.capture, self.clip, self.config, self.reference = (capture, clip, config, reference)
+        self.regions = tuple(regions)
         self.holdout = sorted(set(holdout))
         self.camera_indices = [c for c in range(len(capture.rig)) if c not in self.holdout]
         if len(self.camera_indices) < 2:
@@ -124,6 +131,7 @@ class ClipTraining:
         self._workspace = LossWorkspace(self.height, self.width)
         self._sight: dict[tuple[str, int], Tensor] = {}  # rows of static sets, flags of dynamic ones
         self._tiles: ActiveTiles | None = None
+        self._reasons: dict[str, np.ndarray] = {}
 
     # ---------------------------------------------------------------- where we are
 
@@ -206,7 +214,7 @@ class ClipTraining:
             self.pictures, masks, self.rig, gains, static_points, self.config, self.report, voxel_size=voxel_size
         )
         self.moving_spacing = float(cloud.spacing) if len(cloud.points) else voxel_size
-        return cloud
+        return without_static_regions(cloud, self.regions) if self.config.gate != "off" else cloud
 
     def _add_moving(self) -> None:
         """Between the phases of a reference clip: corrected backgrounds, motion, moving anchors, field."""
@@ -218,10 +226,42 @@ class ClipTraining:
         self._say("Carving what moves", f"{len(cloud.points)} moving anchors")
         self._make_dynamic(cloud)
 
+    def _decide(self, cloud: MovingCloud) -> None:
+        """Static anchors that change in this clip get a dynamic feature; which, by config.gate and the regions."""
+        static = self.model.anchor_set("static")
+        is_measured = self.config.gate == "images"
+        if static.is_dynamic or not (is_measured or self.regions):
+            return  # already, where the reference has no gate
+        table = self._measure(cloud) if is_measured else nothing_measured(len(static))
+        table = with_regions(table, static.positions.numpy(), self.regions)
+        is_source = self._base is not None
+        self._reasons = {"gate.static": table.reasons}
+        if not is_source or static.is_trainable:  # otherwise the inherited set keeps its rows, of which some are hidden
+            role = "replacing" if is_source else "promoted"
+            self._reasons = {"gate.static": table.reasons[~table.is_dynamic]}
+            self._reasons |= {f"gate.{role}": table.reasons[table.is_dynamic]} if table.is_dynamic.any() else {}
+        promote(self.model, table.is_dynamic, is_source=is_source)
+        self._say("Deciding what is static", table.summary())
+
+    def _measure(self, cloud: MovingCloud) -> GateTable:
+        return measure_gate(
+            self.pictures.raw,
+            self.clip.n_frames,
+            self.backgrounds.images,
+            self.rig,
+            self.model.anchor_set("static").positions.numpy(),
+            spacing=self.spacing,
+            moving_points=cloud.points,
+            presence=cloud.presence,
+            moving_spacing=float(cloud.spacing),
+        )
+
     def _make_dynamic(self, cloud: MovingCloud) -> None:
         """Last step of preparation: the gate and the field."""
         if self.config.gate == "off":
             remove_gate(self.model)
+        else:
+            self._decide(cloud)
         if self.config.field == "continue" and self.previous is not None and self.previous.header["field"]:
             field, index = read_field(self.previous), self.previous.header["clip_index"]
             if field.shape.n_knots < self.clip.n_frames:
@@ -233,7 +273,8 @@ class ClipTraining:
             self.model.attach_field(field)
             self._say("Sizing the field", f"the field of clip {index} goes on")
             return
-        spacing = float(cloud.spacing)
+        has_promoted = {"promoted", "replacing"} & set(self.model.roles())
+        spacing = self.spacing if has_promoted and len(cloud.points) == 0 else float(cloud.spacing)
         made = fit_field(self.model, spacing=spacing, config=self.config, generator=self._generator)
         self._say("Sizing the field", made)
 
@@ -400,7 +441,7 @@ class ClipTraining:
 
     def state(self) -> ClipState:
         """Snapshot of everything the clip owns. Copies, so that training can go on."""
-        arrays = self.model.own_arrays()
+        arrays = self.model.own_arrays() | self._reasons
         header = {
             "schema": SCHEMA,
             "role": "reference" if self.reference is None else "source",
@@ -435,9 +476,17 @@ class ClipTraining:
         Raises:
             NonFiniteLoss: An array holds numbers that are not finite.
         """
+        state = self.state()
+        # another clip's field may show this one where fields go on: what it would show nobody knows yet
+        if self.config.gate == "images" and self.config.field != "continue":
+            views = [self._views[camera] for camera in self.camera_indices]
+            state, said = demote(state, self.reference, views, reach=self._reach)
+            self._say("Leaving out what is not needed", said)
+            self._reasons = {name: array for name, array in state.arrays.items() if name.startswith("gate.")}
+            self.model = load_clip_model(state, self.reference, is_learning=True)
         # a field that goes on in the next clip, and may show this one then, keeps entries that only others read
         entries = None if self.config.field == "continue" else self.model.entries_in_use()
-        compact = compact_clip(self.state(), entries)
+        compact = compact_clip(state, entries)
         self.model = load_clip_model(compact.state, self.reference, is_learning=True)
         return compact
 
@@ -487,6 +536,7 @@ class ClipTraining:
         self.backgrounds = Backgrounds(images, stable)
         self.phases = [(name, n) for name, n in resume["phases"]]
         self.steps_done = kept.header["step"]
+        self._reasons = {name: array for name, array in kept.arrays.items() if name.startswith("gate.")}
         self._start_phase(resume["phase_index"], resume["steps_in_phase"])
         self._optimizer.restore(kept.arrays, resume["steps_in_phase"])
         self._order.restore(resume["order"])

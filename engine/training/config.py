@@ -109,7 +109,10 @@ class TrainConfig:
     # gate
     gate: str = "hull"
     """hull: static anchors have no dynamic feature, moving ones are decoded only at times where that frame's hull
-    has them. off: the published method, every anchor is evaluated at every time."""
+    has them. images: likewise, but static anchors that two or more cameras see change where no hull is (lamps, soft
+    shadows) get a dynamic feature, and once a clip is trained, anchors that nobody sees and dynamic ones that learned
+    no change are left out. Where it finds neither, the result is that of hull, bit for bit. off: the published method,
+    every anchor is evaluated at every time."""
 
     # what a step of a source clip looks at
     tiles: str = "active"
@@ -227,7 +230,7 @@ _RANGES: dict[str, tuple[float, float]] = {
 
 _CHOICES: dict[str, tuple[str, ...]] = {
     "color": ("auto", "gain", "off"),
-    "gate": ("hull", "off"),
+    "gate": ("hull", "images", "off"),
     "field_tables": ("shared", "per_frame"),
     "decoder": ("frozen", "finetune", "new"),
     "residual": ("dedup", "none", "full"),

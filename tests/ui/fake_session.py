@@ -71,7 +71,16 @@ class FakeSession:
         random = np.random.default_rng(seed)
         self._points = random.normal(0, 0.6, (6000, 3)).astype(np.float32)
         self._colors = (0.5 + 0.5 * np.sin(self._points * 3 + np.array([0, 2, 4]))).astype(np.float32)
-        self._anchors = AnchorArrays(self._points[:1500], self._points[1500:1800] * 0.4, key=("anchors", 0))
+        inherited_roles = np.repeat(np.arange(3, dtype=np.uint8), 500)  # static, moving, promoted
+        self._anchors = AnchorArrays(
+            self._points[:1500],
+            self._points[1500:1800] * 0.4,
+            key=("anchors", 0),
+            inherited_roles=inherited_roles,
+            own_roles=np.full(300, 3, np.uint8),
+            inherited_reasons=np.where(inherited_roles == 2, 2, 255).astype(np.uint8),
+            own_reasons=np.full(300, 255, np.uint8),
+        )
         self.capture: FakeCapture | None = None
         self.rig: CameraRig | None = None
         self.clips: list[Any] = []

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ui.scene import MOVING_MS, MOVING_SHARES, moving_share, thinned
+from ui.anchor_marks import thinned
+from ui.scene import MOVING_MS, MOVING_SHARES, moving_share
 
 
 @pytest.mark.parametrize(

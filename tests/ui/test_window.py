@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from pyglet.window import key, mouse
 
+from app.arrays import AnchorArrays
 from app.commands import (
     DismissNotice,
     LookThrough,
@@ -28,6 +29,8 @@ from app.commands import (
 from app.session import Session
 from app.settings import Settings
 from app.status import ClipStatus
+from engine.cloud.reasons import LIGHT
+from engine.model.roles import ROLES
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from ui.screenshot import read_window, write_png
@@ -200,6 +203,31 @@ def test_tab_shows_all_marks_then_hides_them(pilot: Pilot) -> None:
     pilot.key(key.TAB)
     assert (overlays.show_frusta, overlays.show_inherited, overlays.show_residual) == (False, False, False)
     assert {command.name for command in pilot.sent(ToggleOverlay)} == {"show_frusta", "show_inherited", "show_residual"}
+
+
+def test_the_pointer_asks_an_anchor_what_it_is_and_why(pilot: Pilot, monkeypatch: pytest.MonkeyPatch) -> None:
+    said: list[str] = []
+    monkeypatch.setattr("ui.panels.viewport.imgui.set_tooltip", said.append)
+    pilot.session.clip_states[0] = ClipStatus("trained", 1.0)
+    area, view = pilot.rects["viewport.rendered"], pilot.session.view
+    K, pose = view.K(round(area.width), round(area.height)), view.world_to_camera()
+    x, y, depth = 0.4 * area.width, 0.5 * area.height, 2.0
+    point = pose[:3, :3].T @ (depth * np.linalg.inv(K) @ [x, y, 1.0] - pose[:3, 3])
+    pilot.session._anchors = AnchorArrays(
+        point[None].astype(np.float32),
+        np.zeros((0, 3), np.float32),
+        key="one anchor",
+        inherited_roles=np.array([ROLES.index("promoted")], np.uint8),
+        own_roles=np.zeros(0, np.uint8),
+        inherited_reasons=np.array([LIGHT], np.uint8),
+        own_reasons=np.zeros(0, np.uint8),
+    )
+    pilot.move(area.x0 + x, area.y0 + y)
+    pilot.draw(2)
+    assert not any("promoted" in text for text in said)  # nothing is shown yet
+    pilot.key(key.TAB)
+    pilot.draw(2)
+    assert any("promoted" in text and "lamp or shadow" in text for text in said)
 
 
 def test_escape_closes_neither_the_window_nor_the_loop(pilot: Pilot) -> None:

@@ -155,8 +155,8 @@ class ViewportPanel:
             return
         rows = (
             ("show_frusta", "Cameras", "1"),
-            ("show_inherited", "Inherited anchors (sky circles)", "2"),
-            ("show_residual", "Residual anchors (orange diamonds)", "3"),
+            ("show_inherited", "Inherited anchors (circles)", "2"),
+            ("show_residual", "Residual anchors (diamonds)", "3"),
             ("show_points", "Point cloud", "4"),
         )
         for name, label, key_label in rows:
@@ -237,6 +237,12 @@ class ViewportPanel:
         draw.add_image(imgui.ImTextureRef(composed.texture.glo), pane.low, pane.high)
         if self.is_moving:
             ui.redraw_within(MOVING_S)
+        elif imgui.is_item_hovered() and self._drag is None:
+            pointer = imgui.get_io().mouse_pos
+            pixels = ((pointer.x - pane.x0) * density, (pointer.y - pane.y0) * density)
+            text = self.scene.anchor_text(session, view, *pixels)
+            if text:
+                imgui.set_tooltip(text)
         self._note_stale(composed.is_stale, ui)
         if panes.captured is not None:
             self._draw_captured(session, draw, panes)
@@ -319,8 +325,10 @@ class ViewportPanel:
         if session.overlays.show_inherited and counts.n_inherited:
             kind = "reference" if counts.is_reference else "inherited"
             rows.append(("circle", theme.INHERITED, f"{grouped(counts.n_inherited)} {kind} anchors"))
+            rows += _role_rows("circle", counts.inherited_roles)
         if session.overlays.show_residual and counts.n_residual:
             rows.append(("diamond", theme.RESIDUAL, f"{grouped(counts.n_residual)} residual anchors"))
+            rows += _role_rows("diamond", counts.residual_roles)
         is_labelled = session.overlays.compare == "wipe" and session.view.look_through is not None
         y = area.y0 + (44 if is_labelled else 12)
         for shape, color, text in rows:
@@ -336,6 +344,13 @@ class ViewportPanel:
                 draw.add_ngon_filled(middle, 6, theme.u32(color), 4)
             draw.add_text(ImVec2(x + 26, y + 3), theme.u32(theme.TEXT), text)
             y += 28
+
+
+def _role_rows(shape: str, counts: dict[str, int]) -> list[tuple[str, theme.Color, str]]:
+    """Legend of anchors by what they are; nothing where they are all the same."""
+    if len(counts) < 2:
+        return []
+    return [(shape, theme.ROLE_COLORS[role], f"{grouped(n)} {role}") for role, n in counts.items()]
 
 
 def _segment(label: str, is_on: bool) -> bool:

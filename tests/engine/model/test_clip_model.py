@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 import torch
 
+from engine.cloud.reasons import LIGHT, NO_REASON, STILL
 from engine.errors import ProjectError
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel, decoder_sizes, inherit, load_clip_model
 from engine.model.clip_state import SCHEMA, ClipState
 from engine.model.decoder import HEADS, Decoder
 from engine.model.field import FieldShape, SpatioTemporalField
+from engine.model.roles import ROLES
 
 N_FRAMES = 4
 K = 3
@@ -178,6 +180,32 @@ def test_anchor_view_separates_inherited_from_own():
     assert view.inherited_positions.shape == (30, 3)
     assert view.own_positions.shape == (5, 3)
     assert view.inherited_is_dynamic.sum() == 10
+    assert np.bincount(view.inherited_roles).tolist() == [20, 10]
+    assert (view.own_roles == ROLES.index("residual")).all()
+    assert (view.own_reasons == NO_REASON).all()
+
+
+def test_anchors_say_what_the_gate_said_of_them():
+    reference = state_of(make_reference(), role="reference")
+    source = make_source(reference)
+    is_hidden = torch.zeros(20, dtype=torch.bool)
+    is_hidden[[2, 5]] = True
+    taken = source.take_out("static", is_hidden)
+    presence = torch.ones(2, N_FRAMES, dtype=torch.bool)
+    source.add_set("replacing", taken.subset(torch.ones(2, dtype=torch.bool), presence=presence, is_trainable=True))
+    source.attach_field(make_field(8))
+    state = state_of(source, role="source", reference=reference)
+    reasons = np.full(20, STILL, np.uint8)
+    reasons[[2, 5]] = LIGHT
+    loaded = load_clip_model(ClipState(state.arrays | {"gate.static": reasons}, state.header), reference)
+    view = loaded.anchors()
+    assert (view.own_reasons[view.own_roles == ROLES.index("replacing")] == LIGHT).all()
+    assert (view.inherited_reasons[view.inherited_roles == ROLES.index("static")] == STILL).all()
+    assert (view.inherited_roles == ROLES.index("static")).sum() == 18
+    whole = load_clip_model(reference, None).constant_gaussians("static")
+    kept = np.repeat(~is_hidden.numpy(), K)
+    for ours, theirs in zip(loaded.constant_gaussians("static").tensors(), whole.tensors(), strict=True):
+        assert torch.equal(ours, theirs[torch.from_numpy(kept)])
 
 
 def test_every_head_changes_the_output():

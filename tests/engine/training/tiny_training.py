@@ -48,7 +48,7 @@ class Tiny:
 
     def training(self, clip_index: int, *, is_source: bool = True, **arguments: Any) -> ClipTraining:
         """A training of a clip. Settings of TrainConfig and arguments of ClipTraining by name."""
-        names = {"reference", "previous", "prep_dir", "seed", "report", "clip"}
+        names = {"reference", "previous", "prep_dir", "seed", "report", "clip", "regions"}
         given = {name: arguments.pop(name) for name in names & arguments.keys()}
         given.setdefault("reference", self.reference if is_source else None)
         given.setdefault("clip", self.clips[clip_index])
@@ -68,7 +68,7 @@ class Tiny:
 def make_training(capture: Capture, holdout: list[int], *, clip: Clip, **arguments: Any) -> ClipTraining:
     """A training with the sizes of this module; settings of TrainConfig by name."""
     given: dict[str, Any] = {"seed": 0, "report": lambda _: None, "previous": None}
-    for name in ("reference", "previous", "prep_dir", "seed", "report"):
+    for name in ("reference", "previous", "prep_dir", "seed", "report", "regions"):
         if name in arguments:
             given[name] = arguments.pop(name)
     return ClipTraining(capture, clip, config=TrainConfig(**(SIZES | arguments)), holdout=holdout, **given)

@@ -1,0 +1,7 @@
+"""Roles of anchor sets, in the order in which they are decoded. Plain values, for whoever shows them."""
+
+from __future__ import annotations
+
+ROLES = ("static", "moving", "promoted", "residual", "replacing")
+"""static: no dynamic feature. moving: on the hulls of the reference clip. promoted: static in space, changing in the
+reference clip, as under a lamp. residual: what a source clip adds. replacing: likewise promoted, in a source clip."""
