@@ -36,6 +36,7 @@ from engine.training.building import (
     inheriting_model,
     merged,
     moving_anchors,
+    n_alive,
     remove_gate,
     static_model,
 )
@@ -416,6 +417,8 @@ class ClipTraining:
             "near_plane": self.near_plane,
             "spacing": self.spacing,
             "moving_spacing": self.moving_spacing,
+            "n_anchors": {role: len(self.model.anchor_set(role)) for role in self.model.roles()},
+            "n_alive": n_alive(self.model),
             "decoder": decoder_sizes(self.model.decoder),
             "field": None if self.model.field is None else self.model.field.shape.as_dict(),
         }

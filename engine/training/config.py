@@ -8,9 +8,31 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 from engine.errors import ProjectError
+
+
+class StepRule(NamedTuple):
+    """How the steps of a phase follow from what there is to learn from.
+
+    Attributes:
+        per_item: Steps per picture, or per background.
+        lowest, highest: Bounds of the sum.
+    """
+
+    per_item: int
+    lowest: int
+    highest: int
+
+    def steps(self, n_items: int) -> int:
+        """Steps for so many items."""
+        return min(max(self.per_item * n_items, self.lowest), self.highest)
+
+
+STATIC_RULE = StepRule(30, 300, 1000)
+JOINT_RULE = StepRule(20, 1200, 6000)
+SOURCE_RULE = StepRule(24, 1200, 6000)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,15 +198,15 @@ class TrainConfig:
 
     def n_static_steps(self, n_cameras: int) -> int:
         """Steps of the static phase for this many training cameras."""
-        return self.static_steps or min(max(30 * n_cameras, 300), 1000)
+        return self.static_steps or STATIC_RULE.steps(n_cameras)
 
     def n_joint_steps(self, n_pictures: int) -> int:
         """Steps of the joint phase of a reference clip with this many training pictures."""
-        return self.joint_steps or self._n_pass_steps(n_pictures) or min(max(20 * n_pictures, 1200), 6000)
+        return self.joint_steps or self._n_pass_steps(n_pictures) or JOINT_RULE.steps(n_pictures)
 
     def n_source_steps(self, n_pictures: int) -> int:
         """Steps of a source clip with this many training pictures."""
-        return self.source_steps or self._n_pass_steps(n_pictures) or min(max(24 * n_pictures, 1200), 6000)
+        return self.source_steps or self._n_pass_steps(n_pictures) or SOURCE_RULE.steps(n_pictures)
 
     def _n_pass_steps(self, n_pictures: int) -> int:
         return math.ceil(self.passes * n_pictures)
