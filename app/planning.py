@@ -78,8 +78,8 @@ def short_text(plan: TrainingPlan) -> str:
     """The forecast as one line."""
     steps = f"{plan.n_steps:,} steps" if plan.n_steps else "no steps"
     return (
-        f"{steps}, about {duration_text(plan.seconds)} ({duration_text(float(plan.preparation_s.value))} preparation), "
-        f"{float(plan.memory_mb.value) / 1e3:.1f} GB of memory, {plan.disk_mb.text} stored"
+        f"{steps}, about {duration_text(plan.seconds)} ({duration_text(plan.preparation_s.value)} preparation), "
+        f"{plan.memory_mb.value / 1e3:.1f} GB of memory, {plan.disk_mb.text} stored"
     )
 
 
@@ -109,7 +109,7 @@ def compared_text(plan: TrainingPlan, project: Project) -> str:
         ("stored", plan.disk_mb, taken.disk_mb, "MB"),
     )
     parts = [
-        f"{name} {float(line.value):.3g} against {measured:.3g} {unit}"
+        f"{name} {line.value:.3g} against {measured:.3g} {unit}"
         for name, line, measured, unit in pairs
         if measured is not None
     ]
@@ -142,8 +142,8 @@ def plan_document(
 def totals(plans: Sequence[TrainingPlan]) -> dict[str, float]:
     """Of all planned clips: seconds and bytes add up, memory is that of the largest."""
     return {
-        "preparation_s": round(sum(float(plan.preparation_s.value) for plan in plans), 1),
-        "training_s": round(sum(float(plan.training_s.value) for plan in plans), 1),
-        "memory_mb": max((float(plan.memory_mb.value) for plan in plans), default=0.0),
-        "disk_mb": round(sum(float(plan.disk_mb.value) for plan in plans), 3),
+        "preparation_s": round(sum(plan.preparation_s.value for plan in plans), 1),
+        "training_s": round(sum(plan.training_s.value for plan in plans), 1),
+        "memory_mb": max((plan.memory_mb.value for plan in plans), default=0.0),
+        "disk_mb": round(sum(plan.disk_mb.value for plan in plans), 3),
     }

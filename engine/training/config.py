@@ -104,6 +104,11 @@ class TrainConfig:
     passes: float = 0.0
     """Passes over the training pictures of a clip, for clips of both kinds; 0 keeps the derived steps above."""
 
+    patience: int = 0
+    """Early stop. 0: never. Else 2 % of the training pictures, at least four, are not trained on; when their mean PSNR
+    has not risen by 0.02 dB over so many looks, 150 steps apart, the rates fall to their end within a fifth of the
+    steps done. Off because nobody has measured that the time saved is worth the pictures left out."""
+
     # learning rates; all fall log-linearly to `final_lr_ratio` of their start over the phase
     feature_lr: float = 7.5e-3
     scale_lr: float = 7e-3
@@ -230,6 +235,7 @@ _RANGES: dict[str, tuple[float, float]] = {
     "joint_steps": (0, 1_000_000),
     "source_steps": (0, 1_000_000),
     "passes": (0.0, 1000.0),
+    "patience": (0, 1000),
     "field_levels": (0, 16),
     "feature_lr": (0.0, 1.0),
     "scale_lr": (0.0, 1.0),

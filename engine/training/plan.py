@@ -16,6 +16,7 @@ from engine.training.config import JOINT_RULE, SOURCE_RULE, STATIC_RULE, StepRul
 from engine.training.cost import checkpoint_mb
 from engine.training.expected_sizes import Counts, Footage, clip_sizes, counts_of, expected_counts
 from engine.training.forecasting import UNKNOWN_MACHINE, MachineSpeed, MeasuredClip, forecast
+from engine.training.held_in import MEASURE_EVERY, held_in_items
 
 Value = int | float | str
 
@@ -48,6 +49,13 @@ class PlanLine:
 
 
 @dataclass(frozen=True, slots=True)
+class ForecastLine(PlanLine):
+    """A line of the forecast: its value is a number."""
+
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
 class TrainingPlan:
     """What a training is going to do and what it is expected to take. A value.
 
@@ -67,20 +75,20 @@ class TrainingPlan:
     role: str
     n_steps: int
     lines: tuple[PlanLine, ...]
-    preparation_s: PlanLine
-    training_s: PlanLine
-    memory_mb: PlanLine
-    disk_mb: PlanLine
+    preparation_s: ForecastLine
+    training_s: ForecastLine
+    memory_mb: ForecastLine
+    disk_mb: ForecastLine
 
     @property
-    def forecast(self) -> tuple[PlanLine, ...]:
+    def forecast(self) -> tuple[ForecastLine, ...]:
         """The four forecast lines."""
         return self.preparation_s, self.training_s, self.memory_mb, self.disk_mb
 
     @property
     def seconds(self) -> float:
         """Forecast of the wall time."""
-        return float(self.preparation_s.value) + float(self.training_s.value)
+        return self.preparation_s.value + self.training_s.value
 
     def line(self, name: str) -> PlanLine | None:
         """A line by its name, also one of the forecast; None where the plan has none."""
@@ -140,6 +148,10 @@ def make_plan(
         *_model_lines(config, counts, is_source=is_source),
         PlanLine("kept while training", checkpoint_mb(sizes), "MB", "a checkpoint to go on from; it goes in the end"),
     ]
+    if config.patience and sum(int(line.value) for line in phases):
+        n_kept = len(held_in_items(footage.n_cameras, clip.n_frames, 0))
+        reason = f"when {_plural(n_kept, 'picture')} kept out of training gain nothing over {config.patience} looks"
+        lines.append(PlanLine("early stop", f"{MEASURE_EVERY * config.patience:,}", "steps", reason))
     steps = [int(line.value) for line in phases]
     expected = forecast(footage, clip, config, sizes, steps=steps, history=history, machine=machine)
     return TrainingPlan(
@@ -149,10 +161,10 @@ def make_plan(
         role="source" if is_source else "reference",
         n_steps=sum(steps),
         lines=tuple(lines),
-        preparation_s=PlanLine("preparation", *expected.preparation_s),
-        training_s=PlanLine("training", *expected.training_s),
-        memory_mb=PlanLine("memory", *expected.memory_mb),
-        disk_mb=PlanLine("stored clip", *expected.disk_mb),
+        preparation_s=ForecastLine("preparation", *expected.preparation_s),
+        training_s=ForecastLine("training", *expected.training_s),
+        memory_mb=ForecastLine("memory", *expected.memory_mb),
+        disk_mb=ForecastLine("stored clip", *expected.disk_mb),
     )
 
 
