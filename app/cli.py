@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import functools
 import json
 import logging
 import signal
@@ -29,8 +28,8 @@ from app.arguments import (
     parse_cameras,
     parse_range,
 )
-from app.bench import speed
 from app.bench.command import CHART_FILE, bench
+from app.bench.speed import known_machine_speed
 from app.evaluation_command import evaluate
 from app.headless import (
     open_trained,
@@ -322,8 +321,9 @@ def _plan(options: argparse.Namespace) -> int:
     chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
     order = [i for i in project.training_order(len(clips)) if i in chosen]
     trained = [clip_index for clip_index in order if project.is_trained(clip_index)]
-    measure = functools.cache(speed.machine_speed)
-    plans = [plan_clip(project, capture, clips[i], measure_machine=measure) for i in order if i not in trained]
+    plans = [
+        plan_clip(project, capture, clips[i], measure_machine=known_machine_speed) for i in order if i not in trained
+    ]
     if options.json:
         print(json.dumps(plan_document(project, capture, plans, trained), indent=2))
         return EXIT_OK
@@ -359,8 +359,7 @@ def _train(options: argparse.Namespace, launch: Launch) -> int:
             f"clips {chosen.start} to {chosen.stop - 1} of {len(clips)}"
         )
         first = project.settings.reference_clip  # the others cannot begin before it
-        measure = functools.cache(speed.machine_speed)
-        plans = PlanLines(line, project, capture, measure_machine=measure, is_quiet=options.quiet)
+        plans = PlanLines(line, project, capture, measure_machine=known_machine_speed, is_quiet=options.quiet)
         outcomes = train_clips(
             service,
             sorted(chosen, key=lambda clip_index: clip_index != first),

@@ -9,6 +9,7 @@ from typing import Any
 from app.kernels import COMPILING
 from app.progress import duration_text
 from app.project import Project
+from app.status import PlanStatus, SettingStatus
 from app.training.stage_watch import stages_of
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -16,6 +17,7 @@ from engine.model.clip_state import read_clip_header
 from engine.training.expected_sizes import footage_of
 from engine.training.forecasting import UNKNOWN_MACHINE, MachineSpeed, MeasuredClip, measured_clip
 from engine.training.plan import TrainingPlan, make_plan
+from engine.training.presets import PRESETS
 
 PLAN_SCHEMA = 1
 
@@ -69,6 +71,57 @@ def _measured(project: Project, clip_index: int) -> MeasuredClip | None:
     metrics = header.get("metrics")
     stages_s = stages_of(metrics) if isinstance(metrics, dict) else {}
     return measured_clip(header, disk_mb=disk_mb, uncounted_s=stages_s.get(COMPILING, 0.0))
+
+
+# ---------------------------------------------------------------- for the window
+
+MAIN_SETTINGS = {
+    "static_steps": "Static steps",
+    "joint_steps": "Joint steps",
+    "source_steps": "Steps of later clips",
+    "gaussians_per_anchor": "Gaussians per anchor",
+    "max_static_points": "Static anchors, at most",
+    "max_moving_points": "Moving anchors, at most",
+}
+"""Name in TrainConfig to what the window calls it."""
+
+
+def plan_status(
+    project: Project, capture: Capture, clip: Clip, plan: TrainingPlan | None, *, can_edit: bool
+) -> PlanStatus:
+    """What the window shows of the next clip.
+
+    Args:
+        project, capture, clip: What would be trained.
+        plan: Its plan; None until it is made.
+        can_edit: Whether settings may still change.
+    """
+    settings, config = project.settings, project.settings.config()
+    n_cameras = len(capture.rig) - len(settings.holdout)
+    values = {name: getattr(config, name) for name in MAIN_SETTINGS} | {
+        "static_steps": config.n_static_steps(n_cameras),
+        "joint_steps": config.n_joint_steps(n_cameras * clip.n_frames),
+        "source_steps": config.n_source_steps(n_cameras * clip.n_frames),
+    }
+    lines = () if plan is None else (*plan.lines, *plan.forecast)
+    return PlanStatus(
+        clip_index=clip.clip_index,
+        summary="" if plan is None else short_text(plan),
+        lines=tuple((line.name, line.text, line.reason) for line in lines),
+        presets=tuple(PRESETS),
+        preset=closest_preset(settings.overrides),
+        settings=tuple(
+            SettingStatus(name, label, int(values[name]), name in settings.overrides)
+            for name, label in MAIN_SETTINGS.items()
+        ),
+        can_edit=can_edit,
+    )
+
+
+def closest_preset(overrides: dict[str, Any]) -> str:
+    """The preset with the most settings among those that hold all of its own."""
+    fitting = [name for name, values in PRESETS.items() if values.items() <= overrides.items()]
+    return max(fitting, key=lambda name: len(PRESETS[name]))
 
 
 # ---------------------------------------------------------------- as text and JSON

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from functools import cache
 
 from app.bench.timing import in_fresh_process
 from engine.kernels.cache import is_cache_warm
@@ -30,6 +31,16 @@ def machine_speed() -> MachineSpeed:
         return UNKNOWN_MACHINE
     factor = min(max(measured_ms / REFERENCE_MS, _LOWEST), _HIGHEST)
     return MachineSpeed(factor, f"cost model times {factor:.2f}: a step of known size took {measured_ms:.1f} ms here")
+
+
+def known_machine_speed() -> MachineSpeed:
+    """The same, measured once in the life of the program, as soon as kernels are compiled."""
+    return _measured_once(is_cache_warm())
+
+
+@cache
+def _measured_once(is_warm: bool) -> MachineSpeed:
+    return machine_speed()
 
 
 def _measure_ms() -> float:
