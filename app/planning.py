@@ -42,7 +42,7 @@ def plan_clip(
     settings, config = project.settings, project.settings.config()
     base = project.inherited_index(clip.clip_index)
     if base is None and config.start == "previous" and clip.clip_index != settings.reference_clip:
-        base = project.previous_index(clip.clip_index)
+        base, config = project.previous_index(clip.clip_index), config.going_on()
     history = [
         known
         for other in project.clips(capture.n_frames)

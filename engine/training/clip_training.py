@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -96,8 +95,7 @@ class ClipTraining:
         self._base = merged(previous) if is_streaming and previous is not None else reference
         self._given_config = config
         if is_streaming:  # everything that a source clip can take over, and all of it learns
-            learning = {"inherit": "trainable", "decoder": "finetune", "field": "continue"}
-            config = replace(config, independent=False, start="scratch", **learning)
+            config = config.going_on()
         self.capture, self.clip, self.config, self.reference = (capture, clip, config, reference)
         self.holdout = sorted(set(holdout))
         self.camera_indices = [c for c in range(len(capture.rig)) if c not in self.holdout]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import MISSING, asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from typing import Any, NamedTuple
 
 from engine.errors import ProjectError
@@ -200,6 +200,11 @@ class TrainConfig:
         """Only the values that differ from the defaults."""
         default = TrainConfig()
         return {name: value for name, value in asdict(self).items() if value != getattr(default, name)}
+
+    def going_on(self) -> TrainConfig:
+        """Settings of a clip with start=previous: those of a source clip, and everything inherited learns."""
+        learning = {"inherit": "trainable", "decoder": "finetune", "field": "continue"}
+        return replace(self, independent=False, start="scratch", **learning)
 
     def n_static_steps(self, n_cameras: int) -> int:
         """Steps of the static phase for this many training cameras."""

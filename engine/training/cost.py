@@ -36,7 +36,7 @@ _START_S = {True: 1.2, False: 2.0}
 """Imports, kernels loaded from the cache, by whether it is a source clip."""
 _CARVE_S = 1.6
 _CAMERA_S = 0.38
-"""Of a camera of a reference clip: features, depth sweep, fusion. They work at a size of their own."""
+"""Of a camera where static anchors are built: features, depth sweep, fusion. They work at a size of their own."""
 _BACKGROUND_FRAME_S, _BACKGROUND_PIXEL_S = 3.5e-3, 5e-9
 _PICTURE_S = 3e-3
 _PICTURE_PIXEL_S = {True: 13e-9, False: 45e-9}
@@ -51,6 +51,8 @@ CACHE_MB = 537.0
 # storage
 _REFERENCE_VALUE_BYTES, _SOURCE_VALUE_BYTES = 1.6, 0.54
 """Of a stored value of an anchor, position, colour and presence included."""
+_HEADS_BYTES = 2
+"""Of a weight of the heads, where the clip has its own."""
 _ANCHOR_VALUES = 9
 """Values of an anchor beside its feature."""
 _FIELD_BYTES, _TABLE_VALUE_BYTES = 80e3, 0.2
@@ -77,6 +79,8 @@ class ClipSizes:
         n_products: Multiply-adds of the heads of one anchor.
         is_source: Whether the clip inherits: there is one phase, and preparation is short.
         is_frozen: Whether static anchors and heads are kept as they are, as in a source clip.
+        owns_static: Whether static anchors are the clip's own to store: in a reference clip, or where they learn on.
+        is_built: Whether they are built from the clip's own depth maps.
         has_gate: Whether static anchors stay out of the field; else every anchor is alive at every time.
         has_active_tiles: Whether only active tiles are drawn.
     """
@@ -94,6 +98,8 @@ class ClipSizes:
     n_products: int
     is_source: bool
     is_frozen: bool
+    owns_static: bool
+    is_built: bool
     has_gate: bool
     has_active_tiles: bool
 
@@ -138,12 +144,12 @@ def preparation_s(sizes: ClipSizes) -> float:
     is_source = sizes.is_source
     seconds = _START_S[is_source] + _CARVE_S
     seconds += sizes.n_pictures * (_PICTURE_S + sizes.n_pixels * _PICTURE_PIXEL_S[is_source])
-    if is_source:
+    if sizes.is_built:
+        seconds += sizes.n_cameras * _CAMERA_S
+    if is_source:  # the backgrounds are there
         return seconds
     n_frames = sizes.n_cameras * sizes.n_background_frames
-    return (
-        seconds + sizes.n_cameras * _CAMERA_S + n_frames * (_BACKGROUND_FRAME_S + sizes.n_pixels * _BACKGROUND_PIXEL_S)
-    )
+    return seconds + n_frames * (_BACKGROUND_FRAME_S + sizes.n_pixels * _BACKGROUND_PIXEL_S)
 
 
 def memory_mb(sizes: ClipSizes) -> float:
@@ -157,19 +163,17 @@ def memory_mb(sizes: ClipSizes) -> float:
 
 def checkpoint_mb(sizes: ClipSizes) -> float:
     """What a training keeps to go on from, 10^6 bytes: parameters with two moments each, and the backgrounds."""
-    learning = sizes.n_moving + (0 if sizes.is_frozen else sizes.n_static)
+    learning = sizes.n_moving + (sizes.n_static if sizes.owns_static else 0)
     n_values = learning * (sizes.feature_dim + 6) + sizes.n_table_values
     return (12 * n_values + 3.125 * sizes.n_cameras * sizes.n_pixels) / 1e6
 
 
 def disk_mb(sizes: ClipSizes) -> float:
     """The finished clip as it is stored, 10^6 bytes."""
-    n_bytes = _NOTHING_BYTES
-    values = sizes.feature_dim + _ANCHOR_VALUES
-    if sizes.is_frozen:
-        n_bytes += sizes.n_moving * values * _SOURCE_VALUE_BYTES
-    else:
-        n_bytes += (sizes.n_static + sizes.n_moving) * values * _REFERENCE_VALUE_BYTES + 2 * sizes.n_products
+    n_values = (sizes.n_moving + (sizes.n_static if sizes.owns_static else 0)) * (sizes.feature_dim + _ANCHOR_VALUES)
+    n_bytes = _NOTHING_BYTES + n_values * (_SOURCE_VALUE_BYTES if sizes.is_source else _REFERENCE_VALUE_BYTES)
+    if not sizes.is_frozen:
+        n_bytes += _HEADS_BYTES * sizes.n_products
     if sizes.n_table_values:
         n_bytes += _FIELD_BYTES + sizes.n_table_values * _TABLE_VALUE_BYTES
     return n_bytes / 1e6

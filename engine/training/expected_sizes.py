@@ -25,6 +25,8 @@ _ALIVE_PER_PIXEL, _NEW_PER_FRAME, _MOVING_FILL = 0.035, 0.29, 0.84
 """Moving anchors alive in one frame per pixel; share of them that each further frame adds; how full a limit becomes."""
 _OWN_SHARE, _ALIVE_SHARE = 0.5, 1.2
 """Of a source clip against the reference clip's moving anchors: its own ones, and those alive in one frame."""
+_INHERITED_ALIVE_SHARE = 0.6
+"""Likewise of those alive, where it has none of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +139,10 @@ def expected_counts(
             share = {"dedup": _OWN_SHARE, "none": 0.0, "full": 1.0}[
                 config.residual if config.inherit != "off" else "full"
             ]
-            n_moving, n_alive = round(known.n_moving * share), round(known.n_alive * _ALIVE_SHARE)
+            n_moving, n_alive = (
+                round(known.n_moving * share),
+                round(known.n_alive * (_ALIVE_SHARE if share else _INHERITED_ALIVE_SHARE)),
+            )
     return Counts(n_static, n_moving, n_alive, _expected_table_values(clip, config, n_alive))
 
 
@@ -181,6 +186,8 @@ def clip_sizes(footage: Footage, clip: Clip, config: TrainConfig, counts: Counts
         ),
         is_source=is_source,
         is_frozen=is_frozen,
+        owns_static=not is_source or config.inherit != "frozen",
+        is_built=not is_source or config.inherit == "off",
         has_gate=config.gate == "hull",
         has_active_tiles=is_frozen and config.tiles == "active" and config.gate == "hull",
     )

@@ -28,12 +28,13 @@ class MeasuredClip:
     """A trained clip of the same project, and what it took; None where that was not recorded.
 
     Attributes:
+        is_source: Whether it began with what another clip had learned.
         n_frames, n_steps: As trained.
         preparation_s: Without compiling kernels.
     """
 
     clip_index: int
-    role: str
+    is_source: bool
     n_frames: int
     n_steps: int
     counts: Counts | None
@@ -41,11 +42,6 @@ class MeasuredClip:
     training_s: float | None
     memory_mb: float | None
     disk_mb: float | None
-
-    @property
-    def is_source(self) -> bool:
-        """Whether it inherited."""
-        return self.role == "source"
 
 
 def measured_clip(header: Mapping[str, Any], *, disk_mb: float | None, uncounted_s: float = 0.0) -> MeasuredClip | None:
@@ -64,7 +60,7 @@ def measured_clip(header: Mapping[str, Any], *, disk_mb: float | None, uncounted
     try:
         return MeasuredClip(
             clip_index=int(header["clip_index"]),
-            role=str(header["role"]),
+            is_source=header["role"] == "source" or "previous_fingerprint" in header,
             n_frames=int(header["n_frames"]),
             n_steps=int(header["step"]),
             counts=counts_of(header),
@@ -186,6 +182,8 @@ def _correction(
         if measured and modelled > 0:
             ratios[work.taken.is_source].append((work.taken.clip_index, measured / modelled))
     same, other = ratios[sizes.is_source], ratios[not sizes.is_source]
+    if name == "disk_mb":  # what a clip of the other kind stores, and with how many bits, says nothing
+        other = []
     if not (same or other):
         return None
     factor = statistics.median(ratio for _, ratio in same or other)

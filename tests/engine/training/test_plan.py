@@ -156,6 +156,28 @@ def test_ablations_of_a_source_clip():
         assert lines(**settings)[1].training_s.value > default.training_s.value
 
 
+def test_clips_that_store_and_build_more_cost_more():
+    def planned(**settings):
+        return plan(clip=NEXT, is_source=True, reference=header(), config=TrainConfig(**settings))
+
+    default, own, learning = planned(), planned(inherit="off"), planned(inherit="trainable")
+    assert own.preparation_s.value > default.preparation_s.value + 5  # depth maps of 27 cameras
+    assert learning.preparation_s.value == default.preparation_s.value
+    assert min(own.disk_mb.value, learning.disk_mb.value) > 1.3 * default.disk_mb.value
+    heads = planned(decoder="new").disk_mb.value - default.disk_mb.value
+    assert 0.01 < heads < 0.05
+
+
+def test_a_clip_that_goes_on_from_the_one_before_is_of_the_short_kind():
+    on = TrainConfig(independent=True, start="previous").going_on()
+    found = plan(clip=NEXT, is_source=True, reference=header(), config=on)
+    assert [line.name for line in found.lines if line.name.endswith("steps")] == ["source steps"]
+    assert "they go on learning" in texts(found)["static anchors"][1]
+    before = measured(clip_index=2, previous_fingerprint="0")
+    assert before.is_source
+    assert not measured().is_source
+
+
 def test_a_plan_is_json():
     document = json.loads(json.dumps(plan().as_dict()))
     assert document["forecast"].keys() == {"preparation_s", "training_s", "memory_mb", "disk_mb"}
@@ -236,6 +258,7 @@ def test_a_clip_of_the_other_kind_corrects_within_bounds():
         assert found.training_s.value / plain.training_s.value == pytest.approx(bound, rel=0.1)
         assert "of the other kind" in found.training_s.reason
     assert found.preparation_s.value == plain.preparation_s.value  # not recorded
+    assert found.disk_mb == plain.disk_mb  # the other kind says nothing about that
 
 
 def test_the_clip_itself_does_not_count():
