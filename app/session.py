@@ -42,7 +42,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.capture.rig import CameraRig
 from engine.errors import EngineError
-from engine.training.forecasting import UNKNOWN_MACHINE, MachineSpeed
+from engine.training.forecasting import UNKNOWN_MACHINE
 from engine.training.plan import TrainingPlan
 from engine.training.presets import preset
 
@@ -61,13 +61,18 @@ class PointsRequest:
 
 @dataclass(frozen=True, slots=True)
 class PlanRequest:
-    """The next clip, to be planned. `basis` names what the plan depends on: settings, and which clips are trained."""
+    """The next clip, to be planned.
+
+    Attributes:
+        basis: What the plan depends on: settings, and which clips are trained.
+        can_measure: Whether nothing else computes, so that the machine may be timed.
+    """
 
     clip: Clip
     basis: tuple[str, ...]
+    can_measure: bool
     project: Project = field(compare=False)
     capture: Capture = field(compare=False)
-    measure_machine: Callable[[], MachineSpeed] = field(compare=False)
 
 
 class Session:
@@ -120,7 +125,6 @@ class Session:
         self._pictures = CapturedPictures()
         self._points: LatestWorker[PointsRequest, PointArrays] = LatestWorker("points", _compute_points)
         self._plans: LatestWorker[PlanRequest, TrainingPlan | None] = LatestWorker("plans", _compute_plan)
-        self._measure_machine = known_machine_speed if is_preloading else lambda: UNKNOWN_MACHINE
         self._unread: SnapshotWritten | None = None
         self._anchor_counts: dict[int, tuple[int, int]] = {}
         self._seen: tuple[object, ...] = ()
@@ -459,11 +463,15 @@ class Session:
         clip = service.clips[clip_index]
         trained = (f"{i}: {known.revision}" for i, known in enumerate(service.progress) if known.state == "trained")
         basis = (repr(project.settings), *trained)
-        request = PlanRequest(clip, basis, project, capture, self._measure_machine)
-        newest = self._plans.newest
-        plan = newest[1] if newest is not None and newest[0] == request else None
+        request = PlanRequest(clip, basis, self._is_preloading and not self.jobs, project, capture)
+        newest, plan = self._plans.newest, None
         if newest is None or newest[0] != request:
             self._plans.request(request)
+        if newest is not None and (newest[0].clip, newest[0].basis) == (
+            clip,
+            basis,
+        ):  # shown until the machine is timed
+            plan = newest[1]
         can_edit = project.is_writable and not project.has_progress
         return plan_status(project, capture, clip, plan, can_edit=can_edit)
 
@@ -477,8 +485,9 @@ class Session:
         if self.project is not None:
             self.project.close()
         self._jobs.close(timeout_s=6.0 if self._closing else 1.0)
-        for worker in (self._playback, self._renderer, self._pictures, self._points, self._plans):
+        for worker in (self._playback, self._renderer, self._pictures, self._points):
             worker.close()
+        self._plans.close(timeout_s=0.2)  # it may be waiting for a child process that times the machine
         if self.capture is not None:
             self.capture.close()
 
@@ -582,8 +591,9 @@ def _compute_points(request: PointsRequest) -> PointArrays:
 
 
 def _compute_plan(request: PlanRequest) -> TrainingPlan | None:
+    measure = known_machine_speed if request.can_measure else lambda: UNKNOWN_MACHINE
     try:
-        return plan_clip(request.project, request.capture, request.clip, measure_machine=request.measure_machine)
+        return plan_clip(request.project, request.capture, request.clip, measure_machine=measure)
     except EngineError as error:  # training will say the same
         logger.info("the next clip cannot be planned: %s", error)
         return None

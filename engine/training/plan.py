@@ -144,6 +144,7 @@ def make_plan(
     lines = [
         *_picture_lines(footage, clip, config, is_source=is_source),
         *phases,
+        _voxel_line(reference, is_source=is_source),
         *_anchor_lines(config, counts, known, n_siblings=len(siblings), is_source=is_source),
         *_model_lines(config, counts, is_source=is_source),
         PlanLine("kept while training", checkpoint_mb(sizes), "MB", "a checkpoint to go on from; it goes in the end"),
@@ -218,6 +219,18 @@ def _step_reason(given: int, passes: float, rule: StepRule, n_items: int, item: 
     elif asked > rule.highest:
         bound = f", at most {rule.highest:,}"
     return f"{rule.per_item} for each of {_plural(n_items, item)}{bound}"
+
+
+def _voxel_line(reference: Mapping[str, Any] | None, *, is_source: bool) -> PlanLine:
+    """The grid on which what moves is carved."""
+    known = None if reference is None else reference.get("moving_spacing")
+    if is_source and isinstance(known, int | float):
+        return PlanLine("voxel", float(known), "units", "the reference clip's: the same place gives the same anchors")
+    if is_source:
+        return PlanLine("voxel", "inherited", "", "the reference clip's: the same place gives the same anchors")
+    return PlanLine(
+        "voxel", "derived", "", "as fine as pixels are at that distance, coarser where the limits below ask"
+    )
 
 
 def _anchor_lines(

@@ -35,6 +35,7 @@ def header(**changes) -> dict:
         "step": 6210,
         "n_anchors": {"static": 20621, "moving": 26923},
         "n_alive": 7235,
+        "moving_spacing": 0.02855,
         "field": {
             "is_shared": True,
             "n_knots": 10,
@@ -75,6 +76,7 @@ def test_a_reference_clip():
     assert lines["background frames"] == (40, "of every camera, all there are")
     assert lines["static steps"] == (810, "30 for each of 27 backgrounds")
     assert lines["joint steps"] == (5400, "20 for each of 270 pictures")
+    assert lines["voxel"][0] == "derived"
     assert "22,000" in lines["static anchors"][1]
     assert "tiles" not in lines
     assert "early stop" not in lines
@@ -88,6 +90,7 @@ def test_a_source_clip_counts_what_the_reference_has():
     assert lines["static anchors"] == (20621, "kept as they are; counted in the reference clip")
     assert lines["Gaussians per anchor"] == (5, "the reference clip's")
     assert lines["tiles"][0] == "active"
+    assert lines["voxel"] == (0.02855, "the reference clip's: the same place gives the same anchors")
     assert "background frames" not in lines
 
 
