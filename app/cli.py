@@ -29,6 +29,7 @@ from app.arguments import (
     parse_range,
 )
 from app.bench.command import CHART_FILE, bench
+from app.bench.speed import known_machine_speed
 from app.evaluation_command import evaluate
 from app.gate_command import add_gate_arguments, gate
 from app.headless import (
@@ -38,10 +39,12 @@ from app.headless import (
     train_document,
 )
 from app.logs import start_logging
-from app.progress import ProgressLine, row_progress
+from app.planning import plan_clip, plan_document, plan_text, totals
+from app.progress import ProgressLine, duration_text, row_progress
 from app.project import (
     PROJECT_FILE,
     Project,
+    ProjectSettings,
     check_settings,
     create_project,
     default_settings,
@@ -50,7 +53,7 @@ from app.project import (
 )
 from app.report.command import report
 from app.results import check_writable
-from app.training.lines import show_event, show_outcome, show_status
+from app.training.lines import PlanLines, show_event, show_outcome, show_status
 from app.training.process import ProcessWorker
 from app.training.service import Launch, TrainingService
 from engine.capture.capture import Capture, open_capture
@@ -76,7 +79,10 @@ def build_parser() -> argparse.ArgumentParser:
     add_training_settings(train)
     train.add_argument("--seed", type=int, help="fixes initial values and order of pictures (default: 0)")
     train.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
-    train.add_argument("--json", action="store_true", help="print the outcome as JSON on standard output")
+    train.add_argument(
+        "--plan", action="store_true", help="say what would be trained, why, and what it takes; train nothing"
+    )
+    train.add_argument("--json", action="store_true", help="print the outcome, or the plan, as JSON on standard output")
     train.add_argument("--quiet", action="store_true", help="no progress")
 
     eval_parser = commands.add_parser("eval", help="measure trained clips", description="Measure trained clips.")
@@ -241,6 +247,31 @@ def _terminating_like_ctrl_c() -> Iterator[None]:
 
 def _open_for_training(options: argparse.Namespace) -> tuple[Project, Capture]:
     """The project of the arguments, made or opened; what was given has to agree with what is there."""
+    settings, stored, capture = _chosen_settings(options)
+    if stored is None:
+        return create_project(options.project, settings), capture
+    project = open_project(options.project)
+    try:
+        _check_changes(options, project, settings)
+    except ProjectError:
+        project.close()
+        raise
+    if settings != stored:
+        project.update(settings)
+    return project, capture
+
+
+def _project_to_plan(options: argparse.Namespace) -> tuple[Project, Capture]:
+    """Likewise, for looking only: nothing is made, changed or locked."""
+    settings, stored, capture = _chosen_settings(options)
+    project = Project(options.project, settings, None)
+    if stored is not None:
+        _check_changes(options, Project(options.project, stored, None), settings)
+    return project, capture
+
+
+def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, ProjectSettings | None, Capture]:
+    """Settings that the arguments ask for, those of the project where there is one, and the capture."""
     overrides = overrides_of(options)
     exists = (options.project / PROJECT_FILE).is_file()
     stored = read_settings(options.project) if exists else None
@@ -258,7 +289,7 @@ def _open_for_training(options: argparse.Namespace) -> tuple[Project, Capture]:
         )
         n_clips = len(settings.clips(capture.n_frames))
         parse_range(options.clips, n_clips, option="--clips", what="clips")  # said before the folder is made
-        return create_project(options.project, settings), capture
+        return settings, None, capture
     given = {
         "scale": options.scale,
         "clip_length": options.clip_length,
@@ -266,35 +297,62 @@ def _open_for_training(options: argparse.Namespace) -> tuple[Project, Capture]:
         "holdout": holdout,
         "reference_clip": options.reference_clip,
     }
-    changes: dict[str, Any] = {
-        name: value for name, value in given.items() if value is not None and value != getattr(stored, name)
-    }
-    if stored.overrides | overrides != stored.overrides:
-        changes["overrides"] = stored.overrides | overrides
+    changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     if capture.fingerprint != stored.fingerprint:
         raise ProjectError(
             "The project was made for another capture.", hint="Choose another --project folder.", path=options.project
         )
-    changed = replace(stored, **changes)
-    check_settings(changed, capture)
-    project = open_project(options.project)
-    if changes and project.has_progress:
-        project.close()
-        listed = ", ".join(f"{name} {getattr(stored, name)!r}" for name in changes)
+    place = str(Path(capture.path).resolve())  # the capture may have moved
+    settings = replace(stored, **changes, overrides=stored.overrides | overrides, capture=place)
+    check_settings(settings, capture)
+    return settings, stored, capture
+
+
+def _check_changes(options: argparse.Namespace, project: Project, settings: ProjectSettings) -> None:
+    """See that nothing was learned with other settings."""
+    stored = project.settings
+    names = ("scale", "clip_length", "seed", "holdout", "reference_clip", "overrides")
+    changed = [name for name in names if getattr(settings, name) != getattr(stored, name)]
+    if changed and project.has_progress:
+        listed = ", ".join(f"{name} {getattr(stored, name)!r}" for name in changed)
         raise ProjectError(
             f"The project was trained with {listed}; that cannot change any more.",
             hint="Leave the option out, or choose another --project folder.",
             path=options.project,
         )
-    if changes or stored.capture != str(Path(capture.path).resolve()):  # the capture may have moved
-        project.update(replace(changed, capture=str(Path(capture.path).resolve())))
-    return project, capture
 
 
 # ---------------------------------------------------------------- commands
 
 
+def _plan(options: argparse.Namespace) -> int:
+    project, capture = _project_to_plan(options)
+    clips = project.clips(capture.n_frames)
+    chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
+    order = [i for i in project.training_order(len(clips)) if i in chosen]
+    trained = [clip_index for clip_index in order if project.is_trained(clip_index)]
+    plans = [
+        plan_clip(project, capture, clips[i], measure_machine=known_machine_speed) for i in order if i not in trained
+    ]
+    if options.json:
+        print(json.dumps(plan_document(project, capture, plans, trained), indent=2))
+        return EXIT_OK
+    for plan in plans:
+        print("\n".join(plan_text(plan)))
+    if trained:
+        print(f"Trained already: clip {', '.join(str(clip_index) for clip_index in trained)}")
+    if len(plans) > 1:
+        sums = totals(plans)
+        print(
+            f"All {len(plans)} clips: about {duration_text(sums['preparation_s'] + sums['training_s'])}, "
+            f"at most {sums['memory_mb'] / 1e3:.1f} GB of memory, {sums['disk_mb']:.2g} MB stored"
+        )
+    return EXIT_OK
+
+
 def _train(options: argparse.Namespace, launch: Launch) -> int:
+    if options.plan:
+        return _plan(options)
     was_folder, was_project = options.project.exists(), (options.project / PROJECT_FILE).is_file()
     project, capture = _open_for_training(options)
     is_refused = False
@@ -311,12 +369,14 @@ def _train(options: argparse.Namespace, launch: Launch) -> int:
             f"clips {chosen.start} to {chosen.stop - 1} of {len(clips)}"
         )
         first = project.settings.reference_clip  # the others cannot begin before it
+        plans = PlanLines(line, project, capture, measure_machine=known_machine_speed, is_quiet=options.quiet)
         outcomes = train_clips(
             service,
             sorted(chosen, key=lambda clip_index: clip_index != first),
+            on_begin=lambda clip_index: plans.begin(clips[clip_index]),
             on_status=lambda status: show_status(line, status),
             on_event=lambda event: show_event(line, event),
-            on_outcome=lambda outcome: show_outcome(line, outcome),
+            on_outcome=lambda outcome: (show_outcome(line, outcome), plans.end(outcome)),
         )
         is_refused = outcomes[-1].kind in BAD_INPUT_KINDS
         line.finish()

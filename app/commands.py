@@ -100,6 +100,21 @@ class SetClipLength:
 
 
 @dataclass(frozen=True, slots=True)
+class SetTrainSetting:
+    """One setting of engine.training.config by its name. Only before the first clip is trained."""
+
+    name: str
+    value: int | float | str | bool
+
+
+@dataclass(frozen=True, slots=True)
+class SetPreset:
+    """Training settings of a preset in place of all that were set. Only before the first clip is trained."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
 class HomeView:
     """Frame the point that the cameras look at."""
 
@@ -126,6 +141,8 @@ Command = (
     | ToggleOverlay
     | SetHoldout
     | SetClipLength
+    | SetTrainSetting
+    | SetPreset
     | HomeView
     | DismissNotice
 )

@@ -59,11 +59,18 @@ def train_clips(
     *,
     on_status: Callable[[TrainingStatus], None],
     on_event: Callable[[Event], None],
-    on_outcome: Callable[[ClipOutcome], None],
+    on_outcome: Callable[[ClipOutcome], object],
+    on_begin: Callable[[int], None] = lambda clip_index: None,
     sleep: Callable[[float], None] = time.sleep,
 ) -> list[ClipOutcome]:
     """Train clips one after another; a failure ends it. KeyboardInterrupt stops, keeps and is raised again.
 
+    Args:
+        service: Queue and worker of the project.
+        clip_indices: In order.
+        on_status, on_event, on_outcome: Told how it goes.
+        on_begin: Told the index of each clip before it is trained; not of those that are trained already.
+        sleep: Waits some seconds between looks.
     Raises:
         ProjectError: A clip cannot be trained, for instance because its reference is not.
         KeyboardInterrupt: After the worker has ended and its checkpoint is written.
@@ -74,6 +81,7 @@ def train_clips(
         if known.state == "trained":
             outcome = ClipOutcome(clip_index, "skipped", known.step, known.held_out_psnr)
         else:
+            on_begin(clip_index)
             outcome = _train_clip(service, clip_index, on_status, on_event, sleep)
         outcomes.append(outcome)
         on_outcome(outcome)

@@ -8,20 +8,23 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from app import commands
 from app.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
+from app.bench.speed import known_machine_speed
 from app.jobs import Job, JobContext, Jobs
 from app.latest import LatestWorker
 from app.notices import Notices
 from app.opening import Opened, open_for_window
 from app.pictures import CapturedPictures
+from app.planning import plan_clip, plan_status
 from app.playback import FrameRequest, Playback, ShownFrame, static_points
 from app.preview import make_cloud, picture_hint, read_cloud
 from app.project import Project, check_settings
 from app.render import Renderer
 from app.settings import Settings
-from app.status import COMPARE_MODES, OVERLAY_NAMES, ClipStatus, JobStatus, Overlays, TrainingStatus
+from app.status import COMPARE_MODES, OVERLAY_NAMES, ClipStatus, JobStatus, Overlays, PlanStatus, TrainingStatus
 from app.timeline import Timeline
 from app.training.messages import (
     ClipTrained,
@@ -39,6 +42,9 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.capture.rig import CameraRig
 from engine.errors import EngineError
+from engine.training.forecasting import UNKNOWN_MACHINE
+from engine.training.plan import TrainingPlan
+from engine.training.presets import preset
 
 logger = logging.getLogger(__name__)
 
@@ -53,13 +59,30 @@ class PointsRequest:
     capture: Capture | None = field(default=None, compare=False)
 
 
+@dataclass(frozen=True, slots=True)
+class PlanRequest:
+    """The next clip, to be planned.
+
+    Attributes:
+        basis: What the plan depends on: settings, and which clips are trained.
+        can_measure: Whether nothing else computes, so that the machine may be timed.
+    """
+
+    clip: Clip
+    basis: tuple[str, ...]
+    can_measure: bool
+    project: Project = field(compare=False)
+    capture: Capture = field(compare=False)
+
+
 class Session:
     """Everything the program knows while it runs.
 
     Attributes:
         capture, project: What is open; None before.
         timeline, view, overlays: What the user looks at; the window may change them directly.
-        training, clip_states: Status values, remade by `poll` and `dispatch`.
+        training, clip_states, plan: Status values, remade by `poll` and `dispatch`. The plan is that of the next clip;
+            None while something trains or nothing is left to train.
         notices: What the user has to know.
         holdout: Camera indices that training never sees.
 
@@ -91,6 +114,7 @@ class Session:
         self.settings = Settings() if settings is None else settings
         self.training = TrainingStatus()
         self.clip_states: list[ClipStatus] = []
+        self.plan: PlanStatus | None = None
         self.holdout: tuple[int, ...] = ()
         self._project_dir, self._launch, self._opener = project_dir, launch, opener
         self._service: TrainingService | None = None
@@ -100,6 +124,7 @@ class Session:
         self._renderer = Renderer()
         self._pictures = CapturedPictures()
         self._points: LatestWorker[PointsRequest, PointArrays] = LatestWorker("points", _compute_points)
+        self._plans: LatestWorker[PlanRequest, TrainingPlan | None] = LatestWorker("plans", _compute_plan)
         self._unread: SnapshotWritten | None = None
         self._anchor_counts: dict[int, tuple[int, int]] = {}
         self._seen: tuple[object, ...] = ()
@@ -175,6 +200,10 @@ class Session:
                 self._set_holdout(camera_indices)
             case commands.SetClipLength(n_frames=n_frames):
                 self._change_settings(clip_length=int(n_frames))
+            case commands.SetTrainSetting(name=name, value=value):
+                self._change_overrides(lambda overrides: overrides | {name: value})
+            case commands.SetPreset(name=name):
+                self._change_overrides(lambda _: preset(name))
             case commands.HomeView():
                 self.view.home()
             case commands.DismissNotice(index=index):
@@ -200,6 +229,12 @@ class Session:
             chosen = tuple(names[index] for index in sorted(set(camera_indices)) if 0 <= index < len(names))
             self._change_settings(holdout=chosen)
 
+    def _change_overrides(self, change: Callable[[dict[str, Any]], dict[str, Any]]) -> None:
+        """Replace the training settings; only those that differ from the defaults are kept."""
+        if self.project is not None:
+            wanted = replace(self.project.settings, overrides=change(dict(self.project.settings.overrides)))
+            self._change_settings(overrides=wanted.config().difference())
+
     def _change_settings(self, **changes: object) -> None:
         """Replace settings that every clip shares; only while nothing was learned with the old ones."""
         if self.capture is None or self.project is None or self._service is None:
@@ -207,7 +242,7 @@ class Session:
         if self.project.has_progress or self._service.worker is not None:
             self.notices.add(
                 "warn",
-                "Clip length and held-out cameras are fixed once training has begun",
+                "What all clips share is fixed once training has begun",
                 "What was learned with them would be worthless.",
                 "Use another project folder for other values.",
             )
@@ -280,6 +315,7 @@ class Session:
         for store in (self._playback, self._renderer, self._pictures):
             store.clear()
         self._points.forget()
+        self._plans.forget()
         if self._first_cloud is not None:
             self._first_cloud.context.cancel()
         self._unread, self._anchor_counts = None, {}
@@ -321,7 +357,7 @@ class Session:
 
     def _finished_keys(self) -> tuple[object, ...]:
         workers = (self._playback.worker, self._renderer.worker, self._pictures.viewing, self._pictures.thumbnails)
-        newest = [worker.newest for worker in workers] + [self._points.newest]
+        newest = [worker.newest for worker in workers] + [self._points.newest, self._plans.newest]
         statuses = [(job.name, job.done, job.message) for job in self.jobs]
         return (*(None if found is None else found[0] for found in newest), *statuses, self.notices.revision)
 
@@ -406,7 +442,7 @@ class Session:
     def _refresh(self) -> None:
         """Remake the status values."""
         if self._service is None:
-            self.training, self.clip_states = TrainingStatus(), []
+            self.training, self.clip_states, self.plan = TrainingStatus(), [], None
             return
         clip = self.timeline.clip
         if clip is not None:
@@ -417,6 +453,27 @@ class Session:
                 self._anchor_counts[clip.clip_index] = counts
         self.training = self._service.status(None if clip is None else clip.clip_index)
         self.clip_states = self._service.clip_statuses(self._anchor_counts)
+        self.plan = self._next_plan(self._service)
+
+    def _next_plan(self, service: TrainingService) -> PlanStatus | None:
+        """What the next clip would take; its figures come a moment later, from a thread."""
+        project, capture, clip_index = self.project, self.capture, service.next_clip_index
+        if project is None or capture is None or clip_index is None or service.worker is not None:
+            return None
+        clip = service.clips[clip_index]
+        trained = (f"{i}: {known.revision}" for i, known in enumerate(service.progress) if known.state == "trained")
+        basis = (repr(project.settings), *trained)
+        request = PlanRequest(clip, basis, self._is_preloading and not self.jobs, project, capture)
+        newest, plan = self._plans.newest, None
+        if newest is None or newest[0] != request:
+            self._plans.request(request)
+        if newest is not None and (newest[0].clip, newest[0].basis) == (
+            clip,
+            basis,
+        ):  # shown until the machine is timed
+            plan = newest[1]
+        can_edit = project.is_writable and not project.has_progress
+        return plan_status(project, capture, clip, plan, can_edit=can_edit)
 
     def close(self) -> None:
         """End workers and threads, keeping what was learned. Blocks for a few seconds at most. May be called twice."""
@@ -430,6 +487,7 @@ class Session:
         self._jobs.close(timeout_s=6.0 if self._closing else 1.0)
         for worker in (self._playback, self._renderer, self._pictures, self._points):
             worker.close()
+        self._plans.close(timeout_s=0.2)  # it may be waiting for a child process that times the machine
         if self.capture is not None:
             self.capture.close()
 
@@ -518,6 +576,8 @@ _TITLES: dict[type, str] = {
     commands.TrainNextClip: "The clip cannot be trained",
     commands.SetHoldout: "These cameras cannot be held out",
     commands.SetClipLength: "The clip length cannot be changed",
+    commands.SetTrainSetting: "The setting cannot be changed",
+    commands.SetPreset: "The preset cannot be taken",
 }
 
 
@@ -528,6 +588,15 @@ def _compute_points(request: PointsRequest) -> PointArrays:
         return static_points(request.path, request.revision)
     assert request.capture is not None
     return picture_hint(request.capture, 0)
+
+
+def _compute_plan(request: PlanRequest) -> TrainingPlan | None:
+    measure = known_machine_speed if request.can_measure else lambda: UNKNOWN_MACHINE
+    try:
+        return plan_clip(request.project, request.capture, request.clip, measure_machine=measure)
+    except EngineError as error:  # training will say the same
+        logger.info("the next clip cannot be planned: %s", error)
+        return None
 
 
 def _exit_words(exit_code: int | None) -> str:

@@ -86,6 +86,44 @@ class ClipStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class SettingStatus:
+    """A training setting that the user may change before the first clip is trained.
+
+    Attributes:
+        name: In TrainConfig.
+        value: What it is, or is derived to be.
+        is_set: Whether the user has set it; else it is derived or the default.
+    """
+
+    name: str
+    label: str
+    value: int
+    is_set: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PlanStatus:
+    """What training the next clip would do and take, while nothing trains.
+
+    Attributes:
+        summary: Steps, time, memory and disk in one line; empty until they are known.
+        lines: Name, value and reason of everything that is known.
+        presets: Names to choose from.
+        preset: The one that the settings begin with.
+        settings: The main ones.
+        can_edit: Whether they may still change: nothing was learned with them.
+    """
+
+    clip_index: int
+    summary: str = ""
+    lines: tuple[tuple[str, str, str], ...] = ()
+    presets: tuple[str, ...] = ()
+    preset: str = ""
+    settings: tuple[SettingStatus, ...] = ()
+    can_edit: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class JobStatus:
     """A short job on a thread.
 

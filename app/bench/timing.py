@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import multiprocessing
 import statistics
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
+
+from app.memory import peak_bytes
 
 MEMORY_TIMEOUT_S = 120.0
 
@@ -48,21 +49,22 @@ def interleaved(
     return {name: [Timing.of(stage_ms) for stage_ms in zip(*rows, strict=True)] for name, rows in runs.items()}
 
 
-def peak_extra_mb(prepare: Callable[..., Callable[[], object]], *arguments: Any) -> float | None:
-    """How far a call pushes the memory of a fresh process beyond what it held before, MB. None if that fails.
+def in_fresh_process(call: Callable[..., float], *arguments: Any, timeout_s: float) -> float | None:
+    """What a call returns in a process of its own; None if it fails or takes too long.
 
     Args:
-        prepare: Importable function that makes everything ready, warms kernels up and returns the call to measure.
+        call: Importable function that returns a number.
         arguments: Its arguments.
+        timeout_s: The process is ended after that.
     """
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=_measure_memory, args=(theirs, prepare, arguments), daemon=True)
+    process = context.Process(target=_send_result, args=(theirs, call, arguments), daemon=True)
     process.start()
     theirs.close()
     try:
         with suppress(EOFError, OSError):
-            if ours.poll(MEMORY_TIMEOUT_S):
+            if ours.poll(timeout_s):
                 return float(ours.recv_bytes())
         return None
     finally:
@@ -71,29 +73,24 @@ def peak_extra_mb(prepare: Callable[..., Callable[[], object]], *arguments: Any)
         ours.close()
 
 
-def _measure_memory(pipe: Connection, prepare: Callable[..., Callable[[], object]], arguments: tuple[Any, ...]) -> None:
-    call = prepare(*arguments)
-    before = _peak_bytes(is_reset=True)
-    kept = call()  # alive until the peak is read
-    extra = _peak_bytes() - before
-    del kept
-    pipe.send_bytes(str(max(extra, 0) / 2**20).encode())
+def _send_result(pipe: Connection, call: Callable[..., float], arguments: tuple[Any, ...]) -> None:
+    pipe.send_bytes(str(call(*arguments)).encode())
 
 
-def _peak_bytes(*, is_reset: bool = False) -> int:
-    """Most memory this process ever held, bytes; since now if it can be reset.
+def peak_extra_mb(prepare: Callable[..., Callable[[], object]], *arguments: Any) -> float | None:
+    """How far a call pushes the memory of a fresh process beyond what it held before, MB. None if that fails.
 
-    On Linux the kernel's high-water mark of this very process: ru_maxrss begins at the size of the parent.
+    Args:
+        prepare: Importable function that makes everything ready, warms kernels up and returns the call to measure.
+        arguments: Its arguments.
     """
-    if sys.platform == "linux":
-        if is_reset:
-            with suppress(OSError), open("/proc/self/clear_refs", "w", encoding="ascii") as file:
-                file.write("5")
-        with suppress(OSError, ValueError, StopIteration), open("/proc/self/status", encoding="ascii") as file:
-            return next(int(line.split()[1]) * 1024 for line in file if line.startswith("VmHWM"))
-    try:
-        import resource
-    except ImportError:  # Windows
-        raise NotImplementedError("peak memory is not known on this system") from None
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else peak * 1024
+    return in_fresh_process(_extra_mb, prepare, *arguments, timeout_s=MEMORY_TIMEOUT_S)
+
+
+def _extra_mb(prepare: Callable[..., Callable[[], object]], *arguments: Any) -> float:
+    call = prepare(*arguments)
+    before = peak_bytes(is_reset=True)
+    kept = call()  # alive until the peak is read
+    extra = peak_bytes() - before
+    del kept
+    return max(extra, 0) / 2**20

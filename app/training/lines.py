@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from app.headless import ClipOutcome
+from app.planning import begin_text, compared_text, plan_clip
 from app.progress import ProgressLine, duration_text
+from app.project import Project
 from app.status import TrainingStatus
 from app.training.messages import Event, StageReported, WarningRaised
+from engine.capture.capture import Capture
+from engine.capture.clip import Clip
+from engine.errors import EngineError
+from engine.training.forecasting import MachineSpeed
+from engine.training.plan import TrainingPlan
 
 
 def show_status(line: ProgressLine, status: TrainingStatus) -> None:
@@ -45,3 +54,46 @@ def show_outcome(line: ProgressLine, outcome: ClipOutcome) -> None:
     elif outcome.state == "trained":
         took = duration_text(outcome.seconds)
         line.say(f"Clip {outcome.clip_index} is trained: {outcome.step} steps in {took}{figure}")
+
+
+class PlanLines:
+    """Says the plan of each clip before it is trained, and how right its forecast was.
+
+    Args:
+        line: Where to say it.
+        project, capture: What is trained.
+        measure_machine: Asked where no clip of the project says how long training takes.
+        is_quiet: Plan nothing.
+    """
+
+    def __init__(
+        self,
+        line: ProgressLine,
+        project: Project,
+        capture: Capture,
+        *,
+        measure_machine: Callable[[], MachineSpeed],
+        is_quiet: bool,
+    ) -> None:
+        self._line, self._project, self._capture, self._is_quiet = line, project, capture, is_quiet
+        self._measure_machine = measure_machine
+        self._plan: TrainingPlan | None = None
+
+    def begin(self, clip: Clip) -> None:
+        """A clip is about to be trained. A plan that cannot be made is left out: training says why."""
+        self._plan = None
+        if self._is_quiet:
+            return
+        try:
+            self._plan = plan_clip(self._project, self._capture, clip, measure_machine=self._measure_machine)
+        except EngineError:
+            return
+        for text in begin_text(self._plan):
+            self._line.say(text)
+
+    def end(self, outcome: ClipOutcome) -> None:
+        """Its training has ended."""
+        if outcome.state == "trained" and self._plan is not None:
+            text = compared_text(self._plan, self._project)
+            if text:
+                self._line.say(text)

@@ -17,6 +17,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Protocol
 
+from app.memory import peak_bytes
 from app.project import Project, open_project, read_metrics
 from app.training.messages import (
     ClipTrained,
@@ -275,6 +276,8 @@ class TrainingRun:
             metrics["gradient_norm_max"] = max(self._gradient_norms)
         times = self._watch.document()
         metrics |= times
+        with suppress(NotImplementedError):
+            metrics["memory_mb"] = round(peak_bytes() / 1e6, 1)
         self._note({"step": training.steps_done, **times})
         path = self._project.clip_path(self._job.clip_index)
         keep_clip(clip.with_header(metrics=metrics), path, self._project.live_dir)

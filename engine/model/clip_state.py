@@ -35,7 +35,8 @@ class ClipState:
 
     Header keys: schema, role ("reference" or "source"), clip_index, clip_length, n_frames, start, step, n_steps,
     seed, config (difference from defaults), camera_names (of the gains), near_plane, spacing, moving_spacing,
-    fingerprint, reference_fingerprint, field (FieldShape or None); a kept clip adds metrics.
+    n_anchors (per set), n_alive (most moving anchors in one frame), fingerprint, reference_fingerprint,
+    field (FieldShape or None); a kept clip adds metrics.
     """
 
     arrays: dict[str, np.ndarray]

@@ -18,7 +18,8 @@ from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel, decoder_sizes, inherit
 from engine.model.clip_state import ClipState
 from engine.model.decoder import Decoder
-from engine.model.field import FieldShape, SpatioTemporalField, derive_cells, derive_log2_entries
+from engine.model.field import FieldShape, SpatioTemporalField
+from engine.model.field_sizes import derive_cells, derive_log2_entries
 from engine.training.config import TrainConfig
 
 
@@ -157,7 +158,7 @@ def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generato
     Args:
         spacing: Distance between moving anchors, scene units.
     """
-    positions, n_alive = _alive_positions(model)
+    positions, most_alive = _alive_positions(model), n_alive(model)
     if len(positions) == 0:
         return "no field: nothing moves in this clip"
     # percentiles, so that one stray point does not stretch the grid; beyond them positions clamp to the border
@@ -166,7 +167,7 @@ def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generato
     n_levels = config.field_levels or config.field_max_levels
     is_shared = config.field_tables == "shared"
     n_shared = model.n_frames if is_shared else 1
-    log2_entries = config.field_log2_entries or derive_log2_entries(n_alive, n_shared_knots=n_shared)
+    log2_entries = config.field_log2_entries or derive_log2_entries(most_alive, n_shared_knots=n_shared)
     cells = derive_cells(
         side=side,
         spacing=0.0 if config.field_levels else spacing,  # a fixed number of levels does not look at the anchors
@@ -189,16 +190,21 @@ def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generato
     model.attach_field(SpatioTemporalField(shape, generator))
     return (
         f"{len(cells)} levels up to {cells[-1]} cells (anchors {spacing:.3g} apart), "
-        f"2^{log2_entries} entries {'in all' if is_shared else 'per frame'} ({n_alive} anchors alive)"
+        f"2^{log2_entries} entries {'in all' if is_shared else 'per frame'} ({most_alive} anchors alive)"
     )
 
 
-def _alive_positions(model: ClipModel) -> tuple[Tensor, int]:
-    """Positions of dynamic anchors that exist in some frame [n, 3], and the most that exist in one frame."""
-    parts, n_alive = [torch.zeros(0, 3)], 0
+def n_alive(model: ClipModel) -> int:
+    """The most dynamic anchors that exist in one frame, summed over the sets."""
+    presences = [model.anchor_set(role).presence for role in model.roles()]
+    return sum(int(presence.sum(0).max()) for presence in presences if presence is not None and len(presence))
+
+
+def _alive_positions(model: ClipModel) -> Tensor:
+    """Positions of dynamic anchors that exist in some frame. [n, 3]"""
+    parts = [torch.zeros(0, 3)]
     for role in model.roles():
         anchors = model.anchor_set(role)
         if anchors.presence is not None and len(anchors):
             parts.append(anchors.positions[anchors.presence.any(1)])
-            n_alive += int(anchors.presence.sum(0).max())
-    return torch.cat(parts), n_alive
+    return torch.cat(parts)

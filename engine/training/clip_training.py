@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +37,7 @@ from engine.training.building import (
     inheriting_model,
     merged,
     moving_anchors,
+    n_alive,
     remove_gate,
     static_model,
 )
@@ -45,6 +45,7 @@ from engine.training.config import TrainConfig
 from engine.training.demotion import demote
 from engine.training.fused_loss import LossWorkspace
 from engine.training.gating import nothing_measured, promote, with_regions, without_static_regions
+from engine.training.held_in import MEASURE_EVERY, Patience, held_in_items, steps_to_finish
 from engine.training.losses import photometric_loss
 from engine.training.optimizer import PhaseOptimizer, named_parameters
 from engine.training.order import ErrorOrder, Order, ShuffledOrder
@@ -100,8 +101,7 @@ class ClipTraining:
         self._base = merged(previous) if is_streaming and previous is not None else reference
         self._given_config = config
         if is_streaming:  # everything that a source clip can take over, and all of it learns
-            learning = {"inherit": "trainable", "decoder": "finetune", "field": "continue"}
-            config = replace(config, independent=False, start="scratch", **learning)
+            config = config.going_on()
         self.capture, self.clip, self.config, self.reference = (capture, clip, config, reference)
         self.regions = tuple(regions)
         self.holdout = sorted(set(holdout))
@@ -132,6 +132,9 @@ class ClipTraining:
         self._sight: dict[tuple[str, int], Tensor] = {}  # rows of static sets, flags of dynamic ones
         self._tiles: ActiveTiles | None = None
         self._reasons: dict[str, np.ndarray] = {}
+        n_cameras = len(self.camera_indices)
+        self._held_in = held_in_items(n_cameras, clip.n_frames, seed) if config.patience else []
+        self._patience: Patience | None = None
 
     # ---------------------------------------------------------------- where we are
 
@@ -311,9 +314,13 @@ class ClipTraining:
         parameters = named_parameters(self.model, self.gains, self.config)
         self._optimizer = PhaseOptimizer(parameters, n_steps=n_steps, config=self.config)
         self._optimizer.steps_done = steps_in_phase
-        n_items = len(self.camera_indices) if name == "static" else len(self.pictures)
+        is_static = name == "static"
+        kept_out = set() if is_static else set(self._held_in)
+        n_all = len(self.camera_indices) if is_static else len(self.pictures)
+        self._items = [item for item in range(n_all) if item not in kept_out]
+        self._patience = Patience(self.config.patience) if kept_out else None
         is_by_error = name == "source" and self.config.sampling == "error"
-        self._order: Order = (ErrorOrder if is_by_error else ShuffledOrder)(n_items, seed=self.seed + index)
+        self._order: Order = (ErrorOrder if is_by_error else ShuffledOrder)(len(self._items), seed=self.seed + index)
         self._phase_index = index
         self._sight = {}  # a set may have become dynamic
         has_rest = name == "source" and self.config.tiles == "active" and not self.gains.requires_grad
@@ -332,7 +339,8 @@ class ClipTraining:
             self._add_moving()
             self._start_phase(index, 0)
         stage = self.phases[index][0]
-        item, weight = self._order.draw()
+        drawn, weight = self._order.draw()
+        item = self._items[drawn]
         if stage == "static":
             camera_row, clip_time = item, 0.0
             truth, is_counted = self.backgrounds.images[camera_row], self.backgrounds.is_stable[camera_row]
@@ -362,7 +370,7 @@ class ClipTraining:
         where = f"step {self.steps_done + 1}, camera {self.rig.names[camera_row]}"
         if not np.isfinite(value):
             raise NonFiniteLoss(f"The loss became {value} at {where}.", hint="The last good state was kept.")
-        self._order.saw(item, value)
+        self._order.saw(drawn, value)
         if loss.requires_grad:
             (loss if weight == 1.0 else loss * weight).backward()
         try:
@@ -370,6 +378,7 @@ class ClipTraining:
         except NonFiniteLoss as error:
             raise NonFiniteLoss(f"{error.message} ({where})", hint="The last good state was kept.") from error
         self.steps_done += 1
+        self._look_for_stall()
         return StepStats(
             step=self.steps_done,
             n_steps=self.n_steps,
@@ -379,6 +388,34 @@ class ClipTraining:
             stage=stage,
             gradient_norm=gradient_norm,
         )
+
+    def _look_for_stall(self) -> None:
+        """Now and then, see whether the pictures kept out of training still gain; else cut the phase short."""
+        name, n_steps = self.phases[self._phase_index]
+        done = self._optimizer.steps_done
+        if self._patience is None or done % MEASURE_EVERY or done >= n_steps:
+            return
+        if not self._patience.saw(self.held_in_psnr()):
+            return
+        n_left = steps_to_finish(done, n_steps)
+        if n_left < n_steps - done:
+            self._optimizer.finish_within(n_left)
+            self.phases[self._phase_index] = (name, done + n_left)
+            gained = f"{len(self._held_in)} pictures kept out of training stay at {self._patience.best:.2f} dB"
+            self._say("Early stop", f"{gained}: {n_left} steps to the end instead of {n_steps - done}")
+
+    def held_in_psnr(self) -> float:
+        """Mean PSNR of the pictures of training cameras that are kept out of training, dB; NaN without patience."""
+        values = []
+        for item in self._held_in:
+            camera_row, frame = divmod(item, self.clip.n_frames)
+            clip_time = frame / self.clip.clip_length
+            view = self._views[self.camera_indices[camera_row]]
+            with torch.no_grad():
+                gaussians = self.model.decode(clip_time, self._rows(camera_row, clip_time))
+                image = render_gaussians(gaussians, view).image[0] * self.gains[camera_row]
+            values.append(psnr(image.numpy(), self.pictures.raw(camera_row, frame) / 255.0))
+        return float(np.mean(values)) if values else float("nan")
 
     def _active_picture(self, camera_row: int, view: View, clip_time: float) -> ActivePicture:
         rows = self._rows(camera_row, clip_time)
@@ -457,6 +494,8 @@ class ClipTraining:
             "near_plane": self.near_plane,
             "spacing": self.spacing,
             "moving_spacing": self.moving_spacing,
+            "n_anchors": {role: len(self.model.anchor_set(role)) for role in self.model.roles()},
+            "n_alive": n_alive(self.model),
             "decoder": decoder_sizes(self.model.decoder),
             "field": None if self.model.field is None else self.model.field.shape.as_dict(),
         }
@@ -499,6 +538,8 @@ class ClipTraining:
             "steps_in_phase": in_phase if index == self._phase_index else self.phases[self._phase_index][1],
             "phases": self.phases,
             "order": self._order.state(),
+            "schedule": self._optimizer.schedule,
+            "patience": None if self._patience is None else self._patience.state(),
             "generator": self._generator.get_state().numpy().tolist(),
         }
         arrays = state.arrays | self._optimizer.arrays()
@@ -539,5 +580,8 @@ class ClipTraining:
         self._reasons = {name: array for name, array in kept.arrays.items() if name.startswith("gate.")}
         self._start_phase(resume["phase_index"], resume["steps_in_phase"])
         self._optimizer.restore(kept.arrays, resume["steps_in_phase"])
+        self._optimizer.schedule = resume.get("schedule", self._optimizer.schedule)
         self._order.restore(resume["order"])
+        if self._patience is not None and resume.get("patience"):
+            self._patience.restore(resume["patience"])
         self._generator.set_state(torch.tensor(resume["generator"], dtype=torch.uint8))

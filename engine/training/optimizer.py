@@ -74,6 +74,7 @@ class PhaseOptimizer:
         self._max_norm = config.max_gradient_norm
         self.n_steps = n_steps
         self.steps_done = 0
+        self._from_step, self._from_decay = 0, 1.0
         self._adam = make_adam(self._parameters, backend)
 
     def step(self) -> float:
@@ -90,12 +91,32 @@ class PhaseOptimizer:
             bad = not_finite(gradients)
             raise NonFiniteLoss(f"The gradient of {', '.join(bad) or 'the sum'} is not finite.")
         scale = min(1.0, self._max_norm / (norm + 1e-6)) if self._max_norm else 1.0
-        decay = self._final_ratio ** (self.steps_done / max(self.n_steps, 1))
+        decay = self.decay
         self._adam.update(gradients, {name: rate * decay for name, rate in self._rates.items()}, scale)
         for parameter in self._parameters.values():
             parameter.grad = None
         self.steps_done += 1
         return norm
+
+    @property
+    def decay(self) -> float:
+        """Share of the initial rates that the next step learns with."""
+        share = (self.steps_done - self._from_step) / max(self.n_steps - self._from_step, 1)
+        return self._from_decay * (self._final_ratio / self._from_decay) ** share
+
+    def finish_within(self, n_steps: int) -> None:
+        """From here on rates fall to their end within so many more steps, from where they are."""
+        self._from_step, self._from_decay = self.steps_done, self.decay
+        self.n_steps = self.steps_done + n_steps
+
+    @property
+    def schedule(self) -> list[float]:
+        """Where the present fall of the rates began: step and share of the initial rates. For a checkpoint."""
+        return [self._from_step, self._from_decay]
+
+    @schedule.setter
+    def schedule(self, values: list[float]) -> None:
+        self._from_step, self._from_decay = int(values[0]), float(values[1])
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Moments and step counts, for a checkpoint. Copies."""

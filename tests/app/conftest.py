@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from app.bench import speed
 from app.commands import OpenCapture
 from app.project import Project
 from app.session import Session
@@ -16,6 +17,7 @@ from app.settings import Settings
 from app.training.inline import InlineWorker
 from app.training.messages import TrainJob
 from app.training.run import MakeTraining
+from engine.training.forecasting import MachineSpeed
 from tests.app.fakes import make_fake, write_capture
 
 DEADLINE_S = 30.0
@@ -32,6 +34,12 @@ def own_user_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nothing of a test reaches the user's own data."""
     for name in ("XDG_DATA_HOME", "XDG_CONFIG_HOME"):
         monkeypatch.setenv(name, str(tmp_path / name.lower()))
+
+
+@pytest.fixture(autouse=True)
+def known_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test measures how fast this machine is."""
+    monkeypatch.setattr(speed, "machine_speed", lambda: MachineSpeed(2.0, "made up for a test"))
 
 
 def inline(job: TrainJob, project: Project, make_training: MakeTraining = make_fake) -> InlineWorker:

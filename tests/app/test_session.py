@@ -8,7 +8,9 @@ import pytest
 
 from app import commands as c
 from app.project import open_project, read_settings
+from app.status import PlanStatus
 from engine.model.clip_state import read_clip_state
+from engine.training.presets import PRESETS
 from tests.app.conftest import poll_until
 from tests.app.fakes import N_STEPS, make_fake, make_slow
 
@@ -209,6 +211,69 @@ def test_what_was_learned_fixes_clip_length_and_hold_out(make_session):
     session.dispatch(c.SetClipLength(2))
     assert "fixed" in session.notices[-1].title
     assert session.project.settings.clip_length == 6
+
+
+def planned(session) -> PlanStatus:
+    """The plan with its figures, which a thread makes."""
+    poll_until(session, lambda: session.plan is not None and session.plan.summary != "", what="the plan")
+    return session.plan
+
+
+def test_the_next_clip_has_a_plan_that_follows_the_settings(make_session):
+    session = make_session()
+    session.dispatch(c.SetClipLength(3))
+    before = planned(session)
+    assert (before.clip_index, before.preset, before.can_edit) == (0, "small", True)
+    assert before.summary.startswith("1,500 steps, about ")
+    assert {setting.name: setting.value for setting in before.settings}["joint_steps"] == 1200
+    session.dispatch(c.SetTrainSetting("joint_steps", 50))
+    assert session.plan.summary == ""  # the old figures would be wrong
+    after = planned(session)
+    assert after.summary.startswith("350 steps, ")
+    (changed,) = [setting for setting in after.settings if setting.is_set]
+    assert (changed.name, changed.value) == ("joint_steps", 50)
+    assert read_settings(session.project.folder).overrides == {"joint_steps": 50}
+    session.dispatch(c.SetTrainSetting("joint_steps", 0))  # derived again
+    assert read_settings(session.project.folder).overrides == {}
+    assert planned(session) == before
+
+
+@pytest.mark.parametrize("name", list(PRESETS))
+def test_a_preset_takes_the_place_of_what_was_set(make_session, name):
+    session = make_session()
+    session.dispatch(c.SetTrainSetting("joint_steps", 50))
+    session.dispatch(c.SetPreset(name))
+    assert session.project.settings.overrides == PRESETS[name]
+    assert session.plan.preset == name
+
+
+@pytest.mark.parametrize(
+    ("command", "expected"),
+    [
+        (c.SetTrainSetting("joint_steps", -1), "joint_steps is -1"),
+        (c.SetTrainSetting("speed", 3), "no training setting called speed"),
+        (c.SetPreset("huge"), "no preset called 'huge'"),
+    ],
+)
+def test_a_setting_that_cannot_be_is_told_and_changes_nothing(make_session, command, expected):
+    session = make_session()
+    session.dispatch(command)
+    assert expected in session.notices[-1].detail
+    assert session.project.settings.overrides == {}
+
+
+def test_what_was_learned_fixes_the_training_settings(make_session):
+    session = make_session()
+    session.dispatch(c.SetClipLength(3))
+    session.dispatch(c.TrainNextClip())
+    assert session.plan is None  # something trains
+    poll_until(session, lambda: session.clip_states[0].state == "trained", what="the clip")
+    found = planned(session)
+    assert (found.clip_index, found.can_edit) == (1, False)
+    assert any("as measured on clip 0" in reason for _, _, reason in found.lines)
+    session.dispatch(c.SetPreset("toy"))
+    assert "fixed" in session.notices[-1].title
+    assert session.project.settings.overrides == {}
 
 
 def test_a_damaged_checkpoint_is_told_and_training_starts_over(make_session):

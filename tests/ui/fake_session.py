@@ -15,7 +15,7 @@ import numpy as np
 from app import commands
 from app.arrays import AnchorArrays, Picture, PointArrays
 from app.notices import Notices
-from app.status import ClipStatus, JobStatus, Overlays, TrainingStatus
+from app.status import ClipStatus, JobStatus, Overlays, PlanStatus, SettingStatus, TrainingStatus
 from app.timeline import Timeline
 from app.view import OrbitView
 from engine.capture.clip import split_clips
@@ -64,6 +64,15 @@ class FakeSession:
         self.overlays = Overlays()
         self.settings = SimpleNamespace(recent=["/captures/kitchen", "/captures/dance_floor"])
         self.training = TrainingStatus(can_train_next=True, next_clip_index=0)
+        self.plan: PlanStatus | None = PlanStatus(
+            clip_index=0,
+            summary="4,140 steps, about 1:20, 0.8 GB of memory, 1.2 MB stored",
+            lines=(("pictures", "180", "18 cameras x 10 frames"), ("training", "64 s", "as measured")),
+            presets=("toy", "small"),
+            preset="small",
+            settings=(SettingStatus("joint_steps", "Joint steps", 3600),),
+            can_edit=True,
+        )
         self.holdout: tuple[int, ...] = (0, 3)
         self.reference_index = 0
         self.is_closed = False

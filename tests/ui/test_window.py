@@ -21,6 +21,8 @@ from app.commands import (
     PauseTraining,
     SetCompare,
     SetFrame,
+    SetPreset,
+    SetTrainSetting,
     StopTraining,
     ToggleOverlay,
     TogglePlay,
@@ -140,6 +142,35 @@ def test_train_button_and_key_ask_for_the_next_clip(pilot: Pilot) -> None:
     pilot.click("training.next")
     pilot.key(key.T)
     assert len(pilot.sent(TrainNextClip)) == 2
+
+
+def test_the_plan_of_the_next_clip_folds_out_and_settings_can_be_typed(pilot: Pilot) -> None:
+    assert "plan.summary" in pilot.rects
+    assert "plan.joint_steps" not in pilot.rects
+    pilot.click("plan.header")
+    pilot.draw(2)
+    pilot.click("plan.joint_steps")
+    pilot.key(key.A, modifiers=(key.LCTRL,))
+    pilot.type("500")
+    pilot.key(key.ENTER)
+    assert pilot.sent(SetTrainSetting) == [SetTrainSetting("joint_steps", 500)]
+    pilot.click("plan.preset")
+    pilot.draw(2)
+    pilot.click("plan.preset.toy")
+    assert pilot.sent(SetPreset) == [SetPreset("toy")]
+
+
+def test_settings_of_a_trained_project_cannot_be_typed(pilot: Pilot) -> None:
+    pilot.session.plan = dataclasses.replace(pilot.session.plan, can_edit=False)
+    pilot.click("plan.header")
+    pilot.draw(2)
+    pilot.click("plan.joint_steps")
+    pilot.type("5")
+    pilot.key(key.ENTER)
+    pilot.click("plan.preset")
+    pilot.draw(2)
+    assert "plan.preset.toy" not in pilot.rects
+    assert pilot.sent(SetTrainSetting) == []
 
 
 def test_running_training_offers_pause_and_stop(pilot: Pilot) -> None:

@@ -10,6 +10,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
 from app.commands import PauseTraining, ResumeTraining, StopTraining, TrainNextClip
 from ui import theme
+from ui.panels.plan import draw_plan
 from ui.panels.timeline import STATE_WORDS
 from ui.state import Dispatch, UiState
 from ui.theme import Icon
@@ -75,6 +76,8 @@ def _draw_buttons(session: Any, dispatch: Dispatch, ui: UiState) -> None:
                 else "it starts from the reference"
             )
             text_wrapped_dim(f"Next: clip {index}, frames {clip.start} to {clip.stop - 1}, {kind}.")
+        if session.plan is not None:
+            draw_plan(session.plan, dispatch, ui)
         return
     half = (width - 8) / 2
     if status.state == "paused":

@@ -1,0 +1,202 @@
+"""Plans of a project's clips: what the settings, the capture and the clips trained before say together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Any
+
+from app.kernels import COMPILING
+from app.progress import duration_text
+from app.project import Project
+from app.status import PlanStatus, SettingStatus
+from app.training.stage_watch import stages_of
+from engine.capture.capture import Capture
+from engine.capture.clip import Clip
+from engine.model.clip_state import read_clip_header
+from engine.training.expected_sizes import footage_of
+from engine.training.forecasting import UNKNOWN_MACHINE, MachineSpeed, MeasuredClip, measured_clip
+from engine.training.plan import TrainingPlan, make_plan
+from engine.training.presets import PRESETS
+
+PLAN_SCHEMA = 1
+
+
+def plan_clip(
+    project: Project,
+    capture: Capture,
+    clip: Clip,
+    *,
+    measure_machine: Callable[[], MachineSpeed] = lambda: UNKNOWN_MACHINE,
+) -> TrainingPlan:
+    """The plan of one clip of a project.
+
+    Args:
+        project: Its folder need not exist yet.
+        capture: At the project's scale.
+        clip: One of its clips.
+        measure_machine: Asked where no other clip of the project says how long training takes.
+    Raises:
+        CaptureError, PreparationError: The capture does not fit the settings.
+    """
+    settings, config = project.settings, project.settings.config()
+    base = project.inherited_index(clip.clip_index)
+    if base is None and config.start == "previous" and clip.clip_index != settings.reference_clip:
+        base, config = project.previous_index(clip.clip_index), config.going_on()
+    history = [
+        known
+        for other in project.clips(capture.n_frames)
+        if other != clip and (known := _measured(project, other.clip_index)) is not None
+    ]
+    is_measured = any(known.training_s for known in history)
+    return make_plan(
+        footage_of(capture, capture.camera_indices(settings.holdout)),
+        clip,
+        config,
+        is_source=base is not None,
+        reference=None if base is None else read_clip_header(project.clip_path(base)),
+        history=history,
+        machine=UNKNOWN_MACHINE if is_measured else measure_machine(),
+    )
+
+
+def _measured(project: Project, clip_index: int) -> MeasuredClip | None:
+    path = project.clip_path(clip_index)
+    header = read_clip_header(path)
+    if header is None:
+        return None
+    disk_mb = None
+    with suppress(OSError):
+        disk_mb = path.stat().st_size / 1e6
+    metrics = header.get("metrics")
+    stages_s = stages_of(metrics) if isinstance(metrics, dict) else {}
+    return measured_clip(header, disk_mb=disk_mb, uncounted_s=stages_s.get(COMPILING, 0.0))
+
+
+# ---------------------------------------------------------------- for the window
+
+MAIN_SETTINGS = {
+    "static_steps": "Static steps",
+    "joint_steps": "Joint steps",
+    "source_steps": "Steps of later clips",
+    "gaussians_per_anchor": "Gaussians per anchor",
+    "max_static_points": "Static anchors, at most",
+    "max_moving_points": "Moving anchors, at most",
+}
+"""Name in TrainConfig to what the window calls it."""
+
+
+def plan_status(
+    project: Project, capture: Capture, clip: Clip, plan: TrainingPlan | None, *, can_edit: bool
+) -> PlanStatus:
+    """What the window shows of the next clip.
+
+    Args:
+        project, capture, clip: What would be trained.
+        plan: Its plan; None until it is made.
+        can_edit: Whether settings may still change.
+    """
+    settings, config = project.settings, project.settings.config()
+    n_cameras = len(capture.rig) - len(settings.holdout)
+    values = {name: getattr(config, name) for name in MAIN_SETTINGS} | {
+        "static_steps": config.n_static_steps(n_cameras),
+        "joint_steps": config.n_joint_steps(n_cameras * clip.n_frames),
+        "source_steps": config.n_source_steps(n_cameras * clip.n_frames),
+    }
+    lines = () if plan is None else (*plan.lines, *plan.forecast)
+    return PlanStatus(
+        clip_index=clip.clip_index,
+        summary="" if plan is None else short_text(plan),
+        lines=tuple((line.name, line.text, line.reason) for line in lines),
+        presets=tuple(PRESETS),
+        preset=closest_preset(settings.overrides),
+        settings=tuple(
+            SettingStatus(name, label, int(values[name]), name in settings.overrides)
+            for name, label in MAIN_SETTINGS.items()
+        ),
+        can_edit=can_edit,
+    )
+
+
+def closest_preset(overrides: dict[str, Any]) -> str:
+    """The preset with the most settings among those that hold all of its own."""
+    fitting = [name for name, values in PRESETS.items() if values.items() <= overrides.items()]
+    return max(fitting, key=lambda name: len(PRESETS[name]))
+
+
+# ---------------------------------------------------------------- as text and JSON
+
+
+def short_text(plan: TrainingPlan) -> str:
+    """The forecast as one line."""
+    steps = f"{plan.n_steps:,} steps" if plan.n_steps else "no steps"
+    return (
+        f"{steps}, about {duration_text(plan.seconds)} ({duration_text(plan.preparation_s.value)} preparation), "
+        f"{plan.memory_mb.value / 1e3:.1f} GB of memory, {plan.disk_mb.text} stored"
+    )
+
+
+def plan_text(plan: TrainingPlan) -> list[str]:
+    """Every line of a plan, reasons included."""
+    head = f"Clip {plan.clip_index}, frames {plan.start} to {plan.start + plan.n_frames - 1}, {plan.role}"
+    rows = [f"  {line.name:<21} {line.text:>11}  {line.reason}" for line in plan.lines]
+    rows += [f"  {line.name:<21} {line.text:>11}  forecast: {line.reason}" for line in plan.forecast]
+    return [head, *rows]
+
+
+def begin_text(plan: TrainingPlan) -> list[str]:
+    """The few lines that a training begins with."""
+    counts = ", ".join(f"{line.text} {line.name}" for line in plan.lines if line.name.endswith(("steps", "anchors")))
+    return [f"Clip {plan.clip_index}: {short_text(plan)}", f"  {counts}", f"  Times: {plan.training_s.reason}"]
+
+
+def compared_text(plan: TrainingPlan, project: Project) -> str:
+    """The forecast of a clip that is trained now, against what it took; empty where nothing was recorded."""
+    taken = _measured(project, plan.clip_index)
+    if taken is None:
+        return ""
+    pairs = (
+        ("preparation", plan.preparation_s, taken.preparation_s, "s"),
+        ("training", plan.training_s, taken.training_s, "s"),
+        ("memory", plan.memory_mb, taken.memory_mb, "MB"),
+        ("stored", plan.disk_mb, taken.disk_mb, "MB"),
+    )
+    parts = [
+        f"{name} {line.value:.3g} against {measured:.3g} {unit}"
+        for name, line, measured, unit in pairs
+        if measured is not None
+    ]
+    return f"  Forecast against measured: {', '.join(parts)}" if parts else ""
+
+
+def plan_document(
+    project: Project, capture: Capture, plans: Sequence[TrainingPlan], trained: Sequence[int]
+) -> dict[str, Any]:
+    """What `train --plan --json` prints.
+
+    Args:
+        project, capture: As planned.
+        plans: Of the clips that are not trained yet.
+        trained: Indices of chosen clips that are.
+    """
+    rows = [plan.as_dict() | {"state": "planned"} for plan in plans]
+    rows += [{"clip_index": clip_index, "state": "trained"} for clip_index in trained]
+    return {
+        "schema": PLAN_SCHEMA,
+        "project": str(project.folder),
+        "capture": str(capture.path),
+        "holdout": list(project.settings.holdout),
+        "settings": project.settings.config().difference(),
+        "clips": sorted(rows, key=lambda row: row["clip_index"]),
+        "forecast": totals(plans),
+    }
+
+
+def totals(plans: Sequence[TrainingPlan]) -> dict[str, float]:
+    """Of all planned clips: seconds and bytes add up, memory is that of the largest."""
+    return {
+        "preparation_s": round(sum(plan.preparation_s.value for plan in plans), 1),
+        "training_s": round(sum(plan.training_s.value for plan in plans), 1),
+        "memory_mb": max((plan.memory_mb.value for plan in plans), default=0.0),
+        "disk_mb": round(sum(plan.disk_mb.value for plan in plans), 3),
+    }

@@ -1,0 +1,65 @@
+"""A clip in which nothing moves: no field, no residual anchors, no steps, next to nothing to store."""
+
+from __future__ import annotations
+
+import pytest
+from safetensors.numpy import load_file
+
+from engine.model.clip_model import load_clip_model
+from engine.model.clip_state import read_clip_state
+from engine.model.compact import write_compact_clip
+from engine.training import clip_training
+from engine.training.expected_sizes import counts_of, footage_of
+from engine.training.pictures import TrainingPictures
+from engine.training.plan import make_plan
+from engine.training.preparation import BACKGROUNDS_FILE
+
+MAX_BYTES = 20_000
+
+
+@pytest.fixture
+def still(tiny, monkeypatch):
+    """A source clip whose every picture is its camera's background, prepared."""
+    images = load_file(tiny.prep_dir / BACKGROUNDS_FILE)["images"]
+
+    class StillPictures(TrainingPictures):
+        def raw(self, camera_row, frame_in_clip):
+            return images[camera_row]
+
+    monkeypatch.setattr(clip_training, "TrainingPictures", StillPictures)
+    return tiny.prepared(1)
+
+
+def test_it_takes_no_step(still):
+    assert still.model.field is None
+    assert "residual" not in still.model.roles()
+    assert still.n_steps == still.steps_done == 0
+    assert still.is_finished
+
+
+def test_it_stores_a_few_kilobytes_and_can_be_seen(still, tiny, tmp_path):
+    path = tmp_path / "still.safetensors"
+    write_compact_clip(path, still.finish())
+    assert path.stat().st_size < MAX_BYTES
+    state = read_clip_state(path)
+    counts = counts_of(state.header)
+    assert counts is not None
+    assert (counts.n_moving, counts.n_alive, counts.n_table_values) == (0, 0, 0)
+    model = load_clip_model(state, tiny.reference)
+    static_alone = tiny.reference.header["n_anchors"]["static"] * model.decoder.gaussians_per_anchor
+    assert len(model.decode(0.0)) == static_alone  # inherited moving anchors are there and switched off
+
+
+def test_its_plan_says_so(still, tiny):
+    footage = footage_of(tiny.capture, tiny.holdout)
+    moving, plan = (
+        make_plan(
+            footage, tiny.clips[1], still.config, is_source=True, reference=tiny.reference.header, is_still=is_still
+        )
+        for is_still in (False, True)
+    )
+    assert plan.n_steps == plan.training_s.value == 0
+    assert plan.disk_mb.value < MAX_BYTES / 1e6 < moving.disk_mb.value
+    assert plan.seconds < moving.seconds
+    reasons = {line.name: line.reason for line in plan.lines}
+    assert all("nothing moves" in reasons[name] for name in ("source steps", "residual anchors", "field"))

@@ -1,0 +1,72 @@
+"""The plan of the next clip in the training panel: what it takes, why, and the main settings while they may change."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from imgui_bundle import ImVec2, imgui
+
+from app.commands import SetPreset, SetTrainSetting
+from ui.state import Dispatch, UiState
+from ui.widgets import text_wrapped_dim
+
+LINES_HEIGHT = 170.0
+FIELD_WIDTH = 110.0
+
+
+def draw_plan(plan: Any, dispatch: Dispatch, ui: UiState) -> None:
+    """The forecast in one sentence, and below a header that folds out: settings, then every line with its reason.
+
+    Args:
+        plan: app.status.PlanStatus.
+    """
+    text_wrapped_dim(f"Plan: {plan.summary}." if plan.summary else "Plan: looking at what there is to learn ...")
+    ui.mark("plan.summary")
+    is_open = imgui.collapsing_header("Plan and settings")
+    ui.mark("plan.header")
+    if not is_open:
+        return
+    imgui.begin_disabled(not plan.can_edit)
+    _draw_settings(plan, dispatch, ui)
+    imgui.end_disabled()
+    if not plan.can_edit:
+        text_wrapped_dim("Settings are fixed: clips were trained with them.")
+    _draw_lines(plan)
+
+
+def _draw_settings(plan: Any, dispatch: Dispatch, ui: UiState) -> None:
+    imgui.set_next_item_width(FIELD_WIDTH)
+    if imgui.begin_combo("Preset", plan.preset):
+        for name in plan.presets:
+            if imgui.selectable(name, name == plan.preset)[0]:
+                dispatch(SetPreset(name))
+            ui.mark(f"plan.preset.{name}")
+        imgui.end_combo()
+    ui.mark("plan.preset")
+    for setting in plan.settings:
+        imgui.set_next_item_width(FIELD_WIDTH)
+        flags = imgui.InputTextFlags_.enter_returns_true
+        is_entered, typed = imgui.input_int(f"{setting.label}##{setting.name}", setting.value, 0, 0, flags)
+        ui.mark(f"plan.{setting.name}")
+        if is_entered and typed != setting.value:
+            dispatch(SetTrainSetting(setting.name, typed))
+        if setting.is_set:
+            imgui.same_line()
+            imgui.text_disabled("set")
+
+
+def _draw_lines(plan: Any) -> None:
+    flags = imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.scroll_y | imgui.TableFlags_.row_bg
+    if not plan.lines or not imgui.begin_table("plan", 2, flags, ImVec2(0, LINES_HEIGHT)):
+        return
+    imgui.table_setup_column("name", imgui.TableColumnFlags_.width_stretch)
+    imgui.table_setup_column("value")
+    for name, text, reason in plan.lines:
+        imgui.table_next_row()
+        imgui.table_next_column()
+        imgui.text(name)
+        imgui.set_item_tooltip(reason)
+        imgui.table_next_column()
+        imgui.text(text)
+        imgui.set_item_tooltip(reason)
+    imgui.end_table()
