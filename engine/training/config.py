@@ -82,7 +82,7 @@ class TrainConfig:
     passes: float = 0.0
     """Passes over the training pictures of a clip, for clips of both kinds; 0 keeps the derived steps above."""
 
-    # learning rates; all fall log-linearly to `final_lr_ratio` of their start over the phase
+    # learning rates; all fall log-linearly over the phase, to `final_lr_ratio` of their start
     feature_lr: float = 7.5e-3
     scale_lr: float = 7e-3
     table_lr: float = 0.04
@@ -97,6 +97,15 @@ class TrainConfig:
     gain_lr: float = 3e-4
     """Per-camera colour gains, reference clip only; not trained where `color` found none."""
     final_lr_ratio: float = 0.02
+    """Of every group without a ratio of its own below, where 0 stands for this one and 1 for a constant rate."""
+    feature_final_ratio: float = 0.0
+    scale_final_ratio: float = 0.0
+    field_final_ratio: float = 0.0
+    """Table and network of the field."""
+    opacity_head_final_ratio: float = 0.0
+    shape_head_final_ratio: float = 0.0
+    color_head_final_ratio: float = 0.0
+    offset_head_final_ratio: float = 0.0
 
     # loss
     ssim_weight: float = 0.2
@@ -219,6 +228,13 @@ _RANGES: dict[str, tuple[float, float]] = {
     "offset_head_lr": (0.0, 1.0),
     "gain_lr": (0.0, 1.0),
     "final_lr_ratio": (1e-6, 1.0),
+    "feature_final_ratio": (0.0, 1.0),
+    "scale_final_ratio": (0.0, 1.0),
+    "field_final_ratio": (0.0, 1.0),
+    "opacity_head_final_ratio": (0.0, 1.0),
+    "shape_head_final_ratio": (0.0, 1.0),
+    "color_head_final_ratio": (0.0, 1.0),
+    "offset_head_final_ratio": (0.0, 1.0),
     "ssim_weight": (0.0, 1.0),
     "volume_weight": (0.0, 10.0),
     "max_gradient_norm": (0.0, 1e6),

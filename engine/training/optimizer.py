@@ -6,6 +6,7 @@ Rates carry no scene scale and the horizon is the phase's own number of steps, s
 from __future__ import annotations
 
 import math
+from fnmatch import fnmatchcase
 
 import numpy as np
 from torch import Tensor, nn
@@ -15,12 +16,14 @@ from engine.model.clip_model import ClipModel
 from engine.training.adam import make_adam, not_finite
 from engine.training.config import TrainConfig
 
-_HEAD_RATES = {
-    "opacity": "opacity_head_lr",
-    "color": "color_head_lr",
-    "shape": "shape_head_lr",
-    "offset": "offset_head_lr",
+_HEADS = ("opacity", "color", "shape", "offset")
+_OWN_RATIOS = {
+    "sets.*.features": "feature_final_ratio",
+    "sets.*.log_*_scales": "scale_final_ratio",
+    "field.*": "field_final_ratio",
+    **{f"decoder.{head}.*": f"{head}_head_final_ratio" for head in _HEADS},
 }
+"""Names of parameters to the setting that says where their rates end."""
 
 
 def named_parameters(
@@ -38,9 +41,9 @@ def named_parameters(
         add(f"sets.{role}.features", anchors.features, config.feature_lr)
         add(f"sets.{role}.log_offset_scales", anchors.log_offset_scales, config.scale_lr)
         add(f"sets.{role}.log_base_scales", anchors.log_base_scales, config.scale_lr)
-    for head, rate_name in _HEAD_RATES.items():
+    for head in _HEADS:
         for i, parameter in enumerate(model.decoder.head_parameters(head)):
-            add(f"decoder.{head}.{i}", parameter, getattr(config, rate_name))
+            add(f"decoder.{head}.{i}", parameter, getattr(config, f"{head}_head_lr"))
     if model.field is not None:
         for i, table in enumerate(model.field.tables):
             add(f"field.tables.{i}", table, config.table_lr)
@@ -50,13 +53,19 @@ def named_parameters(
     return chosen
 
 
+def final_ratio(name: str, config: TrainConfig) -> float:
+    """Where the rate of a parameter of `named_parameters` ends, as a share of its start."""
+    own = [getattr(config, setting) for pattern, setting in _OWN_RATIOS.items() if fnmatchcase(name, pattern)]
+    return next((ratio for ratio in own if ratio), config.final_lr_ratio)
+
+
 class PhaseOptimizer:
     """Adam over the trainable parameters of one phase. Owns moments and schedule, not the parameters.
 
     Args:
         parameters: By name, with the rate at the start.
         n_steps: Steps of the phase, over which rates fall.
-        config: Final ratio of the rates and the norm to clip at.
+        config: Final ratios of the rates and the norm to clip at.
         backend: Of `engine.training.adam.make_adam`.
     """
 
@@ -70,7 +79,7 @@ class PhaseOptimizer:
     ) -> None:
         self._parameters = {name: parameter for name, (parameter, _) in parameters.items()}
         self._rates = {name: rate for name, (_, rate) in parameters.items()}
-        self._final_ratio = config.final_lr_ratio
+        self._final_ratios = {name: final_ratio(name, config) for name in parameters}
         self._max_norm = config.max_gradient_norm
         self.n_steps = n_steps
         self.steps_done = 0
@@ -90,8 +99,9 @@ class PhaseOptimizer:
             bad = not_finite(gradients)
             raise NonFiniteLoss(f"The gradient of {', '.join(bad) or 'the sum'} is not finite.")
         scale = min(1.0, self._max_norm / (norm + 1e-6)) if self._max_norm else 1.0
-        decay = self._final_ratio ** (self.steps_done / max(self.n_steps, 1))
-        self._adam.update(gradients, {name: rate * decay for name, rate in self._rates.items()}, scale)
+        share_done = self.steps_done / max(self.n_steps, 1)
+        rates = {name: rate * self._final_ratios[name] ** share_done for name, rate in self._rates.items()}
+        self._adam.update(gradients, rates, scale)
         for parameter in self._parameters.values():
             parameter.grad = None
         self.steps_done += 1
