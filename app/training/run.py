@@ -42,7 +42,7 @@ from app.training.rate import Rate
 from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
 from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch, stages_of
 from engine.errors import EngineError, NonFiniteLoss, ProjectError
-from engine.model.clip_state import ClipState
+from engine.model.clip_state import ClipState, read_clip_header
 from engine.model.compact import CompactClip
 from engine.training.report import Progress, ReportProgress, StepStats
 
@@ -411,10 +411,6 @@ class TrainingRun:
     def _end_failed(self, error: Exception) -> None:
         trace = "".join(traceback.format_exception(error))
         logger.error("clip %d failed: %s", self._job.clip_index, trace)
-        if isinstance(error, NonFiniteLoss) and self._training is not None:
-            with suppress(EngineError):
-                if is_finite(self._training.state()):
-                    self._write_checkpoint(self._training)
         message, hint = str(error), ""
         if isinstance(error, EngineError):
             message, hint = error.told_apart()
@@ -423,5 +419,24 @@ class TrainingRun:
         else:
             message = f"{type(error).__name__}: {error}"
             hint = "This is a fault of the program; the log has the details."
+        if isinstance(error, NonFiniteLoss) and self._training is not None:
+            message = f"{message} {self._keep_last_good(self._training)}"
         self._snapshots.clear()
         self._send(TrainingFailed(type(error).__name__, message, hint, trace))
+
+    def _keep_last_good(self, training: Training) -> str:
+        """Keep what was learned before a step that failed, if it is any good. Says what is kept now."""
+        assert self._project is not None
+        try:
+            is_good = is_finite(training.state())
+        except EngineError:
+            is_good = False
+        if is_good and self._write_checkpoint(training):
+            return f"Step {training.steps_done} is kept; training again with the same command goes on from there."
+        kept = read_clip_header(self._project.checkpoint_path(self._job.clip_index))
+        why = "could not be kept" if is_good else "holds numbers that are not finite"
+        if kept is None:
+            return f"Step {training.steps_done} {why}; training again starts from the beginning."
+        return (
+            f"Step {training.steps_done} {why}; training again with the same command goes on from step {kept['step']}."
+        )
