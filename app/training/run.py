@@ -146,6 +146,8 @@ class TrainingRun:
         self._losses: list[float] = []
         self._gradient_norms: list[float] = []
         """Of all steps of this process."""
+        self._n_clipped = 0
+        """Those of them whose gradients were scaled down."""
         self._rate = Rate()
         self._watch = StageWatch(clock)
         self._paused_stage: str | None = None
@@ -232,6 +234,7 @@ class TrainingRun:
         now_s = self._clock()
         self._losses.append(stats.loss)
         self._gradient_norms.append(stats.gradient_norm)
+        self._n_clipped += stats.is_clipped
         is_last = training.steps_done >= training.n_steps
         if self._report_cadence.is_due(now_s) or is_last:
             self._report_cadence.done(now_s, now_s)
@@ -273,6 +276,7 @@ class TrainingRun:
         if self._gradient_norms:
             metrics["gradient_norm_median"] = statistics.median(self._gradient_norms)
             metrics["gradient_norm_max"] = max(self._gradient_norms)
+            metrics["gradient_clipped_steps"] = self._n_clipped
         times = self._watch.document()
         metrics |= times
         self._note({"step": training.steps_done, **times})
@@ -282,6 +286,11 @@ class TrainingRun:
             self._project.checkpoint_path(self._job.clip_index).unlink(missing_ok=True)
         self._snapshots.clear()
         logger.info("clip %d is trained: %d steps", self._job.clip_index, training.steps_done)
+        if self._n_clipped:
+            found = f"{self._n_clipped} of {len(self._gradient_norms)} steps, up to {max(self._gradient_norms):.3g}"
+            logger.warning("clip %d: gradients were scaled down in %s", self._job.clip_index, found)
+            title = f"Clip {self._job.clip_index} had gradients above max_gradient_norm"
+            self._send(WarningRaised(title, f"They were scaled down in {found}."))
         self._send(ClipTrained(str(path), training.steps_done, value))
 
     # ---------------------------------------------------------------- commands

@@ -340,6 +340,7 @@ class ClipTraining:
             n_gaussians=active.n_all,
             stage=stage,
             gradient_norm=gradient_norm,
+            is_clipped=self._optimizer.clips(gradient_norm),
         )
 
     def _active_picture(self, camera_row: int, view: View, clip_time: float) -> ActivePicture:

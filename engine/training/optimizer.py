@@ -98,7 +98,7 @@ class PhaseOptimizer:
         if not math.isfinite(norm):
             bad = not_finite(gradients)
             raise NonFiniteLoss(f"The gradient of {', '.join(bad) or 'the sum'} is not finite.")
-        scale = min(1.0, self._max_norm / (norm + 1e-6)) if self._max_norm else 1.0
+        scale = self._max_norm / norm if self.clips(norm) else 1.0
         share_done = self.steps_done / max(self.n_steps, 1)
         rates = {name: rate * self._final_ratios[name] ** share_done for name, rate in self._rates.items()}
         self._adam.update(gradients, rates, scale)
@@ -106,6 +106,10 @@ class PhaseOptimizer:
             parameter.grad = None
         self.steps_done += 1
         return norm
+
+    def clips(self, norm: float) -> bool:
+        """Whether gradients of this norm are scaled down."""
+        return 0.0 < self._max_norm < norm
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Moments and step counts, for a checkpoint. Copies."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -191,6 +193,20 @@ def test_a_fault_of_the_program_is_reported_with_its_trace(bench):
     assert failed.kind == "ZeroDivisionError"
     assert "Traceback" in failed.trace
     assert "fault of the program" in failed.hint
+
+
+@pytest.mark.parametrize("n_clipped", [0, 2])
+def test_clipped_steps_are_counted_and_told(bench, n_clipped):
+    def clip_some(it):
+        ordinary = it.training.step
+        it.training.step = lambda: replace(stats := ordinary(), is_clipped=stats.step <= n_clipped)
+
+    it = bench(n_steps=5, change=clip_some)
+    assert it.steps(10) is False
+    metrics = read_clip_state(it.project.clip_path(0)).header["metrics"]
+    assert metrics["gradient_clipped_steps"] == n_clipped
+    told = [event.detail for event in it.of(m.WarningRaised)]
+    assert told == (["They were scaled down in 2 of 5 steps, up to 5."] if n_clipped else [])
 
 
 def _fails_at(step):
