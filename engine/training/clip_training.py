@@ -18,6 +18,7 @@ from torch import Tensor, nn
 
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.cloud.gains import in_gauge
 from engine.cloud.moving_cloud import MovingCloud
 from engine.cloud.range import near_plane
 from engine.cloud.static_cloud import StaticCloud
@@ -331,6 +332,8 @@ class ClipTraining:
             gradient_norm = self._optimizer.step()
         except NonFiniteLoss as error:
             raise gradient_not_finite(error, where=where, config=self.config) from error
+        if self.gains.requires_grad:  # a step moves all cameras a little together; what is unseen stays at gain 1
+            self.gains.detach().numpy()[:] = in_gauge(self.gains.detach().numpy())
         self.steps_done += 1
         return StepStats(
             step=self.steps_done,

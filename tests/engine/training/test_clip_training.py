@@ -107,6 +107,7 @@ def test_gains_learn_in_the_reference_clip_and_are_kept_in_the_next(setting, tmp
     reference = finish(training)
     learned = reference.arrays["gains"]
     assert (learned != estimated.numpy()).any()
+    assert np.median(np.log(learned), axis=0) == pytest.approx(0.0, abs=1e-7)  # the gauge; float32 rounds at 6e-8
     source = start(setting.capture, 1, tmp_path, config=config, reference=reference)
     source.prepare()
     source.step()
