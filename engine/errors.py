@@ -88,4 +88,4 @@ class TrainingError(EngineError):
 
 
 class NonFiniteLoss(TrainingError):
-    """The loss or a gradient stopped being a finite number; the last good state was kept."""
+    """The loss or a gradient stopped being a finite number; nothing was changed by it."""

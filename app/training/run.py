@@ -43,7 +43,7 @@ from app.training.rate import Rate
 from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
 from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch, stages_of
 from engine.errors import EngineError, NonFiniteLoss, ProjectError
-from engine.model.clip_state import ClipState
+from engine.model.clip_state import ClipState, read_clip_header
 from engine.model.compact import CompactClip
 from engine.training.report import Progress, ReportProgress, StepStats
 
@@ -147,6 +147,8 @@ class TrainingRun:
         self._losses: list[float] = []
         self._gradient_norms: list[float] = []
         """Of all steps of this process."""
+        self._n_clipped = 0
+        """Those of them whose gradients were scaled down."""
         self._rate = Rate()
         self._watch = StageWatch(clock)
         self._paused_stage: str | None = None
@@ -233,6 +235,7 @@ class TrainingRun:
         now_s = self._clock()
         self._losses.append(stats.loss)
         self._gradient_norms.append(stats.gradient_norm)
+        self._n_clipped += stats.is_clipped
         is_last = training.steps_done >= training.n_steps
         if self._report_cadence.is_due(now_s) or is_last:
             self._report_cadence.done(now_s, now_s)
@@ -274,6 +277,7 @@ class TrainingRun:
         if self._gradient_norms:
             metrics["gradient_norm_median"] = statistics.median(self._gradient_norms)
             metrics["gradient_norm_max"] = max(self._gradient_norms)
+            metrics["gradient_clipped_steps"] = self._n_clipped
         times = self._watch.document()
         metrics |= times
         with suppress(NotImplementedError):
@@ -285,6 +289,11 @@ class TrainingRun:
             self._project.checkpoint_path(self._job.clip_index).unlink(missing_ok=True)
         self._snapshots.clear()
         logger.info("clip %d is trained: %d steps", self._job.clip_index, training.steps_done)
+        if self._n_clipped:
+            found = f"{self._n_clipped} of {len(self._gradient_norms)} steps, up to {max(self._gradient_norms):.3g}"
+            logger.warning("clip %d: gradients were scaled down in %s", self._job.clip_index, found)
+            title = f"Clip {self._job.clip_index} had gradients above max_gradient_norm"
+            self._send(WarningRaised(title, f"They were scaled down in {found}."))
         self._send(ClipTrained(str(path), training.steps_done, value))
 
     # ---------------------------------------------------------------- commands
@@ -414,10 +423,6 @@ class TrainingRun:
     def _end_failed(self, error: Exception) -> None:
         trace = "".join(traceback.format_exception(error))
         logger.error("clip %d failed: %s", self._job.clip_index, trace)
-        if isinstance(error, NonFiniteLoss) and self._training is not None:
-            with suppress(EngineError):
-                if is_finite(self._training.state()):
-                    self._write_checkpoint(self._training)
         message, hint = str(error), ""
         if isinstance(error, EngineError):
             message, hint = error.told_apart()
@@ -426,5 +431,24 @@ class TrainingRun:
         else:
             message = f"{type(error).__name__}: {error}"
             hint = "This is a fault of the program; the log has the details."
+        if isinstance(error, NonFiniteLoss) and self._training is not None:
+            message = f"{message} {self._keep_last_good(self._training)}"
         self._snapshots.clear()
         self._send(TrainingFailed(type(error).__name__, message, hint, trace))
+
+    def _keep_last_good(self, training: Training) -> str:
+        """Keep what was learned before a step that failed, if it is any good. Says what is kept now."""
+        assert self._project is not None
+        try:
+            is_good = is_finite(training.state())
+        except EngineError:
+            is_good = False
+        if is_good and self._write_checkpoint(training):
+            return f"Step {training.steps_done} is kept; training again with the same command goes on from there."
+        kept = read_clip_header(self._project.checkpoint_path(self._job.clip_index))
+        why = "could not be kept" if is_good else "holds numbers that are not finite"
+        if kept is None:
+            return f"Step {training.steps_done} {why}; training again starts from the beginning."
+        return (
+            f"Step {training.steps_done} {why}; training again with the same command goes on from step {kept['step']}."
+        )

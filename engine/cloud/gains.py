@@ -8,8 +8,8 @@ cameras, 0.78 to 1.20, log spread 10 %), raw colours, against a geometric mean o
 24 27.4 to 27.5 dB (difference 0.1 +- 0.2). The four held-out cameras of that dome, looked at once it was chosen, came
 out the other way: 29.3 dB against 29.8, and 30.8 with their own gains; so the choice is a matter of luck there.
 Neighbours tell nothing there: a predicted gain errs by 10 % from all other cameras, by 11 to 12 % from the six
-nearest, by 15 to 18 % from the nearest. The gauge is that of the estimate; training moved the geometric mean by 0.1 to
-0.2 %, and what is unseen goes on being shown at gain 1.
+nearest, by 15 to 18 % from the nearest. Training puts its gains back into this gauge after every step: left alone they
+moved by 0.1 to 0.2 % together, and what is unseen is shown at gain 1.
 """
 
 from __future__ import annotations
@@ -88,6 +88,17 @@ def gains_from_observations(log_colors: np.ndarray, first_guess: np.ndarray) -> 
             log_gains[camera] = np.median(log_colors[camera, rows] - scene[rows], axis=0)
         log_gains -= np.median(log_gains, axis=0)
     return np.exp(log_gains), scene_colors(log_colors, np.exp(log_gains))
+
+
+def in_gauge(gains: np.ndarray) -> np.ndarray:
+    """The gains with a median of 1 over the cameras, channel by channel; of an even number, the mean of both in log.
+
+    Args:
+        gains: Above 0. [C, 3] float
+    Returns:
+        [C, 3], dtype of gains. Ratios between cameras stay.
+    """
+    return (gains / np.exp(np.median(np.log(np.maximum(gains.astype(np.float64), 1e-6)), axis=0))).astype(gains.dtype)
 
 
 def scene_colors(log_colors: np.ndarray, gains: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from torch import Tensor, nn
 
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.cloud.gains import in_gauge
 from engine.cloud.gate import GateTable, measure_gate
 from engine.cloud.moving_cloud import MovingCloud
 from engine.cloud.range import near_plane
@@ -61,6 +62,7 @@ from engine.training.preparation import (
     write_backgrounds,
 )
 from engine.training.report import Progress, ReportProgress, StepStats
+from engine.training.stopping import gradient_not_finite, loss_not_finite
 from engine.training.volume import volume_sum
 
 
@@ -332,7 +334,7 @@ class ClipTraining:
         """Draw a picture, render it, compare, update.
 
         Raises:
-            NonFiniteLoss: The loss or a gradient is not finite; the model is as it was before this step.
+            NonFiniteLoss: The loss or a gradient is not finite; names it. The model is as it was before this step.
         """
         index, _ = self._phase_at(self.steps_done)
         if index != self._phase_index:
@@ -350,8 +352,9 @@ class ClipTraining:
             truth, is_counted = self.pictures.raw(camera_row, frame), None
         view = self._views[self.camera_indices[camera_row]]
         active = self._active_picture(camera_row, view, clip_time)
+        image = render_gaussians(active.gaussians, view, tile_mask=active.tile_mask).image[0]
         compared = photometric_loss(
-            render_gaussians(active.gaussians, view, tile_mask=active.tile_mask).image[0],
+            image,
             truth,
             ssim_weight=self.config.ssim_weight,
             gain=self.gains[camera_row],
@@ -360,23 +363,26 @@ class ClipTraining:
             rest=active.rest,
             workspace=self._workspace,
         )
-        loss, mean_square = compared.loss, compared.mean_square
+        loss, mean_square, volume = compared.loss, compared.mean_square, torch.zeros(())
         if self._tiles is not None:
             mean_square += self._tiles.square_outside(active, item, truth, self.gains[camera_row])
         if self.config.volume_weight and active.n_all:
-            volume = volume_sum(active.learning.scales, self.spacing)
-            loss = loss + (self.config.volume_weight / active.n_all) * volume
+            volume = (self.config.volume_weight / active.n_all) * volume_sum(active.learning.scales, self.spacing)
+            loss = loss + volume
         value = float(loss.detach())
         where = f"step {self.steps_done + 1}, camera {self.rig.names[camera_row]}"
         if not np.isfinite(value):
-            raise NonFiniteLoss(f"The loss became {value} at {where}.", hint="The last good state was kept.")
+            terms = {"photometric": float(compared.loss.detach()), "volume": float(volume.detach())}
+            raise loss_not_finite(image=image.detach(), **terms, where=where, config=self.config)
         self._order.saw(drawn, value)
         if loss.requires_grad:
             (loss if weight == 1.0 else loss * weight).backward()
         try:
             gradient_norm = self._optimizer.step()
         except NonFiniteLoss as error:
-            raise NonFiniteLoss(f"{error.message} ({where})", hint="The last good state was kept.") from error
+            raise gradient_not_finite(error, where=where, config=self.config) from error
+        if self.gains.requires_grad:  # a step moves all cameras a little together; what is unseen stays at gain 1
+            self.gains.detach().numpy()[:] = in_gauge(self.gains.detach().numpy())
         self.steps_done += 1
         self._look_for_stall()
         return StepStats(
@@ -387,6 +393,7 @@ class ClipTraining:
             n_gaussians=active.n_all,
             stage=stage,
             gradient_norm=gradient_norm,
+            is_clipped=self._optimizer.clips(gradient_norm),
         )
 
     def _look_for_stall(self) -> None:

@@ -33,6 +33,7 @@ class StepStats:
         n_gaussians: Gaussians rendered.
         stage: "static", "joint" or "source".
         gradient_norm: Euclidean norm over all gradients, before `max_gradient_norm` clips it.
+        is_clipped: Whether it did.
     """
 
     step: int
@@ -42,6 +43,7 @@ class StepStats:
     n_gaussians: int
     stage: str
     gradient_norm: float
+    is_clipped: bool = False
 
 
 ReportProgress = Callable[[Progress], None]

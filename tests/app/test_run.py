@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -191,6 +193,66 @@ def test_a_fault_of_the_program_is_reported_with_its_trace(bench):
     assert failed.kind == "ZeroDivisionError"
     assert "Traceback" in failed.trace
     assert "fault of the program" in failed.hint
+
+
+@pytest.mark.parametrize("n_clipped", [0, 2])
+def test_clipped_steps_are_counted_and_told(bench, n_clipped):
+    def clip_some(it):
+        ordinary = it.training.step
+        it.training.step = lambda: replace(stats := ordinary(), is_clipped=stats.step <= n_clipped)
+
+    it = bench(n_steps=5, change=clip_some)
+    assert it.steps(10) is False
+    metrics = read_clip_state(it.project.clip_path(0)).header["metrics"]
+    assert metrics["gradient_clipped_steps"] == n_clipped
+    told = [event.detail for event in it.of(m.WarningRaised)]
+    assert told == (["They were scaled down in 2 of 5 steps, up to 5."] if n_clipped else [])
+
+
+def _fails_at(step):
+    def change(it):
+        it.training.fails_at = step
+
+    return change
+
+
+def test_a_loss_that_is_no_number_keeps_the_steps_before_and_says_so(bench):
+    it = bench(change=_fails_at(4))
+    assert it.steps(10) is False
+    failed = it.events[-1]
+    assert failed.message == (
+        "The loss became nan at step 5. Step 4 is kept; training again with the same command goes on from there."
+    )
+    assert failed.hint == "Lower the rates."
+    assert read_clip_state(it.checkpoint).header["step"] == 4
+
+
+@pytest.mark.parametrize("has_older", [False, True])
+def test_what_could_not_be_kept_is_not_said_to_be(bench, monkeypatch, has_older):
+    def full(*_args):
+        raise ProjectError("The clip could not be written (No space left on device).", hint="Free some space.")
+
+    it = bench(change=_fails_at(4))
+    it.steps(3)
+    if has_older:
+        it.commands += [m.Pause()]
+        it.steps(1)
+        it.commands += [m.Resume()]
+    monkeypatch.setattr("tests.app.fakes.write_clip_state", full)
+    assert it.steps(10) is False
+    end = "with the same command goes on from step 2." if has_older else "starts from the beginning."
+    assert it.events[-1].message.endswith(f"Step 4 could not be kept; training again {end}")
+    assert it.of(m.WarningRaised)[-1].hint == "Free some space."
+
+
+def test_a_state_that_is_no_number_is_not_kept(bench):
+    def spoil(it):
+        it.training.fails_at, it.training.value = 0, np.nan
+
+    it = bench(change=spoil)
+    assert it.steps(3) is False
+    assert "Step 0 holds numbers that are not finite; training again starts" in it.events[-1].message
+    assert not it.checkpoint.exists()
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])

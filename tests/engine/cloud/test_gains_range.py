@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from engine.capture.rig import CameraRig
-from engine.cloud.gains import MIN_SPREAD, GainSpread, gain_spread, gains_from_observations, gains_from_pictures
+from engine.cloud.gains import (
+    MIN_SPREAD,
+    GainSpread,
+    gain_spread,
+    gains_from_observations,
+    gains_from_pictures,
+    in_gauge,
+)
 from engine.cloud.median import median_over_cameras
 from engine.cloud.range import depth_ranges, near_plane
 from engine.cloud.voxel import voxel_keys, voxel_means
@@ -156,3 +163,13 @@ def test_median_over_cameras_is_that_of_the_finite_values(rng: np.random.Generat
     found = median_over_cameras(samples)
     assert found.dtype == dtype
     np.testing.assert_allclose(found, expected, rtol=1e-6)  # the mean of two values may round the other way
+
+
+@pytest.mark.parametrize("n_cameras", [1, 6, 7])
+def test_gains_in_their_gauge_have_a_median_of_1_and_the_ratios_they_had(n_cameras):
+    gains = np.exp(np.random.default_rng(0).normal(0.2, 0.1, (n_cameras, 3))).astype(np.float32)
+    found = in_gauge(gains)
+    assert found.dtype == np.float32
+    assert np.median(np.log(found.astype(np.float64)), axis=0) == pytest.approx(0.0, abs=1e-7)  # float32: 6e-8
+    assert np.allclose(found / found[0], gains / gains[0], rtol=3e-7)
+    assert np.allclose(in_gauge(found), found, rtol=1e-7)

@@ -18,6 +18,7 @@ from engine.model.clip_model import load_clip_model
 from engine.model.clip_state import ClipState
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
+from engine.training.stopping import loss_not_finite
 
 CLIP_LENGTH = 10
 CONFIG = TrainConfig(
@@ -106,6 +107,7 @@ def test_gains_learn_in_the_reference_clip_and_are_kept_in_the_next(setting, tmp
     reference = finish(training)
     learned = reference.arrays["gains"]
     assert (learned != estimated.numpy()).any()
+    assert np.median(np.log(learned), axis=0) == pytest.approx(0.0, abs=1e-7)  # the gauge; float32 rounds at 6e-8
     source = start(setting.capture, 1, tmp_path, config=config, reference=reference)
     source.prepare()
     source.step()
@@ -199,10 +201,60 @@ def test_a_gradient_that_is_no_number_stops_with_the_cause_and_keeps_the_model(s
     training.step()
     before = training.state().fingerprint
     training.model.anchor_set("residual").features.register_hook(lambda gradient: gradient * float("nan"))
-    with pytest.raises(NonFiniteLoss, match=r"residual\.features.*camera") as caught:
+    with pytest.raises(NonFiniteLoss, match=r"residual\.features.* at step 2, camera cam") as caught:
         training.step()
-    assert "last good state" in caught.value.hint
+    assert "--set table_lr=0.02 or --set max_gradient_norm=" in caught.value.hint
     assert training.state().fingerprint == before
+
+
+@torch.no_grad()
+def _spoil_scales(training: ClipTraining) -> None:
+    training.model.anchor_set("residual").log_base_scales[:] = float("nan")
+
+
+@torch.no_grad()
+def _spoil_gains(training: ClipTraining) -> None:
+    training.gains[:] = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (_spoil_scales, r"The volume term of the loss became nan at step 2, camera cam\d+; a Gaussian's scales"),
+        (_spoil_gains, r"The photometric loss became nan at step 2, camera cam\d+\."),
+    ],
+)
+def test_a_loss_that_is_no_number_names_its_term_step_and_camera_and_changes_nothing(source, spoil, said):
+    training = source()
+    training.prepare()
+    training.step()
+    spoil(training)
+    before = training.state().fingerprint, {k: v.tobytes() for k, v in training._optimizer.arrays().items()}
+    with pytest.raises(NonFiniteLoss, match=said) as caught:
+        training.step()
+    assert "--set table_lr=0.02" in caught.value.hint
+    assert training.steps_done == 1
+    assert (training.state().fingerprint, {k: v.tobytes() for k, v in training._optimizer.arrays().items()}) == before
+
+
+def test_a_step_after_a_loss_that_is_no_number_goes_on_as_if_nothing_had_been(source):
+    training = source()
+    training.prepare()
+    good = training.gains.detach().clone()
+    _spoil_gains(training)
+    with pytest.raises(NonFiniteLoss):
+        training.step()
+    with torch.no_grad():
+        training.gains[:] = good
+    assert np.isfinite(training.step().loss)
+
+
+def test_rendered_values_that_are_no_numbers_are_counted():
+    image = torch.zeros(2, 3, 3)
+    image[0, 1] = float("inf")
+    values = {"photometric": float("nan"), "volume": 0.0}
+    said = str(loss_not_finite(image=image, **values, where="step 9, camera a", config=TrainConfig()))
+    assert said.startswith("The photometric loss became nan at step 9, camera a; 3 of 18 rendered values are not")
 
 
 def test_holding_out_almost_everything_is_refused(setting, tmp_path):

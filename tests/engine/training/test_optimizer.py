@@ -57,6 +57,33 @@ def test_fused_follows_the_float64_reference(max_gradient_norm):
         assert error < 100 * 2.5e-7 + 100 * rate * 3e-6
 
 
+def test_a_limit_that_is_not_reached_changes_no_bit():
+    found = []
+    for max_gradient_norm in (0.0, 1e6):
+        parameters = make_parameters()
+        optimizer = make_optimizer(parameters, max_gradient_norm=max_gradient_norm)
+        norms = run(parameters, optimizer, range(8))
+        assert not any(optimizer.clips(norm) for norm in norms)
+        found.append(parameters)
+    assert all(torch.equal(found[0][name][0], found[1][name][0]) for name in SHAPES)
+
+
+@pytest.mark.parametrize("backend", ["fused", "reference"])
+def test_gradients_above_the_limit_count_as_if_they_had_that_norm(backend):
+    found = []
+    for length in (10.0, 1e4):  # the same direction, both above
+        parameters = {"row": (nn.Parameter(torch.zeros(64)), 1.0)}
+        optimizer = make_optimizer(parameters, backend, max_gradient_norm=2.0)
+        parameters["row"][0].grad = torch.full((64,), length / 8)
+        norm = optimizer.step()
+        assert norm == pytest.approx(length)
+        assert optimizer.clips(norm)
+        found.append(optimizer.arrays()["optimizer.row.exp_avg"])
+        assert np.linalg.norm(found[-1]) == pytest.approx(0.1 * 2.0, rel=1e-6)  # 1 - beta1 of the gradient
+    assert not optimizer.clips(2.0)
+    assert np.allclose(found[0], found[1], rtol=1e-6)
+
+
 def test_entries_without_gradient_keep_their_bits():
     parameters = make_parameters()
     before = parameters["table"][0].detach().clone()
