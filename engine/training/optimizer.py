@@ -110,7 +110,7 @@ class PhaseOptimizer:
 
     @property
     def share_done(self) -> float:
-        """How much of the fall of the rates lies behind, 0 to 1: the next step's rates are start * final_ratio ** this."""
+        """How much of the fall of the rates lies behind, 0 to 1; rates are start * final_ratio ** this."""
         share = (self.steps_done - self._from_step) / max(self.n_steps - self._from_step, 1)
         return self._from_share + (1.0 - self._from_share) * share
 
