@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.ablation import running
-from app.ablation.running import MEASURED_FILE, RESULT_FILE, TABLE_FILE, Callbacks, project_folder, run_ablation
+from app.ablation import measuring
+from app.ablation.measuring import MEASURED_FILE
+from app.ablation.running import RESULT_FILE, TABLE_FILE, Callbacks, project_folder, run_ablation
 from app.ablation.table import COLUMNS, VariantResult, as_csv, as_text, seam_figures, summarize
 from app.ablation.variants import FULL, MIN_STEPS_PER_FRAME, VARIANTS, chosen_variants, settings_of
 from app.cli import main
@@ -216,7 +217,7 @@ class Runner:
         self.measured: list[str] = []
         self.outcomes: list[str] = []
         self.make_training = make_fake
-        monkeypatch.setattr(running, "evaluate_project", self._evaluate)
+        monkeypatch.setattr(measuring, "evaluate_project", self._evaluate)
         monkeypatch.setattr("app.headless.POLL_EVERY_S", 0.0)
 
     def _evaluate(self, opened, *, clip_indices, cameras, metrics, on_progress) -> dict[str, Any]:
@@ -284,7 +285,7 @@ def test_the_reference_clip_of_full_is_not_trained_again(runner):
 def test_each_seed_has_projects_of_its_own(runner):
     document = runner.run(["residual-none"], seeds=[0, 3])
     assert [(r["variant"], r["seed"]) for r in document["results"]] == [
-        (FULL, 0), ("residual-none", 0), (FULL, 3), ("residual-none", 3)]  # fmt: skip
+        (FULL, 0), (FULL, 3), ("residual-none", 0), ("residual-none", 3)]  # fmt: skip
     assert read_settings(project_folder(runner.folder, FULL, 3)).seed == 3
     assert document["lines"][0]["n_seeds"] == 2
 
@@ -297,6 +298,36 @@ def test_what_is_done_is_not_done_again(runner):
     runner.run(["decoder-new", "residual-none"])
     assert {name for name, _ in runner.launched[len(launched) :]} == {"residual-none-seed0"}
     assert runner.measured[len(measured) :] == ["residual-none-seed0"]
+
+
+def test_a_later_call_keeps_the_lines_of_earlier_ones_in_order(runner):
+    runner.run(["residual-none"], seeds=[1])
+    runner.run(["independent"])
+    launched = len(runner.launched)
+    document = runner.run(["decoder-new"])
+    assert [line["variant"] for line in document["lines"]] == [FULL, "decoder-new", "residual-none", "independent"]
+    assert list(document["words"]) == [line["variant"] for line in document["lines"]]
+    assert [(r["variant"], r["seed"]) for r in document["results"]] == [
+        (FULL, 0), (FULL, 1), ("decoder-new", 0), ("residual-none", 1), ("independent", 0)]  # fmt: skip
+    assert document["seeds"] == [0, 1]
+    assert json.loads((runner.folder / RESULT_FILE).read_text()) == document
+    written = csv.DictReader((runner.folder / TABLE_FILE).read_text().splitlines())
+    assert [row["n_seeds"] for row in written] == ["2", "1", "1", "1"]
+    assert {name for name, _ in runner.launched[launched:]} == {"decoder-new-seed0"}
+
+
+def test_only_what_fits_the_settings_is_taken_up(runner):
+    runner.run(["residual-none", "independent"])
+    place = project_folder(runner.folder, "residual-none", 0)
+    text = json.loads((place / MEASURED_FILE).read_text())
+    text["key"]["clips"][1] = "of other clips"
+    (place / MEASURED_FILE).write_text(json.dumps(text))
+    assert [line["variant"] for line in runner.run([FULL])["lines"]] == [FULL, "independent"]
+    assert [line["variant"] for line in runner.run([FULL], n_clips=1)["lines"]] == [FULL]
+    shutil.copytree(project_folder(runner.folder, "independent", 0), project_folder(runner.folder, "independent", 7))
+    (runner.folder / "full-seedx").mkdir()
+    document = runner.run([FULL])  # a copy under another seed has settings of its own
+    assert [(r["variant"], r["seed"]) for r in document["results"]] == [(FULL, 0), ("independent", 0)]
 
 
 def test_a_figure_file_that_is_damaged_or_of_other_clips_is_measured_again(runner):

@@ -1,0 +1,89 @@
+"""Figures of one trained variant, kept beside it: the same settings are measured once."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from app.ablation.table import seam_figures
+from app.evaluation import evaluate_project
+from app.headless import open_trained
+from app.project import Project, ProjectSettings, open_project
+from app.results import write_text
+from engine.errors import ProjectError
+from engine.model.clip_state import read_clip_header
+
+MEASURED_SCHEMA = 1
+MEASURED_FILE = "measured.json"
+Figures = dict[str, float | None]
+
+
+def measure(
+    place: Path, clips: Sequence[int], borders: set[int], metrics: Any, on_row: Callable[[int, int, Any], None]
+) -> Figures:
+    """Figures of a trained variant, from its file when that is of these clips.
+
+    Args:
+        place: The variant's project.
+        clips: Indices of its clips.
+        borders: Frames at which a clip of "full" starts.
+        metrics, on_row: See app.evaluation.evaluate_project.
+    Raises:
+        ProjectError, CaptureError: It cannot be measured, or the figures cannot be written.
+    """
+    project = open_project(place, is_writable=False)
+    key = _key(project, clips, borders, metrics)
+    figures = _read(place / MEASURED_FILE, key)
+    if figures is not None:
+        return figures
+    opened = open_trained(project)
+    headers = [opened.header(i) for i in clips]
+    holdout = opened.capture.camera_indices(project.settings.holdout)
+    document = evaluate_project(
+        opened, clip_indices=clips, metrics=metrics, cameras=holdout or None, on_progress=on_row
+    )
+    means = document["means"]["held_out"] or document["means"]["trained_on"]
+    figures = {name: value for name, value in means.items() if not isinstance(value, dict)}
+    figures |= seam_figures(document["seams"]["rows"], borders)
+    times = [header.get("metrics") or {} for header in headers]
+    seconds = [time["preparation_s"] + time["training_s"] for time in times if "training_s" in time]
+    figures["minutes"] = sum(seconds) / 60 if len(seconds) == len(headers) else None
+    figures["megabytes"] = sum(project.clip_path(i).stat().st_size for i in clips) / 1e6
+    write_text(place / MEASURED_FILE, json.dumps({"key": key, "figures": figures}, indent=1, allow_nan=False) + "\n")
+    return figures
+
+
+def kept_figures(
+    place: Path, settings: ProjectSettings, clips: Sequence[int], borders: set[int], metrics: Any
+) -> Figures | None:
+    """Figures that an earlier call has measured with these settings; None where there are none. Arguments as above."""
+    try:
+        project = open_project(place, is_writable=False)
+    except ProjectError:  # damaged, or something else of that name
+        return None
+    if project.settings != settings:
+        return None
+    return _read(place / MEASURED_FILE, _key(project, clips, borders, metrics))
+
+
+def _key(project: Project, clips: Sequence[int], borders: set[int], metrics: Any) -> dict[str, Any]:
+    """Everything that the figures depend on."""
+    headers = [read_clip_header(project.clip_path(i)) for i in clips]
+    return {
+        "clips": [None if header is None else header["fingerprint"] for header in headers],
+        "borders": sorted(borders),
+        "metrics": metrics,
+        "schema": MEASURED_SCHEMA,
+    }
+
+
+def _read(path: Path, key: dict[str, Any]) -> Figures | None:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    if not isinstance(content, dict) or content.get("key") != key or not isinstance(content.get("figures"), dict):
+        return None
+    return content["figures"]
