@@ -81,6 +81,6 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
     if options.json:
         print(json.dumps(document, indent=1, allow_nan=False))
     else:
-        print(as_text(document["lines"]))
+        print(f"{as_text(document['lines'])}\n\n{document['definition']}")
     line.say(f"All figures: {options.project / RESULT_FILE} and {TABLE_FILE}")
     return EXIT_OK

@@ -7,15 +7,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from app.ablation.table import seam_figures
 from app.evaluation import evaluate_project
 from app.headless import open_trained
 from app.project import Project, ProjectSettings, open_project
 from app.results import write_text
 from engine.errors import ProjectError
+from engine.metrics.flicker import flicker_figures
 from engine.model.clip_state import read_clip_header
 
-MEASURED_SCHEMA = 1
+MEASURED_SCHEMA = 2
 MEASURED_FILE = "measured.json"
 Figures = dict[str, float | None]
 
@@ -46,7 +46,7 @@ def measure(
     )
     means = document["means"]["held_out"] or document["means"]["trained_on"]
     figures = {name: value for name, value in means.items() if not isinstance(value, dict)}
-    figures |= seam_figures(document["seams"]["rows"], borders)
+    figures |= flicker_figures(document["seams"]["rows"], borders)
     times = [header.get("metrics") or {} for header in headers]
     seconds = [time["preparation_s"] + time["training_s"] for time in times if "training_s" in time]
     figures["minutes"] = sum(seconds) / 60 if len(seconds) == len(headers) else None

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from app.ablation.measuring import kept_figures, measure
-from app.ablation.table import VariantResult, as_csv, summarize
+from app.ablation.table import DEFINITION, VariantResult, as_csv, summarize
 from app.ablation.variants import FULL, VARIANTS, Variant, settings_of
 from app.headless import ClipOutcome, train_clips
 from app.project import PROJECT_FILE, Project, ProjectSettings, check_settings, create_project, open_project
@@ -73,8 +73,8 @@ def run_ablation(
         n_clips: From the first.
         metrics: "quick" or "all", see engine.metrics.picture.measure_picture.
     Returns:
-        JSON-able: schema, capture, holdout, clip_length, n_clips, seeds, words (what each variant is), lines
-        (`summarize`) and results per seed.
+        JSON-able: schema, capture, holdout, clip_length, n_clips, seeds, words (what each variant is), definition
+        (of flicker and seam ratios), lines (`summarize`) and results per seed.
     Raises:
         ProjectError, CaptureError: Bad input.
         TrainingError: A clip failed; what was finished is kept.
@@ -101,6 +101,7 @@ def run_ablation(
             "n_clips": n_clips,
             "seeds": sorted({*seeds, *(result.seed for result in results)}),
             "words": {item.name: item.words for item in VARIANTS if item.name in shown},
+            "definition": DEFINITION,
             "lines": summarize(results),
             "results": [{"variant": r.variant, "seed": r.seed, **r.figures} for r in results],
         }

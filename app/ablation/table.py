@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from engine.metrics.flicker import definition_of
+
 COLUMNS: dict[str, tuple[str, int]] = {
     "psnr": ("PSNR", 2),
     "psnr_fit": ("PSNR fit", 2),
@@ -22,14 +24,16 @@ COLUMNS: dict[str, tuple[str, int]] = {
     "dssim_range2": ("DSSIM r2", 4),
     "lpips": ("LPIPS", 4),
     "flip": ("FLIP", 4),
-    "seam_ratio_static": ("seam static", 3),
-    "seam_ratio_moving": ("seam moving", 3),
-    "seam_change_static": ("flicker /255", 3),
+    "flicker_inside": ("flicker inside /255", 3),
+    "flicker_borders": ("flicker borders /255", 3),
+    "seam_ratio_static": ("seam ratio static", 3),
+    "seam_ratio_moving": ("seam ratio moving", 3),
     "minutes": ("minutes", 1),
     "megabytes": ("MB", 2),
 }
-"""Figure to its heading and decimals. Held-out cameras, raw colours unless the name says fit. PSNR in dB; seam: change
-of the render at clip borders / inside clips; flicker: mean change of static pixels from frame to frame."""
+"""Figure to its heading and decimals. Held-out cameras, raw colours unless the name says fit. PSNR in dB."""
+DEFINITION = definition_of('the borders are those of the clips of "full" for every line')
+"""Of flicker and seam ratios."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,31 +43,6 @@ class VariantResult:
     variant: str
     seed: int
     figures: dict[str, float | None]
-
-
-def seam_figures(rows: Sequence[dict[str, Any]], borders: set[int]) -> dict[str, float | None]:
-    """Change of held-out renders at the given border frames against all other frames.
-
-    The borders are those of "full" for every variant, so that one that has no clips there can be compared.
-
-    Args:
-        rows: PairRow.as_dict.
-        borders: Frames at which a clip of "full" starts.
-    """
-    held_out = [row for row in rows if row["is_held_out"]] or list(rows)
-
-    def mean(name: str, *, is_border: bool) -> float | None:
-        values = [row[name] for row in held_out if (row["frame_index"] in borders) == is_border]
-        values = [value for value in values if value is not None]
-        return float(np.mean(values)) if values else None
-
-    figures: dict[str, float | None] = {}
-    for part in ("static", "moving"):
-        at, inside = (mean(f"change_{part}", is_border=is_border) for is_border in (True, False))
-        figures[f"seam_ratio_{part}"] = None if at is None or not inside else at / inside
-    inside = mean("change_static", is_border=False)
-    figures["seam_change_static"] = None if inside is None else 255.0 * inside
-    return figures
 
 
 def summarize(results: Sequence[VariantResult]) -> list[dict[str, Any]]:

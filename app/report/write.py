@@ -14,7 +14,7 @@ from app.evaluation import evaluate_project
 from app.headless import TrainedProject, open_trained
 from app.report.about import capture_section, settings_section, setup_section, split_section
 from app.report.cache import REPORTS, Measure, evaluation_of
-from app.report.comparison import Compared, comparison_section, flicker_of, speed_section
+from app.report.comparison import Compared, comparison_section, speed_section
 from app.report.costs import storage_section, times_section
 from app.report.facts import find_projects, read_facts, short_names
 from app.report.measured import clips_section, time_section, worst_pictures, worst_section
@@ -25,6 +25,7 @@ from app.report.seam_parts import seams_section, shown_boundaries
 from engine.capture.inspect import describe
 from engine.errors import CaptureError, ProjectError
 from engine.files import atomic_path
+from engine.metrics.flicker import flicker_figures
 
 if TYPE_CHECKING:
     from engine.metrics.picture import Choice
@@ -157,8 +158,8 @@ def _sections(
 
 
 def report_document(compared: Sequence[Compared], sections: Sequence[Section]) -> dict[str, Any]:
-    """What report.json holds: schema, projects (name, folder, settings, clips, means, columns and seams of their
-    evaluations), tables by name as on the page and in the CSV files, and files (of figures and tables)."""
+    """What report.json holds: schema, projects (name, folder, settings, clips, means, columns, seams and flicker of
+    their evaluations), tables by name as on the page and in the CSV files, and files (of figures and tables)."""
     tables = {table.name: table for section in sections for table in section.tables()}
     figures = [figure.name for section in sections for figure in section.figures()]
     return {
@@ -199,7 +200,7 @@ def _project_document(one: Compared) -> dict[str, Any]:
         "columns": evaluation["columns"],
         "means": evaluation["means"],
         "seams": {key: value for key, value in evaluation["seams"].items() if key != "rows"},
-        "flicker_static": flicker_of(evaluation),
+        "flicker": flicker_figures(evaluation["seams"]["rows"]),
     }
 
 

@@ -19,7 +19,7 @@ import pytest
 from app.ablation import measuring
 from app.ablation.measuring import MEASURED_FILE
 from app.ablation.running import RESULT_FILE, TABLE_FILE, Callbacks, project_folder, run_ablation
-from app.ablation.table import COLUMNS, VariantResult, as_csv, as_text, seam_figures, summarize
+from app.ablation.table import COLUMNS, VariantResult, as_csv, as_text, summarize
 from app.ablation.variants import FULL, MIN_STEPS_PER_FRAME, VARIANTS, chosen_variants, settings_of
 from app.cli import main
 from app.headless import open_trained
@@ -28,6 +28,7 @@ from app.training.messages import TrainJob
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import split_clips
 from engine.errors import ProjectError, TrainingError
+from engine.metrics.seams import PairRow
 from engine.model.clip_state import read_clip_state
 from engine.training.config import TrainConfig
 from engine.training.presets import PRESETS, preset
@@ -133,40 +134,8 @@ def test_the_reference_in_the_middle_is_trained_first(runner):
 # ---------------------------------------------------------------- the table
 
 
-def pair(frame: int, static: float | None, moving: float | None, *, is_held_out: bool = True) -> dict[str, Any]:
-    return {
-        "frame_index": frame, "is_held_out": is_held_out, "change_static": static, "change_moving": moving,
-    }  # fmt: skip
-
-
-def test_seams_are_changes_at_borders_of_full_over_those_inside():
-    rows = [pair(1, 0.01, 0.2), pair(2, 0.03, None), pair(3, 0.06, 0.3), pair(4, 0.02, 0.2)]
-    rows.append(pair(3, 9.0, 9.0, is_held_out=False))  # cameras of the training do not count
-    found = seam_figures(rows, {3})
-    assert found["seam_ratio_static"] == pytest.approx(3.0)
-    assert found["seam_ratio_moving"] == pytest.approx(1.5)
-    assert found["seam_change_static"] == pytest.approx(255 * 0.02)
-
-
-@pytest.mark.parametrize(
-    ("rows", "borders"),
-    [
-        ([], {3}),
-        ([pair(1, 0.01, 0.1)], {3}),
-        ([pair(3, 0.01, 0.1)], {3}),
-        ([pair(1, 0.0, 0.0), pair(3, 0.01, 0.1)], {3}),
-        ([pair(1, None, None), pair(3, 0.01, 0.1)], {3}),
-    ],
-)
-def test_a_ratio_that_does_not_exist_is_none(rows, borders):
-    found = seam_figures(rows, borders)
-    assert found["seam_ratio_static"] is None
-    assert found["seam_ratio_moving"] is None
-
-
-def test_without_held_out_cameras_all_count():
-    rows = [pair(1, 0.01, 0.1, is_held_out=False), pair(3, 0.02, 0.1, is_held_out=False)]
-    assert seam_figures(rows, {3})["seam_ratio_static"] == pytest.approx(2.0)
+def pair(frame: int, static: float) -> dict[str, Any]:
+    return PairRow(frame, 0, "0", True, False, static, None, 0.0, None, static, None, 1.0).as_dict()
 
 
 RESULTS = [
@@ -224,7 +193,7 @@ class Runner:
         self.measured.append(opened.project.folder.name)
         assert list(cameras) == [0]
         means = {"psnr": 20.0 + len(clip_indices), "ssim": 0.5, "curves": {"not": "a figure"}}
-        rows = [pair(frame, 0.04 if frame == 4 else 0.02, None) for frame in range(1, 6)]
+        rows = [pair(frame, 0.04 if frame == 4 else 0.02) for frame in range(1, 6)]
         return {"means": {"held_out": means, "trained_on": {}}, "seams": {"rows": rows}}
 
     def _launch(self, job, project):
@@ -267,7 +236,10 @@ def test_every_variant_is_a_project_and_a_line_of_the_table(runner):
         assert settings.overrides | variant.overrides == settings.overrides
     line = document["lines"][0]
     assert line["psnr"] == 22.0
-    assert line["seam_ratio_static"] == pytest.approx(2.0)
+    for line in document["lines"]:  # whatever its own clips are: those of full begin at frame 4
+        assert line["seam_ratio_static"] == pytest.approx(2.0)
+        assert line["flicker_inside"] == pytest.approx(255 * 0.02)
+        assert line["flicker_borders"] == pytest.approx(255 * 0.04)
     assert line["minutes"] > 0
     assert line["megabytes"] > 0
 
@@ -520,7 +492,10 @@ def test_the_command_prints_the_table(run, runner, capture_folder):
     settings = ["--set", "joint_steps=6"]
     code, out, err = run(*arguments, *settings)
     assert code == 0, err
-    assert [line.split()[0] for line in out.splitlines()[1:]] == [FULL, "decoder-new"]
+    table, _, said = out.partition("\n\n")
+    assert [line.split()[0] for line in table.splitlines()[1:]] == [FULL, "decoder-new"]
+    assert said.startswith("Flicker: ")
+    assert 'those of the clips of "full"' in said
     code, out, _ = run(*arguments, *settings, "--json", "--quiet")
     assert code == 0
     assert json.loads(out)["n_clips"] == 2

@@ -70,7 +70,8 @@ class Measure:
                     if frame > 0 and (frame != opened.clips[clip_index].start or clip_index - 1 in clip_indices):
                         pairs.append(
                             PairRow(
-                                frame, clip_index, camera, camera == "0", frame == opened.clips[clip_index].start,
+                                frame, clip_index, camera, camera in opened.project.settings.holdout,
+                                frame == opened.clips[clip_index].start,
                                 *(draw() * 0.01 for _ in range(6)), static_share=0.9,
                             )
                         )  # fmt: skip
@@ -271,6 +272,20 @@ def test_the_comparison_stands_first(page):
     assert anchors[:2] == ["comparison", "speed"]
     assert [row[:2] for row in page.tables["comparison"]] == [[ODD_NAME, "defaults"], ["fast", "source_steps=7"]]
     assert page.tables["speed_error"][1][:3] == ["2", "fast", "0.28"]  # (3 + 6 + 2 + 6) / 60
+
+
+def test_flicker_is_one_thing_on_the_whole_page(page, numbers):
+    rows = [row for row in numbers["tables"]["seam_pairs"]["rows"] if row["is_held_out"]]
+    inside, borders = (
+        [row["change_static"] for row in rows if row["is_boundary"] == is_border] for is_border in (False, True)
+    )
+    expected = [255.0 * sum(values) / len(values) for values in (inside, borders)]
+    own, compared = numbers["projects"][0]["flicker"], numbers["tables"]["comparison"]["rows"][0]
+    for found in (own, compared):
+        assert [found["flicker_inside"], found["flicker_borders"]] == pytest.approx(expected)
+        assert found["seam_ratio_static"] == pytest.approx(expected[1] / expected[0])
+    assert numbers["tables"]["speed_error"]["rows"][0]["flicker_inside"] == own["flicker_inside"]
+    assert page.text.count("Flicker: mean change of the render (R)") == 2  # below the comparison and the marks
 
 
 def test_page_csv_and_json_have_the_same_numbers(page, numbers, made):
