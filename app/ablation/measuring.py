@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,19 @@ from engine.model.clip_state import read_clip_header
 
 MEASURED_SCHEMA = 2
 MEASURED_FILE = "measured.json"
-Figures = dict[str, float | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Figures of a trained variant, None where one does not exist, and on how many frames of each camera."""
+
+    figures: dict[str, float | None]
+    n_frames: int
 
 
 def measure(
     place: Path, clips: Sequence[int], borders: set[int], metrics: Any, on_row: Callable[[int, int, Any], None]
-) -> Figures:
+) -> Measured:
     """Figures of a trained variant, from its file when that is of these clips.
 
     Args:
@@ -35,9 +43,9 @@ def measure(
     """
     project = open_project(place, is_writable=False)
     key = _key(project, clips, borders, metrics)
-    figures = _read(place / MEASURED_FILE, key)
-    if figures is not None:
-        return figures
+    kept = _read(place / MEASURED_FILE, key)
+    if kept is not None:
+        return kept
     opened = open_trained(project)
     headers = [opened.header(i) for i in clips]
     holdout = opened.capture.camera_indices(project.settings.holdout)
@@ -45,19 +53,20 @@ def measure(
         opened, clip_indices=clips, metrics=metrics, cameras=holdout or None, on_progress=on_row
     )
     means = document["means"]["held_out"] or document["means"]["trained_on"]
-    figures = {name: value for name, value in means.items() if not isinstance(value, dict)}
+    figures: dict[str, float | None] = {name: value for name, value in means.items() if not isinstance(value, dict)}
     figures |= flicker_figures(document["seams"]["rows"], borders)
     times = [header.get("metrics") or {} for header in headers]
     seconds = [time["preparation_s"] + time["training_s"] for time in times if "training_s" in time]
     figures["minutes"] = sum(seconds) / 60 if len(seconds) == len(headers) else None
     figures["megabytes"] = sum(project.clip_path(i).stat().st_size for i in clips) / 1e6
-    write_text(place / MEASURED_FILE, json.dumps({"key": key, "figures": figures}, indent=1, allow_nan=False) + "\n")
-    return figures
+    measured = Measured(figures, sum(opened.clips[i].n_frames for i in clips))
+    write_text(place / MEASURED_FILE, json.dumps({"key": key, **asdict(measured)}, indent=1, allow_nan=False) + "\n")
+    return measured
 
 
 def kept_figures(
     place: Path, settings: ProjectSettings, clips: Sequence[int], borders: set[int], metrics: Any
-) -> Figures | None:
+) -> Measured | None:
     """Figures that an earlier call has measured with these settings; None where there are none. Arguments as above."""
     try:
         project = open_project(place, is_writable=False)
@@ -79,11 +88,12 @@ def _key(project: Project, clips: Sequence[int], borders: set[int], metrics: Any
     }
 
 
-def _read(path: Path, key: dict[str, Any]) -> Figures | None:
+def _read(path: Path, key: dict[str, Any]) -> Measured | None:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    if not isinstance(content, dict) or content.get("key") != key or not isinstance(content.get("figures"), dict):
+    if not isinstance(content, dict) or content.get("key") != key:
         return None
-    return content["figures"]
+    figures, n_frames = content.get("figures"), content.get("n_frames")
+    return Measured(figures, n_frames) if isinstance(figures, dict) and isinstance(n_frames, int) else None

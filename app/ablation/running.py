@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from app.ablation.measuring import kept_figures, measure
+from app.ablation.measuring import Measured, kept_figures, measure
 from app.ablation.table import DEFINITION, VariantResult, as_csv, summarize
 from app.ablation.variants import FULL, VARIANTS, Variant, settings_of
 from app.headless import ClipOutcome, train_clips
@@ -89,8 +89,8 @@ def run_ablation(
     for n_done, task in enumerate(todo):
         variant, seed = task.variant, task.settings.seed
         callbacks.on_variant(variant.name, seed, n_done, len(todo))
-        figures = _figures_of(folder, task, clips, metrics, launch, callbacks)
-        found[variant.name, seed] = VariantResult(variant.name, seed, figures)
+        measured = _measured(folder, task, clips, metrics, launch, callbacks)
+        found[variant.name, seed] = VariantResult(variant.name, seed, measured.figures, measured.n_frames)
         results = [found[key] for key in sorted(found, key=lambda key: (_ORDER[key[0]], key[1]))]
         shown = {result.variant for result in results}
         document = {
@@ -103,7 +103,7 @@ def run_ablation(
             "words": {item.name: item.words for item in VARIANTS if item.name in shown},
             "definition": DEFINITION,
             "lines": summarize(results),
-            "results": [{"variant": r.variant, "seed": r.seed, **r.figures} for r in results],
+            "results": [{"variant": r.variant, "seed": r.seed, "n_frames": r.n_frames, **r.figures} for r in results],
         }
         write_text(folder / RESULT_FILE, json.dumps(document, indent=1, allow_nan=False) + "\n")
         write_text(folder / TABLE_FILE, as_csv(document["lines"]))
@@ -129,9 +129,9 @@ def _finished(
                 task = _Task(capture, replace(base, seed=int(text)), variant, int(text), clips)
             except ProjectError:  # the settings of this call have no such variant
                 continue
-            figures = kept_figures(place, task.settings, list(task.chosen), _borders(clips), metrics)
-            if figures is not None:
-                found[variant.name, int(text)] = VariantResult(variant.name, int(text), figures)
+            kept = kept_figures(place, task.settings, list(task.chosen), _borders(clips), metrics)
+            if kept is not None:
+                found[variant.name, int(text)] = VariantResult(variant.name, int(text), kept.figures, kept.n_frames)
     return found
 
 
@@ -155,9 +155,9 @@ class _Task:
         check_settings(self.settings, capture)
 
 
-def _figures_of(
+def _measured(
     folder: Path, task: _Task, clips: Sequence[Clip], metrics: Any, launch: Launch, callbacks: Callbacks
-) -> dict[str, float | None]:
+) -> Measured:
     variant, settings, capture, seed = task.variant, task.settings, task.capture, task.settings.seed
     place = project_folder(folder, variant.name, seed)
     project = _open(place, settings)

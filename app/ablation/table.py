@@ -38,19 +38,20 @@ DEFINITION = definition_of('the borders are those of the clips of "full" for eve
 
 @dataclass(frozen=True, slots=True)
 class VariantResult:
-    """Figures of one variant trained with one seed; None where a figure does not exist."""
+    """Figures of one variant trained with one seed; None where one does not exist. n_frames: measured, per camera."""
 
     variant: str
     seed: int
     figures: dict[str, float | None]
+    n_frames: int | None = None
 
 
 def summarize(results: Sequence[VariantResult]) -> list[dict[str, Any]]:
-    """One line per variant: n seeds, and per figure its mean and standard deviation over seeds."""
+    """One line per variant: n_seeds, n_frames, and per figure its mean and standard deviation over seeds."""
     lines = []
     for name in dict.fromkeys(result.variant for result in results):
         of_name = [result for result in results if result.variant == name]
-        line: dict[str, Any] = {"variant": name, "n_seeds": len(of_name)}
+        line: dict[str, Any] = {"variant": name, "n_seeds": len(of_name), "n_frames": of_name[0].n_frames}
         for figure in COLUMNS:
             values = [v for result in of_name if (v := result.figures.get(figure)) is not None and math.isfinite(v)]
             line[figure] = float(np.mean(values)) if values else None
@@ -63,9 +64,12 @@ def as_text(lines: Sequence[dict[str, Any]]) -> str:
     """The table for a terminal; figures that no line has are left out."""
     shown = [name for name in COLUMNS if any(line[name] is not None for line in lines)]
     width = max((len(line["variant"]) for line in lines), default=0)
-    rows = [["", *(COLUMNS[name][0] for name in shown)]]
+    has_frames = any(line["n_frames"] is not None for line in lines)
+    rows = [["", *(["frames"] if has_frames else []), *(COLUMNS[name][0] for name in shown)]]
     for line in lines:
         cells = [line["variant"].ljust(width)]
+        if has_frames:
+            cells.append("-" if line["n_frames"] is None else str(line["n_frames"]))
         for name in shown:
             value, spread, decimals = line[name], line[f"{name}_std"], COLUMNS[name][1]
             text = "-" if value is None else f"{value:.{decimals}f}"
@@ -78,7 +82,7 @@ def as_text(lines: Sequence[dict[str, Any]]) -> str:
 
 def as_csv(lines: Sequence[dict[str, Any]]) -> str:
     """The table with full precision."""
-    names = ["variant", "n_seeds", *(part for name in COLUMNS for part in (name, f"{name}_std"))]
+    names = ["variant", "n_seeds", "n_frames", *(part for name in COLUMNS for part in (name, f"{name}_std"))]
     text = io.StringIO()
     writer = csv.DictWriter(text, names, lineterminator="\n")
     writer.writeheader()

@@ -153,7 +153,7 @@ def test_seeds_become_mean_and_spread():
     assert full["psnr_std"] == pytest.approx(math.sqrt(8.0))  # of a sample: (2^2 + 2^2) / (2 - 1)
     assert (full["ssim"], full["ssim_std"]) == (0.9, None)  # of the one seed that has it
     assert other["psnr"] is None  # not finite
-    assert full.keys() == {"variant", "n_seeds", *COLUMNS, *(f"{name}_std" for name in COLUMNS)}
+    assert full.keys() == {"variant", "n_seeds", "n_frames", *COLUMNS, *(f"{name}_std" for name in COLUMNS)}
     assert summarize([]) == []
 
 
@@ -164,6 +164,14 @@ def test_the_text_has_a_line_per_variant_and_no_empty_columns():
     assert lines[2].split() == ["other", "-", "0.5000"]
     assert len({len(line) for line in lines}) == 1
     assert as_text([]).strip() == ""
+
+
+def test_a_line_says_on_how_many_frames_it_was_measured():
+    lines = summarize([VariantResult("full", 0, {"psnr": 20.0}, 6), VariantResult("first-frame", 0, {"psnr": 30.0}, 1)])
+    assert [line["n_frames"] for line in lines] == [6, 1]
+    text = [line.split() for line in as_text(lines).splitlines()]
+    assert text == [["frames", "PSNR"], ["full", "6", "20.00"], ["first-frame", "1", "30.00"]]
+    assert [row["n_frames"] for row in csv.DictReader(io.StringIO(as_csv(lines)))] == ["6", "1"]
 
 
 def test_the_file_has_full_precision():
@@ -236,6 +244,9 @@ def test_every_variant_is_a_project_and_a_line_of_the_table(runner):
         assert settings.overrides | variant.overrides == settings.overrides
     line = document["lines"][0]
     assert line["psnr"] == 22.0
+    n_frames = {line["variant"]: line["n_frames"] for line in document["lines"]}
+    assert n_frames == {name: 1 if name == "first-frame" else 6 for name in BY_NAME}
+    assert [result["n_frames"] for result in document["results"]] == list(n_frames.values())
     for line in document["lines"]:  # whatever its own clips are: those of full begin at frame 4
         assert line["seam_ratio_static"] == pytest.approx(2.0)
         assert line["flicker_inside"] == pytest.approx(255 * 0.02)
