@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from engine.capture.capture import Capture
@@ -12,11 +13,27 @@ EXIT_OK, EXIT_BAD_INPUT = 0, 2
 
 
 class PlainParser(argparse.ArgumentParser):
-    """Says what is wrong in one line and how to get help."""
+    """Says what is wrong in one line and how to get help. Options are written in full: `--seed` is not `--seeds`."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{"allow_abbrev": False, **options})
 
     def error(self, message: str) -> NoReturn:
         """End the program with exit code 2 and one line."""
         self.exit(EXIT_BAD_INPUT, f"{self.prog}: {message}. See `{self.prog} --help`.\n")
+
+
+def parse(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> argparse.Namespace:
+    """Arguments after the program's name (those of the process when None) as options.
+
+    What is left over is said with the help of the subcommand it was meant for. Raises SystemExit as argparse does.
+    """
+    options, unknown = parser.parse_known_args(argv)
+    if unknown:
+        command = getattr(options, "command", None)
+        parser.prog = f"{parser.prog} {command}" if command else parser.prog
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+    return options
 
 
 def add_training_settings(command: argparse.ArgumentParser) -> None:

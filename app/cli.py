@@ -25,6 +25,7 @@ from app.arguments import (
     PlainParser,
     add_training_settings,
     overrides_of,
+    parse,
     parse_cameras,
     parse_range,
 )
@@ -141,6 +142,9 @@ def build_parser() -> argparse.ArgumentParser:
     ablate_parser.add_argument("--list", action="store_true", help="say what the variants are and end")
     ablate_parser.add_argument("--n-clips", type=int, metavar="N", help="clips from the first (default: up to 4)")
     ablate_parser.add_argument("--seeds", default="0", help="separated by commas (default: 0)")
+    ablate_parser.add_argument(
+        "--reference-clip", type=int, default=0, metavar="K", help="clip that others inherit from (default: 0)"
+    )
     ablate_parser.add_argument("--metrics", choices=("quick", "all"), default="quick", help="quick: PSNR and SSIM only")
     add_training_settings(ablate_parser)
     ablate_parser.add_argument("--json", action="store_true", help="print the table as JSON on standard output")
@@ -181,7 +185,7 @@ def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -
         The exit code.
     """
     try:
-        options = build_parser().parse_args(argv)
+        options = parse(build_parser(), argv)
     except SystemExit as error:  # argparse has said what is wrong
         return int(error.code or 0)
     log_file = start_logging()

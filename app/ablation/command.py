@@ -44,6 +44,7 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
         holdout=None if options.holdout is None else parse_cameras(options.holdout, capture),
         seed=seeds[0],
         overrides=overrides_of(options),
+        reference_clip=options.reference_clip,
     )
     for seed in seeds[1:]:
         check_settings(replace(settings, seed=seed), capture)
@@ -51,6 +52,11 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
     n_clips = min(most, 4) if options.n_clips is None else options.n_clips
     if not 1 <= n_clips <= most:
         raise ProjectError(f"--n-clips is {n_clips}; the capture has {most} clips of {settings.clip_length} frames.")
+    if settings.reference_clip >= n_clips:
+        raise ProjectError(
+            f"--reference-clip is {settings.reference_clip}, which is none of the {n_clips} clips of the ablation.",
+            hint=f"Choose one from 0 to {n_clips - 1}, or raise --n-clips.",
+        )
     check_writable(options.project / RESULT_FILE)
     line = ProgressLine(is_quiet=options.quiet)
 

@@ -474,6 +474,9 @@ def test_the_list_needs_no_capture(run):
         (["--seeds", "0,-4"], "seed is -4"),
         (["--n-clips", "0"], "--n-clips is 0; the capture has 2 clips of 3 frames"),
         (["--n-clips", "3"], "--n-clips is 3"),
+        (["--reference-clip", "2"], "reference clip is 2"),
+        (["--reference-clip", "1", "--n-clips", "1"], "none of the 1 clips of the ablation. Choose one from 0 to 0"),
+        (["--seed", "3"], "unrecognized arguments: --seed 3. See `clipgstream ablate --help`"),
         (["--variants", "full,nonsense"], "no variant called nonsense"),
         (["--preset", "nonsense"], "no preset called 'nonsense'"),
         (["--metrics", "none"], "invalid choice"),
@@ -513,6 +516,16 @@ def test_the_command_prints_the_table(run, runner, capture_folder):
     code, _, err = run(*arguments, "--set", "joint_steps=7")
     assert code == 2
     assert "other settings" in err
+
+
+def test_the_reference_clip_is_that_of_every_variant_cut_alike(run, runner, capture_folder):
+    code, _, err = run(
+        "ablate", capture_folder, "--project", runner.folder, "--clip-length", 3, "--variants", "decoder-new,gate-off",
+        "--reference-clip", 1, "--quiet",
+    )  # fmt: skip
+    assert code == 0, err
+    for name in (FULL, "decoder-new", "gate-off"):
+        assert read_settings(project_folder(runner.folder, name, 0)).reference_clip == 1
 
 
 # ---------------------------------------------------------------- presets

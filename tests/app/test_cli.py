@@ -306,6 +306,23 @@ def test_help_and_nonsense(run):
     assert run("train")[0] == 2
 
 
+@pytest.mark.parametrize(
+    ("arguments", "unknown"),
+    [
+        (["train", "c", "--project", "p", "--see", "3"], "--see 3"),  # an abbreviation is not taken for --seed
+        (["eval", "p", "--json", "-", "--frames", "0:1"], "--frames 0:1"),
+        (["bench", "extra"], "extra"),
+    ],
+)
+def test_what_a_command_does_not_know_is_said_with_its_own_help(run, arguments, unknown):
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert (
+        err
+        == f"clipgstream {arguments[0]}: unrecognized arguments: {unknown}. See `clipgstream {arguments[0]} --help`.\n"
+    )
+
+
 INTERRUPTED = """
 import os, signal, sys
 from functools import partial
