@@ -10,6 +10,17 @@ from engine.capture.capture import Capture
 from engine.errors import ProjectError
 
 EXIT_OK, EXIT_BAD_INPUT = 0, 2
+COMMANDS = {
+    "train": "train clips of a capture, or go on where it stopped",
+    "eval": "measure trained clips against every camera, and the seams between them",
+    "render": "render a camera of the capture, as video or PNG files",
+    "inspect": "describe a capture, or what the trained clips of a project weigh",
+    "doctor": "look at this machine: versions, memory, compiled kernels, OpenGL, disk",
+    "bench": "measure the kernels on this machine, speed beside error",
+    "report": "write a page about a project, alone or beside others",
+    "ablate": "train variants of the method and baselines, and compare them",
+}
+"""Subcommands that app.cli serves without a window, and what each does."""
 
 
 class PlainParser(argparse.ArgumentParser):

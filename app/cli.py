@@ -20,6 +20,7 @@ from typing import Any
 
 from app.ablation.command import ablate
 from app.arguments import (
+    COMMANDS,
     EXIT_BAD_INPUT,
     EXIT_OK,
     PlainParser,
@@ -69,7 +70,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = PlainParser(prog="clipgstream", description="Train, measure and render dynamic captures without a window.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
-    train = commands.add_parser("train", help="train clips of a capture", description="Train clips of a capture.")
+    train = commands.add_parser("train", help=COMMANDS["train"], description="Train clips of a capture.")
     train.add_argument("capture", type=Path, help="capture folder")
     train.add_argument("--project", type=Path, required=True, help="project folder; made when it is not there")
     train.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
@@ -79,7 +80,7 @@ def build_parser() -> argparse.ArgumentParser:
     train.add_argument("--json", action="store_true", help="print the outcome as JSON on standard output")
     train.add_argument("--quiet", action="store_true", help="no progress")
 
-    eval_parser = commands.add_parser("eval", help="measure trained clips", description="Measure trained clips.")
+    eval_parser = commands.add_parser("eval", help=COMMANDS["eval"], description="Measure trained clips.")
     eval_parser.add_argument("project", type=Path, help="project folder")
     eval_parser.add_argument("--json", required=True, metavar="OUT", help="file for all rows and means; - prints them")
     eval_parser.add_argument("--clips", default=":", metavar="A:B", help="clips to measure (default: all trained)")
@@ -94,7 +95,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     eval_parser.add_argument("--quiet", action="store_true", help="no progress")
 
-    render = commands.add_parser("render", help="render a camera", description="Render a camera of trained clips.")
+    render = commands.add_parser("render", help=COMMANDS["render"], description="Render a camera of trained clips.")
     render.add_argument("project", type=Path, help="project folder")
     render.add_argument("--camera", required=True, metavar="NAME", help="camera of the capture")
     render.add_argument("--frames", default=":", metavar="A:B", help="frames A up to B, B not included (default: all)")
@@ -109,18 +110,18 @@ def build_parser() -> argparse.ArgumentParser:
 
     inspect = commands.add_parser(
         "inspect",
-        help="describe a capture or a project",
+        help=COMMANDS["inspect"],
         description="Describe a capture, or what the trained clips of a project weigh.",
     )
     inspect.add_argument("path", type=Path, help="capture or project folder")
     inspect.add_argument("--json", action="store_true", help="print everything as JSON")
 
-    doctor = commands.add_parser("doctor", help="look at this machine", description="Look at this machine.")
+    doctor = commands.add_parser("doctor", help=COMMANDS["doctor"], description="Look at this machine.")
     doctor.add_argument("--json", action="store_true", help="print the findings as JSON")
 
     bench_parser = commands.add_parser(
         "bench",
-        help="measure the kernels on this machine",
+        help=COMMANDS["bench"],
         description="Measure the kernels on this machine: speed beside error, as a table and a picture.",
     )
     bench_parser.add_argument("--out", type=Path, metavar="DIR", help=f"folder for the picture {CHART_FILE}")
@@ -131,7 +132,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     ablate_parser = commands.add_parser(
         "ablate",
-        help="train variants of the method and compare them",
+        help=COMMANDS["ablate"],
         description="Train the method, its ablations and baselines on a capture, and write the table.",
     )
     ablate_parser.add_argument("capture", type=Path, nargs="?", help="capture folder")
@@ -152,7 +153,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     report_parser = commands.add_parser(
         "report",
-        help="write a page about a project",
+        help=COMMANDS["report"],
         description="Write one HTML page about a trained project, with its figures as PNG and numbers as CSV and JSON.",
     )
     report_parser.add_argument("project", type=Path, help="project folder")
