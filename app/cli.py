@@ -62,6 +62,15 @@ logger = logging.getLogger(__name__)
 EXIT_FAILED, EXIT_INTERRUPTED = 1, 130
 BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
 """Failures of a worker that are the input's and not the program's."""
+_GOES_ON = "What was learned is kept; the same command goes on from there."
+_INTERRUPTED = {
+    "train": _GOES_ON,
+    "ablate": _GOES_ON,
+    "eval": "Nothing was written.",
+    "report": "The page was not written; projects that were measured to the end need not be measured again.",
+    "render": "A video was not written; single pictures that were finished are there.",
+}
+"""What has become of the work, by command."""
 VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov")
 
 
@@ -200,8 +209,7 @@ def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -
     except PermissionError as error:  # a path of the command line below a folder that may not even be looked into
         return _fail(EXIT_BAD_INPUT, f"{error.strerror}. Choose a folder you may use. - {error.filename}")
     except KeyboardInterrupt:
-        kept = "" if options.command == "bench" else " What was learned is kept; the same command goes on from there."
-        return _fail(EXIT_INTERRUPTED, f"Interrupted.{kept}")
+        return _fail(EXIT_INTERRUPTED, f"Interrupted. {_INTERRUPTED.get(options.command, '')}".rstrip())
     except BrokenPipeError:  # whoever read our output has left
         return EXIT_FAILED
     except Exception as error:  # the edge of the command line: one line, no traceback

@@ -29,7 +29,13 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
         return EXIT_OK
     if options.capture is None or options.project is None:
         raise ProjectError("A capture folder and --project are needed.", hint="Only --list does without.")
-    names = None if options.variants is None else [name.strip() for name in options.variants.split(",")]
+    names = (
+        None if options.variants is None else [name for part in options.variants.split(",") if (name := part.strip())]
+    )
+    if names == []:
+        raise ProjectError(
+            f"--variants is '{options.variants}', which names none.", hint="Leave it out for all of them."
+        )
     variants = chosen_variants(names)
     try:
         seeds = [int(seed) for seed in options.seeds.split(",")]

@@ -477,6 +477,7 @@ def test_the_list_needs_no_capture(run):
         (["--reference-clip", "2"], "reference clip is 2"),
         (["--reference-clip", "1", "--n-clips", "1"], "none of the 1 clips of the ablation. Choose one from 0 to 0"),
         (["--seed", "3"], "unrecognized arguments: --seed 3. See `clipgstream ablate --help`"),
+        (["--variants", " , "], "--variants is ' , ', which names none"),
         (["--variants", "full,nonsense"], "no variant called nonsense"),
         (["--preset", "nonsense"], "no preset called 'nonsense'"),
         (["--metrics", "none"], "invalid choice"),
@@ -520,7 +521,7 @@ def test_the_command_prints_the_table(run, runner, capture_folder):
 
 def test_the_reference_clip_is_that_of_every_variant_cut_alike(run, runner, capture_folder):
     code, _, err = run(
-        "ablate", capture_folder, "--project", runner.folder, "--clip-length", 3, "--variants", "decoder-new,gate-off",
+        "ablate", capture_folder, "--project", runner.folder, "--clip-length", 3, "--variants", "decoder-new,,gate-off",
         "--reference-clip", 1, "--quiet",
     )  # fmt: skip
     assert code == 0, err

@@ -449,7 +449,8 @@ def test_what_cannot_be_compared_is_said(project, tmp_path, capture_folder):
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (["{tmp}/nowhere"], "no project"),
+        (["{tmp}/nowhere"], "There is no such folder"),
+        (["{tmp}/plain"], "no project"),
         (["{tmp}/untrained"], "Nothing is trained"),
         (["{tmp}/p", "--compare", "{tmp}/nowhere"], "no such folder"),
         (["{tmp}/p", "--compare", "{tmp}/plain"], "is no project and holds none"),
@@ -508,7 +509,7 @@ def test_an_interrupted_report_keeps_what_was_measured_and_writes_no_page(
     monkeypatch.setattr(write, "write_report", partial(write_report, measure=interrupted, make_pictures=FakePictures))
     arguments = ["report", str(project), "--compare", str(tmp_path / "other"), "--quiet"]
     assert main(arguments) == 130
-    assert "goes on from there" in capsys.readouterr().err
+    assert "were measured to the end need not" in capsys.readouterr().err
     assert [path.name for path in (project / "reports").iterdir()] == ["eval-all.json"]
 
 
