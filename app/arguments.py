@@ -47,6 +47,22 @@ def parse(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> argpar
     return options
 
 
+def add_figure_choices(command: argparse.ArgumentParser, *, default: str | None, said: str) -> None:
+    """Arguments of every subcommand that measures. said: the default of --metrics, for the help."""
+    command.add_argument(
+        "--metrics",
+        choices=("quick", "all"),
+        default=default,
+        help=f"quick: PSNR, SSIM and DSSIM1 only (default: {said})",
+    )
+    command.add_argument(
+        "--precision",
+        choices=("float", "8bit"),
+        default="float",
+        help="compare pictures as rendered, or rounded as in a PNG file (default: float)",
+    )
+
+
 def add_training_settings(command: argparse.ArgumentParser) -> None:
     """Arguments of every subcommand that trains."""
     command.add_argument("--holdout", metavar="NAMES", help="cameras to leave out, or 'none' (default: the capture's)")

@@ -24,6 +24,7 @@ from app.arguments import (
     EXIT_BAD_INPUT,
     EXIT_OK,
     PlainParser,
+    add_figure_choices,
     add_training_settings,
     overrides_of,
     parse,
@@ -93,15 +94,7 @@ def build_parser() -> argparse.ArgumentParser:
     eval_parser.add_argument("project", type=Path, help="project folder")
     eval_parser.add_argument("--json", required=True, metavar="OUT", help="file for all rows and means; - prints them")
     eval_parser.add_argument("--clips", default=":", metavar="A:B", help="clips to measure (default: all trained)")
-    eval_parser.add_argument(
-        "--metrics", choices=("quick", "all"), default="all", help="quick: PSNR and SSIM only (default: all)"
-    )
-    eval_parser.add_argument(
-        "--precision",
-        choices=("float", "8bit"),
-        default="float",
-        help="compare pictures as rendered, or rounded as in a PNG file (default: float)",
-    )
+    add_figure_choices(eval_parser, default="all", said="all")
     eval_parser.add_argument("--quiet", action="store_true", help="no progress")
 
     render = commands.add_parser("render", help=COMMANDS["render"], description="Render a camera of trained clips.")
@@ -155,7 +148,7 @@ def build_parser() -> argparse.ArgumentParser:
     ablate_parser.add_argument(
         "--reference-clip", type=int, default=0, metavar="K", help="clip that others inherit from (default: 0)"
     )
-    ablate_parser.add_argument("--metrics", choices=("quick", "all"), default="quick", help="quick: PSNR and SSIM only")
+    add_figure_choices(ablate_parser, default="quick", said="quick")
     add_training_settings(ablate_parser)
     ablate_parser.add_argument("--json", action="store_true", help="print the table as JSON on standard output")
     ablate_parser.add_argument("--quiet", action="store_true", help="no progress")
@@ -176,11 +169,7 @@ def build_parser() -> argparse.ArgumentParser:
         help="project folders, or folders of projects, to set beside it",
     )
     report_parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the page (default: PROJECT/reports)")
-    report_parser.add_argument(
-        "--metrics",
-        choices=("quick", "all"),
-        help="quick: PSNR and SSIM only (default: all for the project, quick for the others)",
-    )
+    add_figure_choices(report_parser, default=None, said="all for the project, quick for the others")
     report_parser.add_argument("--quiet", action="store_true", help="no progress")
     return parser
 

@@ -85,6 +85,7 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
             n_clips=n_clips,
             seeds=seeds,
             metrics=options.metrics,
+            precision=options.precision,
             launch=launch,
             callbacks=callbacks,
         )

@@ -11,9 +11,9 @@ import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from app.ablation.measuring import Measured, kept_figures, measure
+from app.ablation.measuring import Measured, Scope, kept_figures, measure
 from app.ablation.table import DEFINITION, VariantResult, as_csv, summarize
 from app.ablation.variants import FULL, VARIANTS, Variant, settings_of
 from app.headless import ClipOutcome, train_clips
@@ -26,6 +26,10 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import ProjectError, TrainingError
 from engine.files import atomic_path
+
+if TYPE_CHECKING:
+    from engine.metrics.colors import Precision
+    from engine.metrics.picture import Choice
 
 ABLATION_SCHEMA = 1
 RESULT_FILE = "ablation.json"
@@ -58,7 +62,8 @@ def run_ablation(
     variants: Sequence[Variant],
     n_clips: int,
     seeds: Sequence[int],
-    metrics: Any,
+    metrics: Choice,
+    precision: Precision = "float",
     launch: Launch,
     callbacks: Callbacks,
 ) -> dict[str, Any]:
@@ -71,10 +76,10 @@ def run_ablation(
         folder: Gets one project per variant and seed, ablation.json and ablation.csv.
         settings: Of "full"; its seed is replaced.
         n_clips: From the first.
-        metrics: "quick" or "all", see engine.metrics.picture.measure_picture.
+        metrics, precision: See engine.metrics.picture.measure_picture.
     Returns:
-        JSON-able: schema, capture, holdout, clip_length, n_clips, seeds, words (what each variant is), definition
-        (of flicker and seam ratios), lines (`summarize`) and results per seed.
+        JSON-able: schema, capture, holdout, clip_length, n_clips, metrics, precision, seeds, words (what each variant
+        is), definition (of flicker and seam ratios), lines (`summarize`) and results per seed.
     Raises:
         ProjectError, CaptureError: Bad input.
         TrainingError: A clip failed; what was finished is kept.
@@ -85,11 +90,13 @@ def run_ablation(
         raise ProjectError("field=joint leaves no clips to compare.", hint="Take the variant field-joint.")
     clips = settings.clips(capture.n_frames)[:n_clips]
     todo = [_Task(capture, settings, variant, seed, clips) for seed in seeds for variant in variants]
-    found = _finished(folder, capture, settings, clips, metrics)
+    borders = [clip.start for clip in clips[1:]]
+    all_clips = Scope(range(n_clips), borders, metrics, precision)
+    found = _finished(folder, capture, settings, clips, all_clips)
     for n_done, task in enumerate(todo):
         variant, seed = task.variant, task.settings.seed
         callbacks.on_variant(variant.name, seed, n_done, len(todo))
-        measured = _measured(folder, task, clips, metrics, launch, callbacks)
+        measured = _measured(folder, task, all_clips, launch, callbacks)
         found[variant.name, seed] = VariantResult(variant.name, seed, measured.figures, measured.n_frames)
         results = [found[key] for key in sorted(found, key=lambda key: (_ORDER[key[0]], key[1]))]
         shown = {result.variant for result in results}
@@ -99,6 +106,8 @@ def run_ablation(
             "holdout": list(settings.holdout),
             "clip_length": settings.clip_length,
             "n_clips": n_clips,
+            "metrics": metrics,
+            "precision": precision,
             "seeds": sorted({*seeds, *(result.seed for result in results)}),
             "words": {item.name: item.words for item in VARIANTS if item.name in shown},
             "definition": DEFINITION,
@@ -116,7 +125,7 @@ def project_folder(folder: Path, name: str, seed: int) -> Path:
 
 
 def _finished(
-    folder: Path, capture: Capture, base: ProjectSettings, clips: Sequence[Clip], metrics: Any
+    folder: Path, capture: Capture, base: ProjectSettings, clips: Sequence[Clip], scope: Scope
 ) -> dict[tuple[str, int], VariantResult]:
     """What lies measured in the folder and fits the settings, by variant and seed."""
     found = {}
@@ -129,7 +138,7 @@ def _finished(
                 task = _Task(capture, replace(base, seed=int(text)), variant, int(text), clips)
             except ProjectError:  # the settings of this call have no such variant
                 continue
-            kept = kept_figures(place, task.settings, list(task.chosen), _borders(clips), metrics)
+            kept = kept_figures(place, task.settings, replace(scope, clips=task.chosen))
             if kept is not None:
                 found[variant.name, int(text)] = VariantResult(variant.name, int(text), kept.figures, kept.n_frames)
     return found
@@ -155,9 +164,7 @@ class _Task:
         check_settings(self.settings, capture)
 
 
-def _measured(
-    folder: Path, task: _Task, clips: Sequence[Clip], metrics: Any, launch: Launch, callbacks: Callbacks
-) -> Measured:
+def _measured(folder: Path, task: _Task, scope: Scope, launch: Launch, callbacks: Callbacks) -> Measured:
     variant, settings, capture, seed = task.variant, task.settings, task.capture, task.settings.seed
     place = project_folder(folder, variant.name, seed)
     project = _open(place, settings)
@@ -185,7 +192,7 @@ def _measured(
             raise TrainingError(f"{variant.name}, seed {seed}: {outcomes[-1].message}", hint=outcomes[-1].hint)
     finally:
         project.close()
-    return measure(place, list(task.chosen), _borders(clips), metrics, callbacks.on_row)
+    return measure(place, replace(scope, clips=task.chosen), callbacks.on_row)
 
 
 def _open(place: Path, settings: ProjectSettings) -> Project:
@@ -212,7 +219,3 @@ def _take_reference(project: Project, full: Path) -> None:
     project.reference_path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(project.reference_path) as partial:
         shutil.copyfile(source.reference_path, partial)
-
-
-def _borders(clips: Sequence[Clip]) -> set[int]:
-    return {clip.start for clip in clips[1:]}

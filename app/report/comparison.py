@@ -94,7 +94,7 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
     ]
     said = (
         f"Means over all clips and frames of the {first.group.replace('_', '-')} cameras, raw colours. The best value "
-        "of a column is bold. Projects measured quickly have PSNR and SSIM only."
+        "of a column is bold. Projects measured quickly have PSNR, SSIM and DSSIM1 only."
     )
     notes = [note for one in compared[1:] if (note := comparability(first, one))]
     table = Table("comparison", "All projects", columns, rows)

@@ -28,6 +28,7 @@ from engine.files import atomic_path
 from engine.metrics.flicker import flicker_figures
 
 if TYPE_CHECKING:
+    from engine.metrics.colors import Precision
     from engine.metrics.picture import Choice
 
 REPORT_SCHEMA = 1
@@ -44,6 +45,7 @@ def write_report(
     compare: Sequence[Path] = (),
     out: Path | None = None,
     metrics: Choice | None = None,
+    precision: Precision = "float",
     on_stage: OnStage,
     measure: Measure = evaluate_project,
     make_pictures: Callable[[TrainedProject], Pictures] = ProjectPictures,
@@ -59,6 +61,7 @@ def write_report(
         out: Folder of the report; PROJECT/reports when None.
         metrics: Columns of all projects; None measures all of the project and the quick ones of the others, or shows
             all where they were measured before.
+        precision: Of all projects: pictures as rendered, or rounded to 8 bit.
         on_stage: Told what is done.
         measure, make_pictures: Tests bring quick ones.
     Returns:
@@ -83,6 +86,7 @@ def write_report(
             document = evaluation_of(
                 one,
                 choices=choices,
+                precision=precision,
                 fallback_dir=out,
                 on_progress=_measuring(on_stage, name),
                 measure=measure,

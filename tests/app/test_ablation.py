@@ -197,7 +197,7 @@ class Runner:
         monkeypatch.setattr(measuring, "evaluate_project", self._evaluate)
         monkeypatch.setattr("app.headless.POLL_EVERY_S", 0.0)
 
-    def _evaluate(self, opened, *, clip_indices, cameras, metrics, on_progress) -> dict[str, Any]:
+    def _evaluate(self, opened, *, clip_indices, cameras, metrics, precision, on_progress) -> dict[str, Any]:
         self.measured.append(opened.project.folder.name)
         assert list(cameras) == [0]
         means = {"psnr": 20.0 + len(clip_indices), "ssim": 0.5, "curves": {"not": "a figure"}}
@@ -319,7 +319,8 @@ def test_a_figure_file_that_is_damaged_or_of_other_clips_is_measured_again(runne
     path.write_text("{")
     runner.run([FULL])
     runner.run([FULL], n_clips=1)
-    assert runner.measured == ["full-seed0"] * 3
+    runner.run([FULL], n_clips=1, precision="8bit")
+    assert runner.measured == ["full-seed0"] * 4
 
 
 def test_it_goes_on_where_it_was_stopped(runner):
@@ -514,6 +515,9 @@ def test_the_command_prints_the_table(run, runner, capture_folder):
     code, out, _ = run(*arguments, *settings, "--json", "--quiet")
     assert code == 0
     assert json.loads(out)["n_clips"] == 2
+    assert json.loads(out)["precision"] == "float"
+    code, out, _ = run(*arguments, *settings, "--json", "--quiet", "--precision", "8bit")
+    assert json.loads(out)["precision"] == "8bit"
     code, _, err = run(*arguments, "--set", "joint_steps=7")
     assert code == 2
     assert "other settings" in err

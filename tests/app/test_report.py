@@ -50,7 +50,7 @@ class Measure:
     def __init__(self) -> None:
         self.asked: list[tuple[str, str]] = []
 
-    def __call__(self, opened, *, clip_indices, metrics="all", on_progress) -> dict[str, Any]:
+    def __call__(self, opened, *, clip_indices, metrics="all", precision="float", on_progress) -> dict[str, Any]:
         self.asked.append((opened.project.folder.name, metrics))
         draw = random.Random(len(opened.project.folder.name)).random
         rows, pairs = [], []
@@ -81,7 +81,7 @@ class Measure:
             "holdout": list(opened.project.settings.holdout),
             "clips": list(clip_indices),
             "metrics": metrics,
-            "precision": "float",
+            "precision": precision,
             "columns": summary.columns_of(rows),
             "rows": [row.as_dict() for row in rows],
             "means": {
@@ -324,6 +324,7 @@ def test_every_column_is_there_with_unit_direction_and_why_it_is_missing(page):
     assert list(rows) == list(COLUMNS)
     assert rows["psnr_fit_moving"][1:3] == ["dB", "higher"]
     assert rows["flip"][1:3] == ["1", "lower"]
+    assert rows["moving_share"][1:3] == ["1", ""]
     assert rows["lpips"][3:] == ["–"] * 6 + [f"no network here ({6 * len(CAMERAS)} pictures)"]
     assert rows["psnr"][-1] == ""
 
@@ -398,6 +399,18 @@ def test_a_second_report_measures_nothing(project):
     (project / "reports" / "eval-all.json").write_text("{")
     report(project, measure)
     assert measure.asked == [("p", "all")] * 3
+
+
+def test_rounded_pictures_are_measured_and_kept_by_themselves(project):
+    measure = Measure()
+    report(project, measure)
+    report(project, measure, precision="8bit")
+    page = Page(report(project, measure, precision="8bit").read_text(encoding="utf-8"))
+    assert ["Figures", "all columns, pictures compared as 8bit"] in page.tables["setup"]
+    assert measure.asked == [("p", "all")] * 2
+    assert json.loads((project / "reports" / "eval-all-8bit.json").read_text())["evaluation"]["precision"] == "8bit"
+    report(project, measure)
+    assert len(measure.asked) == 2
 
 
 def test_compared_projects_are_measured_quickly_unless_all_is_there(project, tmp_path, capture_folder):
