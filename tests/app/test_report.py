@@ -174,7 +174,7 @@ def change_header(path: Path, change: Callable[[dict[str, Any]], None]) -> None:
     write_clip_state(path, ClipState(state.arrays, state.header))
 
 
-def report(project: Path, measure: Measure | None = None, **options: Any) -> Path:
+def report(project: Path, measure: Callable[..., dict[str, Any]] | None = None, **options: Any) -> Path:
     stages: list[str] = []
     page = write_report(
         project,
@@ -383,6 +383,28 @@ def test_a_shorter_report_leaves_no_files_of_the_longer_one(project):
     report(project)
     assert not (figures / "seam_000003.png").exists()
     assert foreign.exists()
+
+
+def test_two_clips_are_shown_where_the_clip_before_says_more_than_its_last_frame(project):
+    def measured(*, held: set[str]) -> Page:
+        def with_two_clips(opened, **options):
+            document = Measure()(opened, **options)
+            for row in document["seams"]["rows"]:
+                if row["is_boundary"]:
+                    row |= {"is_held": row["camera"] in held, "two_clips_static": 0.02, "two_clips_moving": None}
+                    row |= {"change_static": 0.01 * (1 + (row["camera"] == "0"))}
+            return document
+
+        shutil.rmtree(project / "reports", ignore_errors=True)
+        return Page(report(project, with_two_clips).read_text(encoding="utf-8"))
+
+    said = "At 1 of the borders the field of the clip before ends with its last frame"
+    page = measured(held=set(CAMERAS))
+    assert said in page.text
+    assert "two_clips" not in page.tables
+    page = measured(held=set())
+    assert said not in page.text
+    assert page.tables["two_clips"] == [["3", "4", "5.100", "–", "3.188", page.tables["two_clips"][0][-1]]]
 
 
 # ---------------------------------------------------------------- measured once
