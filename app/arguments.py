@@ -3,20 +3,65 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from engine.capture.capture import Capture
 from engine.errors import ProjectError
 
 EXIT_OK, EXIT_BAD_INPUT = 0, 2
+COMMANDS = {
+    "train": "train clips of a capture, or go on where it stopped",
+    "eval": "measure trained clips against every camera, and the seams between them",
+    "render": "render a camera of the capture, as video or PNG files",
+    "inspect": "describe a capture, or what the trained clips of a project weigh",
+    "gate": "say what is static in a project and why, and overrule it",
+    "doctor": "look at this machine: versions, memory, compiled kernels, OpenGL, disk",
+    "bench": "measure the kernels on this machine, speed beside error",
+    "report": "write a page about a project, alone or beside others",
+    "ablate": "train variants of the method and baselines, and compare them",
+}
+"""Subcommands that app.cli serves without a window, and what each does."""
 
 
 class PlainParser(argparse.ArgumentParser):
-    """Says what is wrong in one line and how to get help."""
+    """Says what is wrong in one line and how to get help. Options are written in full: `--seed` is not `--seeds`."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{"allow_abbrev": False, **options})
 
     def error(self, message: str) -> NoReturn:
         """End the program with exit code 2 and one line."""
         self.exit(EXIT_BAD_INPUT, f"{self.prog}: {message}. See `{self.prog} --help`.\n")
+
+
+def parse(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> argparse.Namespace:
+    """Arguments after the program's name (those of the process when None) as options.
+
+    What is left over is said with the help of the subcommand it was meant for. Raises SystemExit as argparse does.
+    """
+    options, unknown = parser.parse_known_args(argv)
+    if unknown:
+        command = getattr(options, "command", None)
+        parser.prog = f"{parser.prog} {command}" if command else parser.prog
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+    return options
+
+
+def add_figure_choices(command: argparse.ArgumentParser, *, default: str | None, said: str) -> None:
+    """Arguments of every subcommand that measures. said: the default of --metrics, for the help."""
+    command.add_argument(
+        "--metrics",
+        choices=("quick", "all"),
+        default=default,
+        help=f"quick: PSNR, SSIM and DSSIM1 only (default: {said})",
+    )
+    command.add_argument(
+        "--precision",
+        choices=("float", "8bit"),
+        default="float",
+        help="compare pictures as rendered, or rounded as in a PNG file (default: float)",
+    )
 
 
 def add_training_settings(command: argparse.ArgumentParser) -> None:

@@ -20,11 +20,14 @@ from typing import Any
 
 from app.ablation.command import ablate
 from app.arguments import (
+    COMMANDS,
     EXIT_BAD_INPUT,
     EXIT_OK,
     PlainParser,
+    add_figure_choices,
     add_training_settings,
     overrides_of,
+    parse,
     parse_cameras,
     parse_range,
 )
@@ -64,6 +67,15 @@ logger = logging.getLogger(__name__)
 EXIT_FAILED, EXIT_INTERRUPTED = 1, 130
 BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
 """Failures of a worker that are the input's and not the program's."""
+_GOES_ON = "What was learned is kept; the same command goes on from there."
+_INTERRUPTED = {
+    "train": _GOES_ON,
+    "ablate": _GOES_ON,
+    "eval": "Nothing was written.",
+    "report": "The page was not written; projects that were measured to the end need not be measured again.",
+    "render": "A video was not written; single pictures that were finished are there.",
+}
+"""What has become of the work, by command."""
 VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov")
 
 
@@ -72,7 +84,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser = PlainParser(prog="clipgstream", description="Train, measure and render dynamic captures without a window.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
-    train = commands.add_parser("train", help="train clips of a capture", description="Train clips of a capture.")
+    train = commands.add_parser("train", help=COMMANDS["train"], description="Train clips of a capture.")
     train.add_argument("capture", type=Path, help="capture folder")
     train.add_argument("--project", type=Path, required=True, help="project folder; made when it is not there")
     train.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
@@ -85,22 +97,14 @@ def build_parser() -> argparse.ArgumentParser:
     train.add_argument("--json", action="store_true", help="print the outcome, or the plan, as JSON on standard output")
     train.add_argument("--quiet", action="store_true", help="no progress")
 
-    eval_parser = commands.add_parser("eval", help="measure trained clips", description="Measure trained clips.")
+    eval_parser = commands.add_parser("eval", help=COMMANDS["eval"], description="Measure trained clips.")
     eval_parser.add_argument("project", type=Path, help="project folder")
     eval_parser.add_argument("--json", required=True, metavar="OUT", help="file for all rows and means; - prints them")
     eval_parser.add_argument("--clips", default=":", metavar="A:B", help="clips to measure (default: all trained)")
-    eval_parser.add_argument(
-        "--metrics", choices=("quick", "all"), default="all", help="quick: PSNR and SSIM only (default: all)"
-    )
-    eval_parser.add_argument(
-        "--precision",
-        choices=("float", "8bit"),
-        default="float",
-        help="compare pictures as rendered, or rounded as in a PNG file (default: float)",
-    )
+    add_figure_choices(eval_parser, default="all", said="all")
     eval_parser.add_argument("--quiet", action="store_true", help="no progress")
 
-    render = commands.add_parser("render", help="render a camera", description="Render a camera of trained clips.")
+    render = commands.add_parser("render", help=COMMANDS["render"], description="Render a camera of trained clips.")
     render.add_argument("project", type=Path, help="project folder")
     render.add_argument("--camera", required=True, metavar="NAME", help="camera of the capture")
     render.add_argument("--frames", default=":", metavar="A:B", help="frames A up to B, B not included (default: all)")
@@ -115,7 +119,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     inspect = commands.add_parser(
         "inspect",
-        help="describe a capture or a project",
+        help=COMMANDS["inspect"],
         description="Describe a capture, or what the trained clips of a project weigh.",
     )
     inspect.add_argument("path", type=Path, help="capture or project folder")
@@ -124,18 +128,18 @@ def build_parser() -> argparse.ArgumentParser:
     add_gate_arguments(
         commands.add_parser(
             "gate",
-            help="what is static in a project, and why; overrule it",
+            help=COMMANDS["gate"],
             description="Say what the gate decided in each trained clip, and mark regions that clips trained from now "
             "on take as static or as dynamic.",
         )
     )
 
-    doctor = commands.add_parser("doctor", help="look at this machine", description="Look at this machine.")
+    doctor = commands.add_parser("doctor", help=COMMANDS["doctor"], description="Look at this machine.")
     doctor.add_argument("--json", action="store_true", help="print the findings as JSON")
 
     bench_parser = commands.add_parser(
         "bench",
-        help="measure the kernels on this machine",
+        help=COMMANDS["bench"],
         description="Measure the kernels on this machine: speed beside error, as a table and a picture.",
     )
     bench_parser.add_argument("--out", type=Path, metavar="DIR", help=f"folder for the picture {CHART_FILE}")
@@ -146,7 +150,7 @@ def build_parser() -> argparse.ArgumentParser:
 
     ablate_parser = commands.add_parser(
         "ablate",
-        help="train variants of the method and compare them",
+        help=COMMANDS["ablate"],
         description="Train the method, its ablations and baselines on a capture, and write the table.",
     )
     ablate_parser.add_argument("capture", type=Path, nargs="?", help="capture folder")
@@ -157,14 +161,17 @@ def build_parser() -> argparse.ArgumentParser:
     ablate_parser.add_argument("--list", action="store_true", help="say what the variants are and end")
     ablate_parser.add_argument("--n-clips", type=int, metavar="N", help="clips from the first (default: up to 4)")
     ablate_parser.add_argument("--seeds", default="0", help="separated by commas (default: 0)")
-    ablate_parser.add_argument("--metrics", choices=("quick", "all"), default="quick", help="quick: PSNR and SSIM only")
+    ablate_parser.add_argument(
+        "--reference-clip", type=int, default=0, metavar="K", help="clip that others inherit from (default: 0)"
+    )
+    add_figure_choices(ablate_parser, default="quick", said="quick")
     add_training_settings(ablate_parser)
     ablate_parser.add_argument("--json", action="store_true", help="print the table as JSON on standard output")
     ablate_parser.add_argument("--quiet", action="store_true", help="no progress")
 
     report_parser = commands.add_parser(
         "report",
-        help="write a page about a project",
+        help=COMMANDS["report"],
         description="Write one HTML page about a trained project, with its figures as PNG and numbers as CSV and JSON.",
     )
     report_parser.add_argument("project", type=Path, help="project folder")
@@ -178,11 +185,7 @@ def build_parser() -> argparse.ArgumentParser:
         help="project folders, or folders of projects, to set beside it",
     )
     report_parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the page (default: PROJECT/reports)")
-    report_parser.add_argument(
-        "--metrics",
-        choices=("quick", "all"),
-        help="quick: PSNR and SSIM only (default: all for the project, quick for the others)",
-    )
+    add_figure_choices(report_parser, default=None, said="all for the project, quick for the others")
     report_parser.add_argument("--quiet", action="store_true", help="no progress")
     return parser
 
@@ -197,7 +200,7 @@ def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -
         The exit code.
     """
     try:
-        options = build_parser().parse_args(argv)
+        options = parse(build_parser(), argv)
     except SystemExit as error:  # argparse has said what is wrong
         return int(error.code or 0)
     log_file = start_logging()
@@ -211,8 +214,7 @@ def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -
     except PermissionError as error:  # a path of the command line below a folder that may not even be looked into
         return _fail(EXIT_BAD_INPUT, f"{error.strerror}. Choose a folder you may use. - {error.filename}")
     except KeyboardInterrupt:
-        kept = "" if options.command == "bench" else " What was learned is kept; the same command goes on from there."
-        return _fail(EXIT_INTERRUPTED, f"Interrupted.{kept}")
+        return _fail(EXIT_INTERRUPTED, f"Interrupted. {_INTERRUPTED.get(options.command, '')}".rstrip())
     except BrokenPipeError:  # whoever read our output has left
         return EXIT_FAILED
     except Exception as error:  # the edge of the command line: one line, no traceback

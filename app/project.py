@@ -349,6 +349,8 @@ def read_settings(folder: Path) -> ProjectSettings:
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
+        if not folder.exists():
+            raise ProjectError("There is no such folder.", hint="Check the path.", path=folder) from error
         raise ProjectError(
             f"This folder is no project: it has no {PROJECT_FILE}.",
             hint="Train a capture first, or open the folder that holds that file.",

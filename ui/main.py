@@ -11,13 +11,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.arguments import PlainParser
+from app.arguments import COMMANDS, PlainParser
 from engine.assets import asset_path
 
-COMMANDS = ("train", "eval", "render", "inspect", "doctor", "bench", "report", "ablate")
-"""Subcommands that app.cli serves without a window."""
-
-
+DEMO = {"demo": "train the first two clips and leave figures, a picture of the window and a video"}
 SWITCH_INTERVAL_S = 0.0005
 """How long another thread may keep the interpreter from the window's. A frame asks for it some twenty times, and the
 default of 5 ms adds up to a visible stall while a thread imports what draws."""
@@ -35,7 +32,9 @@ def build_parser() -> argparse.ArgumentParser:
     parser = PlainParser(
         prog="clipgstream",
         description="View, train and replay dynamic captures clip by clip.",
-        epilog=f"Without a window: clipgstream {{{','.join(COMMANDS)}}} --help, or clipgstream demo [PATH].",
+        epilog="without a window, each with its own --help:\n"
+        + "\n".join(f"  clipgstream {name:<8} {words}" for name, words in (COMMANDS | DEMO).items()),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("path", nargs="?", type=Path, help="capture or project folder to open")
     parser.add_argument("--size", type=_parse_size, metavar="WxH", help="window size in pixels, for example 1440x900")

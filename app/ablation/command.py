@@ -29,7 +29,13 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
         return EXIT_OK
     if options.capture is None or options.project is None:
         raise ProjectError("A capture folder and --project are needed.", hint="Only --list does without.")
-    names = None if options.variants is None else [name.strip() for name in options.variants.split(",")]
+    names = (
+        None if options.variants is None else [name for part in options.variants.split(",") if (name := part.strip())]
+    )
+    if names == []:
+        raise ProjectError(
+            f"--variants is '{options.variants}', which names none.", hint="Leave it out for all of them."
+        )
     variants = chosen_variants(names)
     try:
         seeds = [int(seed) for seed in options.seeds.split(",")]
@@ -44,6 +50,7 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
         holdout=None if options.holdout is None else parse_cameras(options.holdout, capture),
         seed=seeds[0],
         overrides=overrides_of(options),
+        reference_clip=options.reference_clip,
     )
     for seed in seeds[1:]:
         check_settings(replace(settings, seed=seed), capture)
@@ -51,6 +58,11 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
     n_clips = min(most, 4) if options.n_clips is None else options.n_clips
     if not 1 <= n_clips <= most:
         raise ProjectError(f"--n-clips is {n_clips}; the capture has {most} clips of {settings.clip_length} frames.")
+    if settings.reference_clip >= n_clips:
+        raise ProjectError(
+            f"--reference-clip is {settings.reference_clip}, which is none of the {n_clips} clips of the ablation.",
+            hint=f"Choose one from 0 to {n_clips - 1}, or raise --n-clips.",
+        )
     check_writable(options.project / RESULT_FILE)
     line = ProgressLine(is_quiet=options.quiet)
 
@@ -73,6 +85,7 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
             n_clips=n_clips,
             seeds=seeds,
             metrics=options.metrics,
+            precision=options.precision,
             launch=launch,
             callbacks=callbacks,
         )
@@ -81,6 +94,6 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
     if options.json:
         print(json.dumps(document, indent=1, allow_nan=False))
     else:
-        print(as_text(document["lines"]))
+        print(f"{as_text(document['lines'])}\n\n{document['definition']}")
     line.say(f"All figures: {options.project / RESULT_FILE} and {TABLE_FILE}")
     return EXIT_OK

@@ -11,13 +11,14 @@ import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from app.ablation.table import VariantResult, as_csv, seam_figures, summarize
-from app.ablation.variants import FULL, Variant, settings_of
-from app.evaluation import evaluate_project
-from app.headless import ClipOutcome, open_trained, train_clips
+from app.ablation.measuring import Measured, Scope, kept_figures, measure
+from app.ablation.table import DEFINITION, VariantResult, as_csv, summarize
+from app.ablation.variants import FULL, VARIANTS, Variant, settings_of
+from app.headless import ClipOutcome, train_clips
 from app.project import PROJECT_FILE, Project, ProjectSettings, check_settings, create_project, open_project
+from app.results import write_text
 from app.status import TrainingStatus
 from app.training.messages import Event
 from app.training.service import Launch, TrainingService
@@ -26,10 +27,14 @@ from engine.capture.clip import Clip
 from engine.errors import ProjectError, TrainingError
 from engine.files import atomic_path
 
+if TYPE_CHECKING:
+    from engine.metrics.colors import Precision
+    from engine.metrics.picture import Choice
+
 ABLATION_SCHEMA = 1
 RESULT_FILE = "ablation.json"
 TABLE_FILE = "ablation.csv"
-MEASURED_FILE = "measured.json"
+_ORDER = {variant.name: i for i, variant in enumerate(VARIANTS)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,54 +62,86 @@ def run_ablation(
     variants: Sequence[Variant],
     n_clips: int,
     seeds: Sequence[int],
-    metrics: Any,
+    metrics: Choice,
+    precision: Precision = "float",
     launch: Launch,
     callbacks: Callbacks,
 ) -> dict[str, Any]:
     """Train what is not trained yet, measure what is not measured yet, and write the table after every variant.
 
+    What an earlier call has finished in the folder with the same settings, other variants and seeds too, is in the
+    table from the start. Its lines are in the order of VARIANTS, results of a variant in that of the seeds.
+
     Args:
         folder: Gets one project per variant and seed, ablation.json and ablation.csv.
         settings: Of "full"; its seed is replaced.
         n_clips: From the first.
-        metrics: "quick" or "all", see engine.metrics.picture.measure_picture.
+        metrics, precision: See engine.metrics.picture.measure_picture.
     Returns:
-        JSON-able: schema, capture, holdout, clip_length, n_clips, seeds, lines (`summarize`) and results per seed.
+        JSON-able: schema, capture, holdout, clip_length, n_clips, metrics, precision, seeds, words (what each variant
+        is), definition (of flicker and seam ratios), lines (`summarize`) and results per seed.
     Raises:
         ProjectError, CaptureError: Bad input.
         TrainingError: A clip failed; what was finished is kept.
         KeyboardInterrupt: Likewise.
     """
-    results: list[VariantResult] = []
     document: dict[str, Any] = {}
     if settings.config().field == "joint":
         raise ProjectError("field=joint leaves no clips to compare.", hint="Take the variant field-joint.")
     clips = settings.clips(capture.n_frames)[:n_clips]
     todo = [_Task(capture, settings, variant, seed, clips) for seed in seeds for variant in variants]
+    borders = [clip.start for clip in clips[1:]]
+    all_clips = Scope(range(n_clips), borders, metrics, precision)
+    found = _finished(folder, capture, settings, clips, all_clips)
     for n_done, task in enumerate(todo):
         variant, seed = task.variant, task.settings.seed
         callbacks.on_variant(variant.name, seed, n_done, len(todo))
-        figures = _figures_of(folder, task, clips, metrics, launch, callbacks)
-        results.append(VariantResult(variant.name, seed, figures))
+        measured = _measured(folder, task, all_clips, launch, callbacks)
+        found[variant.name, seed] = VariantResult(variant.name, seed, measured.figures, measured.n_frames)
+        results = [found[key] for key in sorted(found, key=lambda key: (_ORDER[key[0]], key[1]))]
+        shown = {result.variant for result in results}
         document = {
             "schema": ABLATION_SCHEMA,
             "capture": str(capture.path),
             "holdout": list(settings.holdout),
             "clip_length": settings.clip_length,
             "n_clips": n_clips,
-            "seeds": list(seeds),
-            "words": {item.name: item.words for item in variants},
+            "metrics": metrics,
+            "precision": precision,
+            "seeds": sorted({*seeds, *(result.seed for result in results)}),
+            "words": {item.name: item.words for item in VARIANTS if item.name in shown},
+            "definition": DEFINITION,
             "lines": summarize(results),
-            "results": [{"variant": r.variant, "seed": r.seed, **r.figures} for r in results],
+            "results": [{"variant": r.variant, "seed": r.seed, "n_frames": r.n_frames, **r.figures} for r in results],
         }
-        _write(folder / RESULT_FILE, json.dumps(document, indent=1, allow_nan=False) + "\n")
-        _write(folder / TABLE_FILE, as_csv(document["lines"]))
+        write_text(folder / RESULT_FILE, json.dumps(document, indent=1, allow_nan=False) + "\n")
+        write_text(folder / TABLE_FILE, as_csv(document["lines"]))
     return document
 
 
 def project_folder(folder: Path, name: str, seed: int) -> Path:
     """Where a variant lies."""
     return folder / f"{name}-seed{seed}"
+
+
+def _finished(
+    folder: Path, capture: Capture, base: ProjectSettings, clips: Sequence[Clip], scope: Scope
+) -> dict[tuple[str, int], VariantResult]:
+    """What lies measured in the folder and fits the settings, by variant and seed."""
+    found = {}
+    for variant in VARIANTS:
+        for place in sorted(folder.glob(f"{variant.name}-seed*")):
+            text = place.name.removeprefix(f"{variant.name}-seed")
+            if not text.isdecimal():
+                continue
+            try:
+                task = _Task(capture, replace(base, seed=int(text)), variant, int(text), clips)
+            except ProjectError:  # the settings of this call have no such variant
+                continue
+            kept = kept_figures(place, task.settings, replace(scope, clips=task.chosen))
+            if kept is not None:
+                found[variant.name, int(text)] = VariantResult(variant.name, int(text), kept.figures, kept.n_frames)
+    return found
 
 
 class _Task:
@@ -127,9 +164,7 @@ class _Task:
         check_settings(self.settings, capture)
 
 
-def _figures_of(
-    folder: Path, task: _Task, clips: Sequence[Clip], metrics: Any, launch: Launch, callbacks: Callbacks
-) -> dict[str, float | None]:
+def _measured(folder: Path, task: _Task, scope: Scope, launch: Launch, callbacks: Callbacks) -> Measured:
     variant, settings, capture, seed = task.variant, task.settings, task.capture, task.settings.seed
     place = project_folder(folder, variant.name, seed)
     project = _open(place, settings)
@@ -157,7 +192,7 @@ def _figures_of(
             raise TrainingError(f"{variant.name}, seed {seed}: {outcomes[-1].message}", hint=outcomes[-1].hint)
     finally:
         project.close()
-    return _measure(place, list(task.chosen), {clip.start for clip in clips[1:]}, metrics, callbacks)
+    return measure(place, replace(scope, clips=task.chosen), callbacks.on_row)
 
 
 def _open(place: Path, settings: ProjectSettings) -> Project:
@@ -184,54 +219,3 @@ def _take_reference(project: Project, full: Path) -> None:
     project.reference_path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_path(project.reference_path) as partial:
         shutil.copyfile(source.reference_path, partial)
-
-
-def _measure(
-    place: Path, clips: list[int], borders: set[int], metrics: Any, callbacks: Callbacks
-) -> dict[str, float | None]:
-    opened = open_trained(open_project(place, is_writable=False))
-    headers = [opened.header(i) for i in clips]
-    key = {
-        "clips": [header["fingerprint"] for header in headers],
-        "borders": sorted(borders),
-        "metrics": metrics,
-        "schema": ABLATION_SCHEMA,
-    }
-    kept = _read(place / MEASURED_FILE)
-    if kept is not None and kept.get("key") == key:
-        return kept["figures"]
-    holdout = opened.capture.camera_indices(opened.project.settings.holdout)
-    document = evaluate_project(
-        opened,
-        clip_indices=clips,
-        metrics=metrics,
-        cameras=holdout or None,
-        on_progress=callbacks.on_row,
-    )
-    means = document["means"]["held_out"] or document["means"]["trained_on"]
-    figures: dict[str, float | None] = {name: value for name, value in means.items() if not isinstance(value, dict)}
-    figures |= seam_figures(document["seams"]["rows"], borders)
-    times = [header.get("metrics") or {} for header in headers]
-    seconds = [time["preparation_s"] + time["training_s"] for time in times if "training_s" in time]
-    figures["minutes"] = sum(seconds) / 60 if len(seconds) == len(headers) else None
-    figures["megabytes"] = sum(opened.project.clip_path(i).stat().st_size for i in clips) / 1e6
-    _write(place / MEASURED_FILE, json.dumps({"key": key, "figures": figures}, indent=1, allow_nan=False) + "\n")
-    return figures
-
-
-def _read(path: Path) -> dict[str, Any] | None:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return content if isinstance(content, dict) else None
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        with atomic_path(path) as partial:
-            partial.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise ProjectError(
-            f"The file could not be written ({error.strerror}).", hint="Free some space and try again.", path=path
-        ) from error

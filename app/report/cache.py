@@ -15,18 +15,19 @@ from app.report.facts import ProjectFacts
 from engine.files import atomic_path
 
 if TYPE_CHECKING:
+    from engine.metrics.colors import Precision
     from engine.metrics.picture import Choice
 
 logger = logging.getLogger(__name__)
 
-CACHE_SCHEMA = 1
+CACHE_SCHEMA = 2
 REPORTS = "reports"
 """Folder of a project for its reports."""
 Measure = Callable[..., dict[str, Any]]
 
 
-def evaluation_key(facts: ProjectFacts, metrics: Choice) -> str:
-    """Names everything that the figures depend on: clips, hold-out, size, choice, and what this machine can measure."""
+def evaluation_key(facts: ProjectFacts, metrics: Choice, precision: Precision) -> str:
+    """Names everything that the figures depend on: clips, cameras, size, choices, what this machine measures."""
     from engine.metrics import flip, lpips
 
     settings = facts.settings
@@ -38,6 +39,7 @@ def evaluation_key(facts: ProjectFacts, metrics: Choice) -> str:
         "holdout": sorted(settings.holdout),
         "clips": [[clip.clip_index, clip.start, clip.n_frames, clip.fingerprint] for clip in facts.clips],
         "metrics": metrics,
+        "precision": precision,
         "missing": missing,
     }
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
@@ -47,6 +49,7 @@ def evaluation_of(
     facts: ProjectFacts,
     *,
     choices: Sequence[Choice],
+    precision: Precision = "float",
     fallback_dir: Path,
     on_progress: Callable[[int, int, Any], None],
     measure: Measure = evaluate_project,
@@ -56,6 +59,7 @@ def evaluation_of(
 
     Args:
         choices: Metrics that will do, the best first; the last is measured when none is there.
+        precision: Pictures as rendered, or rounded to 8 bit.
         fallback_dir: Takes the file when the project's own folder cannot be written to.
         on_progress, measure: See app.evaluation.evaluate_project.
         opened: The project when it is open already.
@@ -63,19 +67,23 @@ def evaluation_of(
         ProjectError, CaptureError: The project cannot be measured.
     """
     for choice in choices:
-        key = evaluation_key(facts, choice)
-        for path in _places(facts, choice, key, fallback_dir):
+        key = evaluation_key(facts, choice, precision)
+        for path in _places(facts, _name(choice, precision), key, fallback_dir):
             found = _read(path, key)
             if found is not None:
                 return found
     choice = choices[-1]
-    key = evaluation_key(facts, choice)
+    key = evaluation_key(facts, choice, precision)
     opened = open_trained(facts.project) if opened is None else opened
     document = measure(
-        opened, clip_indices=[clip.clip_index for clip in facts.clips], metrics=choice, on_progress=on_progress
+        opened,
+        clip_indices=[clip.clip_index for clip in facts.clips],
+        metrics=choice,
+        precision=precision,
+        on_progress=on_progress,
     )
     text = json.dumps({"schema": CACHE_SCHEMA, "key": key, "evaluation": document}, allow_nan=False)
-    for path in _places(facts, choice, key, fallback_dir):
+    for path in _places(facts, _name(choice, precision), key, fallback_dir):
         try:
             with atomic_path(path) as partial:
                 partial.write_text(text, encoding="utf-8")
@@ -85,9 +93,13 @@ def evaluation_of(
     return document
 
 
-def _places(facts: ProjectFacts, choice: str, key: str, fallback_dir: Path) -> tuple[Path, Path]:
-    own = facts.project.folder / REPORTS / f"eval-{choice}.json"
-    return own, fallback_dir / "evaluations" / f"eval-{choice}-{key}.json"
+def _name(choice: Choice, precision: Precision) -> str:
+    return f"eval-{choice}" if precision == "float" else f"eval-{choice}-{precision}"
+
+
+def _places(facts: ProjectFacts, name: str, key: str, fallback_dir: Path) -> tuple[Path, Path]:
+    own = facts.project.folder / REPORTS / f"{name}.json"
+    return own, fallback_dir / "evaluations" / f"{name}-{key}.json"
 
 
 def _read(path: Path, key: str) -> dict[str, Any] | None:

@@ -28,7 +28,12 @@ def report(options: argparse.Namespace, launch: Launch) -> int:
 
     try:
         page = write_report(
-            options.project, compare=options.compare, out=options.out, metrics=options.metrics, on_stage=show
+            options.project,
+            compare=options.compare,
+            out=options.out,
+            metrics=options.metrics,
+            precision=options.precision,
+            on_stage=show,
         )
     finally:
         line.finish()

@@ -12,6 +12,7 @@ from app.report.facts import ProjectFacts
 from app.report.pareto import pareto_front
 from app.report.parts import Figure, Section
 from app.report.tables import Table, TableColumn
+from engine.metrics.flicker import FIGURES, definition_of, flicker_figures
 
 _FIGURES = (
     ("psnr", "PSNR", "dB", 2),
@@ -24,9 +25,11 @@ _FIGURES = (
     ("flip", "FLIP", "", 4),
 )
 _SEAMS = (
-    ("ratio_static", "Seam ratio, static", "", 2),
+    ("flicker_inside", "Flicker inside clips", "1/255", 3),
+    ("flicker_borders", "Flicker at borders", "1/255", 3),
+    ("seam_ratio_static", "Seam ratio, static", "", 2),
+    ("seam_ratio_moving", "Seam ratio, moving", "", 2),
     ("score", "Seam score", "1/255", 3),
-    ("flicker", "Flicker E, static", "1/255", 3),
 )
 
 
@@ -47,10 +50,10 @@ class Compared:
         return self.evaluation["means"][self.group].get(name)
 
     def seam(self, name: str) -> float | None:
-        """A seam figure over all cameras: one of seams.means.all, or flicker, the mean E on static pixels in 1/255."""
-        if name == "flicker":
-            return flicker_of(self.evaluation)
-        return self.evaluation["seams"]["means"]["all"].get(name)
+        """A figure of flicker_figures, or of seams.means, of the same cameras as `figure`."""
+        if name in FIGURES:
+            return flicker_figures(self.evaluation["seams"]["rows"])[name]
+        return self.evaluation["seams"]["means"][self.group].get(name)
 
     @property
     def minutes(self) -> float | None:
@@ -61,12 +64,6 @@ class Compared:
 def main_group(evaluation: dict[str, Any]) -> str:
     """held_out, or trained_on where nothing was held out."""
     return "held_out" if evaluation["means"].get("held_out") else "trained_on"
-
-
-def flicker_of(evaluation: dict[str, Any]) -> float | None:
-    """Mean of E on static pixels over all pairs of neighbouring frames that have any, 1/255."""
-    values = [row["excess_static"] for row in evaluation["seams"]["rows"] if row["excess_static"] is not None]
-    return 255.0 * sum(values) / len(values) if values else None
 
 
 def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) -> Section:
@@ -96,13 +93,12 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
         for one in compared
     ]
     said = (
-        f"Means over all clips and frames of the {first.group.replace('_', '-')} cameras, raw colours; seams and "
-        "flicker over all cameras. The best value of a column is bold. Projects measured quickly have PSNR and SSIM "
-        "only."
+        f"Means over all clips and frames of the {first.group.replace('_', '-')} cameras, raw colours. The best value "
+        "of a column is bold. Projects measured quickly have PSNR, SSIM and DSSIM1 only."
     )
     notes = [note for one in compared[1:] if (note := comparability(first, one))]
     table = Table("comparison", "All projects", columns, rows)
-    return Section("comparison", "Comparison", [said, table, *notes, *left_out])
+    return Section("comparison", "Comparison", [said, table, definition_of(), *notes, *left_out])
 
 
 def comparability(first: Compared, other: Compared) -> str:
@@ -145,8 +141,8 @@ def speed_section(compared: Sequence[Compared]) -> Section:
     minutes = [time for _, time in timed]
     panels = (
         SpeedPanel(f"PSNR, {timed[0][0].group.replace('_', '-')} cameras, raw, dB", _of(timed, "psnr"), True),
-        SpeedPanel("seam ratio on static pixels", [one.seam("ratio_static") for one, _ in timed], False),
-        SpeedPanel("flicker: mean E on static pixels, 1/255", [one.seam("flicker") for one, _ in timed], False),
+        SpeedPanel("seam ratio on static pixels", [one.seam("seam_ratio_static") for one, _ in timed], False),
+        SpeedPanel("flicker inside clips, 1/255", [one.seam("flicker_inside") for one, _ in timed], False),
     )
     names = [one.facts.name for one, _ in timed]
     own = next((i for i, (one, _) in enumerate(timed) if one is compared[0]), None)
@@ -162,9 +158,9 @@ def speed_section(compared: Sequence[Compared]) -> Section:
         TableColumn("minutes", "Time", 2, unit="min"),
         TableColumn("psnr", "PSNR", 2, unit="dB"),
         TableColumn("is_front_psnr", "On its front"),
-        TableColumn("ratio_static", "Seam ratio, static", 2),
+        TableColumn("seam_ratio_static", "Seam ratio, static", 2),
         TableColumn("is_front_ratio", "On its front"),
-        TableColumn("flicker", "Flicker E, static", 3, unit="1/255"),
+        TableColumn("flicker_inside", "Flicker inside clips", 3, unit="1/255"),
         TableColumn("is_front_flicker", "On its front"),
     )
     rows = [
@@ -174,9 +170,9 @@ def speed_section(compared: Sequence[Compared]) -> Section:
             "minutes": minutes[i],
             "psnr": panels[0].values[i],
             "is_front_psnr": i in on_front[0],
-            "ratio_static": panels[1].values[i],
+            "seam_ratio_static": panels[1].values[i],
             "is_front_ratio": i in on_front[1],
-            "flicker": panels[2].values[i],
+            "flicker_inside": panels[2].values[i],
             "is_front_flicker": i in on_front[2],
         }
         for i, name in enumerate(names)
@@ -188,7 +184,8 @@ def speed_section(compared: Sequence[Compared]) -> Section:
     )
     alt = f"PSNR, seam ratio and flicker of {len(names)} projects against minutes"
     chart = Figure("speed_error", draw_speed_error(names, minutes, panels, own), caption, alt)
-    return Section("speed", "Speed against error", [*parts, chart, Table("speed_error", "The marks", columns, rows)])
+    table = Table("speed_error", "The marks", columns, rows)
+    return Section("speed", "Speed against error", [*parts, chart, table, definition_of()])
 
 
 def _of(timed: Sequence[tuple[Compared, float]], name: str) -> list[float | None]:

@@ -13,6 +13,7 @@ from app.report.pictures import Pictures
 from app.report.tables import Table, TableColumn
 
 GROUP_WORDS = {"held_out": "held out", "trained_on": "trained on"}
+_DIRECTIONS = {True: "higher", False: "lower", None: ""}
 ERROR_RANGE = (0.0, 0.25)
 """Colour range of error pictures, the same in every report; colours lie in 0..1."""
 N_PICTURES = 6
@@ -35,7 +36,7 @@ def clips_section(evaluation: dict[str, Any]) -> Section:
         {
             "figure": name,
             "unit": column["unit"],
-            "better": "higher" if column["is_higher_better"] else "" if name == "moving_share" else "lower",
+            "better": _DIRECTIONS[column["is_higher_better"]],
             **{f"{part}_{group}": found[group].get(name) for part, found in parts for group in groups},
             "why_missing": missing_text(column),
         }

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from app.report.charts import Curve, CurvePanel, MapPanel, draw_maps, draw_over_time
 from app.report.measured import GROUP_WORDS, Tick, clip_borders
-from app.report.parts import Figure, Folded, Section
+from app.report.parts import Figure, Folded, Part, Section
 from app.report.pictures import Pictures
 from app.report.tables import Table, TableColumn
 from engine.metrics.seams import MAP_RANGE
+from engine.metrics.summary import mean_of
 
 N_BOUNDARIES = 6
 """Boundaries with maps; of more, those with the worst score are shown."""
@@ -34,6 +36,7 @@ def seams_section(evaluation: dict[str, Any], pictures: Pictures, tick: Tick) ->
             "ratio is mean R at the boundary / mean R inside; 1 is no seam. Moving pixels may move more at a boundary "
             "than elsewhere; the ratio of the truth says by how much.",
             _boundaries(seams),
+            *_two_clips(seams["rows"]),
         ]
     if seams["rows"]:
         parts += [_over_time(evaluation), _normal(seams)]
@@ -94,6 +97,33 @@ def _boundaries(seams: dict[str, Any]) -> Table:
             }
         )
     return Table("seams", "Every clip boundary", columns, rows)
+
+
+def _two_clips(rows: Sequence[dict[str, Any]]) -> list[Part]:
+    """What two clips say of one instant, at borders where the clip before can say anything but its last frame."""
+    borders = [row for row in rows if row["is_boundary"]]
+    frames = sorted({row["frame_index"] for row in borders if not row["is_held"]})
+    n_held = len({row["frame_index"] for row in borders if row["is_held"]})
+    held = (
+        f"At {n_held} of the borders the field of the clip before ends with its last frame: asked for the first frame "
+        "of the next clip it answers with that one, so what two clips say of one instant differs by R there."
+    )
+    if not frames:
+        return [held] if n_held else []
+    columns = [TableColumn("frame_index", "First frame"), TableColumn("n_pairs", "Cameras")]
+    columns += [
+        TableColumn(f"{name}_{part}", f"{title}, {part}", 3, unit="1/255")
+        for name, title in (("two_clips", "Two clips"), ("change", "R"))
+        for part in _PARTS
+    ]
+    table = []
+    for frame in frames:
+        found = [row for row in borders if row["frame_index"] == frame and not row["is_held"]]
+        means = {column.key: mean_of([row[column.key] for row in found]) for column in columns[2:]}
+        levels = {key: None if value is None else 255.0 * value for key, value in means.items()}
+        table.append({"frame_index": frame, "n_pairs": len(found), **levels})
+    caption = "One instant by two clips: the clip before, asked beyond its end, against the first frame of the next"
+    return [Table("two_clips", caption, columns, table), *([held] if n_held else [])]
 
 
 def _normal(seams: dict[str, Any]) -> Table:

@@ -14,7 +14,7 @@ from app.evaluation import evaluate_project
 from app.headless import TrainedProject, open_trained
 from app.report.about import capture_section, settings_section, setup_section, split_section
 from app.report.cache import REPORTS, Measure, evaluation_of
-from app.report.comparison import Compared, comparison_section, flicker_of, speed_section
+from app.report.comparison import Compared, comparison_section, speed_section
 from app.report.costs import storage_section, times_section
 from app.report.facts import find_projects, read_facts, short_names
 from app.report.measured import clips_section, time_section, worst_pictures, worst_section
@@ -25,8 +25,10 @@ from app.report.seam_parts import seams_section, shown_boundaries
 from engine.capture.inspect import describe
 from engine.errors import CaptureError, ProjectError
 from engine.files import atomic_path
+from engine.metrics.flicker import flicker_figures
 
 if TYPE_CHECKING:
+    from engine.metrics.colors import Precision
     from engine.metrics.picture import Choice
 
 REPORT_SCHEMA = 1
@@ -43,6 +45,7 @@ def write_report(
     compare: Sequence[Path] = (),
     out: Path | None = None,
     metrics: Choice | None = None,
+    precision: Precision = "float",
     on_stage: OnStage,
     measure: Measure = evaluate_project,
     make_pictures: Callable[[TrainedProject], Pictures] = ProjectPictures,
@@ -58,6 +61,7 @@ def write_report(
         out: Folder of the report; PROJECT/reports when None.
         metrics: Columns of all projects; None measures all of the project and the quick ones of the others, or shows
             all where they were measured before.
+        precision: Of all projects: pictures as rendered, or rounded to 8 bit.
         on_stage: Told what is done.
         measure, make_pictures: Tests bring quick ones.
     Returns:
@@ -82,6 +86,7 @@ def write_report(
             document = evaluation_of(
                 one,
                 choices=choices,
+                precision=precision,
                 fallback_dir=out,
                 on_progress=_measuring(on_stage, name),
                 measure=measure,
@@ -157,8 +162,8 @@ def _sections(
 
 
 def report_document(compared: Sequence[Compared], sections: Sequence[Section]) -> dict[str, Any]:
-    """What report.json holds: schema, projects (name, folder, settings, clips, means, columns and seams of their
-    evaluations), tables by name as on the page and in the CSV files, and files (of figures and tables)."""
+    """What report.json holds: schema, projects (name, folder, settings, clips, means, columns, seams and flicker of
+    their evaluations), tables by name as on the page and in the CSV files, and files (of figures and tables)."""
     tables = {table.name: table for section in sections for table in section.tables()}
     figures = [figure.name for section in sections for figure in section.figures()]
     return {
@@ -199,7 +204,7 @@ def _project_document(one: Compared) -> dict[str, Any]:
         "columns": evaluation["columns"],
         "means": evaluation["means"],
         "seams": {key: value for key, value in evaluation["seams"].items() if key != "rows"},
-        "flicker_static": flicker_of(evaluation),
+        "flicker": flicker_figures(evaluation["seams"]["rows"]),
     }
 
 

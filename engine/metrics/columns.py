@@ -12,14 +12,14 @@ class Column:
     Attributes:
         name: Key in rows and means.
         unit: "dB", or "1" for a number without unit.
-        is_higher_better: Direction.
+        is_higher_better: Direction; None for a figure of the capture, which has none.
         is_quick: Whether `metrics="quick"` has it too.
         definition: One sentence.
     """
 
     name: str
     unit: str
-    is_higher_better: bool
+    is_higher_better: bool | None
     is_quick: bool
     definition: str
 
@@ -27,7 +27,7 @@ class Column:
 _BASES = (
     Column("psnr", "dB", True, True, "20 log10(1 / RMSE), one RMSE over the three channels"),
     Column("ssim", "1", True, True, "SSIM, 11 x 11 window, sigma 1.5, zero padding, data range 1, mean of channels"),
-    Column("dssim1", "1", False, False, "(1 - SSIM) / 2, data range 1"),
+    Column("dssim1", "1", False, True, "(1 - SSIM) / 2, data range 1"),
     Column("dssim_range2", "1", False, False, "(1 - SSIM) / 2, constants of data range 2 for pictures in 0..1"),
     Column("dssim_ms", "1", False, False, "(1 - MS-SSIM) / 2, five scales; sides of 176 px and more"),
     Column("flip", "1", False, False, "mean LDR-FLIP, 67 pixels per degree, by flip-evaluator"),
@@ -52,7 +52,7 @@ def _table() -> dict[str, Column]:
                 name = base.name + fit + part
                 found.append(Column(name, base.unit, base.is_higher_better, base.is_quick, words))
     words = "share of the pixels that differ from the camera's own background"
-    found.append(Column("moving_share", "1", False, True, words))
+    found.append(Column("moving_share", "1", None, True, words))
     return {column.name: column for column in found}
 
 

@@ -52,7 +52,7 @@ def measure_picture(
         image: Rendered, any float type; clamped, and rounded if `precision` says so. [H, W, 3]
         pixels: What the camera took. [H, W, 3] uint8
         is_moving: Which pixels move. [H, W] bool
-        metrics: "quick" is PSNR and SSIM; "all" is every column, at about ten times the time (mostly FLIP).
+        metrics: "quick" is PSNR, SSIM and DSSIM1; "all" is every column, at about ten times the time (mostly FLIP).
         precision: See engine.metrics.colors.as_shown. The colour fit starts from that picture and is not rounded again.
     """
     if not np.isfinite(image).all():
@@ -67,9 +67,9 @@ def measure_picture(
         for part, mask in parts.items():
             found[f"psnr{fit}{part}"] = psnr_of(error, mask)
             found[f"ssim{fit}{part}"] = masked_mean(similarity, mask)
+        found[f"dssim1{fit}"] = 0.5 * (1.0 - masked_mean(similarity, None))
         if metrics == "quick":
             continue
-        found[f"dssim1{fit}"] = 0.5 * (1.0 - masked_mean(similarity, None))
         found[f"dssim_range2{fit}"] = dssim_range2_of(moments)
         found[f"dssim_ms{fit}"] = dssim_ms_of(picture, truth, moments)
         if flip.why_missing() is None:

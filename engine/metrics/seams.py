@@ -193,9 +193,9 @@ def _measures(rows: Sequence[PairRow]) -> dict[str, float | None]:
             normal.setdefault((row.camera, row.clip_index), []).append(row.excess_static)
     return {
         "score": mean_of([_score(row, normal) for row in boundary]),
-        "ratio_static": _ratio(boundary, interior, "change_static"),
-        "ratio_moving": _ratio(boundary, interior, "change_moving"),
-        "truth_ratio_moving": _ratio(boundary, interior, "truth_change_moving"),
+        "ratio_static": ratio(boundary, interior, "change_static"),
+        "ratio_moving": ratio(boundary, interior, "change_moving"),
+        "truth_ratio_moving": ratio(boundary, interior, "truth_change_moving"),
     }
 
 
@@ -207,7 +207,8 @@ def _score(row: PairRow, normal: dict[tuple[str, int], list[float]]) -> float | 
     return 255.0 * (row.excess_static - float(np.median(around)))
 
 
-def _ratio(boundary: Sequence[PairRow], interior: Sequence[PairRow], name: str) -> float | None:
+def ratio(boundary: Sequence[PairRow], interior: Sequence[PairRow], name: str) -> float | None:
+    """Mean of a field of PairRow over the first pairs / its mean over the others; None where there is no such value."""
     above, below = (mean_of([getattr(row, name) for row in rows]) for rows in (boundary, interior))
     return None if above is None or not below else above / below
 

@@ -295,6 +295,8 @@ _SHARING = ("decoder", "residual", "inherit")
 """Settings of what a source clip takes over. The first choice of each is the default."""
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
+_WORDS = {bool: "true or false", float: "a number", int: "a whole number"}
+
 
 def _parse_bool(text: str) -> bool:
     try:
@@ -325,5 +327,5 @@ def parse_overrides(assignments: Sequence[str]) -> dict[str, Any]:
             parse: Callable[[str], Any] = _parse_bool if kinds[key] is bool else kinds[key]
             values[key] = parse(text.strip())
         except ValueError as error:
-            raise ProjectError(f"Setting '{key}' is '{text}', which is no {kinds[key].__name__}.") from error
+            raise ProjectError(f"Setting '{key}' is '{text}', which is not {_WORDS[kinds[key]]}.") from error
     return values

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app import cli
 from app.arguments import parse_range
 from app.cli import main
 from app.progress import ProgressLine, duration_text
@@ -156,7 +157,8 @@ def test_trained_clips_are_not_trained_again(run, capture_folder, tmp_path):
         (["--set", "joint_steps"], "no '='"),
         (["--set", "nonsense=1"], "does not exist"),
         (["--set", "ssim_weight=5"], "between 0.0 and 1.0"),
-        (["--set", "joint_steps=many"], "no int"),
+        (["--set", "joint_steps=many"], "not a whole number"),
+        (["--set", "independent=maybe"], "not true or false"),
     ],
 )
 def test_bad_arguments_end_with_2_and_leave_nothing_behind(run, capture_folder, tmp_path, arguments, expected):
@@ -244,6 +246,10 @@ def test_a_source_clip_alone_is_refused(run, capture_folder, tmp_path):
 def test_measuring_needs_something_trained(run, capture_folder, tmp_path, command):
     extra = ["--json", tmp_path / "o.json"] if command == "eval" else ["--camera", "1", "--out", tmp_path / "o.mp4"]
     code, _, err = run(command, tmp_path / "nowhere", *extra)
+    assert code == 2
+    assert "There is no such folder" in err
+    (tmp_path / "empty").mkdir()
+    code, _, err = run(command, tmp_path / "empty", *extra)
     assert code == 2
     assert "no project" in err
     run("train", capture_folder, "--project", tmp_path / "p", "--set", "static_steps=1")  # fails early
@@ -377,6 +383,49 @@ def test_help_and_nonsense(run):
     assert code == 2
     assert "invalid choice" in err
     assert run("train")[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "unknown"),
+    [
+        (["train", "c", "--project", "p", "--see", "3"], "--see 3"),  # an abbreviation is not taken for --seed
+        (["eval", "p", "--json", "-", "--frames", "0:1"], "--frames 0:1"),
+        (["bench", "extra"], "extra"),
+    ],
+)
+def test_what_a_command_does_not_know_is_said_with_its_own_help(run, arguments, unknown):
+    code, out, err = run(*arguments)
+    assert (code, out) == (2, "")
+    assert (
+        err
+        == f"clipgstream {arguments[0]}: unrecognized arguments: {unknown}. See `clipgstream {arguments[0]} --help`.\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["train", "c", "--project", "p"], "What was learned is kept; the same command goes on from there."),
+        (["ablate", "c", "--project", "p"], "What was learned is kept; the same command goes on from there."),
+        (["eval", "p", "--json", "-"], "Nothing was written."),
+        (
+            ["report", "p"],
+            "The page was not written; projects that were measured to the end need not be measured again.",
+        ),
+        (["render", "p", "--camera", "0", "--out", "o"], "A video was not written; single pictures that were finished"),
+        (["inspect", "p"], ""),
+        (["bench"], ""),
+    ],
+)
+def test_an_interrupted_command_says_what_has_become_of_its_work(run, monkeypatch, arguments, expected):
+    def interrupted(options, launch):
+        raise KeyboardInterrupt
+
+    monkeypatch.setitem(cli._COMMANDS, arguments[0], interrupted)
+    code, out, err = run(*arguments)
+    assert (code, out) == (130, "")
+    assert err.strip().startswith(f"clipgstream: Interrupted. {expected}".rstrip())
+    assert ("kept" in err) == ("kept" in expected)
 
 
 INTERRUPTED = """

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from engine.training import config
+
 ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"\]\(([^)#\s]+)\)")
 TREE_ENTRY = re.compile(r"^( *)([\w.{},*-]+/?)(?:  |$)")
@@ -71,3 +73,30 @@ def test_readme_lists_the_keys_of_the_window() -> None:
     assert len(rows) > 10, "the table of shortcuts was not found"
     text = (ROOT / "README.md").read_text("utf-8")
     assert [f"| {key} | {what} |" for key, what in rows if f"| {key} | {what} |" not in text] == []
+
+
+def test_readme_lists_the_options_of_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+    """In the row of the command, or among the settings that commands share."""
+    from app.arguments import COMMANDS
+    from app.cli import build_parser
+
+    text = (ROOT / "README.md").read_text("utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("| `")]
+    shared = text[text.index("Settings of `train` and `ablate`:") : text.index("| `--set` |")]
+    for command in COMMANDS:
+        with pytest.raises(SystemExit):
+            build_parser().parse_args([command, "--help"])
+        options = set(re.findall(r"^  (--[a-z-]+)", capsys.readouterr().out, re.MULTILINE))
+        assert options, command
+        said = "".join(row for row in rows if f"`{command}`" in row.split("|")[1] or f"clipgstream {command} " in row)
+        settings = shared if command in ("train", "ablate") else ""
+        assert sorted(o for o in options if not re.search(rf"{o}(?![a-z-])", said + settings)) == [], command
+
+
+def test_readme_lists_the_switches_of_the_method_with_the_default_first() -> None:
+    text = (ROOT / "README.md").read_text("utf-8")
+    choices = config._CHOICES | {"independent": ("false", "true")}
+    for name, values in choices.items():
+        row = re.search(rf"^\| `{name}` \|(.*)\|$", text, re.MULTILINE)
+        assert row is not None, name
+        assert tuple(word for word in re.findall(r"`(\w+)`", row[1]) if word in values) == values, name

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui.main import COMMANDS, main
+from app.arguments import COMMANDS
+from ui.main import main
 from ui.panels.timeline import MIN_TICK_SPACING_PX, cell_left, frame_at, tick_step
 from ui.panels.training import MAX_PLOT_POINTS, duration_text, plot_arrays
 from ui.panels.viewport import arrange, fit
@@ -132,6 +133,16 @@ def test_without_a_display_the_demo_runs_instead(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("ui.main.has_display", lambda: False)
     assert main(["some_capture"]) == 0
     assert [str(path) for path, _, _ in seen] == ["some_capture"]
+
+
+def test_help_says_what_each_command_does(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--help"])
+    assert ended.value.code == 0
+    lines = [line.split(maxsplit=2) for line in capsys.readouterr().out.splitlines()]
+    said = {line[1]: line[2] for line in lines if line[:1] == ["clipgstream"]}
+    assert said.keys() == {*COMMANDS, "demo"}
+    assert all(said[name] == words for name, words in COMMANDS.items())
 
 
 def test_nonsense_arguments_end_with_2_and_one_line(capsys: pytest.CaptureFixture[str]) -> None:

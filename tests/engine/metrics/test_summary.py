@@ -83,6 +83,7 @@ def test_columns_count_their_gaps():
     assert found["flip"]["why_missing"] == {"no reason": 4}
     assert found["flip"]["is_higher_better"] is False
     assert found["psnr"]["unit"] == "dB"
+    assert found["moving_share"]["is_higher_better"] is None  # of the capture, neither good nor bad
 
 
 def test_a_row_is_flat_in_a_file():

@@ -16,7 +16,13 @@ def test_overrides_become_typed_values():
 
 @pytest.mark.parametrize(
     ("assignment", "expected"),
-    [("joint_steps", "no '='"), ("steps=3", "does not exist"), ("joint_steps=many", "no int")],
+    [
+        ("joint_steps", "no '='"),
+        ("steps=3", "does not exist"),
+        ("joint_steps=many", "is 'many', which is not a whole number"),
+        ("feature_lr=fast", "is 'fast', which is not a number"),
+        ("independent=maybe", "is 'maybe', which is not true or false"),
+    ],
 )
 def test_bad_overrides_name_what_is_wrong(assignment, expected):
     with pytest.raises(ProjectError, match=expected):

@@ -1,0 +1,119 @@
+"""Figures of one trained variant, kept beside it: the same settings are measured once."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from app.evaluation import evaluate_project
+from app.headless import open_trained
+from app.project import Project, ProjectSettings, open_project
+from app.results import write_text
+from engine.errors import ProjectError
+from engine.metrics.flicker import flicker_figures
+from engine.model.clip_state import read_clip_header
+
+if TYPE_CHECKING:
+    from engine.metrics.colors import Precision
+    from engine.metrics.picture import Choice
+
+MEASURED_SCHEMA = 2
+MEASURED_FILE = "measured.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Figures of a trained variant, None where one does not exist, and on how many frames of each camera."""
+
+    figures: dict[str, float | None]
+    n_frames: int
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """What is measured of a variant.
+
+    Attributes:
+        clips: Indices of its clips.
+        borders: Frames at which a clip of "full" starts.
+        metrics, precision: See app.evaluation.evaluate_project.
+    """
+
+    clips: Sequence[int]
+    borders: Sequence[int]
+    metrics: Choice
+    precision: Precision
+
+
+def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None]) -> Measured:
+    """Figures of a trained variant, from its file when that is of these clips and this scope.
+
+    Args:
+        place: The variant's project.
+        on_row: Gets rows measured, rows in all and the newest row.
+    Raises:
+        ProjectError, CaptureError: It cannot be measured, or the figures cannot be written.
+    """
+    project = open_project(place, is_writable=False)
+    key = _key(project, scope)
+    kept = _read(place / MEASURED_FILE, key)
+    if kept is not None:
+        return kept
+    opened = open_trained(project)
+    headers = [opened.header(i) for i in scope.clips]
+    holdout = opened.capture.camera_indices(project.settings.holdout)
+    document = evaluate_project(
+        opened,
+        clip_indices=scope.clips,
+        metrics=scope.metrics,
+        precision=scope.precision,
+        cameras=holdout or None,
+        on_progress=on_row,
+    )
+    means = document["means"]["held_out"] or document["means"]["trained_on"]
+    figures: dict[str, float | None] = {name: value for name, value in means.items() if not isinstance(value, dict)}
+    figures |= flicker_figures(document["seams"]["rows"], scope.borders)
+    times = [header.get("metrics") or {} for header in headers]
+    seconds = [time["preparation_s"] + time["training_s"] for time in times if "training_s" in time]
+    figures["minutes"] = sum(seconds) / 60 if len(seconds) == len(headers) else None
+    figures["megabytes"] = sum(project.clip_path(i).stat().st_size for i in scope.clips) / 1e6
+    measured = Measured(figures, sum(opened.clips[i].n_frames for i in scope.clips))
+    write_text(place / MEASURED_FILE, json.dumps({"key": key, **asdict(measured)}, indent=1, allow_nan=False) + "\n")
+    return measured
+
+
+def kept_figures(place: Path, settings: ProjectSettings, scope: Scope) -> Measured | None:
+    """Figures that an earlier call has measured with these settings; None where there are none."""
+    try:
+        project = open_project(place, is_writable=False)
+    except ProjectError:  # damaged, or something else of that name
+        return None
+    if project.settings != settings:
+        return None
+    return _read(place / MEASURED_FILE, _key(project, scope))
+
+
+def _key(project: Project, scope: Scope) -> dict[str, Any]:
+    """Everything that the figures depend on."""
+    headers = [read_clip_header(project.clip_path(i)) for i in scope.clips]
+    return {
+        "clips": [None if header is None else header["fingerprint"] for header in headers],
+        "borders": list(scope.borders),
+        "metrics": scope.metrics,
+        "precision": scope.precision,
+        "schema": MEASURED_SCHEMA,
+    }
+
+
+def _read(path: Path, key: dict[str, Any]) -> Measured | None:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    if not isinstance(content, dict) or content.get("key") != key:
+        return None
+    figures, n_frames = content.get("figures"), content.get("n_frames")
+    return Measured(figures, n_frames) if isinstance(figures, dict) and isinstance(n_frames, int) else None

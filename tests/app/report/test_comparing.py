@@ -1,0 +1,95 @@
+"""Projects set beside each other, the command, and what bad input leaves behind."""
+
+from __future__ import annotations
+
+import shutil
+from functools import partial
+
+import pytest
+
+from app.cli import main
+from app.report import write
+from app.report.write import write_report
+from engine.errors import ProjectError
+from tests.app.fakes import write_capture
+from tests.app.report.made_up import FakePictures, Measure, Page, report, train
+
+
+def test_what_cannot_be_compared_is_said(project, tmp_path, capture_folder):
+    other = write_capture(tmp_path / "other_capture", n_frames=9)
+    train(tmp_path / "more" / "elsewhere", other)
+    train(tmp_path / "more" / "deep" / "p", capture_folder, n_clips=1)
+    shutil.copytree(project, tmp_path / "more" / "empty", ignore=shutil.ignore_patterns("*.safetensors"))
+    page = Page(report(project, compare=[tmp_path / "more", project, tmp_path]).read_text(encoding="utf-8"))
+    parent = project.parent.name
+    assert [row[0] for row in page.tables["comparison"]] == [f"{parent}/p", "deep/p", "elsewhere"]
+    assert "deep/p is measured on 3 frames, not the same 6" in page.text
+    assert "elsewhere is of another capture" in page.text
+    assert "empty is left out: Nothing is trained in this project yet." in page.text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["{tmp}/nowhere"], "There is no such folder"),
+        (["{tmp}/plain"], "no project"),
+        (["{tmp}/untrained"], "Nothing is trained"),
+        (["{tmp}/p", "--compare", "{tmp}/nowhere"], "no such folder"),
+        (["{tmp}/p", "--compare", "{tmp}/plain"], "is no project and holds none"),
+        (["{tmp}/p", "--compare", "{tmp}/untrained"], "Nothing is trained"),
+        (["{tmp}/p", "--out", "{tmp}/a_file"], "is a file"),
+        (["{tmp}/p", "--metrics", "some"], "invalid choice"),
+    ],
+)
+def test_bad_input_leaves_nothing_behind(arguments, expected, project, tmp_path, capsys):
+    (tmp_path / "plain").mkdir()
+    (tmp_path / "a_file").touch()
+    shutil.copytree(project, tmp_path / "untrained", ignore=shutil.ignore_patterns("*.safetensors"))
+    before = sorted(tmp_path.rglob("*"))
+    assert main(["report", *(part.format(tmp=tmp_path) for part in arguments), "--quiet"]) == 2
+    message = capsys.readouterr().err
+    assert expected in message
+    assert "fault of the program" not in message
+    logs = {path for path in tmp_path.rglob("*") if "xdg" in str(path)}
+    assert sorted(set(tmp_path.rglob("*")) - logs) == [path for path in before if path not in logs]
+
+
+def test_a_report_that_cannot_be_finished_is_taken_back(project, tmp_path, monkeypatch):
+    def refuse(path):
+        if path.name == "report.html":
+            raise OSError(28, "No space left on device")
+        return real(path)
+
+    real = write.atomic_path
+    monkeypatch.setattr(write, "atomic_path", refuse)
+    with pytest.raises(ProjectError, match="No space left"):
+        report(project, out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_writes_the_page(project, tmp_path, monkeypatch, capsys):
+    quick = partial(write_report, measure=Measure(), make_pictures=FakePictures)
+    monkeypatch.setattr(write, "write_report", quick)
+    assert main(["report", str(project), "--out", str(tmp_path / "out")]) == 0
+    message = capsys.readouterr().err
+    assert "Measuring p 100 %" in message
+    assert f"Report: {tmp_path / 'out' / 'report.html'}" in message
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
+def test_an_interrupted_report_keeps_what_was_measured_and_writes_no_page(
+    project, tmp_path, capture_folder, monkeypatch, capsys
+):
+    train(tmp_path / "other", capture_folder)
+    measure = Measure()
+
+    def interrupted(opened, **options):
+        if opened.project.folder.name == "other":
+            raise KeyboardInterrupt
+        return measure(opened, **options)
+
+    monkeypatch.setattr(write, "write_report", partial(write_report, measure=interrupted, make_pictures=FakePictures))
+    arguments = ["report", str(project), "--compare", str(tmp_path / "other"), "--quiet"]
+    assert main(arguments) == 130
+    assert "were measured to the end need not" in capsys.readouterr().err
+    assert [path.name for path in (project / "reports").iterdir()] == ["eval-all.json"]
