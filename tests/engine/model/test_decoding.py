@@ -1,6 +1,8 @@
 """Decode: every back end against plain torch in float64, forward and gradient, hard values included."""
 
+import dataclasses
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -198,29 +200,66 @@ def test_two_decodes_alive_at_once_keep_their_values():
     backward(first)
 
 
-@pytest.mark.parametrize(
-    ("rows", "message"),
-    [([0, 999], "0..69"), ([-1, 3], "-1..3"), ([2, 2], "1 different of 2"), ([0.5], "int64")],
-)
-def test_rows_that_cannot_be_decoded_are_named(rows, message):
+BAD_ROWS = {
+    "0..69": (ValueError, torch.tensor([0, 999])),
+    "-1..3": (ValueError, torch.tensor([-1, 3])),
+    "1 different of 2": (ValueError, torch.tensor([2, 2])),
+    r"int64 \[n\] on the cpu, got torch.float32 of shape \[1\]": (ValueError, torch.tensor([0.5])),
+    r"rows must be int64 \[n\].*of shape \[1, 2\]": (ValueError, torch.tensor([[0, 1]])),
+    "rows must hold numbers": (TypeError, torch.zeros(2, dtype=torch.int64, device="meta")),
+    "rows must be a torch tensor, got numpy.ndarray": (TypeError, np.arange(3)),
+    "contiguous rows": (TypeError, torch.arange(6)[::2]),
+}
+
+
+@pytest.mark.parametrize("message", BAD_ROWS)
+def test_rows_that_cannot_be_decoded_are_named(message):
+    error, rows = BAD_ROWS[message]
     scene = Scene()
-    with pytest.raises(ValueError, match=message):
-        decode_anchors(
-            [ChosenAnchors(anchors=scene.sets["static"], rows=torch.tensor(rows))], scene.decoder, None, ONE_KNOT
-        )
+    with pytest.raises(error, match=message):
+        decode_anchors([ChosenAnchors(scene.sets["static"], rows)], scene.decoder, None, ONE_KNOT)
 
 
 def test_tensors_that_do_not_fit_are_named():
     scene, other = Scene(features=5), Scene(features=6)
-    chosen = ChosenAnchors(anchors=scene.sets["static"], rows=torch.arange(3))
-    with pytest.raises(ValueError, match=r"5 columns.* 6"):
-        decode_anchors([chosen], other.decoder, None, ONE_KNOT)
-    corners = scene.field.corners(scene.sets["moving"].positions)
-    chosen = ChosenAnchors(anchors=scene.sets["static"], rows=torch.arange(3), corners=corners)
-    with pytest.raises(ValueError, match="do not fit 70 anchors"):
-        decode_anchors([chosen], scene.decoder, scene.field, ONE_KNOT)
-    with pytest.raises(ValueError, match="no field"):
-        decode_anchors([chosen], scene.decoder, None, ONE_KNOT)
+    static, moving, rows = scene.sets["static"], scene.sets["moving"], torch.arange(3)
+
+    def refuses(
+        error: type[Exception], message: str, chosen: ChosenAnchors, decoder: Any, field: Any, **options
+    ) -> None:
+        with pytest.raises(error, match=message):
+            decode_anchors([chosen], decoder, field, ONE_KNOT, **options)
+
+    plain = ChosenAnchors(static, rows)
+    refuses(ValueError, r"features must be \[70, 6\] for this decoder, got \[70, 5\]", plain, other.decoder, None)
+    refuses(
+        ValueError,
+        "backend must be auto or one of cpu, reference, got 'gpu'",
+        plain,
+        scene.decoder,
+        None,
+        backend="gpu",
+    )
+    corners = scene.field.corners(moving.positions)
+    wrong = ChosenAnchors(static, rows, corners)
+    message = r"indices of corners must be \[70, 3, 8\] .* got \[71, 3, 8\]"
+    refuses(ValueError, message, wrong, scene.decoder, scene.field)
+    refuses(ValueError, "no field", wrong, scene.decoder, None)
+    short = dataclasses.replace(corners, weights=corners.weights[:5])
+    message = r"weights of corners must be \[71, 3, 8\] .* got \[5, 3, 8\]"
+    refuses(ValueError, message, ChosenAnchors(moving, rows, short), scene.decoder, scene.field)
+    right = ChosenAnchors(moving, rows, corners)
+    message = r"the field gives \[n, 6\], the decoder takes \[n, 5\]"
+    refuses(ValueError, message, right, scene.decoder, other.field)
+    with torch.no_grad():
+        decoded = decode_anchors([plain], scene.decoder, None, ONE_KNOT)
+    message = r"means of decoded must be \[350, 3\] for 70 anchors, got \[15, 3\]"
+    refuses(ValueError, message, ChosenAnchors(static, rows, decoded=decoded), scene.decoder, None)
+    message = "float32 tensors on the cpu; features is torch.float64"
+    static.features.data = static.features.data.double()
+    refuses(TypeError, message, plain, scene.decoder, None, backend="cpu")
+    static.features = torch.nn.Parameter(torch.zeros(70, 5, device="meta"))
+    refuses(TypeError, "features must hold numbers", plain, scene.decoder, None)
 
 
 def _exp_all(source, out, n):
