@@ -31,7 +31,7 @@ from app.arguments import (
     parse_cameras,
     parse_range,
 )
-from app.bench.command import CHART_FILE, bench
+from app.bench.command import CHART_FILE, DEFAULT_OUT, bench
 from app.bench.speed import known_machine_speed
 from app.evaluation_command import evaluate
 from app.gate_command import add_gate_arguments, gate
@@ -142,7 +142,13 @@ def build_parser() -> argparse.ArgumentParser:
         help=COMMANDS["bench"],
         description="Measure the kernels on this machine: speed beside error, as a table and a picture.",
     )
-    bench_parser.add_argument("--out", type=Path, metavar="DIR", help=f"folder for the picture {CHART_FILE}")
+    bench_parser.add_argument(
+        "--out",
+        type=Path,
+        default=DEFAULT_OUT,
+        metavar="DIR",
+        help=f"folder for the picture {CHART_FILE} (default: {DEFAULT_OUT})",
+    )
     bench_parser.add_argument("--json", metavar="FILE", help="file for all figures; - prints them instead of the table")
     bench_parser.add_argument("--full", action="store_true", help="all scenes and sizes; takes some minutes, not one")
     bench_parser.add_argument("--threads", type=int, metavar="N", help="threads to compute with (default: every core)")

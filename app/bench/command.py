@@ -14,11 +14,13 @@ from engine.errors import ProjectError
 from engine.files import atomic_path
 
 CHART_FILE = "speed_error.png"
+DEFAULT_OUT = Path("bench_output")
+"""Where the picture goes unless --out says so, in the current folder."""
 
 
 def bench(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream bench: measure the kernels; prints the table. Returns the exit code."""
-    chart = None if options.out is None else options.out / CHART_FILE
+    chart = options.out / CHART_FILE
     table_file = None if options.json in (None, "-") else Path(options.json)
     for path in (chart, table_file):  # said before a minute is spent
         if path is not None:
@@ -41,10 +43,9 @@ def bench(options: argparse.Namespace, launch: Launch) -> int:
     print(text if options.json == "-" else report_text(report))
     if table_file is not None:
         write_text(table_file, text + "\n")
-    if chart is not None:
-        from app.bench.chart import draw_speed_error
+    from app.bench.chart import draw_speed_error
 
-        with named_failure(chart), atomic_path(chart) as partial:
-            draw_speed_error(report.marks, partial, footer=str(report.machine))
-        line.say(f"Speed against error: {chart}")
+    with named_failure(chart), atomic_path(chart) as partial:
+        draw_speed_error(report.marks, partial, footer=str(report.machine))
+    line.say(f"Speed against error: {chart}")
     return EXIT_OK

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from engine.checks import require_tensor
 from engine.model.anchors import AnchorSet
 from engine.model.cpu.backend import decode_cpu
 from engine.model.decoder import Decoder
@@ -60,20 +61,28 @@ def decode_anchors(
         K Gaussians per row, anchor-major, sets in order; rows of sets with `decoded` are frozen. Differentiable in
         features, log scales, heads and field wherever these require a gradient.
     Raises:
-        ValueError: Rows out of range or given twice, or tensors that do not fit together.
+        ValueError: Rows out of range or given twice, or tensors that do not fit together; with both shapes.
+        TypeError: A tensor without numbers, or "cpu" with tensors that are not contiguous float32 on the cpu.
     """
     for part in chosen:
         _check(part, decoder, field)
     if backend == "auto":
         backend = "cpu" if all(_is_for_cpu(part) for part in chosen) and _is_float32(decoder, field) else "reference"
+    if backend not in _BACKENDS:
+        raise ValueError(f"backend must be auto or one of {', '.join(sorted(_BACKENDS))}, got {backend!r}")
+    if backend == "cpu":
+        _require_float32(chosen, decoder, field)
     return _BACKENDS[backend](chosen, decoder, field, knots)
 
 
 def _check(part: ChosenAnchors, decoder: Decoder, field: SpatioTemporalField | None) -> None:
     n_anchors = len(part.anchors)
     rows = part.rows
-    if rows.ndim != 1 or rows.dtype != torch.int64:
-        raise ValueError(f"rows must be int64 with one axis, got {rows.dtype} of shape {tuple(rows.shape)}")
+    require_tensor("rows", rows)
+    if rows.ndim != 1 or rows.dtype != torch.int64 or rows.device.type != "cpu":
+        raise ValueError(
+            f"rows must be int64 [n] on the cpu, got {rows.dtype} of shape {list(rows.shape)} on {rows.device}"
+        )
     values = rows.numpy()  # numpy takes a tenth of torch's time for a look at a few thousand numbers
     is_ascending = len(values) == 0 or (values[0] >= 0 and values[-1] < n_anchors and (values[1:] > values[:-1]).all())
     if not is_ascending:  # the usual case is over; these may be good as well
@@ -82,27 +91,67 @@ def _check(part: ChosenAnchors, decoder: Decoder, field: SpatioTemporalField | N
         n_different = len(np.unique(values))
         if n_different != len(values):
             raise ValueError(f"rows must differ from each other, got {n_different} different of {len(values)}")
-    n_static = part.anchors.features.shape[1]
-    if n_static != decoder.static_dim:
-        raise ValueError(f"features have {n_static} columns, the decoder takes {decoder.static_dim}")
-    if part.corners is None:
+    features = part.anchors.features
+    require_tensor("features", features)
+    if features.shape != (n_anchors, decoder.static_dim):
+        wanted = [n_anchors, decoder.static_dim]
+        raise ValueError(f"features must be {wanted} for this decoder, got {list(features.shape)}")
+    if part.decoded is not None:
+        n_gaussians = n_anchors * decoder.gaussians_per_anchor
+        for name, width in (("means", (3,)), ("quats", (4,)), ("scales", (3,)), ("opacities", ()), ("colors", (3,))):
+            shape = getattr(part.decoded, name).shape
+            if shape != (n_gaussians, *width):
+                wanted = [n_gaussians, *width]
+                raise ValueError(f"{name} of decoded must be {wanted} for {n_anchors} anchors, got {list(shape)}")
+    corners = part.corners
+    if corners is None:
         return
     if field is None:
         raise ValueError("an anchor set has corners, but there is no field")
-    shape = field.shape
-    if part.corners.indices.shape != (n_anchors, len(shape.cells), 8) or part.corners.n_entries != shape.n_entries:
+    wanted = (n_anchors, len(field.shape.cells), 8)
+    for name, shape in (("indices", corners.indices.shape), ("weights", corners.weights.shape)):
+        if shape != wanted:
+            raise ValueError(f"{name} of corners must be {list(wanted)} for these anchors and field, got {list(shape)}")
+    if corners.n_entries != field.shape.n_entries:
+        raise ValueError(f"corners are of {corners.n_entries} entries, the field has {field.shape.n_entries}")
+    if field.shape.feature_dim != decoder.dynamic_dim:
         raise ValueError(
-            f"corners {part.corners.indices.shape} of {part.corners.n_entries} entries do not fit {n_anchors} anchors "
-            f"and a field of {len(shape.cells)} levels with {shape.n_entries} entries"
+            f"the field gives [n, {field.shape.feature_dim}], the decoder takes [n, {decoder.dynamic_dim}]"
         )
-    if shape.feature_dim != decoder.dynamic_dim:
-        raise ValueError(f"the field gives {shape.feature_dim} values, the decoder takes {decoder.dynamic_dim}")
+
+
+def _require_float32(chosen: Sequence[ChosenAnchors], decoder: Decoder, field: SpatioTemporalField | None) -> None:
+    """TypeError that names a tensor which kernels, who take it by address, would misread."""
+    tensors: list[tuple[str, Tensor]] = [("decoder", decoder.first["opacity"])]
+    if field is not None:
+        tensors.append(("field", field.hidden.weight))
+    for part in chosen:
+        anchors = part.anchors
+        tensors += [
+            ("features", anchors.features),
+            ("positions", anchors.positions),
+            ("color_logits", anchors.color_logits),
+            ("log_offset_scales", anchors.log_offset_scales),
+            ("log_base_scales", anchors.log_base_scales),
+        ]
+        if part.decoded is not None:
+            tensors += [("decoded", tensor) for tensor in part.decoded.tensors()]
+        if not part.rows.is_contiguous():
+            raise TypeError("backend 'cpu' needs contiguous rows")
+    for name, tensor in tensors:
+        if tensor.dtype != torch.float32 or tensor.device.type != "cpu" or not tensor.is_contiguous():
+            raise TypeError(
+                f"backend 'cpu' needs contiguous float32 tensors on the cpu; {name} is {tensor.dtype} on "
+                f"{tensor.device}, {'contiguous' if tensor.is_contiguous() else 'not contiguous'}"
+            )
 
 
 def _is_for_cpu(part: ChosenAnchors) -> bool:
     anchors = part.anchors
     fixed = (anchors.positions, anchors.color_logits)
-    return anchors.features.dtype == torch.float32 and not any(tensor.requires_grad for tensor in fixed)
+    features = anchors.features
+    is_fit = features.dtype == torch.float32 and features.device.type == "cpu"
+    return is_fit and not any(tensor.requires_grad for tensor in fixed)
 
 
 def _is_float32(decoder: Decoder, field: SpatioTemporalField | None) -> bool:

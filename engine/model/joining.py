@@ -30,7 +30,16 @@ def join_frozen(frozen: Gaussians, rows: np.ndarray, learning: Gaussians) -> Gau
         learning: Not frozen, or frozen in part.
     Raises:
         ValueError: A row is out of range.
+        TypeError: Rows are not int64 in one piece, or a column of either part is no float32 on the cpu.
     """
+    if rows.dtype != np.int64 or rows.ndim != 1 or not rows.flags.c_contiguous:
+        raise TypeError(f"rows must be contiguous int64 [n], got {rows.dtype} {list(rows.shape)}")
+    for part, gaussians in (("frozen", frozen), ("learning", learning)):
+        for column in gaussians.tensors():
+            if column.dtype != torch.float32 or column.device.type != "cpu":
+                raise TypeError(f"{part} must be float32 on the cpu, got {column.dtype} on {column.device}")
+    if not all(column.is_contiguous() for column in frozen.tensors()):
+        raise TypeError("frozen must be contiguous; call contiguous() on its tensors")
     if len(rows) and not 0 <= rows.min() <= rows.max() < len(frozen):
         raise ValueError(f"rows must lie in 0..{len(frozen) - 1}, got {rows.min()}..{rows.max()}")
     is_frozen = torch.ones(len(rows) + len(learning), dtype=torch.bool)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal, Protocol
 
 import torch
 from torch import Tensor
 
+from engine.checks import require_tensor
 from engine.raster.cpu.backend import rasterize_cpu
 from engine.raster.gaussians import Gaussians
 from engine.raster.reference import rasterize_reference
@@ -75,14 +77,16 @@ def rasterize(
         ValueError: A shape or value that does not fit. Names the argument, and both shapes.
     """
     check_gaussians(gaussians)
-    views = pinhole_views(viewmats, Ks, int(width), int(height), near_plane)
+    views = pinhole_views(viewmats, Ks, width, height, near_plane)
     means = gaussians.means
     if background is None:
         background = means.new_zeros(3)
-    elif background.shape != (3,):
-        raise ValueError(f"background must be [3], got {list(background.shape)}")
-    elif background.is_meta:
-        raise TypeError("background must hold numbers, got a tensor on device meta")
+    else:
+        require_tensor("background", background)
+        if background.shape != (3,):
+            raise ValueError(f"background must be [3], got {list(background.shape)}")
+        if not all(map(math.isfinite, background.tolist())):
+            raise ValueError(f"background must be finite, got {background.tolist()}")
     background = background.to(means)
     is_fast = means.dtype == torch.float32 and means.device.type == "cpu"
     if backend == "auto":
@@ -95,14 +99,16 @@ def rasterize(
         gaussians,
         views,
         background,
-        tile_mask=None if tile_mask is None else _checked_mask(tile_mask, len(views), int(width), int(height)),
+        tile_mask=None if tile_mask is None else _checked_mask(tile_mask, views),
         want_means2d=want_means2d,
         want_depth=want_depth,
     )
 
 
-def _checked_mask(tile_mask: Tensor, n_views: int, width: int, height: int) -> Tensor:
+def _checked_mask(tile_mask: Tensor, views: list[PinholeView]) -> Tensor:
     """The mask on the cpu. [C, rows, columns] bool"""
+    require_tensor("tile_mask", tile_mask)
+    n_views, width, height = len(views), views[0].width, views[0].height
     shape = n_tiles(width, height)
     if tile_mask.shape not in (shape, (n_views, *shape)):
         raise ValueError(
@@ -117,16 +123,16 @@ def _checked_mask(tile_mask: Tensor, n_views: int, width: int, height: int) -> T
 def check_gaussians(gaussians: Gaussians) -> None:
     """Shapes, dtypes and device fit each other. TypeError or ValueError that names the tensor."""
     means = gaussians.means
+    require_tensor("means", means)
     if means.ndim != 2 or means.shape[1] != 3:
         raise ValueError(f"means must be [N, 3], got {list(means.shape)}")
     if not means.dtype.is_floating_point:
         raise TypeError(f"means must be floating point, got {means.dtype}")
-    if means.is_meta:
-        raise TypeError("means must hold numbers, got a tensor on device meta")
     n_rows = len(means)
     wanted = {"quats": (n_rows, 4), "scales": (n_rows, 3), "opacities": (n_rows,), "colors": (n_rows, 3)}
     for name, shape in wanted.items():
         tensor = getattr(gaussians, name)
+        require_tensor(name, tensor)
         if tensor.shape != shape:
             raise ValueError(
                 f"{name} must be {list(shape)} to match means {list(means.shape)}, got {list(tensor.shape)}"
@@ -138,6 +144,7 @@ def check_gaussians(gaussians: Gaussians) -> None:
     is_frozen = gaussians.is_frozen
     if is_frozen is None:
         return
+    require_tensor("is_frozen", is_frozen)
     if is_frozen.shape != (n_rows,):
         raise ValueError(
             f"is_frozen must be {[n_rows]} to match means {list(means.shape)}, got {list(is_frozen.shape)}"

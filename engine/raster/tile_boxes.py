@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from engine.checks import require_tensor
 from engine.raster.cpu.tile_boxes import covered_tiles, meeting_rows, tile_boxes_cpu
 from engine.raster.gaussians import Gaussians
 from engine.raster.rasterize import check_gaussians
@@ -48,7 +49,17 @@ class TileBoxes:
             rows: [N] int64
         Returns:
             [n] int64
+        Raises:
+            ValueError, TypeError: Shape or dtype of an argument does not fit; the message names it.
         """
+        if tile_mask.shape != self.shape or tile_mask.dtype != np.bool_:
+            raise ValueError(
+                f"tile_mask must be bool {list(self.shape)}, got {tile_mask.dtype} {list(tile_mask.shape)}"
+            )
+        if rows.shape != (len(self.packed),):
+            raise ValueError(
+                f"rows must be {[len(self.packed)]} to match boxes {list(self.packed.shape)}, got {list(rows.shape)}"
+            )
         return meeting_rows(self.packed, tile_mask, rows)
 
 
@@ -72,7 +83,9 @@ def tile_boxes(
         TypeError, ValueError: An argument does not fit; the message names it.
     """
     check_gaussians(gaussians)
-    (view,) = pinhole_views(viewmat[None], K[None], int(width), int(height), near_plane)
+    for name, matrix in (("viewmat", viewmat), ("K", K)):
+        require_tensor(name, matrix)
+    (view,) = pinhole_views(viewmat[None], K[None], width, height, near_plane)
     means = gaussians.means
     is_fast = means.dtype == torch.float32 and means.device.type == "cpu"
     if backend == "auto":

@@ -213,6 +213,13 @@ class FusedAdam:
         return chunks
 
     def _table(self, gradients: Mapping[str, Tensor]) -> tuple[list[Tensor], np.ndarray]:
+        for name, gradient in gradients.items():
+            wanted = self._parameters[name]
+            if gradient.shape != wanted.shape or not _is_float32(gradient):
+                raise ValueError(
+                    f"the gradient of {name} must be {list(wanted.shape)} in float32 on the cpu like the parameter, "
+                    f"got {list(gradient.shape)} in {gradient.dtype} on {gradient.device}"
+                )
         kept = [gradient.contiguous() for gradient in gradients.values()]  # alive as long as addresses are used
         rows = [self._chunks[name].copy() for name in gradients]
         for chunk, gradient in zip(rows, kept, strict=True):
@@ -286,7 +293,12 @@ def make_adam(parameters: Mapping[str, Tensor], backend: str = "auto") -> AdamSt
 
 
 def _is_fit(parameter: Tensor) -> bool:
-    return parameter.dtype == torch.float32 and parameter.device.type == "cpu" and parameter.is_contiguous()
+    return _is_float32(parameter) and parameter.is_contiguous()
+
+
+def _is_float32(tensor: Tensor) -> bool:
+    """float32 in main memory."""
+    return tensor.dtype == torch.float32 and tensor.device.type == "cpu"
 
 
 def not_finite(gradients: Mapping[str, Tensor]) -> list[str]:

@@ -15,9 +15,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from engine.checks import require_number, require_tensor
 from engine.training.fused_loss import TILE_PX, LossWorkspace, loss_terms, tile_grid
 from engine.training.ssim_lanes import C1, C2, RADIUS, WINDOW
-from engine.training.truth_moments import TruthMoments, writable_picture
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,6 @@ def photometric_loss(
     is_counted: np.ndarray | None = None,
     tile_mask: np.ndarray | None = None,
     rest: Tensor | None = None,
-    moments: TruthMoments | None = None,
     workspace: LossWorkspace | None = None,
     backend: str = "auto",
 ) -> PhotometricLoss:
@@ -68,7 +67,6 @@ def photometric_loss(
         tile_mask: Active tiles of 32 px, the last ones cut off by the picture; None means all. [rows, columns] bool
         rest: What tiles hold that are not active, like the image; None for the truth. No gradient, neither by it nor,
             in its tiles, by the gain. [H, W, 3]
-        moments: `truth_moments(truth)` in place of blurring the truth; only "fused" uses them.
         workspace: Scratch for this picture size, kept between calls; None makes one.
         backend: "auto", "fused" (float32 on the CPU) or "reference".
     Returns:
@@ -76,14 +74,17 @@ def photometric_loss(
     Raises:
         ValueError, TypeError: Shape or dtype of an argument does not fit; the message names it.
     """
+    _check(image, truth, gain, is_counted, tile_mask, rest, workspace)
+    require_number("ssim_weight", ssim_weight)
+    if not 0.0 <= ssim_weight <= 1.0:
+        raise ValueError(f"ssim_weight must lie in 0..1, got {ssim_weight}")
     if backend == "auto":
         backend = "fused" if image.dtype == torch.float32 and image.device.type == "cpu" else "reference"
     if backend not in _BACKENDS:
         raise ValueError(f"backend must be auto or one of {', '.join(sorted(_BACKENDS))}, got {backend!r}")
-    _check(image, truth, gain, is_counted, tile_mask, rest, moments, workspace)
-    if backend == "fused" and image.dtype != torch.float32:
-        raise TypeError(f"backend 'fused' needs a float32 image, got {image.dtype}")
-    return _BACKENDS[backend](image, truth, ssim_weight, gain, is_counted, tile_mask, rest, moments, workspace)
+    if backend == "fused" and (image.dtype != torch.float32 or image.device.type != "cpu"):
+        raise TypeError(f"backend 'fused' needs a float32 image on the cpu, got {image.dtype} on {image.device}")
+    return _BACKENDS[backend](image, truth, ssim_weight, gain, is_counted, tile_mask, rest, workspace)
 
 
 def ssim_map(image: Tensor, truth: Tensor) -> Tensor:
@@ -100,7 +101,7 @@ def ssim_map(image: Tensor, truth: Tensor) -> Tensor:
     return (numerator / denominator).permute(1, 2, 0)
 
 
-def _reference(image, truth, ssim_weight, gain, is_counted, tile_mask, rest, _moments, _workspace) -> PhotometricLoss:
+def _reference(image, truth, ssim_weight, gain, is_counted, tile_mask, rest, _workspace) -> PhotometricLoss:
     truth = torch.as_tensor(truth)
     truth = truth.to(image.dtype) / 255 if truth.dtype == torch.uint8 else truth.to(image.dtype)
     shown = image if gain is None else image * gain
@@ -134,9 +135,9 @@ class _Fused(torch.autograd.Function):
         return image_grad, gain_grad, None
 
 
-def _fused(image, truth, ssim_weight, gain, is_counted, tile_mask, rest, moments, workspace) -> PhotometricLoss:
+def _fused(image, truth, ssim_weight, gain, is_counted, tile_mask, rest, workspace) -> PhotometricLoss:
     height, width = image.shape[:2]
-    pixels = writable_picture(truth)
+    pixels = _writable_picture(truth)
     scratch = workspace or LossWorkspace(height, width)
     mean_square = 0.0
 
@@ -150,7 +151,6 @@ def _fused(image, truth, ssim_weight, gain, is_counted, tile_mask, rest, moments
             is_counted=None if is_counted is None else np.require(is_counted, requirements=["C", "W"]),
             tile_mask=None if tile_mask is None else np.require(tile_mask, requirements=["C", "W"]),
             rest=None if rest is None else rest.detach().contiguous().numpy(),
-            moments=None if moments is None else moments.blurred,
             workspace=scratch,
         )
         n = image.numel()
@@ -161,10 +161,19 @@ def _fused(image, truth, ssim_weight, gain, is_counted, tile_mask, rest, moments
     return PhotometricLoss(loss, mean_square)  # pyright: ignore[reportArgumentType] - apply is untyped
 
 
+def _writable_picture(truth: Tensor | np.ndarray) -> np.ndarray:
+    """As the kernel takes it: contiguous and writable."""
+    pixels = truth.detach().numpy() if isinstance(truth, Tensor) else truth
+    return np.require(pixels, requirements=["C", "W"])
+
+
 _BACKENDS: dict[str, Callable[..., PhotometricLoss]] = {"reference": _reference, "fused": _fused}
 
 
-def _check(image, truth, gain, is_counted, tile_mask, rest, moments, workspace) -> None:
+def _check(image, truth, gain, is_counted, tile_mask, rest, workspace) -> None:
+    require_tensor("image", image)
+    if not isinstance(truth, np.ndarray):
+        require_tensor("truth", truth)
     if image.ndim != 3 or image.shape[2] != 3 or image.numel() == 0:
         raise ValueError(f"image must be [H, W, 3] with at least one pixel, got {list(image.shape)}")
     if not image.is_floating_point():
@@ -176,20 +185,30 @@ def _check(image, truth, gain, is_counted, tile_mask, rest, moments, workspace) 
         ("is_counted", is_counted, (height, width)),
         ("tile_mask", tile_mask, tile_grid(height, width)),
         ("rest", rest, (height, width, 3)),
-        ("moments", moments, (height, width)),
     ]
+    for name, value in (("gain", gain), ("rest", rest)):
+        if value is not None:
+            require_tensor(name, value)
+    masks = (("is_counted", is_counted), ("tile_mask", tile_mask))
+    for name, value in masks:
+        if value is not None and not isinstance(value, np.ndarray):
+            raise TypeError(f"{name} must be a numpy array, got {type(value).__name__}")
     for name, value, shape in expected:
         if value is not None and tuple(value.shape) != shape:
-            raise ValueError(f"{name} must be {list(shape)} for this image, got {list(value.shape)}")
-    for name, value in (("is_counted", is_counted), ("tile_mask", tile_mask)):
+            raise ValueError(
+                f"{name} must be {list(shape)} to match image {list(image.shape)}, got {list(value.shape)}"
+            )
+    for name, value in masks:
         if value is not None and value.dtype != np.bool_:
             raise TypeError(f"{name} must be bool, got {value.dtype}")
     kinds = ("torch.uint8", "uint8", str(image.dtype), str(image.dtype).removeprefix("torch."))
     if str(truth.dtype) not in kinds:
         raise TypeError(f"truth must be uint8 or {image.dtype} like the image, got {truth.dtype}")
     for name, value in (("gain", gain), ("rest", rest)):
-        if value is not None and value.dtype != image.dtype:
-            raise TypeError(f"{name} must be {image.dtype} like the image, got {value.dtype}")
+        if value is not None and (value.dtype != image.dtype or value.device != image.device):
+            raise TypeError(
+                f"{name} must be {image.dtype} on {image.device} like the image, got {value.dtype} on {value.device}"
+            )
     if workspace is not None and (workspace.height, workspace.width) != (height, width):
         size = f"{workspace.width} x {workspace.height}"
         raise ValueError(f"workspace was made for {size}, the image is {width} x {height}")

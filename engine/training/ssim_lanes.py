@@ -66,25 +66,6 @@ def blur_moments(typing_context, image, truth, target, ring_bytes):
 
 
 @kernel_intrinsic
-def blur_moments_known_truth(typing_context, image, truth, target, ring_bytes):
-    """As `blur_moments` without those of b: the third ring gets a^2 alone, the second nothing."""
-    signature = types.void(*[types.int64] * 4)
-
-    def generate(context, builder, signature, arguments):
-        image, truth, target, ring_bytes = arguments
-        build = LaneBuilder(builder)
-        sums = [build.constant(0.0)] * 3
-        for weight, a, b in zip(WINDOW, _window_of(build, image), _window_of(build, truth), strict=True):
-            weighted = a * weight
-            sums = [sums[0] + weighted, weighted.times_plus(a, sums[1]), weighted.times_plus(b, sums[2])]
-        for index, value in zip((0, 2, 3), sums, strict=True):
-            build.store(value, builder.add(target, builder.mul(ring_bytes, build.int64(index))))
-        return context.get_dummy_value()
-
-    return signature, generate
-
-
-@kernel_intrinsic
 def blur_along(typing_context, source, target):
     """Blur sixteen values along their row. Reads 15 values on both sides."""
     signature = types.void(types.int64, types.int64)
@@ -174,46 +155,6 @@ def ssim_rows(typing_context, rings, row_bytes, first_row, offset, partials, ins
         to = (partials, row_bytes, build.load(inside))
         for row, values in enumerate(zip(*blurred, strict=True)):
             _store_terms(build, _dissimilarity(*values), row, to, sums)
-        return context.get_dummy_value()
-
-    return signature, generate
-
-
-@kernel_intrinsic
-def ssim_rows_known_truth(
-    typing_context, rings, row_bytes, first_row, offset, truth_means, truth_squares, partials, inside, sums
-):
-    """As `ssim_rows`, with b and b^2 blurred before: addresses of four rows each. The third ring holds a^2 alone."""
-    signature = types.void(*[types.int64] * 9)
-
-    def generate(context, builder, signature, arguments):
-        rings, row_bytes, first_row, offset, truth_means, truth_squares, partials, inside, sums = arguments
-        build = LaneBuilder(builder)
-        ring_bytes = builder.mul(row_bytes, build.int64(RING_ROWS))
-        blurred = []
-        for index in (0, 2, 3):
-            ring = builder.add(rings, builder.mul(ring_bytes, build.int64(index)))
-            blurred.append(_blur_down(build, ring, row_bytes, first_row, offset))
-        to = (partials, row_bytes, build.load(inside))
-        for row, (mean_a, square_a, product) in enumerate(zip(*blurred, strict=True)):
-            down = builder.mul(row_bytes, build.int64(row))
-            mean_b, square_b = build.load(truth_means, down), build.load(truth_squares, down)
-            _store_terms(build, _dissimilarity(mean_a, mean_b, square_a + square_b, product), row, to, sums)
-        return context.get_dummy_value()
-
-    return signature, generate
-
-
-@kernel_intrinsic
-def blur_down_rows(typing_context, ring, row_bytes, first_row, offset, target):
-    """Blur four rows along columns, sixteen values each; `target` addresses the values in the first of four rows."""
-    signature = types.void(*[types.int64] * 5)
-
-    def generate(context, builder, signature, arguments):
-        ring, row_bytes, first_row, offset, target = arguments
-        build = LaneBuilder(builder)
-        for row, value in enumerate(_blur_down(build, ring, row_bytes, first_row, offset)):
-            build.store(value, builder.add(target, builder.mul(row_bytes, build.int64(row))))
         return context.get_dummy_value()
 
     return signature, generate

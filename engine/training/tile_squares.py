@@ -60,7 +60,14 @@ def tile_squares(image: np.ndarray, truth: np.ndarray, gain: np.ndarray) -> np.n
         image: Contiguous. [H, W, 3] float32
         truth: Contiguous. [H, W, 3] uint8
         gain: [3] float32
+    Raises:
+        ValueError, TypeError: Shape or dtype of an argument does not fit; the message names it.
     """
+    if image.ndim != 3 or image.shape[2] != 3 or truth.shape != image.shape or gain.shape != (3,):
+        raise ValueError(
+            f"image and truth must both be [H, W, 3] and gain [3], got image {list(image.shape)}, "
+            f"truth {list(truth.shape)} and gain {list(gain.shape)}"
+        )
     height, width = image.shape[:2]
     sums = np.zeros(tile_grid(height, width))
     job = SquareJob(image.reshape(height, -1), truth.reshape(height, -1), np.tile(gain, width), sums)

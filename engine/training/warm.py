@@ -16,11 +16,10 @@ def warm_up() -> None:
     from engine.training.adam import make_adam
     from engine.training.losses import photometric_loss
     from engine.training.tile_squares import tile_squares
-    from engine.training.truth_moments import truth_moments
 
     image, gain = nn.Parameter(torch.full((8, 8, 3), 0.5)), nn.Parameter(torch.ones(3))
     truth = np.zeros((8, 8, 3), np.uint8)
-    result = photometric_loss(image, truth, ssim_weight=0.2, gain=gain, moments=truth_moments(truth))
+    result = photometric_loss(image, truth, ssim_weight=0.2, gain=gain)
     result.loss.backward()
     tile_squares(image.detach().numpy(), truth, gain.detach().numpy())
     gradients = {"image": torch.ones(8, 8, 3)}

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.bench import raster, suite
+from app.bench import chart, raster, suite
 from app.bench.chart import draw_speed_error
 from app.bench.clips import ClipRecipe
-from app.bench.command import CHART_FILE
+from app.bench.command import CHART_FILE, DEFAULT_OUT
 from app.bench.field import SCENES, DecodeScene, measure_decode
 from app.bench.fma_limit import measure_fma_limit
 from app.bench.iteration import SIZES, STAGES, measure_iteration
@@ -189,12 +189,25 @@ def test_the_command_prints_a_table_and_writes_document_and_picture(tiny_plan, t
     assert is_picture(out / CHART_FILE)
 
 
-def test_json_on_standard_output_is_only_json(tiny_plan, monkeypatch, capsys):
+@pytest.fixture
+def empty_plan(tiny_plan, tmp_path, monkeypatch):
+    """Nothing is measured, and the picture is a word; in an empty current folder."""
     monkeypatch.setattr(suite, "QUICK", Plan())
+    monkeypatch.setattr(chart, "draw_speed_error", lambda marks, path, footer: path.write_text("picture"))
+    monkeypatch.chdir(tmp_path)
+
+
+def test_json_on_standard_output_is_only_json(empty_plan, capsys):
     assert main(["bench", "--json", "-", "--quiet"]) == 0
     said = capsys.readouterr()
     assert json.loads(said.out)["fma_per_s"] > 0
     assert said.err == ""
+
+
+def test_the_picture_lies_in_the_current_folder_unless_told_where(empty_plan, tmp_path, capsys):
+    assert main(["bench"]) == 0
+    assert (tmp_path / DEFAULT_OUT / CHART_FILE).read_text() == "picture"
+    assert str(DEFAULT_OUT / CHART_FILE) in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -214,7 +227,9 @@ def test_bad_arguments_end_with_2_before_anything_is_measured(monkeypatch, tmp_p
     assert expected in capsys.readouterr().err
 
 
-def test_an_interrupt_is_told_in_one_line(monkeypatch, capsys):
+def test_an_interrupt_is_told_in_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+
     def interrupted(*arguments: object, **options: object) -> None:
         raise KeyboardInterrupt
 

@@ -1,6 +1,6 @@
 """Decode: every back end against plain torch in float64, forward and gradient, hard values included."""
 
-import copy
+import dataclasses
 from itertools import pairwise
 from typing import Any
 
@@ -11,105 +11,11 @@ from numba import cfunc, get_num_threads, set_num_threads, types
 
 from engine.kernels import routines
 from engine.kernels.memory import RecycledMemory
-from engine.model.anchors import AnchorSet
 from engine.model.cpu import activation
-from engine.model.decoder import Decoder
 from engine.model.decoding import ChosenAnchors, decode_anchors
-from engine.model.field import FieldShape, SpatioTemporalField
 from engine.model.warm import warm_up
 from engine.raster.gaussians import Gaussians
-
-PAPER: dict[str, Any] = {"features": 64, "hidden": 64, "k": 10}
-ODD: dict[str, Any] = {"features": 5, "hidden": 20, "k": 5}
-PRESET: dict[str, Any] = {"features": 16, "hidden": 64, "k": 5}
-SINGLE: dict[str, Any] = {"features": 3, "hidden": 7, "k": 1}
-
-
-class Scene:
-    """A static, a moving and a residual set with their heads and their field, all learning."""
-
-    def __init__(
-        self,
-        *,
-        features: int = 5,
-        hidden: int = 20,
-        k: int = 5,
-        n: int = 70,
-        channels: int = 4,
-        spread: float = 1.0,
-        is_shared: bool = False,
-    ) -> None:
-        self.generator = torch.Generator().manual_seed(n)
-        shape = FieldShape(
-            n_knots=3, cells=(3, 7, 12), n_entries=512, channels=channels, hidden=hidden, feature_dim=features,
-            bounds_min=(0.0, 0.0, 0.0), side=1.0, is_shared=is_shared,
-        )  # fmt: skip
-        self.field = SpatioTemporalField(shape, self.generator)
-        self.decoder = Decoder(
-            static_dim=features, dynamic_dim=features, gaussians_per_anchor=k, hidden=hidden, generator=self.generator
-        )
-        with torch.no_grad():
-            for table in self.field.tables:
-                table.normal_(generator=self.generator)
-        self.sets = {
-            "static": self._anchors(n, features, spread, is_dynamic=False),
-            "moving": self._anchors(n + 1, features, spread, is_dynamic=True),
-            "residual": self._anchors(n // 2, features, spread, is_dynamic=True),
-        }
-
-    def _anchors(self, n: int, features: int, spread: float, *, is_dynamic: bool) -> AnchorSet:
-        def random(*size: int) -> torch.Tensor:
-            return torch.rand(*size, generator=self.generator)
-
-        presence = torch.ones(n, 3, dtype=torch.bool) if is_dynamic else None
-        anchors = AnchorSet.from_cloud(random(n, 3), random(n, 3), spacing=0.1, feature_dim=features, presence=presence)
-        with torch.no_grad():
-            anchors.features.normal_(generator=self.generator).mul_(spread)
-            anchors.log_offset_scales.add_(random(n, 3))
-            anchors.log_base_scales.add_(random(n, 3))
-        return anchors
-
-    def double(self) -> "Scene":
-        """A copy in float64, without gradients."""
-        twin = copy.deepcopy(self)
-        for module in twin.modules():
-            module.double()
-        for parameter in twin.parameters().values():
-            parameter.grad = None
-        return twin
-
-    def modules(self) -> list[torch.nn.Module]:
-        return [self.field, self.decoder, *self.sets.values()]
-
-    def parameters(self) -> dict[str, torch.nn.Parameter]:
-        named = {"field": self.field, "decoder": self.decoder, **self.sets}
-        return {f"{name}.{key}": p for name, module in named.items() for key, p in module.named_parameters()}
-
-    def rows(self, *, share: float = 0.7) -> dict[str, torch.Tensor]:
-        generator = torch.Generator().manual_seed(5)
-        chosen = {}
-        for role, anchors in self.sets.items():
-            order = torch.randperm(len(anchors), generator=generator)
-            chosen[role] = order[: int(share * len(anchors))].sort().values
-        return chosen
-
-    def decode(self, rows: dict[str, torch.Tensor], knots: list, backend: str, decoded: Any = None) -> Gaussians:
-        chosen = [
-            ChosenAnchors(
-                anchors=anchors,
-                rows=rows[role],
-                corners=self.field.corners(anchors.positions.float()) if anchors.is_dynamic else None,
-                decoded=decoded if role == "static" else None,
-            )
-            for role, anchors in self.sets.items()
-        ]
-        return decode_anchors(chosen, self.decoder, self.field, knots, backend=backend)
-
-
-def backward(gaussians: Gaussians) -> None:
-    generator = torch.Generator().manual_seed(9)
-    weights = [torch.randn(t.shape, generator=generator).to(t.dtype) for t in gaussians.tensors()]
-    torch.autograd.backward(gaussians.tensors(), weights)
+from tests.decode_scenes import ODD, PAPER, PRESET, SINGLE, Scene, backward
 
 
 def assert_close(scene: Scene, ours: Gaussians, truth_scene: Scene, truth: Gaussians, tolerance: float) -> None:
@@ -294,29 +200,66 @@ def test_two_decodes_alive_at_once_keep_their_values():
     backward(first)
 
 
-@pytest.mark.parametrize(
-    ("rows", "message"),
-    [([0, 999], "0..69"), ([-1, 3], "-1..3"), ([2, 2], "1 different of 2"), ([0.5], "int64")],
-)
-def test_rows_that_cannot_be_decoded_are_named(rows, message):
+BAD_ROWS = {
+    "0..69": (ValueError, torch.tensor([0, 999])),
+    "-1..3": (ValueError, torch.tensor([-1, 3])),
+    "1 different of 2": (ValueError, torch.tensor([2, 2])),
+    r"int64 \[n\] on the cpu, got torch.float32 of shape \[1\]": (ValueError, torch.tensor([0.5])),
+    r"rows must be int64 \[n\].*of shape \[1, 2\]": (ValueError, torch.tensor([[0, 1]])),
+    "rows must hold numbers": (TypeError, torch.zeros(2, dtype=torch.int64, device="meta")),
+    "rows must be a torch tensor, got numpy.ndarray": (TypeError, np.arange(3)),
+    "contiguous rows": (TypeError, torch.arange(6)[::2]),
+}
+
+
+@pytest.mark.parametrize("message", BAD_ROWS)
+def test_rows_that_cannot_be_decoded_are_named(message):
+    error, rows = BAD_ROWS[message]
     scene = Scene()
-    with pytest.raises(ValueError, match=message):
-        decode_anchors(
-            [ChosenAnchors(anchors=scene.sets["static"], rows=torch.tensor(rows))], scene.decoder, None, ONE_KNOT
-        )
+    with pytest.raises(error, match=message):
+        decode_anchors([ChosenAnchors(scene.sets["static"], rows)], scene.decoder, None, ONE_KNOT)
 
 
 def test_tensors_that_do_not_fit_are_named():
     scene, other = Scene(features=5), Scene(features=6)
-    chosen = ChosenAnchors(anchors=scene.sets["static"], rows=torch.arange(3))
-    with pytest.raises(ValueError, match=r"5 columns.* 6"):
-        decode_anchors([chosen], other.decoder, None, ONE_KNOT)
-    corners = scene.field.corners(scene.sets["moving"].positions)
-    chosen = ChosenAnchors(anchors=scene.sets["static"], rows=torch.arange(3), corners=corners)
-    with pytest.raises(ValueError, match="do not fit 70 anchors"):
-        decode_anchors([chosen], scene.decoder, scene.field, ONE_KNOT)
-    with pytest.raises(ValueError, match="no field"):
-        decode_anchors([chosen], scene.decoder, None, ONE_KNOT)
+    static, moving, rows = scene.sets["static"], scene.sets["moving"], torch.arange(3)
+
+    def refuses(
+        error: type[Exception], message: str, chosen: ChosenAnchors, decoder: Any, field: Any, **options
+    ) -> None:
+        with pytest.raises(error, match=message):
+            decode_anchors([chosen], decoder, field, ONE_KNOT, **options)
+
+    plain = ChosenAnchors(static, rows)
+    refuses(ValueError, r"features must be \[70, 6\] for this decoder, got \[70, 5\]", plain, other.decoder, None)
+    refuses(
+        ValueError,
+        "backend must be auto or one of cpu, reference, got 'gpu'",
+        plain,
+        scene.decoder,
+        None,
+        backend="gpu",
+    )
+    corners = scene.field.corners(moving.positions)
+    wrong = ChosenAnchors(static, rows, corners)
+    message = r"indices of corners must be \[70, 3, 8\] .* got \[71, 3, 8\]"
+    refuses(ValueError, message, wrong, scene.decoder, scene.field)
+    refuses(ValueError, "no field", wrong, scene.decoder, None)
+    short = dataclasses.replace(corners, weights=corners.weights[:5])
+    message = r"weights of corners must be \[71, 3, 8\] .* got \[5, 3, 8\]"
+    refuses(ValueError, message, ChosenAnchors(moving, rows, short), scene.decoder, scene.field)
+    right = ChosenAnchors(moving, rows, corners)
+    message = r"the field gives \[n, 6\], the decoder takes \[n, 5\]"
+    refuses(ValueError, message, right, scene.decoder, other.field)
+    with torch.no_grad():
+        decoded = decode_anchors([plain], scene.decoder, None, ONE_KNOT)
+    message = r"means of decoded must be \[350, 3\] for 70 anchors, got \[15, 3\]"
+    refuses(ValueError, message, ChosenAnchors(static, rows, decoded=decoded), scene.decoder, None)
+    message = "float32 tensors on the cpu; features is torch.float64"
+    static.features.data = static.features.data.double()
+    refuses(TypeError, message, plain, scene.decoder, None, backend="cpu")
+    static.features = torch.nn.Parameter(torch.zeros(70, 5, device="meta"))
+    refuses(TypeError, "features must hold numbers", plain, scene.decoder, None)
 
 
 def _exp_all(source, out, n):

@@ -41,3 +41,15 @@ def test_joined_rows_are_the_same_and_only_the_learning_ones_learn(rows, n_learn
 def test_a_row_out_of_range_is_an_error(row):
     with pytest.raises(ValueError, match=r"0\.\.9"):
         join_frozen(random_gaussians(10, 0), np.array([row]), random_gaussians(2, 1))
+
+
+def test_what_kernels_would_misread_is_an_error():
+    frozen, learning = random_gaussians(10, 0), random_gaussians(2, 1)
+    with pytest.raises(TypeError, match=r"rows .* int64 \[n\], got int32"):
+        join_frozen(frozen, np.array([1], np.int32), learning)
+    with pytest.raises(TypeError, match=r"rows .* contiguous"):
+        join_frozen(frozen, np.arange(6)[::2], learning)
+    with pytest.raises(TypeError, match=r"frozen must be float32 .* got torch\.float64"):
+        join_frozen(Gaussians(*(tensor.double() for tensor in frozen.tensors())), np.array([1]), learning)
+    with pytest.raises(TypeError, match="frozen must be contiguous"):
+        join_frozen(random_gaussians(20, 0)[slice(None, None, 2)], np.array([1]), learning)

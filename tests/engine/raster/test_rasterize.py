@@ -6,6 +6,7 @@ import dataclasses
 import threading
 from typing import Any
 
+import numpy as np
 import pytest
 import torch
 
@@ -282,17 +283,44 @@ BAD_ARGUMENTS = {
     "Ks": (ValueError, {"Ks": torch.eye(3)[None].repeat(2, 1, 1)}),
     r"Ks\[0\]": (ValueError, {"Ks": -torch.eye(3)[None]}),
     r"quats must be \[5, 4\] to match means \[5, 3\], got \[5, 3\]": (ValueError, {"quats": torch.zeros(5, 3)}),
-    r"opacities must be torch.float32 on cpu .* meta": (TypeError, {"opacities": torch.zeros(5, device="meta")}),
+    "opacities must hold numbers, got a tensor on device meta": (
+        TypeError,
+        {"opacities": torch.zeros(5, device="meta")},
+    ),
     "means must be floating point": (TypeError, {"means": torch.zeros(5, 3, dtype=torch.int64)}),
     "means .* meta": (TypeError, {"means": torch.zeros(5, 3, device="meta")}),
     "viewmats .* meta": (TypeError, {"viewmats": torch.zeros(1, 4, 4, device="meta")}),
     "Ks .* meta": (TypeError, {"Ks": torch.zeros(1, 3, 3, device="meta")}),
     "background .* meta": (TypeError, {"background": torch.zeros(3, device="meta")}),
-    r"Ks must be \[1, 3, 3\] to match viewmats, got \[2, 3, 3\]": (ValueError, {"Ks": torch.eye(3).repeat(2, 1, 1)}),
+    r"Ks must be \[1, 3, 3\] to match viewmats \[1, 4, 4\], got \[2, 3, 3\]": (
+        ValueError,
+        {"Ks": torch.eye(3).repeat(2, 1, 1)},
+    ),
     r"Ks\[0\] holds numbers that are not finite": (ValueError, {"Ks": torch.full((1, 3, 3), float("inf"))}),
     "height must be below 32768|width and height": (ValueError, {"height": 1 << 15}),
     r"viewmats\[0\]": (ValueError, {"viewmats": torch.full((1, 4, 4), float("nan"))}),
     "width": (ValueError, {"width": 0}),
+    r"width must be a whole number, got 8.7": (TypeError, {"width": 8.7}),
+    r"height must be a whole number, got '8'": (TypeError, {"height": "8"}),
+    "near_plane must be a number, got 'a'": (TypeError, {"near_plane": "a"}),
+    "near_plane must be a finite": (ValueError, {"near_plane": float("nan")}),
+    "viewmats must be a torch tensor, got numpy.ndarray": (TypeError, {"viewmats": np.eye(4)[None]}),
+    "Ks must be a torch tensor, got builtins.list": (TypeError, {"Ks": np.eye(3)[None].tolist()}),
+    "means must be a torch tensor": (TypeError, {"means": np.zeros((5, 3), np.float32)}),
+    "colors must be a torch tensor": (TypeError, {"colors": np.zeros((5, 3), np.float32)}),
+    "background must be a torch tensor": (TypeError, {"background": (0.0, 0.0, 0.0)}),
+    "background must be finite": (ValueError, {"background": torch.tensor([0.0, float("nan"), 0.0])}),
+    "tile_mask .* meta": (TypeError, {"tile_mask": torch.ones(1, 1, dtype=torch.bool, device="meta")}),
+    "tile_mask must be a torch tensor": (TypeError, {"tile_mask": np.ones((1, 1), bool)}),
+    r"viewmats\[0\] must be a rotation .* got\n\[\[0": (ValueError, {"viewmats": torch.zeros(1, 4, 4)}),
+    "bottom row 0 0 0 1": (ValueError, {"viewmats": torch.ones(1, 4, 4)}),
+    r"viewmats\[1\] must be a rotation": (
+        ValueError,
+        {
+            "viewmats": torch.stack([torch.eye(4), torch.diag(torch.tensor([1.0, 1.0, 0.0, 1.0]))]),
+            "Ks": torch.eye(3).repeat(2, 1, 1),
+        },
+    ),
     "background": (ValueError, {"background": torch.zeros(4)}),
     "near_plane": (ValueError, {"near_plane": 0.0}),
     "backend": (ValueError, {"backend": "gpu"}),
@@ -308,6 +336,13 @@ def test_a_wrong_argument_is_named(name):
     gaussians = Gaussians(*(values.pop(key) for key in shapes))
     with pytest.raises(error, match=name):
         rasterize(gaussians, **values)
+
+
+def test_whole_numbers_of_any_kind_are_sizes():
+    scene = layered_scene(5, 16, 12, 2.0)
+    expected = rasterize(scene.gaussians, scene.viewmats, scene.Ks, 16, 12).image
+    sizes: dict[str, Any] = {"width": np.int64(16), "height": np.int32(12), "near_plane": np.float32(0.01)}
+    assert torch.equal(rasterize(scene.gaussians, scene.viewmats, scene.Ks, **sizes).image, expected)
 
 
 def test_cpu_refuses_float64():

@@ -110,3 +110,14 @@ def test_arguments_are_checked():
         boxes_of(scene, scene.gaussians, "quick")
     with pytest.raises(TypeError, match="float64"):
         boxes_of(scene, scene.gaussians, "cpu")
+
+
+def test_a_mask_or_rows_that_do_not_fit_the_boxes_are_named():
+    scene = layered_scene(5, 70, 40, 2.0)
+    boxes = tile_boxes(scene.gaussians, scene.viewmats[0], scene.Ks[0], 70, 40)
+    with pytest.raises(ValueError, match=r"tile_mask must be bool \[2, 3\], got bool \[1, 3\]"):
+        boxes.meeting(np.ones((1, 3), bool), np.arange(5))
+    with pytest.raises(ValueError, match=r"rows must be \[5\] to match boxes \[5, 2\], got \[4\]"):
+        boxes.meeting(np.ones((2, 3), bool), np.arange(4))
+    with pytest.raises(TypeError, match="viewmat must be a torch tensor"):
+        tile_boxes(scene.gaussians, scene.viewmats[0].numpy(), scene.Ks[0], 70, 40)  # pyright: ignore[reportArgumentType]

@@ -9,6 +9,7 @@ import torch
 from torch import nn
 
 from engine.errors import NonFiniteLoss
+from engine.training.adam import make_adam
 from engine.training.config import TrainConfig
 from engine.training.optimizer import PhaseOptimizer
 
@@ -195,3 +196,10 @@ def test_back_end_that_does_not_fit_is_refused():
         make_optimizer(make_parameters(), "quick")
     with pytest.raises(TypeError, match="one, row"):
         make_optimizer(make_parameters(torch.float64), "fused")
+
+
+@pytest.mark.parametrize("gradient", [torch.ones(3), torch.ones(4, dtype=torch.float64)])
+def test_a_gradient_unlike_its_parameter_is_an_error(gradient):
+    adam = make_adam({"weights": torch.zeros(4)}, "fused")
+    with pytest.raises(ValueError, match=r"gradient of weights must be \[4\] in float32"):
+        adam.norm({"weights": gradient})
