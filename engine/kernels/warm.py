@@ -21,10 +21,10 @@ from engine.kernels.cache import is_cache_warm, use_kernel_cache, write_marker
 logger = logging.getLogger(__name__)
 
 GROUPS = (
-    ("point clouds", "engine.cloud.warm", 5.0),
-    ("decoder", "engine.model.warm", 4.5),
-    ("rasterizer", "engine.raster.cpu.warm", 4.0),
-    ("loss and optimiser", "engine.training.warm", 3.5),
+    ("point clouds", "engine.cloud.warm", 8.8),
+    ("decoder", "engine.model.warm", 4.1),
+    ("rasterizer", "engine.raster.cpu.warm", 4.9),
+    ("loss and optimiser", "engine.training.warm", 5.0),
     ("figures", "engine.metrics.window", 0.5),
 )
 """Name, module, and about how long compiling takes, of each group. Every module has a `warm_up()` that runs each of its
