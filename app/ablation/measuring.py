@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from engine.metrics.colors import Precision
     from engine.metrics.picture import Choice
 
-MEASURED_SCHEMA = 2
+MEASURED_SCHEMA = 3
 MEASURED_FILE = "measured.json"
 
 
@@ -79,10 +79,32 @@ def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None]) 
     times = [header.get("metrics") or {} for header in headers]
     seconds = [time["preparation_s"] + time["training_s"] for time in times if "training_s" in time]
     figures["minutes"] = sum(seconds) / 60 if len(seconds) == len(headers) else None
+    figures |= _later_clips(document["means"]["clips"], dict(zip(scope.clips, headers, strict=True)))
     figures["megabytes"] = sum(project.clip_path(i).stat().st_size for i in scope.clips) / 1e6
     measured = Measured(figures, sum(opened.clips[i].n_frames for i in scope.clips))
     write_text(place / MEASURED_FILE, json.dumps({"key": key, **asdict(measured)}, indent=1, allow_nan=False) + "\n")
     return measured
+
+
+def _later_clips(means: dict[str, Any], headers: dict[int, dict[str, Any]]) -> dict[str, float | None]:
+    """What the next clip takes and gives: means over the clips that inherit. None where there is none.
+
+    Args:
+        means: Of the evaluation, per clip and group.
+        headers: Of the clip files, per clip index.
+    """
+    chosen = [index for index, header in headers.items() if header["role"] == "source"]
+    groups = [means.get(str(index), {}) for index in chosen]
+    rows = [group.get("held_out") or group.get("trained_on") or {} for group in groups]
+    times = [headers[index].get("metrics") or {} for index in chosen]
+    figures: dict[str, list[Any]] = {
+        "later_psnr": [row.get("psnr") for row in rows],
+        "later_psnr_moving": [row.get("psnr_moving") for row in rows],
+        "later_s": [time["preparation_s"] + time["training_s"] if "training_s" in time else None for time in times],
+    }
+    return {
+        name: sum(values) / len(values) if values and None not in values else None for name, values in figures.items()
+    }
 
 
 def kept_figures(place: Path, settings: ProjectSettings, scope: Scope) -> Measured | None:
