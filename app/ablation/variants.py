@@ -29,6 +29,7 @@ class Variant:
             the first frame.
         shares_reference: Whether its reference clip is that of "full": only source clips differ.
         is_reference_moved: Whether the clip in the middle is the one that others inherit from.
+        reference_of: Another variant whose reference clip it shares, when that is not "full".
         is_on_request: Only trained when it is named.
         base_name: The variant that this one is with source clips of another length; see `with_source_steps`.
     """
@@ -40,13 +41,14 @@ class Variant:
     cut: str = "clips"
     shares_reference: bool = True
     is_reference_moved: bool = False
+    reference_of: str = ""
     is_on_request: bool = False
     base_name: str = ""
 
     @property
     def family(self) -> str:
         """Variants of one family have the same reference clip."""
-        return FULL if self.shares_reference else self.base_name or self.name
+        return FULL if self.shares_reference else self.reference_of or self.base_name or self.name
 
 
 FULL = "full"
@@ -146,6 +148,7 @@ VARIANTS = (
         PUBLISHED_SIZES,
         is_baseline=True,
         shares_reference=False,
+        reference_of="published-gate",
         is_on_request=True,
     ),
 )

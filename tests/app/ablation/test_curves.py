@@ -73,3 +73,4 @@ def test_a_variant_with_a_number_of_steps_is_known_by_its_name():
     assert variant_called("nonsense-steps5") is None
     assert variant_called("full-steps0") is None
     assert with_source_steps(BY_NAME["published"], 5).family == "published"
+    assert with_source_steps(BY_NAME["published-tiles"], 5).family == "published-gate"
