@@ -166,6 +166,11 @@ def build_parser() -> argparse.ArgumentParser:
     )
     ablate_parser.add_argument("--list", action="store_true", help="say what the variants are and end")
     ablate_parser.add_argument("--n-clips", type=int, metavar="N", help="clips from the first (default: up to 4)")
+    ablate_parser.add_argument(
+        "--source-steps",
+        metavar="N,M,...",
+        help="train source clips with each of these numbers of steps: quality over time",
+    )
     ablate_parser.add_argument("--seeds", default="0", help="separated by commas (default: 0)")
     ablate_parser.add_argument(
         "--reference-clip", type=int, default=0, metavar="K", help="clip that others inherit from (default: 0)"

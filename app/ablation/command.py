@@ -18,14 +18,17 @@ from engine.errors import ProjectError
 
 def ablate(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream ablate: train variants and compare them; prints the table. Returns the exit code."""
+    from app.ablation.curves import curve_lines
     from app.ablation.running import RESULT_FILE, TABLE_FILE, Callbacks, run_ablation
     from app.ablation.table import as_text
-    from app.ablation.variants import VARIANTS, chosen_variants
+    from app.ablation.variants import VARIANTS, chosen_variants, with_source_steps
 
     if options.list:
         width = max(len(variant.name) for variant in VARIANTS)
         for variant in VARIANTS:
-            print(f"{variant.name:<{width}}  {'baseline: ' if variant.is_baseline else ''}{variant.words}")
+            kind = "baseline: " if variant.is_baseline else ""
+            end = " (only when named)" if variant.is_on_request else ""
+            print(f"{variant.name:<{width}}  {kind}{variant.words}{end}")
         return EXIT_OK
     if options.capture is None or options.project is None:
         raise ProjectError("A capture folder and --project are needed.", hint="Only --list does without.")
@@ -37,12 +40,12 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
             f"--variants is '{options.variants}', which names none.", hint="Leave it out for all of them."
         )
     variants = chosen_variants(names)
-    try:
-        seeds = [int(seed) for seed in options.seeds.split(",")]
-    except ValueError as error:
-        raise ProjectError(f"--seeds is '{options.seeds}'; write whole numbers separated by commas.") from error
-    if len(set(seeds)) < len(seeds):
-        raise ProjectError(f"--seeds is '{options.seeds}'; a seed counts only once.")
+    seeds = _whole_numbers("--seeds", options.seeds)
+    if options.source_steps is not None:
+        lengths = sorted(_whole_numbers("--source-steps", options.source_steps))
+        if lengths[0] < 1:
+            raise ProjectError(f"--source-steps is '{options.source_steps}'; a clip needs at least one step.")
+        variants = [with_source_steps(variant, n_steps) for variant in variants for n_steps in lengths]
     capture = open_capture(options.capture, scale=options.scale if options.scale is not None else 1.0)
     settings = default_settings(
         capture,
@@ -94,6 +97,18 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
     if options.json:
         print(json.dumps(document, indent=1, allow_nan=False))
     else:
-        print(f"{as_text(document['lines'])}\n\n{document['definition']}")
+        compared = "".join(f"\n{sentence}" for sentence in curve_lines(document["curves"]))
+        print(f"{as_text(document['lines'])}\n{compared}\n{document['definition']}")
     line.say(f"All figures: {options.project / RESULT_FILE} and {TABLE_FILE}")
     return EXIT_OK
+
+
+def _whole_numbers(option: str, text: str) -> list[int]:
+    """An option's numbers, each of which counts once."""
+    try:
+        numbers = [int(number) for number in text.split(",")]
+    except ValueError as error:
+        raise ProjectError(f"{option} is '{text}'; write whole numbers separated by commas.") from error
+    if len(set(numbers)) < len(numbers):
+        raise ProjectError(f"{option} is '{text}'; a number counts only once.")
+    return numbers

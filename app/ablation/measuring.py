@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.evaluation import evaluate_project
 from app.headless import open_trained
+from app.later_clips import later_figures
 from app.project import Project, ProjectSettings, open_project
 from app.results import write_text
 from engine.errors import ProjectError
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from engine.metrics.colors import Precision
     from engine.metrics.picture import Choice
 
-MEASURED_SCHEMA = 2
+MEASURED_SCHEMA = 3
 MEASURED_FILE = "measured.json"
 
 
@@ -73,12 +74,18 @@ def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None]) 
         cameras=holdout or None,
         on_progress=on_row,
     )
-    means = document["means"]["held_out"] or document["means"]["trained_on"]
+    group = "held_out" if document["means"]["held_out"] else "trained_on"
+    means = document["means"][group]
     figures: dict[str, float | None] = {name: value for name, value in means.items() if not isinstance(value, dict)}
     figures |= flicker_figures(document["seams"]["rows"], scope.borders)
     times = [header.get("metrics") or {} for header in headers]
-    seconds = [time["preparation_s"] + time["training_s"] for time in times if "training_s" in time]
-    figures["minutes"] = sum(seconds) / 60 if len(seconds) == len(headers) else None
+    seconds = [time["preparation_s"] + time["training_s"] if "training_s" in time else None for time in times]
+    known = [second for second in seconds if second is not None]
+    figures["minutes"] = sum(known) / 60 if len(known) == len(headers) else None
+    source_s = {
+        i: second for i, header, second in zip(scope.clips, headers, seconds, strict=True) if header["role"] == "source"
+    }
+    figures |= later_figures(document["means"]["clips"], group, source_s)
     figures["megabytes"] = sum(project.clip_path(i).stat().st_size for i in scope.clips) / 1e6
     measured = Measured(figures, sum(opened.clips[i].n_frames for i in scope.clips))
     write_text(place / MEASURED_FILE, json.dumps({"key": key, **asdict(measured)}, indent=1, allow_nan=False) + "\n")

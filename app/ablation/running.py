@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.ablation.curves import curves_of
 from app.ablation.measuring import Measured, Scope, kept_figures, measure
 from app.ablation.table import DEFINITION, VariantResult, as_csv, summarize
-from app.ablation.variants import FULL, VARIANTS, Variant, settings_of
+from app.ablation.variants import Variant, rank, settings_of, variant_called
 from app.headless import ClipOutcome, train_clips
 from app.project import PROJECT_FILE, Project, ProjectSettings, check_settings, create_project, open_project
 from app.results import write_text
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
 ABLATION_SCHEMA = 1
 RESULT_FILE = "ablation.json"
 TABLE_FILE = "ablation.csv"
-_ORDER = {variant.name: i for i, variant in enumerate(VARIANTS)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ def run_ablation(
         metrics, precision: See engine.metrics.picture.measure_picture.
     Returns:
         JSON-able: schema, capture, holdout, clip_length, n_clips, metrics, precision, seeds, words (what each variant
-        is), definition (of flicker and seam ratios), lines (`summarize`) and results per seed.
+        is), definition (of flicker and seam ratios), lines (`summarize`), curves (`curves_of`) and results per seed.
     Raises:
         ProjectError, CaptureError: Bad input.
         TrainingError: A clip failed; what was finished is kept.
@@ -93,13 +93,16 @@ def run_ablation(
     borders = [clip.start for clip in clips[1:]]
     all_clips = Scope(range(n_clips), borders, metrics, precision)
     found = _finished(folder, capture, settings, clips, all_clips)
+    first_of: dict[tuple[str, int], Path] = {}  # what trains the reference clip of a family
+    for task in todo:
+        first_of.setdefault((task.variant.family, task.settings.seed), task.place(folder))
     for n_done, task in enumerate(todo):
         variant, seed = task.variant, task.settings.seed
         callbacks.on_variant(variant.name, seed, n_done, len(todo))
-        measured = _measured(folder, task, all_clips, launch, callbacks)
+        measured = _measured(task.place(folder), task, first_of[variant.family, seed], all_clips, launch, callbacks)
         found[variant.name, seed] = VariantResult(variant.name, seed, measured.figures, measured.n_frames)
-        results = [found[key] for key in sorted(found, key=lambda key: (_ORDER[key[0]], key[1]))]
-        shown = {result.variant for result in results}
+        results = [found[key] for key in sorted(found, key=lambda key: (rank(key[0]), key[1]))]
+        shown = list(dict.fromkeys(result.variant for result in results))
         document = {
             "schema": ABLATION_SCHEMA,
             "capture": str(capture.path),
@@ -109,9 +112,10 @@ def run_ablation(
             "metrics": metrics,
             "precision": precision,
             "seeds": sorted({*seeds, *(result.seed for result in results)}),
-            "words": {item.name: item.words for item in VARIANTS if item.name in shown},
+            "words": {name: item.words for name in shown if (item := variant_called(name)) is not None},
             "definition": DEFINITION,
-            "lines": summarize(results),
+            "lines": (lines := summarize(results)),
+            "curves": curves_of(lines),
             "results": [{"variant": r.variant, "seed": r.seed, "n_frames": r.n_frames, **r.figures} for r in results],
         }
         write_text(folder / RESULT_FILE, json.dumps(document, indent=1, allow_nan=False) + "\n")
@@ -129,18 +133,18 @@ def _finished(
 ) -> dict[tuple[str, int], VariantResult]:
     """What lies measured in the folder and fits the settings, by variant and seed."""
     found = {}
-    for variant in VARIANTS:
-        for place in sorted(folder.glob(f"{variant.name}-seed*")):
-            text = place.name.removeprefix(f"{variant.name}-seed")
-            if not text.isdecimal():
-                continue
-            try:
-                task = _Task(capture, replace(base, seed=int(text)), variant, int(text), clips)
-            except ProjectError:  # the settings of this call have no such variant
-                continue
-            kept = kept_figures(place, task.settings, replace(scope, clips=task.chosen))
-            if kept is not None:
-                found[variant.name, int(text)] = VariantResult(variant.name, int(text), kept.figures, kept.n_frames)
+    for place in sorted(folder.glob("*-seed*")):
+        name, _, text = place.name.rpartition("-seed")
+        variant = variant_called(name)
+        if variant is None or not text.isdecimal():
+            continue
+        try:
+            task = _Task(capture, replace(base, seed=int(text)), variant, int(text), clips)
+        except ProjectError:  # the settings of this call have no such variant
+            continue
+        kept = kept_figures(place, task.settings, replace(scope, clips=task.chosen))
+        if kept is not None:
+            found[name, int(text)] = VariantResult(name, int(text), kept.figures, kept.n_frames)
     return found
 
 
@@ -163,14 +167,18 @@ class _Task:
         )
         check_settings(self.settings, capture)
 
+    def place(self, folder: Path) -> Path:
+        """Where its project lies."""
+        return project_folder(folder, self.variant.name, self.settings.seed)
 
-def _measured(folder: Path, task: _Task, scope: Scope, launch: Launch, callbacks: Callbacks) -> Measured:
+
+def _measured(place: Path, task: _Task, first: Path, scope: Scope, launch: Launch, callbacks: Callbacks) -> Measured:
+    """Train what is missing and measure. first: the project whose reference clip this one takes over."""
     variant, settings, capture, seed = task.variant, task.settings, task.capture, task.settings.seed
-    place = project_folder(folder, variant.name, seed)
     project = _open(place, settings)
     try:
-        if variant.shares_reference and variant.name != FULL:
-            _take_reference(project, project_folder(folder, FULL, seed))
+        if place != first:
+            _take_reference(project, first)
         service = TrainingService(
             project,
             project.clips(capture.n_frames),
@@ -207,9 +215,9 @@ def _open(place: Path, settings: ProjectSettings) -> Project:
     return project
 
 
-def _take_reference(project: Project, full: Path) -> None:
-    """Copy the reference clip, and what clips share, of the finished "full"."""
-    source = open_project(full, is_writable=False)
+def _take_reference(project: Project, first: Path) -> None:
+    """Copy the reference clip, and what clips share, of a finished project."""
+    source = open_project(first, is_writable=False)
     if project.is_trained(project.settings.reference_clip) or not source.reference_path.is_file():
         return
     project.prep_dir.mkdir(parents=True, exist_ok=True)

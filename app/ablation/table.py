@@ -28,10 +28,14 @@ COLUMNS: dict[str, tuple[str, int]] = {
     "flicker_borders": ("flicker borders /255", 3),
     "seam_ratio_static": ("seam ratio static", 3),
     "seam_ratio_moving": ("seam ratio moving", 3),
+    "later_psnr": ("later PSNR", 2),
+    "later_psnr_moving": ("later moving", 2),
+    "later_s": ("s per later clip", 0),
     "minutes": ("minutes", 1),
     "megabytes": ("MB", 2),
 }
-"""Figure to its heading and decimals. Held-out cameras, raw colours unless the name says fit. PSNR in dB."""
+"""Figure to its heading and decimals. Held-out cameras, raw colours unless the name says fit. PSNR in dB. "later" ones
+are means over the clips that inherit, their time that of preparation and training."""
 DEFINITION = definition_of('the borders are those of the clips of "full" for every line')
 """Of flicker and seam ratios."""
 

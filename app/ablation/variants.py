@@ -6,8 +6,9 @@ the same loaders, anchors, rasterizer and metrics; they are named for what they 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from engine.capture.clip import Clip
@@ -28,6 +29,9 @@ class Variant:
             the first frame.
         shares_reference: Whether its reference clip is that of "full": only source clips differ.
         is_reference_moved: Whether the clip in the middle is the one that others inherit from.
+        reference_of: Another variant whose reference clip it shares, when that is not "full".
+        is_on_request: Only trained when it is named.
+        base_name: The variant that this one is with source clips of another length; see `with_source_steps`.
     """
 
     name: str
@@ -37,9 +41,29 @@ class Variant:
     cut: str = "clips"
     shares_reference: bool = True
     is_reference_moved: bool = False
+    reference_of: str = ""
+    is_on_request: bool = False
+    base_name: str = ""
+
+    @property
+    def family(self) -> str:
+        """Variants of one family have the same reference clip."""
+        return FULL if self.shares_reference else self.reference_of or self.base_name or self.name
 
 
 FULL = "full"
+PUBLISHED_SIZES: dict[str, Any] = {
+    "static_feature_dim": 64,
+    "dynamic_feature_dim": 64,
+    "gaussians_per_anchor": 10,
+    "head_hidden": 256,
+    "field_hidden": 128,
+    "field_base_cells": 16,
+    "field_growth": 2.0,
+    "field_levels": 16,
+    "field_log2_entries": 17,
+}
+"""Sizes of the published method. Its rates and lengths are not among them: what costs is compared at equal rates."""
 MIN_STEPS_PER_FRAME = 20
 """Of a stream, also where the clips of "full" have fewer."""
 VARIANTS = (
@@ -93,12 +117,89 @@ VARIANTS = (
         cut="first",
         shares_reference=False,
     ),
+    # from the published scheme to "full", one part after the other; only time changes where the tiles do
+    Variant(
+        "published",
+        "published sizes, every anchor at every time, all tiles",
+        PUBLISHED_SIZES | {"gate": "off", "tiles": "all"},
+        is_baseline=True,
+        shares_reference=False,
+        is_on_request=True,
+    ),
+    Variant(
+        "published-static",
+        "published sizes, static anchors decoded once",
+        PUBLISHED_SIZES | {"gate": "static", "tiles": "all"},
+        is_baseline=True,
+        shares_reference=False,
+        is_on_request=True,
+    ),
+    Variant(
+        "published-gate",
+        "published sizes, and moving anchors only where they can be",
+        PUBLISHED_SIZES | {"tiles": "all"},
+        is_baseline=True,
+        shares_reference=False,
+        is_on_request=True,
+    ),
+    Variant(
+        "published-tiles",
+        "published sizes, gate, and only active tiles",
+        PUBLISHED_SIZES,
+        is_baseline=True,
+        shares_reference=False,
+        reference_of="published-gate",
+        is_on_request=True,
+    ),
 )
 """Everything that `clipgstream ablate` can train, in the order of its table."""
 
 
+_STEPS_NAME = re.compile(r"(.+)-steps([1-9][0-9]*)")
+
+
+def with_source_steps(variant: Variant, n_steps: int) -> Variant:
+    """The same with source clips of so many steps: a point of the curve of its quality over time.
+
+    Raises:
+        ProjectError: It has no source clips of the usual length.
+    """
+    if variant.cut != "clips" or variant.overrides.get("independent"):
+        raise ProjectError(
+            f"{variant.name} has no source clips, so their number of steps would change nothing.",
+            hint="Leave it out, or leave out --source-steps.",
+        )
+    return replace(
+        variant,
+        name=f"{variant.name}-steps{n_steps}",
+        words=f"{variant.words}; {n_steps} steps in a source clip",
+        overrides=variant.overrides | {"source_steps": n_steps},
+        base_name=variant.name,
+    )
+
+
+def variant_called(name: str) -> Variant | None:
+    """The variant of a name, also of one that `with_source_steps` gave; None when there is none."""
+    known = {variant.name: variant for variant in VARIANTS}
+    steps = _STEPS_NAME.fullmatch(name)
+    if name in known or steps is None:
+        return known.get(name)
+    base = known.get(steps[1])
+    try:
+        return None if base is None else with_source_steps(base, int(steps[2]))
+    except ProjectError:
+        return None
+
+
+def rank(name: str) -> tuple[int, int]:
+    """Place of a variant in the table."""
+    steps = _STEPS_NAME.fullmatch(name)
+    base = name if steps is None else steps[1]
+    return [variant.name for variant in VARIANTS].index(base), 0 if steps is None else int(steps[2])
+
+
 def chosen_variants(names: Sequence[str] | None) -> list[Variant]:
-    """Variants by name, in the order of the table; all of them for None. "full" is always there.
+    """Variants by name, in the order of the table; all but those on request for None. "full" is always there.
 
     Raises:
         ProjectError: There is no such variant.
@@ -109,7 +210,9 @@ def chosen_variants(names: Sequence[str] | None) -> list[Variant]:
         raise ProjectError(
             f"There is no variant called {', '.join(unknown)}.", hint=f"Variants are {', '.join(sorted(known))}."
         )
-    return [variant for variant in VARIANTS if names is None or variant.name in {*names, FULL}]
+    if names is None:
+        return [variant for variant in VARIANTS if not variant.is_on_request]
+    return [variant for variant in VARIANTS if variant.name in {*names, FULL}]
 
 
 def settings_of(

@@ -177,12 +177,13 @@ def draw_stacked(parts: Mapping[str, Sequence[float]], names: Sequence[str], lab
 
 
 def draw_speed_error(
-    names: Sequence[str], minutes: Sequence[float], panels: Sequence[SpeedPanel], own: int | None
+    names: Sequence[str], times: Sequence[float], panels: Sequence[SpeedPanel], own: int | None, time_label: str
 ) -> bytes:
     """Figures against wall time, a mark with a label per result, and the front of those that nobody beats.
 
     Args:
-        names, minutes: One per result.
+        names, times: One per result.
+        time_label: What the times are, with their unit.
         own: Index of the result that the page is about; a diamond among circles.
         panels: At least one; those without any value stay empty.
     """
@@ -196,18 +197,18 @@ def draw_speed_error(
             figure.legend(handles=handles, loc="outside right center", fontsize=7.5, handlelength=0, frameon=False)
             labels = [str(i) for i in range(1, len(names) + 1)]
         for axes, panel in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
-            _draw_speed_panel(figure, axes, labels, minutes, panel, own)
+            _draw_speed_panel(figure, axes, labels, times, panel, own)
+            axes.set_xlabel(time_label)
         return png_of(figure)
 
 
 def _draw_speed_panel(
-    figure: Any, axes: Any, labels: Sequence[str], minutes: Sequence[float], panel: SpeedPanel, own: int | None
+    figure: Any, axes: Any, labels: Sequence[str], all_times: Sequence[float], panel: SpeedPanel, own: int | None
 ) -> None:
     chosen = [i for i, value in enumerate(panel.values) if value is not None]
-    points = [(minutes[i], float(panel.values[i] or 0.0)) for i in chosen]
+    points = [(all_times[i], float(panel.values[i] or 0.0)) for i in chosen]
     direction = "upper" if panel.is_higher_better else "lower"
     axes.set_title(f"{direction} left is better", loc="right", fontsize=8, color=FAINT_COLOR)
-    axes.set_xlabel("preparation + training, minutes")
     axes.set_ylabel(panel.label)
     axes.margins(0.22)
     add_grid(axes)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from app.later_clips import LATER_MOVING, LATER_PSNR, LATER_S, later_figures
 from app.report.about import all_settings
 from app.report.charts import SpeedPanel, draw_speed_error
 from app.report.facts import ProjectFacts
@@ -54,6 +55,12 @@ class Compared:
         if name in FIGURES:
             return flicker_figures(self.evaluation["seams"]["rows"])[name]
         return self.evaluation["seams"]["means"][self.group].get(name)
+
+    @property
+    def later(self) -> dict[str, float | None]:
+        """What its later clips take and give, see app.later_clips."""
+        seconds = {clip.clip_index: clip.wall_s for clip in self.facts.clips if clip.role == "source"}
+        return later_figures(self.evaluation["means"]["clips"], self.group, seconds)
 
     @property
     def minutes(self) -> float | None:
@@ -183,9 +190,41 @@ def speed_section(compared: Sequence[Compared]) -> Section:
         "trained."
     )
     alt = f"PSNR, seam ratio and flicker of {len(names)} projects against minutes"
-    chart = Figure("speed_error", draw_speed_error(names, minutes, panels, own), caption, alt)
+    label = "preparation + training, minutes"
+    chart = Figure("speed_error", draw_speed_error(names, minutes, panels, own, label), caption, alt)
     table = Table("speed_error", "The marks", columns, rows)
-    return Section("speed", "Speed against error", [*parts, chart, table, definition_of()])
+    return Section("speed", "Speed against error", [*parts, chart, table, definition_of(), *_later_parts(compared)])
+
+
+def _later_parts(compared: Sequence[Compared]) -> list:
+    """PSNR of the clips that inherit against the time one of them takes. Nothing for fewer than two projects."""
+    timed = [(one, one.later) for one in compared]
+    timed = [(one, later) for one, later in timed if later[LATER_S] and later[LATER_PSNR] is not None]
+    if len(timed) < 2:
+        return []
+    names, seconds = [one.facts.name for one, _ in timed], [float(later[LATER_S] or 0.0) for _, later in timed]
+    panels = (
+        SpeedPanel(f"PSNR, {timed[0][0].group.replace('_', '-')} cameras, raw, dB", _values(timed, LATER_PSNR), True),
+        SpeedPanel("PSNR of moving pixels, dB", _values(timed, LATER_MOVING), True),
+    )
+    own = next((i for i, (one, _) in enumerate(timed) if one is compared[0]), None)
+    caption = "The same for a clip that inherits: means over the clips after the reference clip, which is not counted."
+    alt = f"PSNR of later clips of {len(names)} projects against seconds"
+    label = "preparation + training of a later clip, seconds"
+    chart = Figure("later_clips", draw_speed_error(names, seconds, panels, own, label), caption, alt)
+    columns = (
+        TableColumn("mark", "Mark"),
+        TableColumn("project", "Project"),
+        TableColumn(LATER_S, "A later clip", 1, unit="s"),
+        TableColumn(LATER_PSNR, "PSNR", 2, unit="dB"),
+        TableColumn(LATER_MOVING, "PSNR, moving", 2, unit="dB"),
+    )
+    rows = [{"mark": i + 1, "project": one.facts.name, **later} for i, (one, later) in enumerate(timed)]
+    return [chart, Table("later_clips", "Later clips", columns, rows)]
+
+
+def _values(timed: Sequence[tuple[Compared, dict[str, float | None]]], name: str) -> list[float | None]:
+    return [later[name] for _, later in timed]
 
 
 def _of(timed: Sequence[tuple[Compared, float]], name: str) -> list[float | None]:

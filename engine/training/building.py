@@ -145,11 +145,16 @@ def _start_like_neighbors(residual: AnchorSet, moving: AnchorSet) -> None:
         residual.log_base_scales.copy_(moving.log_base_scales[rows])
 
 
-def remove_gate(model: ClipModel) -> None:
-    """gate=off, the published method: every anchor has a dynamic feature at every time."""
+def remove_gate(model: ClipModel, *, in_time_only: bool = False) -> None:
+    """gate=off, the published method: every anchor has a dynamic feature at every time.
+
+    Args:
+        in_time_only: gate=static: static anchors stay without one; dynamic anchors exist at every time.
+    """
     for role in model.roles():
         anchors = model.anchor_set(role)
-        anchors.presence = torch.ones(len(anchors), model.n_frames, dtype=torch.bool)
+        if anchors.is_dynamic or not in_time_only:
+            anchors.presence = torch.ones(len(anchors), model.n_frames, dtype=torch.bool)
 
 
 def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generator: torch.Generator) -> str:

@@ -267,6 +267,8 @@ class ClipTraining:
             remove_gate(self.model)
         else:
             self._decide(cloud)
+        if self.config.gate == "static":
+            remove_gate(self.model, in_time_only=True)
         if self.config.field == "continue" and self.previous is not None and self.previous.header["field"]:
             field, index = read_field(self.previous), self.previous.header["clip_index"]
             if field.shape.n_knots < self.clip.n_frames:

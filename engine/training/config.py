@@ -149,7 +149,8 @@ class TrainConfig:
     """hull: static anchors have no dynamic feature, moving ones are decoded only at times where that frame's hull
     has them. images: likewise, but static anchors that two or more cameras see change where no hull is (lamps, soft
     shadows) get a dynamic feature, and once a clip is trained, anchors that nobody sees and dynamic ones that learned
-    no change are left out. Where it finds neither, the result is that of hull, bit for bit. off: the published method,
+    no change are left out. Where it finds neither, the result is that of hull, bit for bit. static: static anchors have
+    no dynamic feature, moving ones are decoded at all times; what the gate in time is worth. off: the published method,
     every anchor is evaluated at every time."""
 
     # what a step of a source clip looks at
@@ -281,7 +282,7 @@ _RANGES: dict[str, tuple[float, float]] = {
 
 _CHOICES: dict[str, tuple[str, ...]] = {
     "color": ("auto", "gain", "off"),
-    "gate": ("hull", "images", "off"),
+    "gate": ("hull", "images", "static", "off"),
     "field_tables": ("shared", "per_frame"),
     "decoder": ("frozen", "finetune", "new"),
     "residual": ("dedup", "none", "full"),

@@ -166,7 +166,9 @@ def clip_sizes(footage: Footage, clip: Clip, config: TrainConfig, counts: Counts
         is_source: Whether it inherits; its static anchors and heads are frozen then unless the settings say otherwise.
     """
     is_frozen = is_source and config.inherit == "frozen" and config.decoder == "frozen"
-    n_alive = counts.n_alive if config.gate == "hull" else counts.n_static + counts.n_moving
+    has_gate = config.gate != "off"
+    n_at_all_times = {"static": counts.n_moving, "off": counts.n_static + counts.n_moving}
+    n_alive = n_at_all_times.get(config.gate, counts.n_alive)
     return ClipSizes(
         n_pixels=footage.n_pixels,
         n_cameras=footage.n_cameras,
@@ -188,6 +190,6 @@ def clip_sizes(footage: Footage, clip: Clip, config: TrainConfig, counts: Counts
         is_frozen=is_frozen,
         owns_static=not is_source or config.inherit != "frozen",
         is_built=not is_source or config.inherit == "off",
-        has_gate=config.gate == "hull",
-        has_active_tiles=is_frozen and config.tiles == "active" and config.gate == "hull",
+        has_gate=has_gate,
+        has_active_tiles=is_frozen and config.tiles == "active" and has_gate,
     )

@@ -42,7 +42,9 @@ class Runner:
         assert list(cameras) == [0]
         means = {"psnr": 20.0 + len(clip_indices), "ssim": 0.5, "curves": {"not": "a figure"}}
         rows = [pair(frame, 0.04 if frame == 4 else 0.02) for frame in range(1, 6)]
-        return {"means": {"held_out": means, "trained_on": {}}, "seams": {"rows": rows}}
+        source_steps = opened.project.settings.config().source_steps  # more of them are better, and take longer
+        per_clip = {str(i): {"held_out": {"psnr": 20.0 + source_steps / 10, "psnr_moving": None}} for i in clip_indices}
+        return {"means": {"held_out": means, "trained_on": {}, "clips": per_clip}, "seams": {"rows": rows}}
 
     def _launch(self, job, project):
         self.launched.append((project.folder.name, job.clip_index))

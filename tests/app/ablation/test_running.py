@@ -11,7 +11,7 @@ import pytest
 
 from app.ablation.measuring import MEASURED_FILE
 from app.ablation.running import RESULT_FILE, TABLE_FILE, project_folder
-from app.ablation.variants import FULL
+from app.ablation.variants import FULL, with_source_steps
 from app.project import open_project, read_settings
 from engine.errors import ProjectError, TrainingError
 from tests.app.ablation.runs import BASE, BY_NAME
@@ -19,7 +19,7 @@ from tests.app.fakes import make_fake
 
 
 def test_every_variant_is_a_project_and_a_line_of_the_table(runner):
-    document = runner.run()
+    document = runner.run(list(BY_NAME))
     assert [line["variant"] for line in document["lines"]] == list(BY_NAME)
     assert json.loads((runner.folder / RESULT_FILE).read_text()) == document
     assert [row["variant"] for row in csv.DictReader((runner.folder / TABLE_FILE).read_text().splitlines())] == list(
@@ -52,6 +52,25 @@ def test_the_reference_clip_of_full_is_not_trained_again(runner):
     assert ("independent-seed0", 0) in runner.launched
     full, other = (project_folder(runner.folder, name, 0) / "clips/0000.safetensors" for name in (FULL, "decoder-new"))
     assert full.read_bytes() == other.read_bytes()
+
+
+def test_source_clips_of_several_lengths_share_the_reference_clip_of_their_family(runner):
+    variants = [with_source_steps(BY_NAME[name], n) for name in (FULL, "published", "decoder-new") for n in (4, 8)]
+    document = runner.run(variants=variants)
+    trained_first = {name for name, clip in runner.launched if clip == 0}
+    assert trained_first == {"full-steps4-seed0", "published-steps4-seed0"}
+    lines = {line["variant"]: line for line in document["lines"]}
+    assert list(lines) == [f"{name}-steps{n}" for name in (FULL, "decoder-new", "published") for n in (4, 8)]
+    assert lines["published-steps8"]["later_psnr"] == pytest.approx(20.8)
+    assert lines["published-steps8"]["later_s"] > 0
+    curves = {curve["variant"]: curve for curve in document["curves"]}
+    assert list(curves) == [FULL, "decoder-new", "published"]
+    assert [point["source_steps"] for point in curves["published"]["points"]] == [4, 8]
+    assert curves["published"]["at_equal"]["later_psnr"]["psnr"] == pytest.approx(20.8)
+    assert curves["published"]["at_equal"]["later_psnr_moving"] is None
+    launched = len(runner.launched)
+    assert runner.run([FULL])["curves"] == document["curves"]  # lines of earlier calls stay
+    assert {name for name, _ in runner.launched[launched:]} == {"full-seed0"}
 
 
 def test_each_seed_has_projects_of_its_own(runner):

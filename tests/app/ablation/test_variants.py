@@ -32,7 +32,10 @@ def test_only_variants_whose_reference_clip_is_trained_alike_share_it():
 
 def test_variants_are_chosen_by_name_in_the_order_of_the_table_with_full_beside_them():
     assert [v.name for v in chosen_variants(["independent", "decoder-new"])] == [FULL, "decoder-new", "independent"]
-    assert chosen_variants(None) == list(VARIANTS)
+    usual = [variant for variant in VARIANTS if not variant.is_on_request]
+    assert chosen_variants(None) == usual
+    assert {"published", "full"} - {variant.name for variant in usual} == {"published"}
+    assert [v.name for v in chosen_variants(["published"])] == [FULL, "published"]
     assert [v.name for v in chosen_variants([FULL])] == [FULL]
     with pytest.raises(ProjectError, match="called nonsense") as caught:
         chosen_variants(["full", "nonsense"])

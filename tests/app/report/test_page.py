@@ -82,6 +82,15 @@ def test_the_comparison_stands_first(page):
     assert page.tables["speed_error"][1][:3] == ["2", "fast", "0.28"]  # (3 + 6 + 2 + 6) / 60
 
 
+def test_what_a_later_clip_takes_and_gives_is_set_side_by_side(page, numbers):
+    rows = numbers["tables"]["later_clips"]["rows"]
+    assert [row["project"] for row in rows] == [ODD_NAME, "fast"]
+    own = numbers["projects"][0]
+    assert rows[1]["later_s"] == pytest.approx(8.0)  # clip 1 alone: 2 + 6
+    assert page.tables["later_clips"][1][:3] == ["2", "fast", "8.0"]
+    assert rows[0]["later_psnr"] != own["means"]["held_out"]["psnr"]
+
+
 def test_flicker_is_one_thing_on_the_whole_page(page, numbers):
     rows = [row for row in numbers["tables"]["seam_pairs"]["rows"] if row["is_held_out"]]
     inside, borders = (
