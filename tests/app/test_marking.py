@@ -13,7 +13,7 @@ from app.project import Project, open_project
 from app.training.build import build_training
 from engine.cloud.regions import GateRegion, sphere_region
 from engine.errors import ProjectError
-from tests.app.conftest import poll_until
+from tests.app.conftest import inline, poll_until
 from tests.app.fakes import make_fake
 from tests.app.test_session import train_next
 
@@ -58,21 +58,21 @@ def test_a_mark_reaches_the_file_and_the_next_training(make_session, monkeypatch
     assert list(session.notices) == [n for n in session.notices if n.kind == "info"]
 
 
-def test_a_training_waits_for_what_was_marked_just_before(make_session, monkeypatch):
-    """The disk is slow: without waiting, the training would read the file of before."""
-    seen, is_slow, started = [], threading.Event(), threading.Event()
-    session = ready(make_session(make_training=partial(building, monkeypatch=monkeypatch, seen=seen)))
-    keep = Project.set_gate_regions
+def test_a_training_starts_when_what_was_marked_just_before_is_on_disk(make_session, monkeypatch):
+    seen, keep = [], Project.set_gate_regions
+
+    def launch(job, project):
+        seen.append(project.gate_regions())
+        return inline(job, project)
 
     def slowly(project, regions):
-        started.set()
-        is_slow.wait(0.5)
+        threading.Event().wait(0.5)
         keep(project, regions)
 
+    session = ready(make_session(launch=launch))
     monkeypatch.setattr(Project, "set_gate_regions", slowly)
     session.dispatch(MARK_BALL)
-    started.wait(5.0)
-    train_next(session)
+    session.dispatch(c.TrainNextClip())
     assert seen == [(BALL,)]
 
 
