@@ -57,12 +57,19 @@ class AnchorMarks:
             K: Of the picture in which x and y are pixels. [3, 3]
             near: Nearest depth that is drawn, scene units.
         """
-        points = self.positions @ world_to_camera[:3, :3].T + world_to_camera[:3, 3]
-        depths = np.maximum(points[:, 2], 1e-9)
-        dx = K[0, 0] * points[:, 0] / depths + K[0, 2] - x
-        dy = K[1, 1] * points[:, 1] / depths + K[1, 2] - y
-        rows = np.flatnonzero((points[:, 2] > near) & (dx * dx + dy * dy <= REACH_PX**2))
-        return int(rows[np.argmin(depths[rows])]) if len(rows) else None
+        return nearest_under(self.positions, world_to_camera, K, x, y, near=near)
+
+
+def nearest_under(
+    positions: np.ndarray, world_to_camera: np.ndarray, K: np.ndarray, x: float, y: float, *, near: float
+) -> int | None:
+    """Row of the position under a pixel, see `AnchorMarks.at`. positions: [N, 3]"""
+    points = positions @ world_to_camera[:3, :3].T + world_to_camera[:3, 3]
+    depths = np.maximum(points[:, 2], 1e-9)
+    dx = K[0, 0] * points[:, 0] / depths + K[0, 2] - x
+    dy = K[1, 1] * points[:, 1] / depths + K[1, 2] - y
+    rows = np.flatnonzero((points[:, 2] > near) & (dx * dx + dy * dy <= REACH_PX**2))
+    return int(rows[np.argmin(depths[rows])]) if len(rows) else None
 
 
 def anchor_marks(

@@ -144,9 +144,10 @@ def draw_help(ui: UiState) -> None:
         return
     center = imgui.get_main_viewport().get_center()
     imgui.set_next_window_pos(center, imgui.Cond_.always, ImVec2(0.5, 0.5))
-    imgui.set_next_window_size(ImVec2(880, 0), imgui.Cond_.always)
+    highest = imgui.get_main_viewport().work_size.y - 24
+    imgui.set_next_window_size_constraints(ImVec2(860, 100), ImVec2(860, highest))  # a low window scrolls
     flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_resize
-    flags |= imgui.WindowFlags_.no_collapse
+    flags |= imgui.WindowFlags_.no_collapse | imgui.WindowFlags_.always_auto_resize
     is_shown, is_kept = imgui.begin("Keys and mouse", True, flags)
     if is_shown:
         groups = list(dict.fromkeys(shortcut.group for shortcut in SHORTCUTS))
