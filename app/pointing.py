@@ -40,10 +40,11 @@ def seen_point(gaussians: GaussianArrays, origin: np.ndarray, direction: np.ndar
     offsets = gaussians.means - origin.astype(np.float32)
     along = offsets @ direction.astype(np.float32)
     across_squared = np.einsum("ni,ni->n", offsets, offsets) - along * along
-    reach = REACH * gaussians.scales.max(axis=1)
-    is_near = (along > gaussians.near_plane) & (across_squared < reach * reach)  # NaN is never near
-    norms = np.linalg.norm(gaussians.quats, axis=1)
-    rows = np.flatnonzero(is_near & (norms > 0.0) & np.isfinite(norms))
+    a, b, c = gaussians.scales.T  # several times faster than max(axis=1)
+    reach = REACH * np.maximum(np.maximum(a, b), c)
+    rows = np.flatnonzero((along > gaussians.near_plane) & (across_squared < reach * reach))  # NaN is never near
+    norms = np.linalg.norm(gaussians.quats[rows], axis=1)
+    rows = rows[(norms > 0.0) & np.isfinite(norms)]
     if len(rows) == 0:
         return None
     to_own_axes = Rotation.from_quat(gaussians.quats[rows], scalar_first=True).as_matrix().swapaxes(1, 2)

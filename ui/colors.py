@@ -33,4 +33,4 @@ REGION_COLORS = {"static": SKY, "dynamic": VERMILLION}
 HELD_OUT = PURPLE
 """Cameras that training never sees."""
 CHOSEN = YELLOW
-"""The camera that is looked through."""
+"""The camera that is looked through, and anchors in a region that is being chosen."""

@@ -1,5 +1,5 @@
-"""The regions of a scene as they are drawn over its picture: marked ones, the one looked at, and the sphere that is
-being chosen with the anchors in it. Owns its renderers; GL thread only. Knows no ImGui.
+"""The regions of a scene as they are drawn over its picture: marked ones, of which one may stand out, and the sphere
+that is being chosen with the anchors in it. Owns its renderers; GL thread only. Knows no ImGui.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from app.arrays import AnchorArrays
 from engine.cloud.regions import GateRegion
 from engine.model.roles import ROLES
 from ui.anchor_marks import thinned
-from ui.colors import REGION_COLORS
+from ui.colors import CHOSEN
 from ui.gl import LineRenderer, PointRenderer, Target
 from ui.region_lines import region_lines
 
@@ -32,12 +32,12 @@ class ShownRegions:
 
     Attributes:
         marked: Regions of the project.
-        listed: Position of the one looked at.
+        highlighted: Position of the one that stands out.
         sphere: The one that is being chosen.
     """
 
     marked: tuple[GateRegion, ...] = ()
-    listed: int | None = None
+    highlighted: int | None = None
     sphere: GateRegion | None = None
 
     @property
@@ -72,8 +72,8 @@ class RegionLayer:
         key = (shown, tuple(np.asarray(eye).tolist()))
         if key != self._key:
             self._key = key
-            thin = [region_lines(region, eye) for i, region in enumerate(shown.marked) if i != shown.listed]
-            thick = [region_lines(region, eye) for i, region in enumerate(shown.marked) if i == shown.listed]
+            thin = [region_lines(region, eye) for i, region in enumerate(shown.marked) if i != shown.highlighted]
+            thick = [region_lines(region, eye) for i, region in enumerate(shown.marked) if i == shown.highlighted]
             if shown.sphere is not None:
                 thick.append(region_lines(shown.sphere, eye, is_fine=True))
             for lines, halo, parts in zip(self._lines, self._halos, (thin, thick), strict=True):
@@ -96,13 +96,12 @@ class RegionLayer:
             positions = np.concatenate([anchors.inherited_positions, anchors.own_positions])
             rows = np.flatnonzero(sphere.contains(positions))
             self.counts = _counts(anchors, rows)
-            color = np.array(REGION_COLORS[sphere.treat], np.float32)
-            self._anchors.set(positions[thinned(rows, MAX_ANCHORS)], color)
+            self._anchors.set(positions[thinned(rows, MAX_ANCHORS)], np.array(CHOSEN, np.float32))
         return key
 
     def draw(self, target: Target, camera: tuple[Any, ...]) -> None:
         """Draw what was taken. camera: world_to_camera, K, width, height."""
-        self._anchors.draw(target, *camera, shape="circle", size=5.0, outline_px=1.0, opacity=0.9)
+        self._anchors.draw(target, *camera, shape="circle", size=4.5, outline_px=1.0, opacity=0.9)
         for lines, halo, width_px in zip(self._lines, self._halos, (THIN_PX, THICK_PX), strict=True):
             halo.draw(target, *camera, width_px=width_px + HALO_PX, opacity=0.45)
             lines.draw(target, *camera, width_px=width_px)

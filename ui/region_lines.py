@@ -10,9 +10,8 @@ import numpy as np
 from engine.cloud.regions import GateRegion
 from ui.colors import REGION_COLORS
 
-N_SEGMENTS = 64
-"""Of a circle; dashes are two of them and gaps as well."""
-N_EDGE_SEGMENTS = 24
+N_SEGMENTS, N_EDGE_SEGMENTS, N_DASH = 64, 24, 4
+"""Of a circle, of an edge of a box, of a dash; gaps are as long as dashes."""
 BACK_ALPHA = 0.35
 
 
@@ -29,7 +28,7 @@ def region_lines(region: GateRegion, eye: np.ndarray, *, is_fine: bool = False) 
     paths = _circles(region, is_fine=is_fine) if region.radius > 0.0 else _edges(region)
     segments = np.stack([paths[:, :-1], paths[:, 1:]], axis=2)  # [paths, segments, 2, 3]
     if region.treat == "dynamic":
-        segments = segments[:, np.arange(segments.shape[1]) % 4 < 2]
+        segments = segments[:, np.arange(segments.shape[1]) % (2 * N_DASH) < N_DASH]
     vertices = segments.reshape(-1, 3)
     center = np.array(region.center)
     is_behind = ((vertices - center) * (np.asarray(eye) - center)).sum(axis=1) < 0.0
@@ -39,14 +38,13 @@ def region_lines(region: GateRegion, eye: np.ndarray, *, is_fine: bool = False) 
 
 
 def _circles(region: GateRegion, *, is_fine: bool) -> np.ndarray:
-    """Great circles, with is_fine also diagonal ones and two parallels. [circles, N_SEGMENTS + 1, 3]"""
+    """Three great circles, with is_fine also two parallels. [circles, N_SEGMENTS + 1, 3]"""
     angles = np.linspace(0.0, 2.0 * np.pi, N_SEGMENTS + 1)
     cos, sin = np.cos(angles)[:, None], np.sin(angles)[:, None]
     x, y, z = np.eye(3)
     circles = [cos * x + sin * y, cos * y + sin * z, cos * z + sin * x]
     if is_fine:
         half = np.sqrt(0.5)
-        circles += [cos * half * (x + z) + sin * y, cos * half * (x - z) + sin * y]
         circles += [half * (cos * x + sin * z + side * y) for side in (-1.0, 1.0)]
     return np.array(region.center) + region.radius * np.stack(circles)
 

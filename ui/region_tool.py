@@ -1,4 +1,4 @@
-"""The sphere that is being chosen, and which of the marked regions is looked at. State of the window; no ImGui, no GL.
+"""The sphere that is being chosen, and which of the marked regions stands out. State of the window; no ImGui, no GL.
 
 The pointer leads the sphere until it is placed; keys move it along the axes of the view.
 """
@@ -38,7 +38,8 @@ class RegionTool:
         center: None until the viewport has found what lies under the pointer. Scene units, [3]
         radius: Scene units; 0 before the first sphere.
         is_placed: It stays where it is when the pointer moves.
-        listed: Position of the marked region that is looked at, or None.
+        is_accepted: It is to be marked as soon as the viewport has taken in where the pointer is.
+        highlighted: Position in the list of a marked region that is to stand out, or None.
     """
 
     is_active: bool = False
@@ -46,7 +47,8 @@ class RegionTool:
     center: np.ndarray | None = None
     radius: float = 0.0
     is_placed: bool = False
-    listed: int | None = None
+    is_accepted: bool = False
+    highlighted: int | None = None
     _rig: CameraRig | None = None
 
     def follow(self, rig: CameraRig | None, n_regions: int, *, can_mark: bool) -> None:
@@ -54,22 +56,24 @@ class RegionTool:
         if rig is not self._rig:
             self._rig, self.radius = rig, 0.0
             self.leave()
-            self.listed = None
+            self.highlighted = None
         if not can_mark:
             self.leave()
-        if self.listed is not None and self.listed >= n_regions:
-            self.listed = None
+        if self.highlighted is not None and self.highlighted >= n_regions:
+            self.highlighted = None
 
     def begin(self) -> None:
         """Choose a sphere; while one is being chosen, switch between static and dynamic."""
         if self.is_active:
             self.treat = "dynamic" if self.treat == "static" else "static"
         else:
-            self.is_active, self.is_placed, self.center, self.listed = True, False, None, None
+            self.leave()
+            self.is_active, self.highlighted = True, None
 
     def leave(self) -> None:
         """Choose no more; nothing was marked."""
-        self.is_active, self.is_placed, self.center = False, False, None
+        self.is_active = self.is_placed = self.is_accepted = False
+        self.center = None
 
     @property
     def radius_limits(self) -> tuple[float, float]:
@@ -94,11 +98,11 @@ class RegionTool:
             self.center = self.center + SHIFT_SHARE * self.radius * (np.array([right, down, forward]) @ axes)
             self.is_placed = True
 
-    def look_at_next(self, n_regions: int) -> None:
+    def highlight_next(self, n_regions: int) -> None:
         """Step through the marked regions, then to none."""
         if n_regions:
-            following = 0 if self.listed is None else self.listed + 1
-            self.listed = following if following < n_regions else None
+            following = 0 if self.highlighted is None else self.highlighted + 1
+            self.highlighted = following if following < n_regions else None
 
     @property
     def sphere(self) -> GateRegion | None:
@@ -107,11 +111,10 @@ class RegionTool:
             return None
         return sphere_region(self.treat, self.center.tolist(), self.radius)
 
-    def take(self) -> MarkRegion | None:
-        """The command that marks the sphere, after which none is being chosen; None before there is one."""
-        if not self.is_active or self.center is None:
+    def take_accepted(self) -> MarkRegion | None:
+        """The command that marks an accepted sphere, after which none is being chosen; None before it is accepted."""
+        sphere = self.sphere
+        if sphere is None or not self.is_accepted:
             return None
-        x, y, z = self.center.tolist()
-        command = MarkRegion(self.treat, (x, y, z), self.radius)
         self.leave()
-        return command
+        return MarkRegion(sphere.treat, sphere.center, sphere.radius)

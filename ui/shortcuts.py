@@ -25,7 +25,7 @@ from app.commands import (
 )
 from app.status import COMPARE_MODES
 from ui.panels.regions import TITLE as REGIONS
-from ui.panels.regions import begin_choosing, mark_chosen
+from ui.panels.regions import begin_choosing
 from ui.region_tool import GROWTH
 from ui.state import Dispatch, UiState
 
@@ -197,7 +197,7 @@ def _choose_region(session: Any, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _mark_chosen(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    mark_chosen(dispatch, ui)
+    ui.regions.is_accepted = True  # the viewport marks it, once it knows where the pointer is
 
 
 def _leave_choosing(session: Any, dispatch: Dispatch, ui: UiState) -> None:
@@ -220,12 +220,12 @@ def _shift_by(right: float, down: float, forward: float) -> Action:
 
 def _next_region(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     ui.wanted_panel = REGIONS
-    ui.regions.look_at_next(len(session.regions.regions))
+    ui.regions.highlight_next(len(session.regions.regions))
 
 
 def _remove_region(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    if ui.regions.listed is not None and session.regions.can_mark:
-        dispatch(RemoveRegion(ui.regions.listed))
+    if ui.regions.highlighted is not None and session.regions.can_mark:
+        dispatch(RemoveRegion(ui.regions.highlighted))
 
 
 def _undo_mark(session: Any, dispatch: Dispatch, ui: UiState) -> None:
@@ -270,7 +270,7 @@ SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("_3", "3", "Show or hide residual anchors", COMPARE, _toggle_overlay("show_residual")),
     Shortcut("_4", "4", "Show or hide the point cloud", COMPARE, _toggle_overlay("show_points")),
     Shortcut("_5", "5", "Show or hide marked regions", COMPARE, _toggle_overlay("show_regions")),
-    Shortcut("m", "M", "Mark a sphere as static or moving; again for the other of the two", MARK, _choose_region),
+    Shortcut("m", "M", "Mark a sphere as static or moving; again to switch", MARK, _choose_region),
     Shortcut("enter", "Enter", "Mark the chosen sphere", MARK, _mark_chosen, needs_choosing=True),
     Shortcut("escape", "Escape", "Leave without marking", MARK, _leave_choosing, needs_choosing=True),
     Shortcut("minus", "-", "Smaller sphere", MARK, _grow_by(1 / GROWTH), **_STEERING, is_any_shift=True),
@@ -281,8 +281,8 @@ SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("down_arrow", "Ctrl+Down", "Sphere down", MARK, _shift_by(0, 1, 0), **_STEERING, is_ctrl=True),
     Shortcut("page_up", "Page Up", "Sphere farther away", MARK, _shift_by(0, 0, 1), **_STEERING),
     Shortcut("page_down", "Page Down", "Sphere nearer", MARK, _shift_by(0, 0, -1), **_STEERING),
-    Shortcut("n", "N", "Look at the next marked region", MARK, _next_region),
-    Shortcut("delete", "Delete", "Remove the region looked at", MARK, _remove_region),
+    Shortcut("n", "N", "Highlight the next marked region", MARK, _next_region),
+    Shortcut("delete", "Delete", "Remove the highlighted region", MARK, _remove_region),
     Shortcut("z", "Ctrl+Z", "Take back the last mark or removal", MARK, _undo_mark, is_ctrl=True),
     Shortcut("t", "T", "Train the next clip, pause or resume", TRAIN, _train),
     Shortcut("t", "Ctrl+T", "Stop training and keep what was learned", TRAIN, _stop_training, is_ctrl=True),

@@ -49,7 +49,7 @@ class UiState:
     Attributes:
         fonts: Loaded faces.
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
-        regions: The region that is being chosen, and the one looked at.
+        regions: The region that is being chosen, and the one that stands out.
         wanted_panel: Title of a panel that is to come to the front, or None.
         redraw_in_s: Shortest wait after which some panel wants to be drawn again, or None.
     """

@@ -9,7 +9,6 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.commands import RemoveRegion, UndoMark
 from ui import theme
-from ui.region_tool import RegionTool
 from ui.state import Dispatch, UiState
 from ui.theme import Icon
 from ui.widgets import chip, grouped, primary_button, text_wrapped_dim
@@ -30,13 +29,6 @@ def begin_choosing(session: Any, ui: UiState) -> None:
         ui.regions.leave()
 
 
-def mark_chosen(dispatch: Dispatch, ui: UiState) -> None:
-    """Mark the chosen sphere, if there is one."""
-    command = ui.regions.take()
-    if command is not None:
-        dispatch(command)
-
-
 def draw_regions(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     """Choosing, the list, the way back, and in which clips all of it takes effect."""
     status = session.regions
@@ -44,7 +36,7 @@ def draw_regions(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         text_wrapped_dim("What you mark as static or as moving is listed here when a capture is open.")
         return
     if ui.regions.is_active:
-        _draw_choice(dispatch, ui)
+        _draw_choice(ui)
     else:
         imgui.begin_disabled(not status.can_mark)
         if primary_button(f"{Icon.REGION}  Mark a region", ImVec2(imgui.get_content_region_avail().x, 36), ui):
@@ -75,7 +67,7 @@ def _warning(text: str) -> None:
     imgui.pop_text_wrap_pos()
 
 
-def _draw_choice(dispatch: Dispatch, ui: UiState) -> None:
+def _draw_choice(ui: UiState) -> None:
     """What the sphere means, how large it is, and the two ways to be done."""
     tool = ui.regions
     half = (imgui.get_content_region_avail().x - 8) / 2
@@ -105,7 +97,8 @@ def _draw_choice(dispatch: Dispatch, ui: UiState) -> None:
     imgui.set_item_tooltip("Scene units. The wheel over the picture does the same, and so do - and +.")
     imgui.begin_disabled(tool.sphere is None)
     if primary_button(f"{Icon.CHECK}  Mark it", ImVec2(half, 32), ui):
-        mark_chosen(dispatch, ui)
+        tool.is_accepted = True
+        ui.redraw_within(0.0)
     ui.mark("regions.accept")
     imgui.end_disabled()
     imgui.set_item_tooltip("Enter")
@@ -143,8 +136,8 @@ def _draw_row(index: int, region: Any, can_mark: bool, ui: UiState) -> bool:
     tool = ui.regions
     imgui.push_id(index)
     flags = imgui.SelectableFlags_.allow_overlap
-    if imgui.selectable("##region", tool.listed == index, flags, ImVec2(0, ROW_HEIGHT))[0]:
-        tool.listed = None if tool.listed == index else index
+    if imgui.selectable("##region", tool.highlighted == index, flags, ImVec2(0, ROW_HEIGHT))[0]:
+        tool.highlighted = None if tool.highlighted == index else index
     ui.mark(f"regions.row{index}")
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     draw = imgui.get_window_draw_list()
@@ -161,7 +154,7 @@ def _draw_row(index: int, region: Any, can_mark: bool, ui: UiState) -> bool:
     is_clicked = imgui.button(Icon.TRASH)
     ui.mark(f"regions.remove{index}")
     imgui.end_disabled()
-    imgui.set_item_tooltip("Remove this region (Delete removes the chosen one)")
+    imgui.set_item_tooltip("Remove this region (N highlights the next one, Delete removes it)")
     imgui.pop_id()
     return is_clicked
 
@@ -181,16 +174,16 @@ def draw_region_mark(draw: Any, middle: ImVec2, treat: str) -> None:
 def draw_chosen_sphere(ui: UiState, draw: Any, x: float, y: float, counts: dict[str, int]) -> None:
     """Over the picture: what is being chosen, what it holds, and the keys for it."""
     tool = ui.regions
-    color = theme.REGION_COLORS[tool.treat]
-    text = f"Mark as {REGION_WORDS[tool.treat]}:  radius {tool.radius:.3g}{_held_text(tool, counts)}"
-    chip(draw, x, y, text, color=color)
+    text = f"      Mark as {REGION_WORDS[tool.treat]}:  radius {tool.radius:.3g}{_held_text(counts)}"
+    chip(draw, x, y, text)
+    draw_region_mark(draw, ImVec2(x + 16, y + 12), tool.treat)
     place = "Click elsewhere moves it" if tool.is_placed else "Click fixes it"
     other = REGION_WORDS["dynamic" if tool.treat == "static" else "static"]
     keys = f"{place}   Wheel size   M {other} instead   Enter marks it   Esc leaves"
     chip(draw, x, y + 28, keys, color=theme.TEXT_DIM)
 
 
-def _held_text(tool: RegionTool, counts: dict[str, int]) -> str:
+def _held_text(counts: dict[str, int]) -> str:
     if not counts:
         return ""
     return ",  holds " + ", ".join(f"{grouped(n)} {role}" for role, n in counts.items()) + " anchors"

@@ -125,7 +125,7 @@ class ViewportPanel:
         panes = arrange(area, image_size, session.overlays.compare)
         self._navigate(session, dispatch, ui, panes)
         # Looking through a camera may just have ended; the picture then fills the area from the next frame on.
-        self._draw_picture(session, ui, area, panes)
+        self._draw_picture(session, dispatch, ui, area, panes)
         self._draw_hud(session, ui, area, panes)
 
     # ---- toolbar ---------------------------------------------------------------------------------------------
@@ -162,7 +162,7 @@ class ViewportPanel:
         self._draw_overlay_menu(session, dispatch, ui)
         imgui.same_line(0, 8)
         imgui.begin_disabled(not session.regions.can_mark)
-        if imgui.button(f"{Icon.REGION}  Mark"):
+        if _segment(f"{Icon.REGION}  Mark", ui.regions.is_active):
             if ui.regions.is_active:
                 ui.regions.leave()
             else:
@@ -251,7 +251,7 @@ class ViewportPanel:
 
     # ---- picture ---------------------------------------------------------------------------------------------
 
-    def _draw_picture(self, session: Any, ui: UiState, area: Rect, panes: Panes) -> None:
+    def _draw_picture(self, session: Any, dispatch: Dispatch, ui: UiState, area: Rect, panes: Panes) -> None:
         draw = imgui.get_window_draw_list()
         draw.push_clip_rect(area.low, area.high, True)
         pane = panes.rendered
@@ -268,9 +268,12 @@ class ViewportPanel:
             is_moving=self.is_moving,
         )
         self._aim(session, ui, view, pane, density)
+        command = ui.regions.take_accepted()
+        if command is not None:
+            dispatch(command)
         tool, shown = ui.regions, ShownRegions(sphere=ui.regions.sphere)
         if session.overlays.show_regions:
-            shown = ShownRegions(session.regions.regions, tool.listed, tool.sphere)
+            shown = ShownRegions(session.regions.regions, tool.highlighted, tool.sphere)
         composed = self.scene.compose(session, view, shown)
         draw.add_image(imgui.ImTextureRef(composed.texture.glo), pane.low, pane.high)
         if self.is_moving:
