@@ -40,13 +40,13 @@ def effect_text(started: Sequence[int], *, gate: str) -> str:
     """In which clips regions take effect. started: Clips whose training has started."""
     if gate == "off":
         return "Without effect here: the clips of this project are trained without a gate (gate=off)."
-    text = "A clip takes what is marked when its training starts."
+    text = "What is marked counts in clips whose training starts from now on."
     if not started:
         return text
     names = _clip_names(sorted(started))
     if len(started) == 1:
-        return f"{text} {names} has started already and stays as it is until it is trained again."
-    return f"{text} {names} have started already and stay as they are until they are trained again."
+        return f"{text} {names} has started already: it stays as it is until it is trained again."
+    return f"{text} {names} have started already: they stay as they are until they are trained again."
 
 
 def _clip_names(indices: Sequence[int]) -> str:

@@ -21,7 +21,7 @@ from ui.region_lines import region_lines
 
 MAX_ANCHORS = 1_500
 """At most this many of the anchors in the sphere are shown."""
-THIN_PX, THICK_PX, HALO_PX = 1.5, 2.5, 3.0
+THIN_PX, THICK_PX, HALO_PX = 1.8, 3.0, 3.0
 """Widths of lines; a dark one that is wider by the last lies under each, so that they show on any picture."""
 DARK = np.array([0.03, 0.04, 0.05, 1.0], np.float32)
 

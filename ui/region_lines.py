@@ -10,8 +10,12 @@ import numpy as np
 from engine.cloud.regions import GateRegion
 from ui.colors import REGION_COLORS
 
-N_SEGMENTS, N_EDGE_SEGMENTS, N_DASH = 64, 24, 4
-"""Of a circle, of an edge of a box, of a dash; gaps are as long as dashes."""
+N_SEGMENTS, N_EDGE_SEGMENTS = 64, 24
+"""Of a circle, and of an edge of a box."""
+N_SMALL_DASH, N_LARGE_DASH = 4, 2
+"""Segments of a dash, and of the gap after it, for regions that look small and for large ones."""
+LARGE_SHARE = 0.1
+"""What is larger than this share of its distance looks large."""
 BACK_ALPHA = 0.35
 
 
@@ -27,10 +31,13 @@ def region_lines(region: GateRegion, eye: np.ndarray, *, is_fine: bool = False) 
     """
     paths = _circles(region, is_fine=is_fine) if region.radius > 0.0 else _edges(region)
     segments = np.stack([paths[:, :-1], paths[:, 1:]], axis=2)  # [paths, segments, 2, 3]
-    if region.treat == "dynamic":
-        segments = segments[:, np.arange(segments.shape[1]) % (2 * N_DASH) < N_DASH]
-    vertices = segments.reshape(-1, 3)
     center = np.array(region.center)
+    if region.treat == "dynamic":
+        size = 0.5 * float(np.min(np.array(region.high) - np.array(region.low)))
+        is_large = size > LARGE_SHARE * float(np.linalg.norm(np.asarray(eye) - center))
+        n = N_LARGE_DASH if is_large else N_SMALL_DASH
+        segments = segments[:, np.arange(segments.shape[1]) % (2 * n) < n]
+    vertices = segments.reshape(-1, 3)
     is_behind = ((vertices - center) * (np.asarray(eye) - center)).sum(axis=1) < 0.0
     colors = np.tile(np.array(REGION_COLORS[region.treat], np.float32), (len(vertices), 1))
     colors[is_behind, 3] *= BACK_ALPHA

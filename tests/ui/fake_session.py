@@ -117,7 +117,9 @@ class FakeSession:
         self.clip_states = [ClipStatus() for _ in self.clips]
         self.timeline = Timeline(self.clips, fps=capture.fps)
         self.view = OrbitView(capture.rig)
-        self.regions = RegionsStatus(can_mark=True, effect="A clip takes what is marked when its training starts.")
+        self.regions = RegionsStatus(
+            can_mark=True, effect="What is marked counts in clips whose training starts from now on."
+        )
 
     def dispatch(self, command: Any) -> None:
         """Record the command; carry out what needs no worker."""

@@ -147,10 +147,12 @@ def test_escape_leaves_without_marking_and_keys_of_choosing_do_nothing_then(pilo
     assert tool(pilot).is_active, "Escape closes the sheet first"
     pilot.key(key.ESCAPE)
     assert not tool(pilot).is_active
+    radius = tool(pilot).radius
     for symbol in (key.RETURN, key.ESCAPE, key.MINUS, key.PAGEUP, key.DELETE, key.N):
         pilot.key(symbol)
     pilot.key(key.Z, modifiers=(CTRL,))
     assert pilot.session.commands == []
+    assert (tool(pilot).radius, tool(pilot).is_accepted) == (radius, False)
 
 
 def test_enter_in_the_same_moment_as_a_move_marks_where_the_pointer_is(pilot: Pilot) -> None:

@@ -9,7 +9,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.commands import RemoveRegion, UndoMark
 from ui import theme
-from ui.state import Dispatch, UiState
+from ui.state import Dispatch, Rect, UiState
 from ui.theme import Icon
 from ui.widgets import chip, grouped, primary_button, text_wrapped_dim
 
@@ -171,16 +171,17 @@ def draw_region_mark(draw: Any, middle: ImVec2, treat: str) -> None:
         draw.path_stroke(color, thickness=2)
 
 
-def draw_chosen_sphere(ui: UiState, draw: Any, x: float, y: float, counts: dict[str, int]) -> None:
-    """Over the picture: what is being chosen, what it holds, and the keys for it."""
+def draw_chosen_sphere(ui: UiState, draw: Any, area: Rect, counts: dict[str, int]) -> None:
+    """Over the picture, from the upper left corner of an area: what is being chosen, what it holds, and the keys."""
     tool = ui.regions
     text = f"      Mark as {REGION_WORDS[tool.treat]}:  radius {tool.radius:.3g}{_held_text(counts)}"
-    chip(draw, x, y, text)
-    draw_region_mark(draw, ImVec2(x + 16, y + 12), tool.treat)
+    chip(draw, area.x0, area.y0, text)
+    draw_region_mark(draw, ImVec2(area.x0 + 16, area.y0 + 12), tool.treat)
     place = "Click elsewhere moves it" if tool.is_placed else "Click fixes it"
     other = REGION_WORDS["dynamic" if tool.treat == "static" else "static"]
     keys = f"{place}   Wheel size   M {other} instead   Enter marks it   Esc leaves"
-    chip(draw, x, y + 28, keys, color=theme.TEXT_DIM)
+    if imgui.calc_text_size(keys).x + 30 < area.width:  # the panel says it too
+        chip(draw, area.x0, area.y0 + 28, keys, color=theme.TEXT_DIM)
 
 
 def _held_text(counts: dict[str, int]) -> str:

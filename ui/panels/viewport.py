@@ -367,8 +367,9 @@ class ViewportPanel:
             chip(draw, x, area.y1 - 34, f"{Icon.CLOCK}  stale", color=theme.YELLOW)
         self._draw_legend(session, draw, area)
         if ui.regions.is_active:
-            is_labelled = panes.captured is not None
-            draw_chosen_sphere(ui, draw, area.x0 + 12, area.y0 + (44 if is_labelled else 12), self.scene.regions.counts)
+            below_label = 44 if panes.captured is not None else 12
+            free = Rect(area.x0 + 12, area.y0 + below_label, area.x1, area.y1)
+            draw_chosen_sphere(ui, draw, free, self.scene.regions.counts)
 
     def _note(self, session: Any) -> tuple[str, theme.Color] | None:
         clip = session.timeline.clip_of(session.timeline.frame_index)
