@@ -4,6 +4,7 @@ the clips it reaches. `Marking` keeps the list of the open project; its files ar
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -12,6 +13,8 @@ from app.project import Project
 from app.status import ClipStatus, RegionsStatus
 from engine.cloud.regions import GateRegion, sphere_region
 from engine.errors import EngineError, ProjectError
+
+logger = logging.getLogger(__name__)
 
 STARTED = ("preparing", "training", "paused", "trained")
 """States of clips that have taken their regions already."""
@@ -98,7 +101,7 @@ class Marking:
 
     def leave(self) -> None:
         """Let go of the project once everything is kept."""
-        self.settle()
+        self._settle_for_good()
         self._files.forget()
         self._project, self._regions, self._past = None, (), []
         self._awaited, self._problem = None, ""
@@ -189,8 +192,14 @@ class Marking:
 
     def close(self) -> None:
         """Keep what was marked, end the thread."""
-        self.settle()
+        self._settle_for_good()
         self._files.close()
+
+    def _settle_for_good(self) -> None:
+        self.settle()
+        found = self._files.take_error()
+        if found is not None:  # nobody will ask any more
+            logger.error("the marked regions could not be read or kept: %s", found[1])
 
     # ---------------------------------------------------------------- status
 

@@ -34,17 +34,9 @@ from app.status import (
     RegionsStatus,
     TrainingStatus,
 )
+from app.telling import tell
 from app.timeline import Timeline
-from app.training.messages import (
-    ClipTrained,
-    Event,
-    SnapshotWritten,
-    TrainingFailed,
-    TrainingStopped,
-    TrainJob,
-    WarningRaised,
-    WorkerDied,
-)
+from app.training.messages import ENDINGS, Event, SnapshotWritten, TrainJob
 from app.training.process import ProcessWorker, Worker
 from app.training.service import ClipProgress, Launch, TrainingService
 from app.view import OrbitView
@@ -350,7 +342,7 @@ class Session:
         has_changed = self._jobs.poll()
         if self._service is not None:
             for event in self._service.poll():
-                self._tell(event)
+                self._take_event(event)
                 has_changed = True
         self._release_snapshot()
         has_changed |= self._marking.poll()
@@ -368,32 +360,11 @@ class Session:
         statuses = [(job.name, job.done, job.message) for job in self.jobs]
         return (*(None if found is None else found[0] for found in newest), *statuses, self.notices.revision)
 
-    def _tell(self, event: Event) -> None:
-        """Turn what the user should know into notices."""
-        match event:
-            case SnapshotWritten():
-                self._unread = event
-            case ClipTrained(path=path, held_out_psnr=psnr):
-                figure = "" if psnr is None else f"Held-out PSNR {psnr:.1f} dB."
-                self.notices.add("info", f"Clip {int(Path(path).stem)} is trained", figure)
-            case TrainingStopped(path=path, step=step):
-                detail = f"What was learned in {step} steps is kept." if path else "Nothing was learned yet."
-                self.notices.add("info", "Training stopped", detail)
-            case WarningRaised(title=title, detail=detail, hint=hint):
-                self.notices.add("warn", title, detail, hint)
-            case TrainingFailed(message=message, hint=hint):
-                self.notices.add("error", "Training failed", message, hint)
-            case WorkerDied(exit_code=exit_code, log_tail=log_tail):
-                last = log_tail.splitlines()[-1] if log_tail else "Its log is empty."
-                self.notices.add(
-                    "error",
-                    "The training process ended unexpectedly",
-                    f"{_exit_words(exit_code)} {last}",
-                    "Train the clip again; it goes on from what was kept.",
-                )
-            case _:
-                return
-        if isinstance(event, ClipTrained | TrainingStopped | TrainingFailed | WorkerDied):
+    def _take_event(self, event: Event) -> None:
+        tell(event, self.notices)
+        if isinstance(event, SnapshotWritten):
+            self._unread = event
+        elif isinstance(event, ENDINGS):
             self._unread = None
 
     def _release_snapshot(self) -> None:
@@ -585,9 +556,3 @@ def _compute_points(request: PointsRequest) -> PointArrays:
         return static_points(request.path, request.revision)
     assert request.capture is not None
     return picture_hint(request.capture, 0)
-
-
-def _exit_words(exit_code: int | None) -> str:
-    if exit_code is not None and exit_code < 0:
-        return f"It was ended by signal {-exit_code}{' (often: not enough memory)' if exit_code == -9 else ''}."
-    return f"Its exit code was {exit_code}." if exit_code is not None else ""
