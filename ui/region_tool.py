@@ -13,6 +13,8 @@ from app.commands import MarkRegion
 from engine.capture.rig import CameraRig
 from engine.cloud.regions import GateRegion, sphere_region
 
+REGION_WORDS = {"static": "static", "dynamic": "moving"}
+"""How the window calls the two treatments of engine.cloud.regions."""
 FIRST_RADIUS_SHARE = 0.05
 """Radius of the first sphere, as a share of its distance from the eye."""
 SMALLEST_SHARE, LARGEST_SHARE = 1e-3, 2.0

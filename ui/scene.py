@@ -297,7 +297,7 @@ class Scene:
     def anchor_text(self, session: Any, view: SceneView, x: float, y: float) -> str:
         """What the anchor under a pixel of the view is and why; empty where none is shown or nobody says."""
         found = self._mark_under(session, view, x, y)
-        return "" if found is None else found[0].text(found[1])
+        return "" if found is None else found[0].text(found[1], session.regions.regions)
 
     def _mark_under(self, session: Any, view: SceneView, x: float, y: float) -> tuple[AnchorMarks, int] | None:
         if self._marks is None:

@@ -9,13 +9,12 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.commands import RemoveRegion, UndoMark
 from ui import theme
+from ui.region_tool import REGION_WORDS
 from ui.state import Dispatch, Rect, UiState
 from ui.theme import Icon
 from ui.widgets import chip, grouped, primary_button, text_wrapped_dim
 
 TITLE = "Regions"
-REGION_WORDS = {"static": "static", "dynamic": "moving"}
-"""How the window calls the two treatments of engine.cloud.regions."""
 MEANINGS = {"static": "Nothing moves or changes in here.", "dynamic": "Everything in here may move or change."}
 ROW_HEIGHT = 44.0
 

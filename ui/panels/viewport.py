@@ -15,10 +15,10 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from app.commands import LookThrough, ToggleOverlay
 from app.status import COMPARE_MODES
 from ui import theme
-from ui.panels.regions import REGION_WORDS, begin_choosing, draw_chosen_sphere, draw_region_mark
+from ui.panels.regions import begin_choosing, draw_chosen_sphere, draw_region_mark
 from ui.panels.welcome import draw_welcome
 from ui.region_layer import ShownRegions
-from ui.region_tool import GROWTH
+from ui.region_tool import GROWTH, REGION_WORDS
 from ui.scene import Scene, SceneView
 from ui.shortcuts import set_compare, shown_compare
 from ui.state import Dispatch, Rect, UiState
