@@ -80,7 +80,7 @@ class SetCompare:
 
 @dataclass(frozen=True, slots=True)
 class ToggleOverlay:
-    """Switch one of the overlays: show_frusta, show_inherited, show_residual, show_points."""
+    """Switch one of the overlays: show_frusta, show_inherited, show_residual, show_points, show_regions."""
 
     name: str
 
@@ -115,6 +115,30 @@ class SetPreset:
 
 
 @dataclass(frozen=True, slots=True)
+class MarkRegion:
+    """Mark a sphere in which everything counts as static or dynamic, in clips whose training starts from now on."""
+
+    treat: str
+    """"static" or "dynamic"."""
+    center: tuple[float, float, float]
+    """Scene units."""
+    radius: float
+    """Scene units."""
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveRegion:
+    """Forget the marked region at this position of the list."""
+
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class UndoMark:
+    """Take back the last region that was marked or removed since the project was opened."""
+
+
+@dataclass(frozen=True, slots=True)
 class HomeView:
     """Frame the point that the cameras look at."""
 
@@ -143,6 +167,9 @@ Command = (
     | SetClipLength
     | SetTrainSetting
     | SetPreset
+    | MarkRegion
+    | RemoveRegion
+    | UndoMark
     | HomeView
     | DismissNotice
 )

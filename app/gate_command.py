@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from app.arguments import EXIT_OK
+from app.marking import after_marking, effect_text, region_text
 from app.project import Project, open_project
 from app.training.service import Launch
 from engine.cloud.reasons import REASONS
-from engine.cloud.regions import GateRegion, parse_region
+from engine.cloud.regions import parse_region
 from engine.model.clip_state import ClipState, read_clip_state
 
 SCHEMA = 1
@@ -57,7 +58,8 @@ def gate(options: argparse.Namespace, launch: Launch) -> int:
     project = open_project(options.project, is_writable=is_change)
     try:
         if is_change:
-            project.set_gate_regions([*(() if options.forget else project.gate_regions()), *marks])
+            kept = () if options.forget else project.gate_regions()
+            project.set_gate_regions(after_marking(kept, marks))
         found = describe_gate(project)
     finally:
         project.close()
@@ -105,20 +107,12 @@ def _reasons(state: ClipState) -> dict[str, int]:
 def gate_lines(found: dict[str, Any]) -> list[str]:
     """The same as text."""
     lines = [f"{found['path']}: gate={found['gate']}"]
-    lines += [f"  marked: {_region_text(parse_region(values))}" for values in found["regions"]]
+    lines += [f"  marked: {region_text(parse_region(values))}" for values in found["regions"]]
+    if found["regions"]:
+        lines.append(f"  {effect_text([clip['clip_index'] for clip in found['clips']], gate=found['gate'])}")
     for clip in found["clips"]:
         sets = ", ".join(f"{n} {name}" for name, n in clip["sets"].items()) or "no"
         hidden = f"; {clip['n_hidden']} inherited static anchors are replaced" if clip["n_hidden"] else ""
         lines.append(f"{clip['role']} {clip['clip_index']}: {sets} anchors of its own{hidden}")
         lines += [f"  {n:>7}  {words}" for words, n in clip["reasons"].items()]
     return lines
-
-
-def _region_text(region: GateRegion) -> str:
-    def point(values: tuple[float, float, float]) -> str:
-        return "(" + ", ".join(f"{value:g}" for value in values) + ")"
-
-    if region.radius > 0.0:
-        x, y, z = (0.5 * (a + b) for a, b in zip(region.low, region.high, strict=True))
-        return f"{region.treat} in the sphere of {region.radius:g} around {point((x, y, z))}"
-    return f"{region.treat} in the box from {point(region.low)} to {point(region.high)}"

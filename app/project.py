@@ -160,14 +160,26 @@ class Project:
         """
         return self.training_order(clip_index)[-1]
 
+    def check_writable(self) -> None:
+        """See that this process may change the project.
+
+        Raises:
+            ProjectError: It may not.
+        """
+        if not self.is_writable:
+            raise ProjectError(
+                "The project is open for reading only, because another program trains into it.",
+                hint="Close it there first, then open it again.",
+                path=self.folder,
+            )
+
     def update(self, settings: ProjectSettings) -> None:
         """Replace the settings, on disk first.
 
         Raises:
             ProjectError: The project is read-only, or the disk refused.
         """
-        if not self.is_writable:
-            raise ProjectError("The project is open for reading only.", path=self.folder)
+        self.check_writable()
         _write_json(self.folder / PROJECT_FILE, asdict(settings))
         self.settings = settings
 
@@ -196,8 +208,7 @@ class Project:
         Raises:
             ProjectError: The project is read-only, or the disk refused.
         """
-        if not self.is_writable:
-            raise ProjectError("The project is open for reading only.", path=self.folder)
+        self.check_writable()
         _write_json(self.folder / GATE_FILE, {"regions": [region.as_dict() for region in regions]})
 
     def discard_progress(self, clip_index: int) -> None:

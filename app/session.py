@@ -12,38 +12,38 @@ from typing import Any
 
 from app import commands
 from app.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
-from app.bench.speed import known_machine_speed
 from app.jobs import Job, JobContext, Jobs
 from app.latest import LatestWorker
+from app.marking import Marking
+from app.next_plan import NextPlan
 from app.notices import Notices
 from app.opening import Opened, open_for_window
 from app.pictures import CapturedPictures
-from app.planning import plan_clip, plan_status
 from app.playback import FrameRequest, Playback, ShownFrame, static_points
 from app.preview import make_cloud, picture_hint, read_cloud
 from app.project import Project, check_settings
 from app.render import Renderer
 from app.settings import Settings
-from app.status import COMPARE_MODES, OVERLAY_NAMES, ClipStatus, JobStatus, Overlays, PlanStatus, TrainingStatus
-from app.timeline import Timeline
-from app.training.messages import (
-    ClipTrained,
-    Event,
-    SnapshotWritten,
-    TrainingFailed,
-    TrainingStopped,
-    WarningRaised,
-    WorkerDied,
+from app.status import (
+    COMPARE_MODES,
+    OVERLAY_NAMES,
+    ClipStatus,
+    JobStatus,
+    Overlays,
+    PlanStatus,
+    RegionsStatus,
+    TrainingStatus,
 )
-from app.training.process import ProcessWorker
+from app.telling import tell
+from app.timeline import Timeline
+from app.training.messages import ENDINGS, Event, SnapshotWritten, TrainJob
+from app.training.process import ProcessWorker, Worker
 from app.training.service import ClipProgress, Launch, TrainingService
 from app.view import OrbitView
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.capture.rig import CameraRig
 from engine.errors import EngineError
-from engine.training.forecasting import UNKNOWN_MACHINE
-from engine.training.plan import TrainingPlan
 from engine.training.presets import preset
 
 logger = logging.getLogger(__name__)
@@ -59,30 +59,14 @@ class PointsRequest:
     capture: Capture | None = field(default=None, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
-class PlanRequest:
-    """The next clip, to be planned.
-
-    Attributes:
-        basis: What the plan depends on: settings, and which clips are trained.
-        can_measure: Whether nothing else computes, so that the machine may be timed.
-    """
-
-    clip: Clip
-    basis: tuple[str, ...]
-    can_measure: bool
-    project: Project = field(compare=False)
-    capture: Capture = field(compare=False)
-
-
 class Session:
     """Everything the program knows while it runs.
 
     Attributes:
         capture, project: What is open; None before.
         timeline, view, overlays: What the user looks at; the window may change them directly.
-        training, clip_states, plan: Status values, remade by `poll` and `dispatch`. The plan is that of the next clip;
-            None while something trains or nothing is left to train.
+        training, clip_states, plan, regions: Status values, remade by `poll` and `dispatch`. The plan is that of the
+            next clip; None while something trains or nothing is left to train.
         notices: What the user has to know.
         holdout: Camera indices that training never sees.
 
@@ -124,7 +108,9 @@ class Session:
         self._renderer = Renderer()
         self._pictures = CapturedPictures()
         self._points: LatestWorker[PointsRequest, PointArrays] = LatestWorker("points", _compute_points)
-        self._plans: LatestWorker[PlanRequest, TrainingPlan | None] = LatestWorker("plans", _compute_plan)
+        self._next_plan = NextPlan()
+        self._marking = Marking()
+        self.regions: RegionsStatus = self._marking.status([])
         self._unread: SnapshotWritten | None = None
         self._anchor_counts: dict[int, tuple[int, int]] = {}
         self._seen: tuple[object, ...] = ()
@@ -204,6 +190,12 @@ class Session:
                 self._change_overrides(lambda overrides: overrides | {name: value})
             case commands.SetPreset(name=name):
                 self._change_overrides(lambda _: preset(name))
+            case commands.MarkRegion(treat=treat, center=center, radius=radius):
+                self._marking.mark(treat, center, radius)
+            case commands.RemoveRegion(index=index):
+                self._marking.remove(index)
+            case commands.UndoMark():
+                self._marking.undo()
             case commands.HomeView():
                 self.view.home()
             case commands.DismissNotice(index=index):
@@ -277,6 +269,7 @@ class Session:
         self._retire()
         self.capture, self.project = opened.capture, opened.project
         self.view = OrbitView(opened.capture.rig)
+        self._marking.open(opened.project)
         self._take_clips(opened.capture, opened.project)
         self.settings.add_recent(opened.capture.path)
         for sentence in opened.capture.warnings:
@@ -308,14 +301,19 @@ class Session:
         self.timeline.seek(frame_index if self._service is not None else 0)
         known = [name for name in project.settings.holdout if name in capture.rig.names]
         self.holdout = tuple(capture.camera_indices(known))
-        self._service = TrainingService(project, self.timeline.clips, holdout=self.holdout, launch=self._launch)
+        self._service = TrainingService(project, self.timeline.clips, holdout=self.holdout, launch=self._launch_worker)
+
+    def _launch_worker(self, job: TrainJob, project: Project) -> Worker:
+        self._marking.settle()  # a region marked a moment ago is meant to count
+        return self._launch(job, project)
 
     def _retire(self) -> None:
         """Let go of what was open; a training still running is ended on a thread, keeping what it learned."""
         for store in (self._playback, self._renderer, self._pictures):
             store.clear()
         self._points.forget()
-        self._plans.forget()
+        self._next_plan.forget()
+        self._marking.leave()
         if self._first_cloud is not None:
             self._first_cloud.context.cancel()
         self._unread, self._anchor_counts = None, {}
@@ -344,9 +342,10 @@ class Session:
         has_changed = self._jobs.poll()
         if self._service is not None:
             for event in self._service.poll():
-                self._tell(event)
+                self._take_event(event)
                 has_changed = True
         self._release_snapshot()
+        has_changed |= self._marking.poll()
         self._collect_errors()
         seen = self._finished_keys()
         has_changed |= seen != self._seen
@@ -357,36 +356,15 @@ class Session:
 
     def _finished_keys(self) -> tuple[object, ...]:
         workers = (self._playback.worker, self._renderer.worker, self._pictures.viewing, self._pictures.thumbnails)
-        newest = [worker.newest for worker in workers] + [self._points.newest, self._plans.newest]
+        newest = [worker.newest for worker in (*workers, self._points, self._next_plan)]
         statuses = [(job.name, job.done, job.message) for job in self.jobs]
         return (*(None if found is None else found[0] for found in newest), *statuses, self.notices.revision)
 
-    def _tell(self, event: Event) -> None:
-        """Turn what the user should know into notices."""
-        match event:
-            case SnapshotWritten():
-                self._unread = event
-            case ClipTrained(path=path, held_out_psnr=psnr):
-                figure = "" if psnr is None else f"Held-out PSNR {psnr:.1f} dB."
-                self.notices.add("info", f"Clip {int(Path(path).stem)} is trained", figure)
-            case TrainingStopped(path=path, step=step):
-                detail = f"What was learned in {step} steps is kept." if path else "Nothing was learned yet."
-                self.notices.add("info", "Training stopped", detail)
-            case WarningRaised(title=title, detail=detail, hint=hint):
-                self.notices.add("warn", title, detail, hint)
-            case TrainingFailed(message=message, hint=hint):
-                self.notices.add("error", "Training failed", message, hint)
-            case WorkerDied(exit_code=exit_code, log_tail=log_tail):
-                last = log_tail.splitlines()[-1] if log_tail else "Its log is empty."
-                self.notices.add(
-                    "error",
-                    "The training process ended unexpectedly",
-                    f"{_exit_words(exit_code)} {last}",
-                    "Train the clip again; it goes on from what was kept.",
-                )
-            case _:
-                return
-        if isinstance(event, ClipTrained | TrainingStopped | TrainingFailed | WorkerDied):
+    def _take_event(self, event: Event) -> None:
+        tell(event, self.notices)
+        if isinstance(event, SnapshotWritten):
+            self._unread = event
+        elif isinstance(event, ENDINGS):
             self._unread = None
 
     def _release_snapshot(self) -> None:
@@ -410,6 +388,7 @@ class Session:
             (self._pictures.viewing, "A captured picture cannot be shown"),
             (self._pictures.thumbnails, "A captured picture cannot be shown"),
             (self._points, "The cloud cannot be shown"),
+            (self._marking, "The marked regions could not be read or kept"),
         )
         for worker, title in sources:
             found = worker.take_error()
@@ -443,6 +422,7 @@ class Session:
         """Remake the status values."""
         if self._service is None:
             self.training, self.clip_states, self.plan = TrainingStatus(), [], None
+            self.regions = self._marking.status([])
             return
         clip = self.timeline.clip
         if clip is not None:
@@ -453,33 +433,18 @@ class Session:
                 self._anchor_counts[clip.clip_index] = counts
         self.training = self._service.status(None if clip is None else clip.clip_index)
         self.clip_states = self._service.clip_statuses(self._anchor_counts)
-        self.plan = self._next_plan(self._service)
-
-    def _next_plan(self, service: TrainingService) -> PlanStatus | None:
-        """What the next clip would take; its figures come a moment later, from a thread."""
-        project, capture, clip_index = self.project, self.capture, service.next_clip_index
-        if project is None or capture is None or clip_index is None or service.worker is not None:
-            return None
-        clip = service.clips[clip_index]
-        trained = (f"{i}: {known.revision}" for i, known in enumerate(service.progress) if known.state == "trained")
-        basis = (repr(project.settings), *trained)
-        request = PlanRequest(clip, basis, self._is_preloading and not self.jobs, project, capture)
-        newest, plan = self._plans.newest, None
-        if newest is None or newest[0] != request:
-            self._plans.request(request)
-        if newest is not None and (newest[0].clip, newest[0].basis) == (
-            clip,
-            basis,
-        ):  # shown until the machine is timed
-            plan = newest[1]
-        can_edit = project.is_writable and not project.has_progress
-        return plan_status(project, capture, clip, plan, can_edit=can_edit)
+        self.regions = self._marking.status(self.clip_states)
+        self.plan = None
+        if self.project is not None and self.capture is not None:
+            can_measure = self._is_preloading and not self.jobs
+            self.plan = self._next_plan.status(self._service, self.project, self.capture, can_measure=can_measure)
 
     def close(self) -> None:
         """End workers and threads, keeping what was learned. Blocks for a few seconds at most. May be called twice."""
         if self._is_closed:
             return
         self._is_closed = True
+        self._marking.close()
         if self._service is not None:
             self._service.close()
         if self.project is not None:
@@ -487,7 +452,7 @@ class Session:
         self._jobs.close(timeout_s=6.0 if self._closing else 1.0)
         for worker in (self._playback, self._renderer, self._pictures, self._points):
             worker.close()
-        self._plans.close(timeout_s=0.2)  # it may be waiting for a child process that times the machine
+        self._next_plan.close()
         if self.capture is not None:
             self.capture.close()
 
@@ -578,6 +543,9 @@ _TITLES: dict[type, str] = {
     commands.SetClipLength: "The clip length cannot be changed",
     commands.SetTrainSetting: "The setting cannot be changed",
     commands.SetPreset: "The preset cannot be taken",
+    commands.MarkRegion: "The region cannot be marked",
+    commands.RemoveRegion: "The region cannot be removed",
+    commands.UndoMark: "The last mark cannot be taken back",
 }
 
 
@@ -588,18 +556,3 @@ def _compute_points(request: PointsRequest) -> PointArrays:
         return static_points(request.path, request.revision)
     assert request.capture is not None
     return picture_hint(request.capture, 0)
-
-
-def _compute_plan(request: PlanRequest) -> TrainingPlan | None:
-    measure = known_machine_speed if request.can_measure else lambda: UNKNOWN_MACHINE
-    try:
-        return plan_clip(request.project, request.capture, request.clip, measure_machine=measure)
-    except EngineError as error:  # training will say the same
-        logger.info("the next clip cannot be planned: %s", error)
-        return None
-
-
-def _exit_words(exit_code: int | None) -> str:
-    if exit_code is not None and exit_code < 0:
-        return f"It was ended by signal {-exit_code}{' (often: not enough memory)' if exit_code == -9 else ''}."
-    return f"Its exit code was {exit_code}." if exit_code is not None else ""

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-OVERLAY_NAMES = ("show_frusta", "show_inherited", "show_residual", "show_points")
+from engine.cloud.regions import GateRegion
+
+OVERLAY_NAMES = ("show_frusta", "show_inherited", "show_residual", "show_points", "show_regions")
 COMPARE_MODES = ("off", "wipe", "side")
 
 
@@ -22,6 +24,7 @@ class Overlays:
     show_inherited: bool = False
     show_residual: bool = False
     show_points: bool = True
+    show_regions: bool = True
     compare: str = "off"
     wipe_position: float = 0.5
 
@@ -121,6 +124,25 @@ class PlanStatus:
     preset: str = ""
     settings: tuple[SettingStatus, ...] = ()
     can_edit: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class RegionsStatus:
+    """Where the user says what is static and what moves.
+
+    Attributes:
+        regions: As they are kept in the project; later ones overrule earlier ones.
+        can_mark: Whether a region can be marked or removed now.
+        why_not: The reason if it cannot, and what to do.
+        can_undo: Whether there is a mark or a removal to take back.
+        effect: In which clips they take effect.
+    """
+
+    regions: tuple[GateRegion, ...] = ()
+    can_mark: bool = False
+    why_not: str = ""
+    can_undo: bool = False
+    effect: str = ""
 
 
 @dataclass(frozen=True, slots=True)

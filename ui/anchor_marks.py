@@ -5,13 +5,16 @@ Colour says what an anchor is (static, moving, promoted, residual, replacing), s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from engine.cloud.reasons import NO_REASON, reason_text
+from engine.cloud.reasons import NO_REASON, USER_DYNAMIC, USER_STATIC, reason_text
+from engine.cloud.regions import GateRegion, marked
 from engine.model.roles import ROLES
 from ui.colors import ROLE_COLORS, Color
+from ui.region_tool import REGION_WORDS
 
 REACH_PX = 7.0
 """A mark this near to the pointer is the one that is meant."""
@@ -41,13 +44,21 @@ class AnchorMarks:
     reasons: np.ndarray | None
     counts: dict[str, int]
 
-    def text(self, row: int) -> str:
-        """What an anchor is and why, in one or two lines; empty where nobody says."""
+    def text(self, row: int, regions: Sequence[GateRegion] = ()) -> str:
+        """What an anchor is and why, in one to three lines; empty where nobody says.
+
+        Args:
+            regions: What is marked by now; the clip may have been trained before.
+        """
         if self.roles is None:
             return ""
         lines = [_WORDS[ROLES[int(self.roles[row])]]]
-        reason = reason_text(NO_REASON if self.reasons is None else int(self.reasons[row]))
-        return "\n".join([*lines, reason] if reason else lines)
+        code = NO_REASON if self.reasons is None else int(self.reasons[row])
+        lines += [reason_text(code)] if reason_text(code) else []
+        for treat, reason in (("static", USER_STATIC), ("dynamic", USER_DYNAMIC)):
+            if code != reason and marked(self.positions[row : row + 1], regions, treat)[0]:
+                lines.append(f"in a region marked as {REGION_WORDS[treat]}, which counts from the next training on")
+        return "\n".join(lines)
 
     def at(self, world_to_camera: np.ndarray, K: np.ndarray, x: float, y: float, *, near: float) -> int | None:
         """The mark under the pointer, the nearest to the camera of those within reach; None where there is none.
@@ -57,12 +68,19 @@ class AnchorMarks:
             K: Of the picture in which x and y are pixels. [3, 3]
             near: Nearest depth that is drawn, scene units.
         """
-        points = self.positions @ world_to_camera[:3, :3].T + world_to_camera[:3, 3]
-        depths = np.maximum(points[:, 2], 1e-9)
-        dx = K[0, 0] * points[:, 0] / depths + K[0, 2] - x
-        dy = K[1, 1] * points[:, 1] / depths + K[1, 2] - y
-        rows = np.flatnonzero((points[:, 2] > near) & (dx * dx + dy * dy <= REACH_PX**2))
-        return int(rows[np.argmin(depths[rows])]) if len(rows) else None
+        return nearest_under(self.positions, world_to_camera, K, x, y, near=near)
+
+
+def nearest_under(
+    positions: np.ndarray, world_to_camera: np.ndarray, K: np.ndarray, x: float, y: float, *, near: float
+) -> int | None:
+    """Row of the position under a pixel, see `AnchorMarks.at`. positions: [N, 3]"""
+    points = positions @ world_to_camera[:3, :3].T + world_to_camera[:3, 3]
+    depths = np.maximum(points[:, 2], 1e-9)
+    dx = K[0, 0] * points[:, 0] / depths + K[0, 2] - x
+    dy = K[1, 1] * points[:, 1] / depths + K[1, 2] - y
+    rows = np.flatnonzero((points[:, 2] > near) & (dx * dx + dy * dy <= REACH_PX**2))
+    return int(rows[np.argmin(depths[rows])]) if len(rows) else None
 
 
 def anchor_marks(

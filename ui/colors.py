@@ -28,7 +28,9 @@ RESIDUAL = ORANGE
 """Residual anchors; drawn as diamonds."""
 ROLE_COLORS = {"static": SKY, "moving": GREEN, "promoted": VERMILLION, "residual": ORANGE, "replacing": VERMILLION}
 """Anchors by what they are (engine.model.roles); replacing ones are promoted ones of one clip, drawn as diamonds."""
+REGION_COLORS = {"static": SKY, "dynamic": VERMILLION}
+"""Regions that the user marks, like the anchors they make; drawn with whole lines and with dashes."""
 HELD_OUT = PURPLE
 """Cameras that training never sees."""
 CHOSEN = YELLOW
-"""The camera that is looked through."""
+"""The camera that is looked through, and anchors in a region that is being chosen."""

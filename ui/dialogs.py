@@ -16,7 +16,7 @@ from imgui_bundle import portable_file_dialogs as native
 
 from app.commands import OpenCapture
 from ui import theme
-from ui.shortcuts import MOUSE_HELP, SHORTCUTS
+from ui.shortcuts import MOUSE_HELP, SHORTCUTS, TIME, VIEW, WINDOW
 from ui.state import Dispatch, UiState
 from ui.widgets import text_wrapped_dim
 
@@ -144,19 +144,24 @@ def draw_help(ui: UiState) -> None:
         return
     center = imgui.get_main_viewport().get_center()
     imgui.set_next_window_pos(center, imgui.Cond_.always, ImVec2(0.5, 0.5))
+    highest = imgui.get_main_viewport().work_size.y - 24
     imgui.set_next_window_size(ImVec2(880, 0), imgui.Cond_.always)
+    imgui.set_next_window_size_constraints(ImVec2(880, 100), ImVec2(880, highest))  # in a low window it scrolls
     flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_resize
     flags |= imgui.WindowFlags_.no_collapse
     is_shown, is_kept = imgui.begin("Keys and mouse", True, flags)
+    if imgui.is_window_appearing():
+        ui.redraw_within(0.0)  # only then does what lies below know that it is covered
     if is_shown:
-        groups = list(dict.fromkeys(shortcut.group for shortcut in SHORTCUTS))
+        groups = dict.fromkeys(shortcut.group for shortcut in SHORTCUTS)
+        left = (TIME, VIEW, WINDOW)
         if imgui.begin_table("sheet", 2, imgui.TableFlags_.sizing_stretch_same):
             imgui.table_next_column()
-            for group in groups[:2]:
+            for group in left:
                 _draw_group(group, [(s.label, s.text) for s in SHORTCUTS if s.group == group])
             _draw_group("Mouse", list(MOUSE_HELP))
             imgui.table_next_column()
-            for group in groups[2:]:
+            for group in (group for group in groups if group not in left):
                 _draw_group(group, [(s.label, s.text) for s in SHORTCUTS if s.group == group])
             imgui.end_table()
     imgui.end()

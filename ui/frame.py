@@ -20,6 +20,8 @@ from ui.gl import ImageTexture, free_dropped
 from ui.imgui_backend import ImGuiBackend
 from ui.panels.capture import CapturePanel
 from ui.panels.notices import NoticesPanel
+from ui.panels.regions import TITLE as REGIONS
+from ui.panels.regions import draw_regions
 from ui.panels.timeline import draw_timeline
 from ui.panels.training import draw_training, duration_text
 from ui.panels.viewport import ViewportPanel
@@ -96,6 +98,7 @@ class Frame:
             (VIEWPORT, self.viewport.draw, False),
             (CAPTURE, self.capture.draw, True),
             (TRAINING, draw_training, True),
+            (REGIONS, draw_regions, True),
             (TIMELINE, draw_timeline, True),
         )
 
@@ -181,6 +184,9 @@ class Frame:
         self.dispatch(OpenCapture(path if path.is_dir() or not path.exists() else path.parent))
 
     def _draw_panel(self, title: str, draw_panel: Callable[..., None], has_padding: bool) -> None:
+        if title == self.ui.wanted_panel:
+            self.ui.wanted_panel = None
+            imgui.set_next_window_focus()
         if not has_padding:
             imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
         flags = imgui.WindowFlags_.no_collapse
@@ -240,8 +246,15 @@ class Frame:
         _, left, rest = internal.dock_builder_split_node_py(top, imgui.Dir.left, left_share)
         right_share = min(max(312.0 / max(size.x - 236.0, 1.0), 0.12), 0.4)
         _, right, middle = internal.dock_builder_split_node_py(rest, imgui.Dir.right, right_share)
-        for title, node in ((VIEWPORT, middle), (CAPTURE, left), (TRAINING, right), (TIMELINE, bottom)):
+        for title, node in (
+            (VIEWPORT, middle),
+            (CAPTURE, left),
+            (TRAINING, right),
+            (REGIONS, right),
+            (TIMELINE, bottom),
+        ):
             internal.dock_builder_dock_window(title, node)
+        self.ui.wanted_panel = TRAINING  # of the two that lie over each other
         internal.dock_builder_get_node(middle).set_local_flags(internal.DockNodeFlagsPrivate_.no_tab_bar)
         internal.dock_builder_finish(dock_id)
 
@@ -268,6 +281,7 @@ class Frame:
             if imgui.menu_item(f"{Icon.TRAIN}  {label}", "T", False, True)[0]:
                 train_or_pause(session, self.dispatch)
             imgui.end_menu()
+        self._draw_table_menu("Mark", ("Mark regions",), has_capture)
         if imgui.begin_menu("Window"):
             if imgui.menu_item("Reset the layout", "", False, True)[0]:
                 ui.is_layout_reset_requested = True
@@ -284,7 +298,10 @@ class Frame:
         if not imgui.begin_menu(title, is_enabled):
             return
         for shortcut in SHORTCUTS:
-            if shortcut.group in groups and imgui.menu_item(shortcut.text, shortcut.label, False, True)[0]:
+            if shortcut.group not in groups:
+                continue
+            is_offered = self.ui.regions.is_active or not shortcut.needs_choosing
+            if imgui.menu_item(shortcut.text, shortcut.label, False, is_offered)[0]:
                 shortcut.action(self.session, self.dispatch, self.ui)
         imgui.end_menu()
 

@@ -177,8 +177,8 @@ class ImGuiBackend:
 
     @property
     def needs_follow_up(self) -> bool:
-        """True while a key release waits for the next frame."""
-        return bool(self._held_releases)
+        """True while input waits for the next frame: ImGui takes in what came at once one after the other."""
+        return bool(self._held_releases) or len(self.context.input_events_queue) > 0
 
     def new_frame(self) -> None:
         """Begin an ImGui frame sized to the window."""

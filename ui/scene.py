@@ -16,8 +16,9 @@ import moderngl
 import numpy as np
 
 from app.arrays import AnchorArrays
+from app.pointing import pixel_ray, seen_point
 from app.render import BACKGROUND
-from ui.anchor_marks import AnchorMarks, anchor_marks
+from ui.anchor_marks import AnchorMarks, anchor_marks, nearest_under
 from ui.gl import (
     INHERITED_ANCHOR_COLOR,
     NEAR,
@@ -30,6 +31,8 @@ from ui.gl import (
     frusta_lines,
     is_software,
 )
+from ui.region_layer import RegionLayer, ShownRegions
+from ui.region_tool import rig_radius
 
 MAX_PICTURE_WIDTH = 960
 """The CPU rasterizer is not asked for more than this; the picture is stretched."""
@@ -54,6 +57,8 @@ RENDERED, CLOUD, HINT, CAPTURED, MARKS = (
     "Cameras only",
 )
 
+NO_REGIONS = ShownRegions()
+
 
 @dataclass(frozen=True)
 class SceneView:
@@ -70,6 +75,11 @@ class SceneView:
     width: int
     height: int
     is_moving: bool
+
+    @property
+    def eye(self) -> np.ndarray:
+        """Where from, scene units. [3]"""
+        return -self.world_to_camera[:3, :3].T @ self.world_to_camera[:3, 3]
 
     @property
     def key(self) -> Hashable:
@@ -119,6 +129,7 @@ class Scene:
         self._marks: tuple[AnchorMarks, AnchorMarks] | None = None
         self._marks_key: Hashable = None
         self._frusta = LineRenderer(ctx)
+        self.regions = RegionLayer(ctx)
         self._drawn_key: Hashable = None
         self._asked_size: tuple[int, int] | None = None
         self._asked_capture: tuple[int, int, int] | None = None
@@ -140,6 +151,7 @@ class Scene:
             self._inherited,
             self._residual,
             self._frusta,
+            self.regions,
         )
         for thing in owned:
             thing.release()
@@ -160,7 +172,7 @@ class Scene:
 
     # ---- the picture -----------------------------------------------------------------------------------------
 
-    def compose(self, session: Any, view: SceneView) -> Composed:
+    def compose(self, session: Any, view: SceneView, regions: ShownRegions = NO_REGIONS) -> Composed:
         """Draw what belongs to the session's frame from this view, unless it is drawn already."""
         self._target.resize(view.width, view.height)
         if self.is_software:
@@ -171,11 +183,12 @@ class Scene:
         needs_capture = base_key is None and points_key is None and session.view.look_through is not None
         captured_key = self._take_captured(session, view.width) if needs_capture else None
         marks_key = self._take_marks(session)
-        if self.is_software and base_key is not None and not self._has_marks(session):
+        regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
+        if self.is_software and base_key is not None and regions.is_empty and not self._has_marks(session):
             # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
             self.shows, self.is_stale, self._drawn_key = RENDERED, is_stale, None
             return Composed(self._picture.texture, is_stale)
-        key = (view.key, base_key, points_key, captured_key, marks_key)
+        key = (view.key, base_key, points_key, captured_key, marks_key, regions_key)
         if key != self._drawn_key or self._splats.is_order_stale:
             self._drawn_key = key
             self._draw(view, base_key, points_key, captured_key, session)
@@ -244,9 +257,8 @@ class Scene:
         if overlays.show_frusta:
             held_out = tuple(session.holdout)
             frusta_key = (id(session.rig), held_out)
-            centers = session.rig.centers
-            radius = float(np.linalg.norm(centers - session.rig.focus_point(), axis=1).mean())
-            self._frusta.set(*frusta_lines(session.rig, FRUSTUM_SHARE * radius, held_out), key=frusta_key)
+            size = FRUSTUM_SHARE * rig_radius(session.rig)
+            self._frusta.set(*frusta_lines(session.rig, size, held_out), key=frusta_key)
         anchors = session.shown_anchors()
         if anchors is None:
             self.counts, self._marks, self._marks_key = AnchorCounts(), None, None
@@ -284,14 +296,41 @@ class Scene:
 
     def anchor_text(self, session: Any, view: SceneView, x: float, y: float) -> str:
         """What the anchor under a pixel of the view is and why; empty where none is shown or nobody says."""
+        found = self._mark_under(session, view, x, y)
+        return "" if found is None else found[0].text(found[1], session.regions.regions)
+
+    def _mark_under(self, session: Any, view: SceneView, x: float, y: float) -> tuple[AnchorMarks, int] | None:
         if self._marks is None:
-            return ""
+            return None
         overlays = session.overlays
         for is_shown, marks in zip((overlays.show_residual, overlays.show_inherited), self._marks[::-1], strict=True):
             row = marks.at(view.world_to_camera, view.K, x, y, near=self._near) if is_shown else None
             if row is not None:
-                return marks.text(row)
-        return ""
+                return marks, row
+        return None
+
+    def point_under(self, session: Any, view: SceneView, x: float, y: float, depth: float) -> np.ndarray:
+        """The place under a pixel of the view: of the anchor there if anchors are shown, else of what one sees there.
+
+        Args:
+            depth: From the eye, scene units; taken where nothing is to be seen.
+        Returns:
+            Scene units. [3]
+        """
+        found = self._mark_under(session, view, x, y)
+        if found is not None:
+            return found[0].positions[found[1]].astype(np.float64)
+        origin, direction = pixel_ray(view.world_to_camera, view.K, x, y)
+        gaussians = session.shown_gaussians()
+        if gaussians is not None:
+            seen = seen_point(gaussians, origin, direction)
+            return origin + depth * direction if seen is None else seen
+        cloud = session.shown_points() if session.overlays.show_points else None
+        if cloud is not None and not cloud.is_hint:
+            row = nearest_under(cloud.points, view.world_to_camera, view.K, x, y, near=self._near)
+            if row is not None:
+                return cloud.points[row].astype(np.float64)
+        return origin + depth * direction
 
     def _has_marks(self, session: Any) -> bool:
         overlays = session.overlays
@@ -330,6 +369,7 @@ class Scene:
             self._inherited.draw(target, *camera, shape="ring", size=5.0, opacity=0.55)
         if self.counts.n_residual and session.overlays.show_residual:
             self._residual.draw(target, *camera, shape="diamond", size=6.5, outline_px=0.8, opacity=0.85)
+        self.regions.draw(target, camera)
         target.resolve(BACKGROUND)
 
     def _cloud_point_px(self, view: SceneView) -> float:

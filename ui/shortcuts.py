@@ -13,6 +13,7 @@ from app.commands import (
     HomeView,
     LookThrough,
     PauseTraining,
+    RemoveRegion,
     ResumeTraining,
     SetCompare,
     SetFrame,
@@ -20,8 +21,12 @@ from app.commands import (
     ToggleOverlay,
     TogglePlay,
     TrainNextClip,
+    UndoMark,
 )
 from app.status import COMPARE_MODES
+from ui.panels.regions import TITLE as REGIONS
+from ui.panels.regions import begin_choosing
+from ui.region_tool import GROWTH
 from ui.state import Dispatch, UiState
 
 Action = Callable[[Any, Dispatch, UiState], None]
@@ -38,7 +43,9 @@ class Shortcut:
         key_name: Attribute of imgui.Key, for example "space".
         label: The key as printed.
         needs_capture: Ignored until a capture is open.
+        needs_choosing: Ignored unless a region is being chosen.
         repeats: Holding the key repeats the action.
+        is_any_shift: With Shift or without, for signs that need it on some keyboards.
     """
 
     key_name: str
@@ -49,7 +56,9 @@ class Shortcut:
     is_ctrl: bool = False
     is_shift: bool = False
     needs_capture: bool = True
+    needs_choosing: bool = False
     repeats: bool = False
+    is_any_shift: bool = False
 
     @property
     def key(self) -> Any:
@@ -183,6 +192,47 @@ def _stop_training(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(StopTraining())
 
 
+def _choose_region(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    begin_choosing(session, ui)
+
+
+def _mark_chosen(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    ui.regions.is_accepted = True  # the viewport marks it, once it knows where the pointer is
+
+
+def _leave_choosing(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    ui.regions.leave()
+
+
+def _grow_by(factor: float) -> Action:
+    def grow(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        ui.regions.set_radius(ui.regions.radius * factor)
+
+    return grow
+
+
+def _shift_by(right: float, down: float, forward: float) -> Action:
+    def shift(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        ui.regions.shift(session.view.world_to_camera(), right, down, forward)
+
+    return shift
+
+
+def _next_region(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    ui.wanted_panel = REGIONS
+    ui.regions.highlight_next(len(session.regions.regions))
+
+
+def _remove_region(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    if ui.regions.highlighted is not None and session.regions.can_mark:
+        dispatch(RemoveRegion(ui.regions.highlighted))
+
+
+def _undo_mark(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    if session.regions.can_undo:
+        dispatch(UndoMark())
+
+
 def _help(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_help_open = not ui.is_help_open
 
@@ -195,7 +245,9 @@ def _quit(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     ui.quit_requested = True
 
 
-TIME, VIEW, COMPARE, TRAIN, WINDOW = "Time", "View", "Show and compare", "Train", "Window"
+TIME, VIEW, COMPARE, MARK, TRAIN, WINDOW = "Time", "View", "Show and compare", "Mark regions", "Train", "Window"
+
+_STEERING = {"needs_choosing": True, "repeats": True}
 
 SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("space", "Space", "Play or pause", TIME, _toggle_play),
@@ -217,6 +269,21 @@ SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("_2", "2", "Show or hide inherited anchors", COMPARE, _toggle_overlay("show_inherited")),
     Shortcut("_3", "3", "Show or hide residual anchors", COMPARE, _toggle_overlay("show_residual")),
     Shortcut("_4", "4", "Show or hide the point cloud", COMPARE, _toggle_overlay("show_points")),
+    Shortcut("_5", "5", "Show or hide marked regions", COMPARE, _toggle_overlay("show_regions")),
+    Shortcut("m", "M", "Mark a sphere as static or moving; again to switch", MARK, _choose_region),
+    Shortcut("enter", "Enter", "Mark the chosen sphere", MARK, _mark_chosen, needs_choosing=True),
+    Shortcut("escape", "Escape", "Leave without marking", MARK, _leave_choosing, needs_choosing=True),
+    Shortcut("minus", "-", "Smaller sphere", MARK, _grow_by(1 / GROWTH), **_STEERING, is_any_shift=True),
+    Shortcut("equal", "+", "Larger sphere", MARK, _grow_by(GROWTH), **_STEERING, is_any_shift=True),
+    Shortcut("left_arrow", "Ctrl+Left", "Sphere to the left", MARK, _shift_by(-1, 0, 0), **_STEERING, is_ctrl=True),
+    Shortcut("right_arrow", "Ctrl+Right", "Sphere to the right", MARK, _shift_by(1, 0, 0), **_STEERING, is_ctrl=True),
+    Shortcut("up_arrow", "Ctrl+Up", "Sphere up", MARK, _shift_by(0, -1, 0), **_STEERING, is_ctrl=True),
+    Shortcut("down_arrow", "Ctrl+Down", "Sphere down", MARK, _shift_by(0, 1, 0), **_STEERING, is_ctrl=True),
+    Shortcut("page_up", "Page Up", "Sphere farther away", MARK, _shift_by(0, 0, 1), **_STEERING),
+    Shortcut("page_down", "Page Down", "Sphere nearer", MARK, _shift_by(0, 0, -1), **_STEERING),
+    Shortcut("n", "N", "Highlight the next marked region", MARK, _next_region),
+    Shortcut("delete", "Delete", "Remove the highlighted region", MARK, _remove_region),
+    Shortcut("z", "Ctrl+Z", "Take back the last mark or removal", MARK, _undo_mark, is_ctrl=True),
     Shortcut("t", "T", "Train the next clip, pause or resume", TRAIN, _train),
     Shortcut("t", "Ctrl+T", "Stop training and keep what was learned", TRAIN, _stop_training, is_ctrl=True),
     Shortcut("o", "Ctrl+O", "Open a capture folder", WINDOW, _open, is_ctrl=True, needs_capture=False),
@@ -228,6 +295,7 @@ MOUSE_HELP: tuple[tuple[str, str], ...] = (
     ("Left drag", "Orbit around the pivot"),
     ("Right drag", "Move the view sideways (also Shift + middle drag)"),
     ("Wheel", "Move nearer or farther (also Ctrl + middle drag)"),
+    ("Click, wheel", "While a region is chosen: fix its place, change its size (Ctrl + wheel moves the view)"),
     ("Timeline drag", "Move through time"),
     ("White line drag", "Wipe between render and captured picture"),
     ("Folder drop", "Open it as a capture"),
@@ -237,15 +305,19 @@ MOUSE_HELP: tuple[tuple[str, str], ...] = (
 def handle_shortcuts(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     """Run the actions of keys pressed since the last frame. Text fields keep their keys."""
     io = imgui.get_io()
-    if imgui.is_key_pressed(imgui.Key.escape, False):
+    if ui.is_help_open and imgui.is_key_pressed(imgui.Key.escape, False):
         ui.is_help_open = False
+        return
     if io.want_text_input:
         return
     for shortcut in SHORTCUTS:
-        if shortcut.is_ctrl != io.key_ctrl or shortcut.is_shift != io.key_shift or io.key_alt:
+        is_shift_right = shortcut.is_any_shift or shortcut.is_shift == io.key_shift
+        if shortcut.is_ctrl != io.key_ctrl or not is_shift_right or io.key_alt:
             continue
         if not imgui.is_key_pressed(shortcut.key, shortcut.repeats):
             continue
         if shortcut.needs_capture and session.capture is None:
+            continue
+        if shortcut.needs_choosing and not ui.regions.is_active:
             continue
         shortcut.action(session, dispatch, ui)

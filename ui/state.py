@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from imgui_bundle import ImVec2, imgui
 
 from ui.gl.image import Rect as PixelRect
+from ui.region_tool import RegionTool
 from ui.theme import Fonts
 
 Dispatch = Callable[[object], None]
@@ -48,11 +49,15 @@ class UiState:
     Attributes:
         fonts: Loaded faces.
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
+        regions: The region that is being chosen, and the one that stands out.
+        wanted_panel: Title of a panel that is to come to the front, or None.
         redraw_in_s: Shortest wait after which some panel wants to be drawn again, or None.
     """
 
     fonts: Fonts = field(default_factory=Fonts)
     rects: dict[str, Rect] = field(default_factory=dict)
+    regions: RegionTool = field(default_factory=RegionTool)
+    wanted_panel: str | None = None
     is_help_open: bool = False
     is_open_requested: bool = False
     is_layout_reset_requested: bool = False

@@ -16,6 +16,7 @@ from app.render import BACKGROUND
 from ui.colors import GREEN, ORANGE, SKY, VERMILLION, YELLOW, Color, rgb
 from ui.colors import HELD_OUT as HELD_OUT  # looked up as theme.HELD_OUT by the panels, as all colours are
 from ui.colors import INHERITED as INHERITED
+from ui.colors import REGION_COLORS as REGION_COLORS
 from ui.colors import RESIDUAL as RESIDUAL
 from ui.colors import ROLE_COLORS as ROLE_COLORS
 
@@ -92,6 +93,9 @@ class Icon:
     HELP = "\uf059"
     FILM = "\uf008"
     DROP = "\uf019"
+    REGION = "\uf05b"
+    TRASH = "\uf1f8"
+    UNDO = "\uf2ea"
 
 
 CLIP_ICONS: dict[str, str] = {

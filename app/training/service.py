@@ -177,12 +177,7 @@ class TrainingService:
         Raises:
             ProjectError: The project is read-only, there is no such clip, or its reference is missing.
         """
-        if not self.project.is_writable:
-            raise ProjectError(
-                "The project is open for reading only, because another program trains into it.",
-                hint="Close it there first, then open it again.",
-                path=self.project.folder,
-            )
+        self.project.check_writable()
         if not 0 <= clip_index < len(self.clips):
             raise ProjectError(f"There is no clip {clip_index}; clips are 0 to {len(self.clips) - 1}.")
         coming = {*self.queue, *(() if self.worker is None else (self.worker.job.clip_index,))}

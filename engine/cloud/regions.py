@@ -33,18 +33,22 @@ class GateRegion:
     high: tuple[float, float, float]
     radius: float = 0.0
 
+    @property
+    def center(self) -> tuple[float, float, float]:
+        """Middle of it, scene units."""
+        x, y, z = (0.5 * (a + b) for a, b in zip(self.low, self.high, strict=True))
+        return x, y, z
+
     def contains(self, points: np.ndarray) -> np.ndarray:
         """Which of these points lie inside. points: [P, 3]; gives [P] bool"""
-        low, high = np.array(self.low), np.array(self.high)
         if self.radius > 0.0:
-            return np.asarray(((points - 0.5 * (low + high)) ** 2).sum(axis=1) <= self.radius**2)
-        return np.asarray(((points >= low) & (points <= high)).all(axis=1))
+            return np.asarray(((points - np.array(self.center)) ** 2).sum(axis=1) <= self.radius**2)
+        return np.asarray(((points >= np.array(self.low)) & (points <= np.array(self.high))).all(axis=1))
 
     def as_dict(self) -> dict[str, Any]:
         """As `parse_region` takes it."""
         if self.radius > 0.0:
-            center = [0.5 * (a + b) for a, b in zip(self.low, self.high, strict=True)]
-            return {"treat": self.treat, "sphere": [center, self.radius]}
+            return {"treat": self.treat, "sphere": [list(self.center), self.radius]}
         return {"treat": self.treat, "box": [list(self.low), list(self.high)]}
 
 
@@ -74,6 +78,11 @@ def parse_region(values: Any) -> GateRegion:
     x0, y0, z0 = low.tolist()
     x1, y1, z1 = high.tolist()
     return GateRegion(values["treat"], (x0, y0, z0), (x1, y1, z1), radius)
+
+
+def sphere_region(treat: str, center: Sequence[float], radius: float) -> GateRegion:
+    """A sphere. center: scene units, [3]. Raises like `parse_region`."""
+    return parse_region({"treat": treat, "sphere": [[float(value) for value in center], float(radius)]})
 
 
 def marked(points: np.ndarray, regions: Sequence[GateRegion], treat: str) -> np.ndarray:

@@ -14,12 +14,22 @@ import numpy as np
 
 from app import commands
 from app.arrays import AnchorArrays, Picture, PointArrays
+from app.marking import after_marking
 from app.notices import Notices
-from app.status import ClipStatus, JobStatus, Overlays, PlanStatus, SettingStatus, TrainingStatus
+from app.status import (
+    ClipStatus,
+    JobStatus,
+    Overlays,
+    PlanStatus,
+    RegionsStatus,
+    SettingStatus,
+    TrainingStatus,
+)
 from app.timeline import Timeline
 from app.view import OrbitView
 from engine.capture.clip import split_clips
 from engine.capture.rig import CameraRig
+from engine.cloud.regions import GateRegion, sphere_region
 
 
 def make_rig(n_cameras: int = 8, width: int = 320, height: int = 240) -> CameraRig:
@@ -90,6 +100,7 @@ class FakeSession:
             inherited_reasons=np.where(inherited_roles == 2, 2, 255).astype(np.uint8),
             own_reasons=np.full(300, 255, np.uint8),
         )
+        self.regions = RegionsStatus(why_not="Open a capture first.")
         self.capture: FakeCapture | None = None
         self.rig: CameraRig | None = None
         self.clips: list[Any] = []
@@ -106,6 +117,9 @@ class FakeSession:
         self.clip_states = [ClipStatus() for _ in self.clips]
         self.timeline = Timeline(self.clips, fps=capture.fps)
         self.view = OrbitView(capture.rig)
+        self.regions = RegionsStatus(
+            can_mark=True, effect="What is marked counts in clips whose training starts from now on."
+        )
 
     def dispatch(self, command: Any) -> None:
         """Record the command; carry out what needs no worker."""
@@ -125,8 +139,16 @@ class FakeSession:
                 setattr(self.overlays, name, not getattr(self.overlays, name))
             case commands.HomeView():
                 self.view.home()
+            case commands.MarkRegion():
+                sphere = sphere_region(command.treat, command.center, command.radius)
+                self._set_regions(after_marking(self.regions.regions, [sphere]))
+            case commands.RemoveRegion(index=index):
+                self._set_regions((*self.regions.regions[:index], *self.regions.regions[index + 1 :]))
             case commands.DismissNotice():
                 self.notices.dismiss(command.index)
+
+    def _set_regions(self, regions: tuple[GateRegion, ...]) -> None:
+        self.regions = replace(self.regions, regions=regions, can_undo=True)
 
     def poll(self) -> bool:
         """Nothing happens by itself here."""

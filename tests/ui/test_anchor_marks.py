@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from engine.cloud.reasons import LIGHT, NO_REASON
+from engine.cloud.reasons import LIGHT, NO_REASON, USER_DYNAMIC, USER_STATIC, reason_text
+from engine.cloud.regions import sphere_region
 from engine.model.roles import ROLES
 from ui.anchor_marks import REACH_PX, anchor_marks
 from ui.colors import ROLE_COLORS, SKY
@@ -60,3 +61,15 @@ def test_no_anchors_at_all():
     marks = anchor_marks(nothing, np.zeros(0, np.uint8), np.zeros(0, np.uint8), most=10, color=SKY)
     assert marks.at(np.eye(4), K, 50, 40, near=0.1) is None
     assert marks.counts == {}
+
+
+def test_an_anchor_in_a_region_says_so_until_its_clip_was_trained_with_it():
+    regions = [sphere_region("static", (0.0, 0.0, 1.5), 1.0), sphere_region("dynamic", (0.0, 0.0, 2.0), 0.1)]
+    marks = anchor_marks(POSITIONS, CODES, REASONS, most=10, color=SKY)
+    first, second, third, _ = (marks.text(row, regions).splitlines() for row in range(4))
+    assert first[1:] == ["in a region marked as moving, which counts from the next training on"]  # the later one
+    assert second[1:] == [reason_text(LIGHT), "in a region marked as static, which counts from the next training on"]
+    assert len(third) == 1
+    heeded = np.array([USER_DYNAMIC, USER_STATIC, NO_REASON, NO_REASON], np.uint8)
+    marks = anchor_marks(POSITIONS, CODES, heeded, most=10, color=SKY)
+    assert [len(marks.text(row, regions).splitlines()) for row in range(4)] == [2, 2, 1, 1]

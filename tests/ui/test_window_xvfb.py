@@ -25,7 +25,7 @@ ORBIT_RADIANS_PER_PX = 0.006
 
 
 def journey(desk: Desk, pictures: Path) -> None:
-    """Open, look through a camera, compare, scrub, orbit, dolly, play; asserts what each must do."""
+    """Open, look through a camera, compare, scrub, orbit, dolly, play, mark; asserts what each must do."""
     state = desk.wait_for("an open capture", lambda s: s["capture"] is not None and "timeline.track" in s["rects"], 60)
     desk.focus()
     desk.wait_for("something to look at", lambda s: s["shows"] != "Cameras only", 30)
@@ -65,9 +65,23 @@ def journey(desk: Desk, pictures: Path) -> None:
     desk.key("space")
     desk.wait_for("a pause", lambda s: not s["is_playing"])
 
+    desk.wait_for("a project to mark in", lambda s: s["can_mark"])
+    desk.move(*desk.center("viewport.canvas"))
+    desk.key("m")
+    radius = desk.wait_for("a sphere at the pointer", lambda s: s["sphere"])["sphere"]["sphere"][1]
+    desk.do("click 4", "click 4")
+    desk.wait_for("a larger sphere", lambda s: abs(s["sphere"]["sphere"][1] / radius - 1.21) < 1e-6)
+    desk.key("m")
+    chosen = desk.wait_for("the other meaning", lambda s: s["sphere"]["treat"] == "dynamic")["sphere"]
+    desk.screenshot(pictures / "5_marking.png")
+    desk.key("Return")
+    desk.wait_for("a marked region", lambda s: s["regions"] == [chosen] and s["sphere"] is None)
+    desk.key("ctrl+z")
+    desk.wait_for("the mark taken back", lambda s: s["regions"] == [])
+
     desk.key("F1")
     desk.wait_for("the help sheet", lambda s: s["is_help_open"])
-    desk.screenshot(pictures / "5_help.png")
+    desk.screenshot(pictures / "6_help.png")
     desk.key("Escape")
     desk.wait_for("the sheet to close", lambda s: not s["is_help_open"])
     assert desk.program.poll() is None, "Escape must not end the program"
@@ -77,12 +91,12 @@ def train(desk: Desk, pictures: Path, *, wait_s: float) -> None:
     """Press the button and watch until the first clip is trained, still scrubbing meanwhile."""
     desk.click("training.next")
     desk.wait_for("training to begin", lambda s: s["training"]["state"] in ("starting", "preparing", "running"), 20)
-    desk.screenshot(pictures / "6_training_begins.png")
+    desk.screenshot(pictures / "7_training_begins.png")
     desk.wait_for("steps", lambda s: s["training"]["step"] > 20, wait_s)
-    desk.screenshot(pictures / "7_training_runs.png")
+    desk.screenshot(pictures / "8_training_runs.png")
     desk.key("Tab")
     desk.wait_for("clip 0 to be trained", lambda s: s["clips"][0] == "trained", wait_s)
-    desk.screenshot(pictures / "8_trained.png")
+    desk.screenshot(pictures / "9_trained.png")
 
 
 @pytest.fixture

@@ -9,12 +9,16 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.commands import LookThrough, ToggleOverlay
 from app.status import COMPARE_MODES
 from ui import theme
+from ui.panels.regions import begin_choosing, draw_chosen_sphere, draw_region_mark
 from ui.panels.welcome import draw_welcome
+from ui.region_layer import ShownRegions
+from ui.region_tool import GROWTH, REGION_WORDS
 from ui.scene import Scene, SceneView
 from ui.shortcuts import set_compare, shown_compare
 from ui.state import Dispatch, Rect, UiState
@@ -24,6 +28,8 @@ from ui.widgets import chip, grouped
 MOVING_S = 0.22
 """The view counts as moving for this long after the last change of it."""
 WIPE_GRAB_PX = 9.0
+CLICK_PX = 4.0
+"""A press that moves less than this before its release is a click, where clicks mean something."""
 TOOLBAR_HEIGHT = 38.0
 STALE_AFTER_S = 0.15
 COMPARE_WORDS = {"off": "Off", "wipe": "Wipe", "side": "Side by side"}
@@ -64,6 +70,9 @@ class ViewportPanel:
         self.scene = scene
         self._drag: str | None = None
         self._button: int = 0
+        self._pressed_at = (0.0, 0.0)
+        self._is_click = False
+        self._aimed_at = (0.0, 0.0)
         self._moved_s = -1e9
         self._stale_since_s: float | None = None
         self._fps = 0.0
@@ -87,6 +96,8 @@ class ViewportPanel:
 
     def draw(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
         """Toolbar, picture, HUD."""
+        status = session.regions
+        ui.regions.follow(session.rig, len(status.regions), can_mark=status.can_mark)
         if session.capture is None:
             origin, size = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
             area = Rect(origin.x, origin.y, origin.x + size.x, origin.y + size.y)
@@ -112,9 +123,9 @@ class ViewportPanel:
             width, height = session.rig.image_sizes[shown]
             image_size = (int(width), int(height))
         panes = arrange(area, image_size, session.overlays.compare)
-        self._navigate(session, dispatch, panes)
+        self._navigate(session, dispatch, ui, panes)
         # Looking through a camera may just have ended; the picture then fills the area from the next frame on.
-        self._draw_picture(session, ui, area, panes)
+        self._draw_picture(session, dispatch, ui, area, panes)
         self._draw_hud(session, ui, area, panes)
 
     # ---- toolbar ---------------------------------------------------------------------------------------------
@@ -149,6 +160,18 @@ class ViewportPanel:
             imgui.open_popup("overlays")
         ui.mark("viewport.overlays")
         self._draw_overlay_menu(session, dispatch, ui)
+        imgui.same_line(0, 8)
+        imgui.begin_disabled(not session.regions.can_mark)
+        if _segment(f"{Icon.REGION}  Mark", ui.regions.is_active):
+            if ui.regions.is_active:
+                ui.regions.leave()
+            else:
+                begin_choosing(session, ui)
+        ui.mark("viewport.mark")
+        imgui.end_disabled()
+        words = session.regions.why_not or "Say of a part of the scene that it is static, or that it moves (M)"
+        if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+            imgui.set_tooltip(words)
 
     def _draw_overlay_menu(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
         if not imgui.begin_popup("overlays"):
@@ -158,6 +181,7 @@ class ViewportPanel:
             ("show_inherited", "Inherited anchors (circles)", "2"),
             ("show_residual", "Residual anchors (diamonds)", "3"),
             ("show_points", "Point cloud", "4"),
+            ("show_regions", "Marked regions", "5"),
         )
         for name, label, key_label in rows:
             if imgui.menu_item(label, key_label, bool(getattr(session.overlays, name)), True)[0]:
@@ -168,14 +192,18 @@ class ViewportPanel:
 
     # ---- pointer ---------------------------------------------------------------------------------------------
 
-    def _navigate(self, session: Any, dispatch: Dispatch, panes: Panes) -> None:
+    def _navigate(self, session: Any, dispatch: Dispatch, ui: UiState, panes: Panes) -> None:
         io = imgui.get_io()
-        view = session.view
+        view, tool = session.view, ui.regions
         if imgui.is_item_hovered() and io.mouse_wheel != 0.0:
-            self._leave_camera(session, dispatch)
-            view.dolly(0.9**io.mouse_wheel)
-            self.note_moved()
+            if tool.sphere is not None and not io.key_ctrl:
+                tool.set_radius(tool.radius * GROWTH**io.mouse_wheel)
+            else:
+                self._leave_camera(session, dispatch)
+                view.dolly(0.9**io.mouse_wheel)
+                self.note_moved()
         if imgui.is_item_activated():
+            self._pressed_at = (io.mouse_pos.x, io.mouse_pos.y)
             buttons = (imgui.MouseButton_.left, imgui.MouseButton_.right, imgui.MouseButton_.middle)
             self._button = next((button for button in buttons if imgui.is_mouse_down(button)), buttons[0])
             self._drag = "wipe" if self._is_on_wipe(session, panes, io.mouse_pos) else "view"
@@ -192,6 +220,12 @@ class ViewportPanel:
             session.overlays.wipe_position = min(max(share, 0.0), 1.0)
             imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
             return
+        if tool.is_active and self._button == imgui.MouseButton_.left and self._drag == "view":
+            x, y = self._pressed_at
+            if max(abs(io.mouse_pos.x - x), abs(io.mouse_pos.y - y)) < CLICK_PX:
+                self._is_click = imgui.is_item_deactivated()
+                return
+            self._drag = "turn"  # from here on it is no click, even if it comes back
         dx, dy = io.mouse_delta.x, io.mouse_delta.y
         if dx == 0.0 and dy == 0.0:
             return
@@ -217,7 +251,7 @@ class ViewportPanel:
 
     # ---- picture ---------------------------------------------------------------------------------------------
 
-    def _draw_picture(self, session: Any, ui: UiState, area: Rect, panes: Panes) -> None:
+    def _draw_picture(self, session: Any, dispatch: Dispatch, ui: UiState, area: Rect, panes: Panes) -> None:
         draw = imgui.get_window_draw_list()
         draw.push_clip_rect(area.low, area.high, True)
         pane = panes.rendered
@@ -233,11 +267,18 @@ class ViewportPanel:
             height=size[1],
             is_moving=self.is_moving,
         )
-        composed = self.scene.compose(session, view)
+        self._aim(session, ui, view, pane, density)
+        command = ui.regions.take_accepted()
+        if command is not None:
+            dispatch(command)
+        tool, shown = ui.regions, ShownRegions(sphere=ui.regions.sphere)
+        if session.overlays.show_regions:
+            shown = ShownRegions(session.regions.regions, tool.highlighted, tool.sphere)
+        composed = self.scene.compose(session, view, shown)
         draw.add_image(imgui.ImTextureRef(composed.texture.glo), pane.low, pane.high)
         if self.is_moving:
             ui.redraw_within(MOVING_S)
-        elif imgui.is_item_hovered() and self._drag is None:
+        elif imgui.is_item_hovered() and self._drag is None and not tool.is_active:
             pointer = imgui.get_io().mouse_pos
             pixels = ((pointer.x - pane.x0) * density, (pointer.y - pane.y0) * density)
             text = self.scene.anchor_text(session, view, *pixels)
@@ -247,6 +288,25 @@ class ViewportPanel:
         if panes.captured is not None:
             self._draw_captured(session, draw, panes)
         draw.pop_clip_rect()
+
+    def _aim(self, session: Any, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
+        """Lead the sphere that is being chosen: to the middle at first, then by the pointer, until a click fixes it."""
+        tool, pointer = ui.regions, imgui.get_io().mouse_pos
+        is_click, self._is_click = self._is_click, False
+        if not tool.is_active:
+            return
+        at = (pointer.x, pointer.y)
+        is_over = imgui.is_item_hovered() and pane.contains(*at)
+        is_led = is_over and not tool.is_placed and self._drag is None and at != self._aimed_at
+        if tool.center is not None and not is_led and not (is_over and is_click):
+            return
+        self._aimed_at = at
+        x, y = at if is_over else pane.center
+        away = session.view.pivot if tool.center is None else tool.center
+        depth = max(float(np.linalg.norm(away - view.eye)), 1e-6)
+        pixels = ((x - pane.x0) * density, (y - pane.y0) * density)
+        tool.place(self.scene.point_under(session, view, *pixels, depth), eye=view.eye)
+        tool.is_placed |= is_click
 
     def _note_stale(self, is_stale: bool, ui: UiState) -> None:
         if not is_stale:
@@ -306,6 +366,10 @@ class ViewportPanel:
         if stale_s >= STALE_AFTER_S:
             chip(draw, x, area.y1 - 34, f"{Icon.CLOCK}  stale", color=theme.YELLOW)
         self._draw_legend(session, draw, area)
+        if ui.regions.is_active:
+            below_label = 44 if panes.captured is not None else 12
+            free = Rect(area.x0 + 12, area.y0 + below_label, area.x1, area.y1)
+            draw_chosen_sphere(ui, draw, free, self.scene.regions.counts)
 
     def _note(self, session: Any) -> tuple[str, theme.Color] | None:
         clip = session.timeline.clip_of(session.timeline.frame_index)
@@ -329,6 +393,11 @@ class ViewportPanel:
         if session.overlays.show_residual and counts.n_residual:
             rows.append(("diamond", theme.RESIDUAL, f"{grouped(counts.n_residual)} residual anchors"))
             rows += _role_rows("diamond", counts.residual_roles)
+        if session.overlays.show_regions:
+            for treat, words in REGION_WORDS.items():
+                n = sum(region.treat == treat for region in session.regions.regions)
+                text = f"{n} {words} region{'s' if n > 1 else ''}"
+                rows += [(treat, theme.REGION_COLORS[treat], text)] if n else []
         is_labelled = session.overlays.compare == "wipe" and session.view.look_through is not None
         y = area.y0 + (44 if is_labelled else 12)
         for shape, color, text in rows:
@@ -338,7 +407,9 @@ class ViewportPanel:
                 ImVec2(x, y), ImVec2(area.x1 - 12, y + 24), theme.u32(theme.faded(theme.VOID, 0.78)), 4
             )
             middle = ImVec2(x + 14, y + 12)
-            if shape == "circle":
+            if shape in REGION_WORDS:
+                draw_region_mark(draw, middle, shape)
+            elif shape == "circle":
                 draw.add_circle(middle, 5, theme.u32(color), 0, 2)
             else:
                 draw.add_ngon_filled(middle, 6, theme.u32(color), 4)

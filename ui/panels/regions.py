@@ -1,0 +1,189 @@
+"""The regions panel: the sphere that is being chosen, and the list of what is marked as static or as moving."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from app.commands import RemoveRegion, UndoMark
+from ui import theme
+from ui.region_tool import REGION_WORDS
+from ui.state import Dispatch, Rect, UiState
+from ui.theme import Icon
+from ui.widgets import chip, grouped, primary_button, text_wrapped_dim
+
+TITLE = "Regions"
+MEANINGS = {"static": "Nothing moves or changes in here.", "dynamic": "Everything in here may move or change."}
+ROW_HEIGHT = 44.0
+
+
+def begin_choosing(session: Any, ui: UiState) -> None:
+    """Start choosing a sphere, or switch what it means; where nothing can be marked the panel says why."""
+    ui.wanted_panel = TITLE
+    if session.regions.can_mark:
+        ui.regions.begin()
+    else:
+        ui.regions.leave()
+
+
+def draw_regions(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    """Choosing, the list, the way back, and in which clips all of it takes effect."""
+    status = session.regions
+    if session.capture is None:
+        text_wrapped_dim("What you mark as static or as moving is listed here when a capture is open.")
+        return
+    if ui.regions.is_active:
+        _draw_choice(ui)
+    else:
+        imgui.begin_disabled(not status.can_mark)
+        if primary_button(f"{Icon.REGION}  Mark a region", ImVec2(imgui.get_content_region_avail().x, 36), ui):
+            begin_choosing(session, ui)
+        ui.mark("regions.begin")
+        imgui.end_disabled()
+        imgui.set_item_tooltip("M")
+        if status.why_not:
+            _warning(status.why_not)
+    imgui.spacing()
+    _draw_list(status, dispatch, ui)
+    imgui.begin_disabled(not status.can_undo)
+    if imgui.button(f"{Icon.UNDO}  Undo"):
+        dispatch(UndoMark())
+    ui.mark("regions.undo")
+    imgui.end_disabled()
+    imgui.set_item_tooltip("Takes back the last mark or removal (Ctrl+Z)")
+    imgui.spacing()
+    if status.effect:
+        text_wrapped_dim(status.effect)
+        if "again" in status.effect:
+            text_wrapped_dim("To train a clip again, right-click it in the timeline.")
+
+
+def _warning(text: str) -> None:
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_colored(ImVec4(*theme.ORANGE), f"{Icon.WARNING}  {text}")
+    imgui.pop_text_wrap_pos()
+
+
+def _draw_choice(ui: UiState) -> None:
+    """What the sphere means, how large it is, and the two ways to be done."""
+    tool = ui.regions
+    half = (imgui.get_content_region_avail().x - 8) / 2
+    for treat, words in REGION_WORDS.items():
+        if treat != "static":
+            imgui.same_line()
+        is_on = tool.treat == treat
+        imgui.push_style_color(imgui.Col_.button, ImVec4(*(theme.RAISED_ACTIVE if is_on else theme.BACKDROP)))
+        if imgui.button(f"      {words.capitalize()}##treat", ImVec2(half, 32)):
+            tool.treat = treat
+        imgui.pop_style_color()
+        ui.mark(f"regions.{words}")
+        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        draw = imgui.get_window_draw_list()
+        draw_region_mark(draw, ImVec2(low.x + 20, (low.y + high.y) / 2), treat)
+        if is_on:
+            draw.add_rect(low, high, theme.u32(theme.REGION_COLORS[treat]), 4, thickness=2)
+        imgui.set_item_tooltip(f"{MEANINGS[treat]} M switches.")
+    text_wrapped_dim(MEANINGS[tool.treat])
+    imgui.set_next_item_width(-80)
+    low_radius, high_radius = tool.radius_limits
+    flags = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.always_clamp
+    is_moved, radius = imgui.slider_float("radius", tool.radius, low_radius, high_radius, "%.4g", flags)
+    ui.mark("regions.radius")
+    if is_moved:
+        tool.set_radius(radius)
+    imgui.set_item_tooltip("Scene units. The wheel over the picture does the same, and so do - and +.")
+    imgui.begin_disabled(tool.sphere is None)
+    if primary_button(f"{Icon.CHECK}  Mark it", ImVec2(half, 32), ui):
+        tool.is_accepted = True
+        ui.redraw_within(0.0)
+    ui.mark("regions.accept")
+    imgui.end_disabled()
+    imgui.set_item_tooltip("Enter")
+    imgui.same_line()
+    if imgui.button("Cancel", ImVec2(half, 32)):
+        tool.leave()
+    ui.mark("regions.cancel")
+    imgui.set_item_tooltip("Escape")
+    text_wrapped_dim("Point at the scene; a click fixes the place. Ctrl + arrows, Page Up and Page Down move it.")
+
+
+def _draw_list(status: Any, dispatch: Dispatch, ui: UiState) -> None:
+    """One row per region, the newest last: it overrules the others."""
+    if not status.regions:
+        text_wrapped_dim("Nothing is marked: what is static and what moves is decided from the pictures alone.")
+        return
+    imgui.text(f"{len(status.regions)} marked")
+    if len(status.regions) > 1:
+        imgui.same_line()
+        imgui.text_disabled("later ones overrule earlier ones")
+    rows_px = len(status.regions) * (ROW_HEIGHT + imgui.get_style().item_spacing.y) + 8
+    height = min(max(imgui.get_content_region_avail().y - 130, 2 * ROW_HEIGHT), rows_px)
+    removed = None
+    if imgui.begin_child("list", ImVec2(0, height)):
+        for index, region in enumerate(status.regions):
+            if _draw_row(index, region, status.can_mark, ui):
+                removed = index
+    imgui.end_child()
+    if removed is not None:
+        dispatch(RemoveRegion(removed))
+
+
+def _draw_row(index: int, region: Any, can_mark: bool, ui: UiState) -> bool:
+    """Returns whether the region is to be removed."""
+    tool = ui.regions
+    imgui.push_id(index)
+    flags = imgui.SelectableFlags_.allow_overlap
+    if imgui.selectable("##region", tool.highlighted == index, flags, ImVec2(0, ROW_HEIGHT))[0]:
+        tool.highlighted = None if tool.highlighted == index else index
+    ui.mark(f"regions.row{index}")
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    draw = imgui.get_window_draw_list()
+    draw_region_mark(draw, ImVec2(low.x + 14, low.y + 13), region.treat)
+    is_sphere = region.radius > 0.0
+    shape = f"sphere, radius {region.radius:.3g}" if is_sphere else "box"
+    title = f"{index + 1}  {REGION_WORDS[region.treat]} {shape}"
+    draw.add_text(ImVec2(low.x + 28, low.y + 4), theme.u32(theme.TEXT), title)
+    place = ", ".join(f"{value:.3g}" for value in region.center)
+    draw.add_text(ImVec2(low.x + 28, low.y + 23), theme.u32(theme.TEXT_DIM), f"around {place}")
+    imgui.same_line(imgui.get_content_region_avail().x - 30)
+    imgui.set_cursor_screen_pos(ImVec2(high.x - 34, low.y + 8))
+    imgui.begin_disabled(not can_mark)
+    is_clicked = imgui.button(Icon.TRASH)
+    ui.mark(f"regions.remove{index}")
+    imgui.end_disabled()
+    imgui.set_item_tooltip("Remove this region (N highlights the next one, Delete removes it)")
+    imgui.pop_id()
+    return is_clicked
+
+
+def draw_region_mark(draw: Any, middle: ImVec2, treat: str) -> None:
+    """The small sign of a treatment: a whole ring for static, a dashed one for moving."""
+    color = theme.u32(theme.REGION_COLORS[treat])
+    if treat == "static":
+        draw.add_circle(middle, 6, color, 0, 2)
+        return
+    for i in range(4):
+        start = i * math.pi / 2
+        draw.path_arc_to(middle, 6, start, start + math.pi / 3.4, 6)
+        draw.path_stroke(color, thickness=2)
+
+
+def draw_chosen_sphere(ui: UiState, draw: Any, area: Rect, counts: dict[str, int]) -> None:
+    """Over the picture, from the upper left corner of an area: what is being chosen, what it holds, and the keys."""
+    tool = ui.regions
+    text = f"      Mark as {REGION_WORDS[tool.treat]}:  radius {tool.radius:.3g}{_held_text(counts)}"
+    chip(draw, area.x0, area.y0, text)
+    draw_region_mark(draw, ImVec2(area.x0 + 16, area.y0 + 12), tool.treat)
+    place = "Click elsewhere moves it" if tool.is_placed else "Click fixes it"
+    other = REGION_WORDS["dynamic" if tool.treat == "static" else "static"]
+    keys = f"{place}   Wheel size   M {other} instead   Enter marks it   Esc leaves"
+    if imgui.calc_text_size(keys).x + 30 < area.width:  # the panel says it too
+        chip(draw, area.x0, area.y0 + 28, keys, color=theme.TEXT_DIM)
+
+
+def _held_text(counts: dict[str, int]) -> str:
+    if not counts:
+        return ""
+    return ",  holds " + ", ".join(f"{grouped(n)} {role}" for role, n in counts.items()) + " anchors"
