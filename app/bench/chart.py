@@ -14,6 +14,7 @@ _BACKENDS = {"cpu": ("o", "ours (numba, float32)"), "reference": ("D", "plain to
 _OPERATIONS = {
     "raster": ("Rasterizer", "largest pixel error (colours in 0..1)"),
     "decode": ("Decode", "largest error of a value, relative to the largest"),
+    "step": ("Training step", "largest pixel error (colours in 0..1)"),
 }
 _GRADIENT_LABEL = "largest relative gradient error"
 
@@ -39,7 +40,7 @@ def draw_speed_error(marks: Sequence[SpeedError], path: Path, *, footer: str) ->
         title, value_label = _OPERATIONS[operation]
         _draw(left, chosen, [mark.value_error for mark in chosen], value_label)
         _draw(right, chosen, [mark.gradient_error for mark in chosen], _GRADIENT_LABEL)
-        left.set_ylabel("forward + backward pass, ms")
+        left.set_ylabel("whole step, ms" if operation == "step" else "forward + backward pass, ms")
         left.set_title(f"{title}: speed beside error", loc="left", fontsize=11, fontweight="bold")
         right.set_title("lower left is better", loc="right", fontsize=9, color=FAINT_COLOR)
         right.legend(handles=_legend(right, chosen), fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5))

@@ -12,11 +12,11 @@ class SpeedError:
     """One mark of the chart: a back end on a scene small enough for float64 brute force.
 
     Attributes:
-        operation: "raster" or "decode".
+        operation: "raster", "decode" or "step".
         scene: Name of the scene.
         size: What was computed, for people.
         backend: "cpu", or "reference" for plain torch in float32.
-        total_ms: Forward and backward pass, median.
+        total_ms: Forward and backward pass, median; of a step, all of it.
         value_error: Largest error of a value against float64, absolute (pixels: colours in 0..1).
         gradient_error: Largest relative error of a gradient against float64: |a - b| / |b| over each parameter.
     """
@@ -97,7 +97,7 @@ def kernel_row(
 
 @dataclass(frozen=True, slots=True)
 class IterationRow:
-    """One size and kind of training step.
+    """One size and kind of training step: times at full size, errors of the same step in a part of its picture.
 
     Attributes:
         scene: "joint" (everything learns) or "source" (heads frozen, half of the anchors static and frozen).
@@ -105,6 +105,8 @@ class IterationRow:
         n_gaussians: Gaussians rendered.
         stages: Name and time of each stage, in order, cut apart at their boundaries.
         total: The whole step without cuts.
+        errors: See StepErrors.
+        reference_ratio: Time of a whole step in plain torch in float32 over ours, in that part of the picture.
     """
 
     scene: str
@@ -112,3 +114,26 @@ class IterationRow:
     n_gaussians: int
     stages: tuple[tuple[str, Timing], ...]
     total: Timing
+    errors: StepErrors
+    reference_ratio: float
+
+
+@dataclass(frozen=True, slots=True)
+class StepErrors:
+    """Errors of one training step against the same step in float64.
+
+    Attributes:
+        checked_at: The part of the picture in which they were found.
+        value_error: Largest error of a pixel, colours in 0..1.
+        loss_error: Of the loss, relative.
+        gradient_error: Largest relative error of a gradient over all trainable tensors, as in SpeedError.
+        worst_gradient: Name of that tensor.
+        update_error: Largest relative error of what Adam adds to a parameter, given the same gradients.
+    """
+
+    checked_at: str
+    value_error: float
+    loss_error: float
+    gradient_error: float
+    worst_gradient: str
+    update_error: float

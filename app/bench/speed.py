@@ -52,7 +52,8 @@ def _measure_ms() -> float:
     from app.kernels import use_threads
 
     use_threads(None)
-    from app.bench.iteration import SIZES, StepRun
+    from app.bench.iteration import SIZES
+    from app.bench.step import StepRun
 
     run = StepRun(SIZES["2k"])
     return min([run.whole()[0] for _ in range(N_WARM + N_STEPS)][N_WARM:])

@@ -103,7 +103,9 @@ def run_plan(plan: Plan, *, n_threads: int | None = None, say: Say = lambda what
     for name in plan.iterations:
         for is_source in (False, True):
             begin(f"training step, {name}, {'source' if is_source else 'joint'}")
-            report.iterations.append(measure_iteration(name, is_source=is_source, n_runs=plan.n_steps))
+            step, marks = measure_iteration(name, is_source=is_source, n_runs=plan.n_steps)
+            report.iterations.append(step)
+            report.marks += marks
     report.fma_per_s = max(report.fma_per_s, measure_fma_limit())  # whoever disturbed the first may be gone
     say("done", 1.0)
     return report

@@ -22,6 +22,7 @@ _KERNEL_HEAD = (
     "vs torch",
     "peak MB",
 )
+_STEP_ERROR_HEAD = ("checked at", "pixel err", "loss err", "gradient err", "update err", "vs torch")
 
 
 def report_text(report: Report) -> str:
@@ -29,13 +30,14 @@ def report_text(report: Report) -> str:
     parts = [
         str(report.machine),
         f"Limit: {report.fma_per_s / 1e9:.1f} G multiply-adds of sixteen lanes per second. Times are medians of the "
-        "runs (minima). Errors are against float64; torch is plain torch in float32 at the size of the check.",
+        "runs (minima). Errors are against float64; torch is plain torch in float32 at the size of the check. A "
+        "training step is checked in the middle of its picture, with all its anchors and by the same camera.",
     ]
     if report.kernels:
         parts.append(_aligned([_KERNEL_HEAD, *(_kernel_cells(row, report.fma_per_s) for row in report.kernels)]))
     if report.iterations:
         names = [name for name, _ in report.iterations[0].stages]
-        head = ("training step, ms", *names, "sum", "whole step", "Gaussians")
+        head = ("training step, ms", *names, "sum", "whole step", "Gaussians", *_STEP_ERROR_HEAD)
         parts.append(_aligned([head, *(_iteration_cells(row) for row in report.iterations)]))
     return "\n\n".join(parts)
 
@@ -63,7 +65,20 @@ def _kernel_cells(row: KernelRow, fma_per_s: float) -> tuple[str, ...]:
 def _iteration_cells(row: IterationRow) -> tuple[str, ...]:
     stages = [f"{timing.median_ms:.2f}" for _, timing in row.stages]
     total = sum(timing.median_ms for _, timing in row.stages)
-    return (f"{row.scene}, {row.size}", *stages, f"{total:.1f}", _timing(row.total), str(row.n_gaussians))
+    errors = row.errors
+    return (
+        f"{row.scene}, {row.size}",
+        *stages,
+        f"{total:.1f}",
+        _timing(row.total),
+        str(row.n_gaussians),
+        errors.checked_at,
+        f"{errors.value_error:.1e}",
+        f"{errors.loss_error:.1e}",
+        f"{errors.gradient_error:.1e}",
+        f"{errors.update_error:.1e}",
+        f"{row.reference_ratio:.3g}x",
+    )
 
 
 def _timing(timing: Timing) -> str:

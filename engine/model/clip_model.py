@@ -160,13 +160,14 @@ class ClipModel(nn.Module):
         frames = [knot for knot, _ in self.knots(clip_time)]
         return anchors.presence[:, frames].any(1).nonzero()[:, 0]
 
-    def decode(self, clip_time: float, rows: dict[str, Tensor] | None = None) -> Gaussians:
+    def decode(self, clip_time: float, rows: dict[str, Tensor] | None = None, *, backend: str = "auto") -> Gaussians:
         """Gaussians at a time of the clip, in [0, 1).
 
         Args:
             clip_time: frame_in_clip / clip_length; times between frames are interpolated.
             rows: Rows per role to decode, for instance those a camera can see; None decodes all that exist. Rows of
                 dynamic sets should exist at this time, others are decoded all the same.
+            backend: Of `decode_anchors`. What never changes is kept as the first call decoded it.
         Returns:
             K Gaussians per row; sets follow each other in the order of `roles`.
         """
@@ -176,19 +177,19 @@ class ClipModel(nn.Module):
                 anchors=self.anchor_set(role),
                 rows=self.alive(role, clip_time) if rows is None else rows[role],
                 corners=self._corners.get(role),
-                decoded=self.constant_gaussians(role) if self.is_constant(role) else None,
+                decoded=self.constant_gaussians(role, backend=backend) if self.is_constant(role) else None,
             )
             for role in self.roles()
         ]
-        return decode_anchors(chosen, self.decoder, self.field, knots)
+        return decode_anchors(chosen, self.decoder, self.field, knots, backend=backend)
 
-    def constant_gaussians(self, role: str) -> Gaussians:
+    def constant_gaussians(self, role: str, *, backend: str = "auto") -> Gaussians:
         """Gaussians of a whole set that `is_constant`, K per anchor, decoded at the first call."""
         if role not in self._frozen:
             anchors = self.anchor_set(role)
             everything = ChosenAnchors(anchors=anchors, rows=torch.arange(len(anchors)))
             with torch.no_grad():
-                self._frozen[role] = decode_anchors([everything], self.decoder, None, [(0, 1.0)])
+                self._frozen[role] = decode_anchors([everything], self.decoder, None, [(0, 1.0)], backend=backend)
         return self._frozen[role]
 
     def anchors(self, clip_time: float | None = None) -> AnchorView:

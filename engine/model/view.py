@@ -15,6 +15,7 @@ from torch import Tensor
 from engine.model.clip_model import ClipModel
 from engine.raster import Rendering, rasterize
 from engine.raster.gaussians import Gaussians
+from engine.raster.rasterize import BackendName
 
 REACH_SPACINGS = 4.0
 """Gaussians are expected within this many static anchor spacings of their anchor when anchors are culled."""
@@ -83,12 +84,18 @@ def visible_rows(model: ClipModel, view: View, clip_time: float, *, reach: float
 
 
 def render_gaussians(
-    gaussians: Gaussians, view: View, *, background: Tensor | None = None, tile_mask: np.ndarray | None = None
+    gaussians: Gaussians,
+    view: View,
+    *,
+    background: Tensor | None = None,
+    tile_mask: np.ndarray | None = None,
+    backend: BackendName = "auto",
 ) -> Rendering:
     """Rasterize through one view; tensors of the rendering have a leading camera axis of 1.
 
     Args:
         tile_mask: Tiles that are wanted, None for all. [rows, columns] bool
+        backend: Of `rasterize`.
     """
     return rasterize(
         gaussians,
@@ -98,6 +105,7 @@ def render_gaussians(
         view.height,
         background=background,
         near_plane=view.near_plane,
+        backend=backend,
         tile_mask=None if tile_mask is None else torch.from_numpy(tile_mask),
     )
 

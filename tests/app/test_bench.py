@@ -8,9 +8,11 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import torch
 from PIL import Image
 
 from app.bench import chart, raster, suite
@@ -19,15 +21,22 @@ from app.bench.clips import ClipRecipe
 from app.bench.command import CHART_FILE, DEFAULT_OUT
 from app.bench.field import SCENES, DecodeScene, measure_decode
 from app.bench.fma_limit import measure_fma_limit
-from app.bench.iteration import SIZES, STAGES, measure_iteration
+from app.bench.iteration import SIZES, measure_iteration
 from app.bench.machine import describe_machine
 from app.bench.raster import evaluated_pairs, limit_shares, measure_raster
 from app.bench.rows import SpeedError
 from app.bench.scenes import RECIPES, Recipe
+from app.bench.step import EXACT, STAGES, StepRun, Window
+from app.bench.step_errors import measure_errors, middle
 from app.bench.suite import FULL, QUICK, Plan, document
 from app.bench.table import report_text
 from app.bench.timing import Timing, interleaved, peak_extra_mb
 from app.cli import main
+from engine.model import decoding
+from engine.raster import Rendering
+from engine.raster.rasterize import BACKENDS as RASTERIZERS
+from engine.training import adam, losses
+from engine.training.adam import FusedAdam
 
 ROOT = Path(__file__).resolve().parents[2]
 TINY = Recipe(100, 32, 24, 3.0)
@@ -50,7 +59,7 @@ def tiny_plan(monkeypatch: pytest.MonkeyPatch) -> Plan:
 def marks() -> list[SpeedError]:
     return [
         SpeedError(operation, scene, "100 in 80x60", backend, ms, error, 3 * error)
-        for operation in ("raster", "decode")
+        for operation in ("raster", "decode", "step")
         for scene, factor in (("small", 1.0), ("large", 7.0))
         for backend, ms, error in (("cpu", 2.0 * factor, 1e-6), ("reference", 300.0 * factor, 2e-7))
     ]
@@ -142,16 +151,15 @@ def test_the_decodes_row_has_speed_and_error():
 
 @pytest.mark.parametrize("is_source", [False, True])
 def test_a_training_step_is_cut_into_stages(is_source):
-    row = measure_iteration("tiny", is_source=is_source, n_runs=2, recipe=TINY_CLIP)
+    row, found = measure_iteration("tiny", is_source=is_source, n_runs=2, recipe=TINY_CLIP)
     assert tuple(name for name, _ in row.stages) == STAGES
     assert row.n_gaussians == 120
     assert row.total.min_ms > 0
     assert row.scene == ("source" if is_source else "joint")
+    assert [(mark.operation, mark.backend) for mark in found] == [("step", "cpu"), ("step", "reference")]
 
 
 def test_cut_steps_learn_the_same_as_whole_ones():
-    from app.bench.iteration import StepRun
-
     runs = [StepRun(TINY_CLIP), StepRun(TINY_CLIP)]
     for _ in range(3):
         runs[0].whole()
@@ -161,6 +169,76 @@ def test_cut_steps_learn_the_same_as_whole_ones():
     for name, parameter in first.items():
         np.testing.assert_allclose(parameter.detach(), second[name].detach(), rtol=1e-4, atol=1e-6, err_msg=name)
     assert any(not np.array_equal(p.detach(), first[name].detach()) for name, p in moved.named_parameters())
+
+
+@pytest.mark.parametrize("is_source", [False, True])
+def test_the_steps_row_has_speed_and_error(is_source):
+    errors, found = measure_errors(replace(TINY_CLIP, is_source=is_source), scene="tiny")
+    assert errors.checked_at == "32x24"
+    assert 0 < errors.value_error < 1e-5
+    assert errors.loss_error < 1e-5
+    assert 0 < errors.gradient_error < 1e-4
+    assert errors.worst_gradient in dict(StepRun(replace(TINY_CLIP, is_source=is_source))._parameters)
+    assert 0 < errors.update_error < 1e-3
+    assert all(mark.total_ms > 0 and mark.gradient_error < 1e-4 for mark in found.values())
+
+
+def test_a_step_in_a_window_draws_that_part_of_the_picture():
+    window = Window(8, 5, 16, 12)
+    whole, part = StepRun(TINY_CLIP, path=EXACT).kept(), StepRun(TINY_CLIP, path=EXACT, window=window).kept()
+    expected, shifted = whole.image[5:17, 8:24], whole.image[6:18, 8:24]
+    assert (part.image - expected).abs().mean() < 0.005  # not zero: footprints beyond a border are held at its slope
+    assert (part.image - shifted).abs().mean() > 0.01
+    assert part.image.std() > 0.05
+    assert part.gradients.keys() == whole.gradients.keys()
+    assert middle(ClipRecipe(10, 1, 480, 360)) == Window(208, 156, 64, 48)
+
+
+class _Skewed(torch.autograd.Function):
+    """Nothing forward; a gradient one percent too large."""
+
+    @staticmethod
+    def forward(ctx: Any, tensor: torch.Tensor) -> torch.Tensor:
+        return tensor.view_as(tensor)
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: torch.Tensor) -> torch.Tensor:
+        return 1.01 * gradients[0]
+
+
+def skewed(tensor: torch.Tensor) -> torch.Tensor:
+    return _Skewed.apply(tensor)  # pyright: ignore[reportReturnType] - apply is untyped
+
+
+def wrong_picture(found: Rendering) -> Rendering:
+    return replace(found, image=found.image + 0.01)
+
+
+class HastyAdam(FusedAdam):
+    """Learns one percent too fast."""
+
+    def update(self, gradients: Any, rates: Any, scale: float) -> None:
+        super().update(gradients, {name: 1.01 * rate for name, rate in rates.items()}, scale)
+
+
+FAULTS = {
+    "picture": (RASTERIZERS, "cpu", wrong_picture, {"value_error", "loss_error", "gradient_error"}),
+    "rasterizer": (RASTERIZERS, "cpu", lambda f: replace(f, image=skewed(f.image)), {"gradient_error"}),
+    "decode": (decoding._BACKENDS, "cpu", lambda f: replace(f, scales=skewed(f.scales)), {"gradient_error"}),
+    "loss": (losses._BACKENDS, "fused", lambda f: replace(f, loss=skewed(f.loss)), {"gradient_error"}),
+    "adam": (adam.BACKENDS, "fused", None, {"update_error"}),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_wrong_back_end_shows_in_its_column_and_in_no_other(fault, monkeypatch):
+    table, name, spoil, expected = FAULTS[fault]
+    right = table[name]
+    wrong = HastyAdam if spoil is None else lambda *arguments, **options: spoil(right(*arguments, **options))
+    monkeypatch.setitem(table, name, wrong)
+    errors, _ = measure_errors(TINY_CLIP, scene="tiny")
+    columns = ("value_error", "loss_error", "gradient_error", "update_error")
+    assert {column for column in columns if getattr(errors, column) > 2e-3} == expected
 
 
 def test_the_limit_is_a_plausible_number_of_operations(monkeypatch):
@@ -179,12 +257,15 @@ def test_the_command_prints_a_table_and_writes_document_and_picture(tiny_plan, t
     assert "decode 2k" in said.out
     assert "joint, 60 anchors" in said.out
     assert "value err" in said.out
+    assert "update err" in said.out
     assert describe_machine(1).cpu in said.out
     assert "Measuring" in said.err
     found = json.loads((tmp_path / "b.json").read_text())
     assert found["schema"] == 1
     assert [row["operation"] for row in found["kernels"]] == ["raster", "decode"]
     assert [row["scene"] for row in found["iterations"]] == ["joint", "source"]
+    assert all(0 < row["errors"]["gradient_error"] < 1e-4 for row in found["iterations"])
+    assert {mark["operation"] for mark in found["speed_error"]} == {"raster", "decode", "step"}
     assert all(math.isfinite(mark["gradient_error"]) for mark in found["speed_error"])
     assert is_picture(out / CHART_FILE)
 
@@ -239,7 +320,7 @@ def test_an_interrupt_is_told_in_one_line(tmp_path, monkeypatch, capsys):
 
 
 def test_the_picture_shows_every_operation(tmp_path):
-    for operations, height in ((("raster",), 400), (("raster", "decode"), 700)):
+    for operations, height in ((("raster",), 400), (("raster", "decode"), 700), (("raster", "decode", "step"), 1000)):
         path = tmp_path / f"{len(operations)}.png"
         draw_speed_error([mark for mark in marks() if mark.operation in operations], path, footer="a machine")
         assert is_picture(path)

@@ -16,7 +16,6 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -28,8 +27,6 @@ from app.kernels import use_threads
 from engine.assets import asset_path
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips
-from engine.model import clip_model
-from engine.model.decoding import decode_anchors
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 
@@ -91,14 +88,15 @@ def measure(capture: Capture, *, holdout: list[int], clip_length: int, n_runs: i
 
     def step(name: str) -> tuple[float]:
         source = sources[SCHEMES[name]]
-        in_torch: Callable[..., Any] = partial(decode_anchors, backend="reference")
-        clip_model.decode_anchors = in_torch if name == IN_TORCH else decode_anchors
+        decode = source.model.decode
+        if name == IN_TORCH:
+            source.model.decode = partial(decode, backend="reference")
         try:
             started = time.perf_counter()
             n_gaussians[name] = source.step().n_gaussians
             return ((time.perf_counter() - started) * 1e3,)
         finally:
-            clip_model.decode_anchors = decode_anchors
+            source.model.decode = decode
 
     timings = interleaved({name: partial(step, name) for name in SCHEMES}, n_runs, n_warm=N_WARM)
     return [Part(name, timings[name][0], n_gaussians[name]) for name in SCHEMES]
