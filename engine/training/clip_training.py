@@ -134,6 +134,7 @@ class ClipTraining:
         self._sight: dict[tuple[str, int], Tensor] = {}  # rows of static sets, flags of dynamic ones
         self._tiles: ActiveTiles | None = None
         self._reasons: dict[str, np.ndarray] = {}
+        self._coverage: dict[str, int | float | str] | None = None
         n_cameras = len(self.camera_indices)
         self._held_in = held_in_items(n_cameras, clip.n_frames, seed) if config.patience else []
         self._patience: Patience | None = None
@@ -304,7 +305,9 @@ class ClipTraining:
             drop_inherited(self.model, own, self.config)
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         cloud = self._find_motion()
-        self._say("Comparing with the reference", add_residual(self.model, cloud, self.config))
+        coverage = add_residual(self.model, cloud, self.config)
+        self._coverage = coverage.as_dict()
+        self._say("Comparing with the reference", coverage.text)
         self._make_dynamic(cloud)
 
     # ---------------------------------------------------------------- steps
@@ -503,6 +506,7 @@ class ClipTraining:
             "moving_spacing": self.moving_spacing,
             "n_anchors": {role: len(self.model.anchor_set(role)) for role in self.model.roles()},
             "n_alive": n_alive(self.model),
+            "coverage": self._coverage,
             "decoder": decoder_sizes(self.model.decoder),
             "field": None if self.model.field is None else self.model.field.shape.as_dict(),
         }
@@ -577,6 +581,7 @@ class ClipTraining:
         self._load_pictures()
         resume = json.loads(kept.header["resume"])
         self.spacing, self.moving_spacing = kept.header["spacing"], kept.header["moving_spacing"]
+        self._coverage = kept.header.get("coverage")
         self.model = load_clip_model(kept, self.reference, is_learning=True)
         self.gains = nn.Parameter(torch.from_numpy(kept.arrays["resume.gains"].copy()))
         images = kept.arrays["resume.backgrounds"]

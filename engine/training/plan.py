@@ -237,6 +237,7 @@ def _anchor_lines(
     config: TrainConfig, counts: Counts, reference: Counts | None, *, n_siblings: int, is_source: bool
 ) -> list[PlanLine]:
     past = f"expected, the middle of {_plural(n_siblings, 'clip')} trained before"
+    limit = f"at most {config.max_moving_points:,} with the inherited ones in use"
     if not is_source:
         static = f"expected; the voxel grows until there are at most {config.max_static_points:,}"
         moving = f"expected; the voxel grows until there are at most {config.max_moving_points:,}"
@@ -247,15 +248,17 @@ def _anchor_lines(
     words = {"frozen": "kept as they are", "trainable": "they go on learning", "off": "left out, the clip has its own"}
     known = "counted in the reference clip" if reference else "expected, the reference clip is not trained yet"
     residual = {
-        "dedup": "expected; those that inherited anchors do not cover",
+        "dedup": f"expected; those that inherited anchors do not cover, {limit}",
         "none": "residual=none",
         "full": "expected; all that moves, residual=full",
     }[config.residual]
     if not counts.n_alive:
-        past = residual = "nothing moves"
+        residual = "nothing moves"
+    elif n_siblings:
+        residual = f"{past}; {limit}" if config.residual == "dedup" else past
     return [
         PlanLine("static anchors", counts.n_static, "", f"{words[config.inherit]}; {known}"),
-        PlanLine("residual anchors", counts.n_moving, "", past if n_siblings or not counts.n_alive else residual),
+        PlanLine("residual anchors", counts.n_moving, "", residual),
     ]
 
 
