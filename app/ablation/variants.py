@@ -69,6 +69,12 @@ VARIANTS = (
         shares_reference=False,
         is_reference_moved=True,
     ),
+    Variant(
+        "gate-images",
+        "static anchors that the pictures show changing get a dynamic feature",
+        {"gate": "images"},
+        shares_reference=False,
+    ),
     Variant("gate-off", "every anchor at every time, as published", {"gate": "off"}, shares_reference=False),
     Variant("independent", "clips share nothing", {"independent": True}, is_baseline=True, shares_reference=False),
     Variant(

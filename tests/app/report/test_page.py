@@ -17,6 +17,15 @@ from engine.metrics.columns import COLUMNS
 from tests.app.fakes import write_capture
 from tests.app.report.made_up import CAMERAS, ODD_NAME, Page, change_header, report, train
 
+COVERAGE = {
+    "n_points": 4000,
+    "n_inherited": 500,
+    "n_residual": 3000,
+    "n_left_out": 500,
+    "share": 0.9876,
+    "reason": "<3>",
+}
+
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -30,6 +39,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
             metrics = {"stages_s": {"Carving": seconds * factor, "Training": 60.0 * factor}}
             metrics |= {"preparation_s": seconds * factor, "training_s": 60.0 * factor}
             change_header(project / "clips" / f"{clip:04d}.safetensors", lambda h, m=metrics: h.update(metrics=m))
+    change_header(folder / ODD_NAME / "clips" / "0001.safetensors", lambda h: h.update(coverage=COVERAGE))
     report(folder / ODD_NAME, compare=[folder / "others"])
     return folder
 
@@ -80,6 +90,11 @@ def test_the_comparison_stands_first(page):
     assert anchors[:2] == ["comparison", "speed"]
     assert [row[:2] for row in page.tables["comparison"]] == [[ODD_NAME, "defaults"], ["fast", "source_steps=7"]]
     assert page.tables["speed_error"][1][:3] == ["2", "fast", "0.28"]  # (3 + 6 + 2 + 6) / 60
+
+
+def test_the_split_says_how_much_of_what_moves_is_within_reach_of_an_anchor(page, numbers):
+    assert page.tables["coverage"] == [["1", "4000", "500", "3000", "500", "0.988", "<3>"]]
+    assert numbers["tables"]["coverage"]["rows"] == [{"clip": 1, **COVERAGE}]
 
 
 def test_flicker_is_one_thing_on_the_whole_page(page, numbers):

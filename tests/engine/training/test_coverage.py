@@ -27,7 +27,7 @@ def scene() -> tuple[ClipModel, MovingCloud]:
         torch.from_numpy(cube), torch.full((len(cube), 3), 0.5), spacing=1.0, feature_dim=16, presence=nobody
     )
     model = ClipModel(sets={"moving": moving}, decoder=torch.nn.Module(), field=None, clip_length=4, n_frames=4)  # type: ignore[arg-type]
-    points = np.concatenate([cube, cube + np.float32([100, 0, 0])])
+    points = np.concatenate([cube, cube + np.array([100, 0, 0], np.float32)])
     presence = (points[:, 2].astype(int) % 4)[:, None] == np.arange(4)
     return model, MovingCloud(points, np.full_like(points, 0.5), presence, 1.0)
 
