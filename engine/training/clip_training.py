@@ -46,6 +46,7 @@ from engine.training.config import TrainConfig
 from engine.training.demotion import demote
 from engine.training.fused_loss import LossWorkspace
 from engine.training.gating import nothing_measured, promote, with_regions, without_static_regions
+from engine.training.half_size import HalfSize
 from engine.training.held_in import MEASURE_EVERY, Patience, held_in_items, steps_to_finish
 from engine.training.losses import photometric_loss
 from engine.training.optimizer import PhaseOptimizer, named_parameters
@@ -328,10 +329,16 @@ class ClipTraining:
         self._order: Order = (ErrorOrder if is_by_error else ShuffledOrder)(len(self._items), seed=self.seed + index)
         self._phase_index = index
         self._sight = {}  # a set may have become dynamic
-        has_rest = name == "source" and self.config.tiles == "active" and not self.gains.requires_grad
-        self._tiles = ActiveTiles(self.model) if has_rest and ActiveTiles.applies(self.model) else None
+        self._set_size(is_half=steps_in_phase < self.config.n_coarse_steps(n_steps))
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self.phases[index] = (name, steps_in_phase)
+
+    def _set_size(self, *, is_half: bool) -> None:
+        """Pictures are drawn and compared at this size from here on; `config.coarse_share`."""
+        self._half = HalfSize(self.capture.rig, near_plane=self.near_plane) if is_half else None
+        is_source = self.phases[self._phase_index][0] == "source"
+        has_rest = is_source and self.config.tiles == "active" and not self.gains.requires_grad
+        self._tiles = ActiveTiles(self.model) if has_rest and ActiveTiles.applies(self.model) else None
 
     def step(self) -> StepStats:
         """Draw a picture, render it, compare, update.
@@ -339,11 +346,13 @@ class ClipTraining:
         Raises:
             NonFiniteLoss: The loss or a gradient is not finite; names it. The model is as it was before this step.
         """
-        index, _ = self._phase_at(self.steps_done)
+        index, in_phase = self._phase_at(self.steps_done)
         if index != self._phase_index:
             self._add_moving()
             self._start_phase(index, 0)
-        stage = self.phases[index][0]
+        stage, n_steps = self.phases[index]
+        if self._half is not None and in_phase >= self.config.n_coarse_steps(n_steps):
+            self._set_size(is_half=False)
         drawn, weight = self._order.draw()
         item = self._items[drawn]
         if stage == "static":
@@ -353,7 +362,11 @@ class ClipTraining:
             camera_row, frame = divmod(item, self.clip.n_frames)
             clip_time = frame / self.clip.clip_length
             truth, is_counted = self.pictures.raw(camera_row, frame), None
-        view = self._views[self.camera_indices[camera_row]]
+        views, workspace = self._views, self._workspace
+        if self._half is not None:
+            views, workspace = self._half.views, self._half.workspace
+            truth, is_counted = self._half.truth(item, truth, is_counted)
+        view = views[self.camera_indices[camera_row]]
         active = self._active_picture(camera_row, view, clip_time)
         image = render_gaussians(active.gaussians, view, tile_mask=active.tile_mask).image[0]
         compared = photometric_loss(
@@ -364,7 +377,7 @@ class ClipTraining:
             is_counted=is_counted,  # unstable pixels of a background do not
             tile_mask=active.tile_mask,
             rest=active.rest,
-            workspace=self._workspace,
+            workspace=workspace,
         )
         loss, mean_square, volume = compared.loss, compared.mean_square, torch.zeros(())
         if self._tiles is not None:
@@ -403,7 +416,7 @@ class ClipTraining:
         """Now and then, see whether the pictures kept out of training still gain; else cut the phase short."""
         name, n_steps = self.phases[self._phase_index]
         done = self._optimizer.steps_done
-        if self._patience is None or done % MEASURE_EVERY or done >= n_steps:
+        if self._patience is None or self._half is not None or done % MEASURE_EVERY or done >= n_steps:
             return
         if not self._patience.saw(self.held_in_psnr()):
             return

@@ -190,4 +190,5 @@ def clip_sizes(footage: Footage, clip: Clip, config: TrainConfig, counts: Counts
         is_built=not is_source or config.inherit == "off",
         has_gate=config.gate == "hull",
         has_active_tiles=is_frozen and config.tiles == "active" and config.gate == "hull",
+        coarse_share=config.coarse_share,
     )

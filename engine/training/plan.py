@@ -149,6 +149,10 @@ def make_plan(
         *_model_lines(config, counts, is_source=is_source),
         PlanLine("kept while training", checkpoint_mb(sizes), "MB", "a checkpoint to go on from; it goes in the end"),
     ]
+    if config.coarse_share and sum(int(line.value) for line in phases):
+        n_coarse = sum(config.n_coarse_steps(int(line.value)) for line in phases)
+        reason = f"the first {100 * config.coarse_share:.0f} % of every phase, as set"
+        lines.append(PlanLine("half size", n_coarse, "steps", reason))
     if config.patience and sum(int(line.value) for line in phases):
         n_kept = len(held_in_items(footage.n_cameras, clip.n_frames, 0))
         reason = f"when {_plural(n_kept, 'picture')} kept out of training gain nothing over {config.patience} looks"
