@@ -26,7 +26,9 @@ def describe_project(folder: Path) -> dict[str, Any]:
 
     Returns:
         schema; kind "project"; path; capture; fps (None when the capture is not there); clips, each with clip_index,
-        role, start, n_frames, components (name to bytes) and n_bytes; components and n_bytes of all clips;
+        role, start, n_frames, components (name to bytes), n_bytes and coverage (what moves and how much of it has an
+        anchor near it, see engine.training.building.Coverage; None where not known); components and n_bytes of all
+        clips;
         reference_bytes and reference_share, of the clip that others inherit from; bytes_per_frame and mb_per_minute,
         of all others: what video costs once the reference is there. None where there are none, or where the frame
         rate is not known.
@@ -56,6 +58,7 @@ def describe_project(folder: Path) -> dict[str, Any]:
                 "n_frames": clip.n_frames,
                 "components": clip.storage,
                 "n_bytes": sum(clip.storage.values()),
+                "coverage": clip.coverage,
             }
             for clip in facts.clips
         ],
@@ -88,6 +91,9 @@ def project_lines(found: dict[str, Any]) -> list[str]:
     for row in (heads, *rows):
         cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
         lines.append("  " + "  ".join(cells))
+    covered = [f"clip {clip['clip_index']} {_covered(clip['coverage'])}" for clip in clips if clip["coverage"]]
+    if covered:
+        lines.append(f"Of what moves, within reach of an anchor: {'; '.join(covered)}.")
     if found["bytes_per_frame"] is not None:
         line = f"Clips after the reference take {found['bytes_per_frame'] / 1e3:.1f} kB per frame"
         if found["mb_per_minute"] is None:
@@ -95,6 +101,13 @@ def project_lines(found: dict[str, Any]) -> list[str]:
         else:
             lines.append(f"{line}: {found['mb_per_minute']:.1f} MB per minute at {found['fps']:g} frames per second.")
     return lines
+
+
+def _covered(coverage: dict[str, Any]) -> str:
+    said = f"{100 * coverage['share']:.1f} % with {coverage['n_residual']:,} anchors of its own"
+    if coverage["n_left_out"]:
+        said += f", {coverage['n_left_out']:,} points beyond the budget left to those beside them"
+    return said
 
 
 def _n_bytes(clips: list[ClipFacts]) -> int:

@@ -75,6 +75,18 @@ def split_section(facts: ProjectFacts, capture: Mapping[str, Any], n_clips: int)
         + ", ".join(f"{c.clip_index} (frames {c.start} to {c.start + c.n_frames - 1})" for c in facts.clips),
     }
     parts: list[Any] = [_pairs("split", "Cameras and clips", rows)]
+    covered = [{"clip": clip.clip_index, **clip.coverage} for clip in facts.clips if clip.coverage]
+    if covered:
+        columns = (
+            TableColumn("clip", "Clip"),
+            TableColumn("n_points", "Moving points"),
+            TableColumn("n_inherited", "On inherited anchors"),
+            TableColumn("n_residual", "Anchors of its own"),
+            TableColumn("n_left_out", "Beyond the budget"),
+            TableColumn("share", "Within reach of an anchor", 3),
+            TableColumn("reason", "Budget"),
+        )
+        parts.append(Table("coverage", "What moves in later clips, and the anchors that reach it", columns, covered))
     if len(measured) < n_clips:
         left = [index for index in range(n_clips) if index not in measured]
         parts.append(f"Not trained, and so in no figure of this page: clip {', '.join(map(str, left))}.")

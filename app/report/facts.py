@@ -31,6 +31,8 @@ class ClipFacts:
         storage: Bytes per component, see app.report.storage.
         stages_s: Wall seconds per stage, see app.training.stage_watch; empty when not recorded.
         preparation_s, training_s: Together all of it; None when not recorded.
+        coverage: Of a clip that inherits: what moves and how much of it has an anchor near it, see
+            engine.training.building.Coverage; None when not recorded.
     """
 
     clip_index: int
@@ -43,6 +45,7 @@ class ClipFacts:
     stages_s: dict[str, float]
     preparation_s: float | None
     training_s: float | None
+    coverage: dict[str, Any] | None = None
 
     @property
     def wall_s(self) -> float | None:
@@ -110,6 +113,7 @@ def _read_clip(path: Path) -> ClipFacts:
             stages_s=stages_of(metrics),
             preparation_s=_seconds(metrics.get("preparation_s")),
             training_s=_seconds(metrics.get("training_s")),
+            coverage=dict(header["coverage"]) if header.get("coverage") else None,
         )
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ProjectError(

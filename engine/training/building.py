@@ -5,12 +5,15 @@ Sizes follow the data and the reasons are returned as lines to report. Nothing h
 
 from __future__ import annotations
 
+from dataclasses import asdict, dataclass, replace
+
 import numpy as np
 import torch
 from scipy.spatial import KDTree
 from torch import Tensor
 
 from engine.capture.clip import Clip
+from engine.cloud.budget import NOBODY, choose_within_budget
 from engine.cloud.dedup import mean_neighbor_distance, residual_rows
 from engine.cloud.moving_cloud import MovingCloud
 from engine.cloud.static_cloud import StaticCloud
@@ -21,6 +24,9 @@ from engine.model.decoder import Decoder
 from engine.model.field import FieldShape, SpatioTemporalField
 from engine.model.field_sizes import derive_cells, derive_log2_entries
 from engine.training.config import TrainConfig
+
+_REACH_SPACINGS = 1.05
+"""How far an anchor stands in for points that did not become anchors: the voxels that share a face with its own."""
 
 
 def static_model(cloud: StaticCloud, clip: Clip, config: TrainConfig, generator: torch.Generator) -> ClipModel:
@@ -106,16 +112,56 @@ def moving_anchors(cloud: MovingCloud, rows: np.ndarray, config: TrainConfig) ->
     )
 
 
-def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> str:
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """How much of what moves in a source clip has an anchor near it. A value.
+
+    Attributes:
+        n_points: Moving points of the clip.
+        n_inherited: Of these, inside the spheres of inherited anchors.
+        n_residual: Anchors of the clip's own.
+        n_left_out: Points that would have become anchors beyond the budget.
+        share: Of the points that are within reach of an anchor of either kind; 1 where nothing moves.
+        reason: Where the budget comes from.
+    """
+
+    n_points: int
+    n_inherited: int
+    n_residual: int
+    n_left_out: int
+    share: float
+    reason: str
+
+    @property
+    def text(self) -> str:
+        """As it is told while the clip is prepared."""
+        n_outside = self.n_points - self.n_inherited
+        percent = 100 * n_outside / max(self.n_points, 1)
+        said = f"{n_outside} of {self.n_points} moving points ({percent:.0f} %) lie outside the inherited anchors; "
+        said += f"{self.n_residual} residual anchors ({self.reason})"
+        if self.n_left_out:
+            said += f", {self.n_left_out} points left to the anchors beside them"
+        return f"{said}; {100 * self.share:.1f} % of what moves is within reach of an anchor"
+
+    def as_dict(self) -> dict[str, int | float | str]:
+        """JSON-able."""
+        return asdict(self)
+
+
+def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> Coverage:
     """Split a source clip's moving points into those the reference covers and residual anchors; says how many.
 
     A point is covered when it lies inside the union of spheres around the inherited moving anchors, each with the
     mean distance to its three nearest neighbours as radius. Covered points switch on the inherited anchor nearest to
     them in the frames they are present in, so nothing covered is left without an anchor; the others become residual
     anchors. Source: ClipGStream, geometry-aware deduplication, with the exact union.
+
+    A clip has no more anchors that move than `config.max_moving_points`, inherited ones that it uses included. Which
+    of the others become anchors then is said in `engine.cloud.budget`; the rest switch on the one beside them.
     """
     is_new = np.ones(len(cloud.points), bool)
     moving = model.anchor_set("moving") if "moving" in model.roles() else None
+    n_used = 0
     if moving is not None and len(cloud.points):
         centers = moving.positions.numpy()
         is_new = residual_rows(cloud.points, centers, mean_neighbor_distance(centers, k=3))
@@ -123,16 +169,58 @@ def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> s
         presence = np.zeros((len(centers), cloud.presence.shape[1]), bool)
         np.logical_or.at(presence, nearest, cloud.presence[~is_new])
         moving.presence = torch.from_numpy(presence)
-    share = 100 * is_new.mean() if len(is_new) else 0.0
-    said = f"{is_new.sum()} of {len(is_new)} moving points ({share:.0f} %) lie outside the inherited anchors"
-    chosen = {"dedup": is_new, "none": np.zeros_like(is_new), "full": np.ones_like(is_new)}[config.residual]
+        n_used = int(presence.any(1).sum())
+    chosen, presence, is_reached, reason = is_new, cloud.presence, np.ones(len(cloud.points), bool), "all of them"
+    if config.residual == "none":
+        chosen, is_reached, reason = np.zeros_like(is_new), ~is_new, "residual=none"
+    elif config.residual == "full":
+        chosen, reason = is_reached, "all moving points, residual=full"
+    else:
+        budget, limit = _residual_budget(cloud.presence[is_new], n_used, config)
+        if is_new.sum() > budget:
+            chosen, presence, is_reached = _within_budget(cloud, is_new, budget)
+            reason = limit
     if chosen.any():
-        residual = moving_anchors(cloud, chosen, config)
+        residual = moving_anchors(replace(cloud, presence=presence), chosen, config)
         if moving is not None:
             _start_like_neighbors(residual, moving)
         model.add_set("residual", residual)
-    kept = {"dedup": "they become", "none": "none becomes one of the", "full": "all points become"}[config.residual]
-    return f"{said}; {kept} residual anchors"
+    return Coverage(
+        n_points=len(is_new),
+        n_inherited=int((~is_new).sum()),
+        n_residual=int(chosen.sum()),
+        n_left_out=int((is_new & ~chosen).sum()) if config.residual == "dedup" else 0,
+        share=float(is_reached.mean()) if len(is_reached) else 1.0,
+        reason=reason,
+    )
+
+
+def _residual_budget(presence: np.ndarray, n_used: int, config: TrainConfig) -> tuple[int, str]:
+    """Most residual anchors of a clip, and why.
+
+    Args:
+        presence: Of the points that would become anchors. [P, M] bool
+        n_used: Inherited anchors that exist in some frame of the clip.
+    """
+    rest, n_alive = config.max_moving_points - n_used, int(presence.sum(0).max(initial=0))
+    if rest >= n_alive:
+        return rest, f"at most {config.max_moving_points} a clip, {n_used} inherited ones in use"
+    return n_alive, "as many as are there in the busiest frame"
+
+
+def _within_budget(cloud: MovingCloud, is_new: np.ndarray, budget: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rows that become anchors [P], presence with that of the points beside them [P, M], points within reach [P]."""
+    rows = np.flatnonzero(is_new)
+    is_chosen, stand_in = choose_within_budget(
+        cloud.points[rows], cloud.presence[rows], budget=budget, reach=_REACH_SPACINGS * cloud.spacing
+    )
+    has_other = (stand_in != NOBODY) & ~is_chosen
+    presence, is_reached = cloud.presence.copy(), ~is_new
+    np.logical_or.at(presence, rows[stand_in[has_other]], cloud.presence[rows[has_other]])
+    is_reached[rows] = stand_in != NOBODY
+    chosen = np.zeros_like(is_new)
+    chosen[rows[is_chosen]] = True
+    return chosen, presence, is_reached
 
 
 def _start_like_neighbors(residual: AnchorSet, moving: AnchorSet) -> None:

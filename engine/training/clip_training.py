@@ -46,6 +46,7 @@ from engine.training.config import TrainConfig
 from engine.training.demotion import demote
 from engine.training.fused_loss import LossWorkspace
 from engine.training.gating import nothing_measured, promote, with_regions, without_static_regions
+from engine.training.half_size import HalfSize
 from engine.training.held_in import MEASURE_EVERY, Patience, held_in_items, steps_to_finish
 from engine.training.losses import photometric_loss
 from engine.training.optimizer import PhaseOptimizer, named_parameters
@@ -134,6 +135,7 @@ class ClipTraining:
         self._sight: dict[tuple[str, int], Tensor] = {}  # rows of static sets, flags of dynamic ones
         self._tiles: ActiveTiles | None = None
         self._reasons: dict[str, np.ndarray] = {}
+        self._coverage: dict[str, int | float | str] | None = None
         n_cameras = len(self.camera_indices)
         self._held_in = held_in_items(n_cameras, clip.n_frames, seed) if config.patience else []
         self._patience: Patience | None = None
@@ -306,7 +308,9 @@ class ClipTraining:
             drop_inherited(self.model, own, self.config)
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         cloud = self._find_motion()
-        self._say("Comparing with the reference", add_residual(self.model, cloud, self.config))
+        coverage = add_residual(self.model, cloud, self.config)
+        self._coverage = coverage.as_dict()
+        self._say("Comparing with the reference", coverage.text)
         self._make_dynamic(cloud)
 
     # ---------------------------------------------------------------- steps
@@ -327,10 +331,16 @@ class ClipTraining:
         self._order: Order = (ErrorOrder if is_by_error else ShuffledOrder)(len(self._items), seed=self.seed + index)
         self._phase_index = index
         self._sight = {}  # a set may have become dynamic
-        has_rest = name == "source" and self.config.tiles == "active" and not self.gains.requires_grad
-        self._tiles = ActiveTiles(self.model) if has_rest and ActiveTiles.applies(self.model) else None
+        self._set_size(is_half=steps_in_phase < self.config.n_coarse_steps(n_steps))
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self.phases[index] = (name, steps_in_phase)
+
+    def _set_size(self, *, is_half: bool) -> None:
+        """Pictures are drawn and compared at this size from here on; `config.coarse_share`."""
+        self._half = HalfSize(self.capture.rig, near_plane=self.near_plane) if is_half else None
+        is_source = self.phases[self._phase_index][0] == "source"
+        has_rest = is_source and self.config.tiles == "active" and not self.gains.requires_grad
+        self._tiles = ActiveTiles(self.model) if has_rest and ActiveTiles.applies(self.model) else None
 
     def step(self) -> StepStats:
         """Draw a picture, render it, compare, update.
@@ -338,11 +348,13 @@ class ClipTraining:
         Raises:
             NonFiniteLoss: The loss or a gradient is not finite; names it. The model is as it was before this step.
         """
-        index, _ = self._phase_at(self.steps_done)
+        index, in_phase = self._phase_at(self.steps_done)
         if index != self._phase_index:
             self._add_moving()
             self._start_phase(index, 0)
-        stage = self.phases[index][0]
+        stage, n_steps = self.phases[index]
+        if self._half is not None and in_phase >= self.config.n_coarse_steps(n_steps):
+            self._set_size(is_half=False)
         drawn, weight = self._order.draw()
         item = self._items[drawn]
         if stage == "static":
@@ -352,7 +364,11 @@ class ClipTraining:
             camera_row, frame = divmod(item, self.clip.n_frames)
             clip_time = frame / self.clip.clip_length
             truth, is_counted = self.pictures.raw(camera_row, frame), None
-        view = self._views[self.camera_indices[camera_row]]
+        views, workspace = self._views, self._workspace
+        if self._half is not None:
+            views, workspace = self._half.views, self._half.workspace
+            truth, is_counted = self._half.truth(item, truth, is_counted)
+        view = views[self.camera_indices[camera_row]]
         active = self._active_picture(camera_row, view, clip_time)
         image = render_gaussians(active.gaussians, view, tile_mask=active.tile_mask).image[0]
         compared = photometric_loss(
@@ -363,7 +379,7 @@ class ClipTraining:
             is_counted=is_counted,  # unstable pixels of a background do not
             tile_mask=active.tile_mask,
             rest=active.rest,
-            workspace=self._workspace,
+            workspace=workspace,
         )
         loss, mean_square, volume = compared.loss, compared.mean_square, torch.zeros(())
         if self._tiles is not None:
@@ -402,7 +418,7 @@ class ClipTraining:
         """Now and then, see whether the pictures kept out of training still gain; else cut the phase short."""
         name, n_steps = self.phases[self._phase_index]
         done = self._optimizer.steps_done
-        if self._patience is None or done % MEASURE_EVERY or done >= n_steps:
+        if self._patience is None or self._half is not None or done % MEASURE_EVERY or done >= n_steps:
             return
         if not self._patience.saw(self.held_in_psnr()):
             return
@@ -505,6 +521,7 @@ class ClipTraining:
             "moving_spacing": self.moving_spacing,
             "n_anchors": {role: len(self.model.anchor_set(role)) for role in self.model.roles()},
             "n_alive": n_alive(self.model),
+            "coverage": self._coverage,
             "decoder": decoder_sizes(self.model.decoder),
             "field": None if self.model.field is None else self.model.field.shape.as_dict(),
         }
@@ -579,6 +596,7 @@ class ClipTraining:
         self._load_pictures()
         resume = json.loads(kept.header["resume"])
         self.spacing, self.moving_spacing = kept.header["spacing"], kept.header["moving_spacing"]
+        self._coverage = kept.header.get("coverage")
         self.model = load_clip_model(kept, self.reference, is_learning=True)
         self.gains = nn.Parameter(torch.from_numpy(kept.arrays["resume.gains"].copy()))
         images = kept.arrays["resume.backgrounds"]

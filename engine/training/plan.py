@@ -149,6 +149,10 @@ def make_plan(
         *_model_lines(config, counts, is_source=is_source),
         PlanLine("kept while training", checkpoint_mb(sizes), "MB", "a checkpoint to go on from; it goes in the end"),
     ]
+    if config.coarse_share and sum(int(line.value) for line in phases):
+        n_coarse = sum(config.n_coarse_steps(int(line.value)) for line in phases)
+        reason = f"the first {100 * config.coarse_share:.0f} % of every phase, as set"
+        lines.append(PlanLine("half size", n_coarse, "steps", reason))
     if config.patience and sum(int(line.value) for line in phases):
         n_kept = len(held_in_items(footage.n_cameras, clip.n_frames, 0))
         reason = f"when {_plural(n_kept, 'picture')} kept out of training gain nothing over {config.patience} looks"
@@ -237,6 +241,7 @@ def _anchor_lines(
     config: TrainConfig, counts: Counts, reference: Counts | None, *, n_siblings: int, is_source: bool
 ) -> list[PlanLine]:
     past = f"expected, the middle of {_plural(n_siblings, 'clip')} trained before"
+    limit = f"at most {config.max_moving_points:,} with the inherited ones in use"
     if not is_source:
         static = f"expected; the voxel grows until there are at most {config.max_static_points:,}"
         moving = f"expected; the voxel grows until there are at most {config.max_moving_points:,}"
@@ -247,15 +252,17 @@ def _anchor_lines(
     words = {"frozen": "kept as they are", "trainable": "they go on learning", "off": "left out, the clip has its own"}
     known = "counted in the reference clip" if reference else "expected, the reference clip is not trained yet"
     residual = {
-        "dedup": "expected; those that inherited anchors do not cover",
+        "dedup": f"expected; those that inherited anchors do not cover, {limit}",
         "none": "residual=none",
         "full": "expected; all that moves, residual=full",
     }[config.residual]
     if not counts.n_alive:
-        past = residual = "nothing moves"
+        residual = "nothing moves"
+    elif n_siblings:
+        residual = f"{past}; {limit}" if config.residual == "dedup" else past
     return [
         PlanLine("static anchors", counts.n_static, "", f"{words[config.inherit]}; {known}"),
-        PlanLine("residual anchors", counts.n_moving, "", past if n_siblings or not counts.n_alive else residual),
+        PlanLine("residual anchors", counts.n_moving, "", residual),
     ]
 
 

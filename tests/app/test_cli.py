@@ -22,7 +22,7 @@ from app.project import open_project, read_settings
 from app.results import check_writable
 from app.video import write_pictures, write_video
 from engine.errors import ProjectError
-from engine.model.clip_state import read_clip_state
+from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
 from tests.app.conftest import inline
 from tests.app.fakes import N_STEPS, make_crashing, make_fake, write_capture
 
@@ -360,6 +360,20 @@ def test_inspecting_a_project_counts_the_bytes_of_its_clips(run, capture_folder,
     capture.rename(tmp_path / "elsewhere")
     assert json.loads(run("inspect", project, "--json")[1])["mb_per_minute"] is None
     assert "the capture is not there" in run("inspect", project)[1]
+
+
+def test_inspecting_a_project_says_how_much_of_what_moves_is_within_reach_of_an_anchor(run, capture_folder, tmp_path):
+    project = tmp_path / "p"
+    assert run("train", capture_folder, "--project", project, "--clip-length", 3)[0] == 0
+    assert "within reach" not in run("inspect", project)[1]  # nothing known, as in files of earlier versions
+    path = project / "clips" / "0001.safetensors"
+    state = read_clip_state(path)
+    coverage = {"n_points": 4000, "n_inherited": 500, "n_residual": 3000, "n_left_out": 500, "share": 0.9876}
+    write_clip_state(path, ClipState(state.arrays, state.header | {"coverage": coverage | {"reason": "at most 3500"}}))
+    clips = json.loads(run("inspect", project, "--json")[1])["clips"]
+    assert [clip["coverage"] and clip["coverage"]["share"] for clip in clips] == [None, 0.9876]
+    said = "clip 1 98.8 % with 3,000 anchors of its own, 500 points beyond the budget left to those beside them"
+    assert said in run("inspect", project)[1]
 
 
 def test_inspecting_a_project_without_clips_or_with_a_damaged_one_is_bad_input(run, capture_folder, tmp_path):

@@ -17,6 +17,15 @@ from engine.metrics.columns import COLUMNS
 from tests.app.fakes import write_capture
 from tests.app.report.made_up import CAMERAS, ODD_NAME, Page, change_header, report, train
 
+COVERAGE = {
+    "n_points": 4000,
+    "n_inherited": 500,
+    "n_residual": 3000,
+    "n_left_out": 500,
+    "share": 0.9876,
+    "reason": "<3>",
+}
+
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -30,6 +39,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
             metrics = {"stages_s": {"Carving": seconds * factor, "Training": 60.0 * factor}}
             metrics |= {"preparation_s": seconds * factor, "training_s": 60.0 * factor}
             change_header(project / "clips" / f"{clip:04d}.safetensors", lambda h, m=metrics: h.update(metrics=m))
+    change_header(folder / ODD_NAME / "clips" / "0001.safetensors", lambda h: h.update(coverage=COVERAGE))
     report(folder / ODD_NAME, compare=[folder / "others"])
     return folder
 
@@ -89,6 +99,11 @@ def test_what_a_later_clip_takes_and_gives_is_set_side_by_side(page, numbers):
     assert rows[1]["later_s"] == pytest.approx(8.0)  # clip 1 alone: 2 + 6
     assert page.tables["later_clips"][1][:3] == ["2", "fast", "8.0"]
     assert rows[0]["later_psnr"] != own["means"]["held_out"]["psnr"]
+
+
+def test_the_split_says_how_much_of_what_moves_is_within_reach_of_an_anchor(page, numbers):
+    assert page.tables["coverage"] == [["1", "4000", "500", "3000", "500", "0.988", "<3>"]]
+    assert numbers["tables"]["coverage"]["rows"] == [{"clip": 1, **COVERAGE}]
 
 
 def test_flicker_is_one_thing_on_the_whole_page(page, numbers):

@@ -98,6 +98,17 @@ def test_a_source_clip_before_its_reference_says_that_it_guesses():
     assert "not trained yet" in texts(plan(clip=NEXT, is_source=True))["static anchors"][1]
 
 
+def test_steps_at_half_size_are_told_take_less_time_and_more_memory():
+    full, coarse = plan(is_source=True), plan(is_source=True, config=TrainConfig(coarse_share=0.5))
+    assert full.line("half size") is None
+    assert texts(coarse)["half size"] == (3000, "the first 50 % of every phase, as set")
+    assert texts(plan(config=TrainConfig(coarse_share=0.5)))["half size"][0] == 405 + 2700
+    assert coarse.n_steps == full.n_steps
+    assert 0.8 < coarse.training_s.value / full.training_s.value < 1.0
+    pictures_mb = 270 * 640 * 360 * 3 / 1e6
+    assert coarse.memory_mb.value - full.memory_mb.value == pytest.approx(pictures_mb / 4, abs=0.01)
+
+
 def test_clips_trained_before_say_what_to_expect():
     siblings = [
         measured(clip_index=i, role="source", n_anchors={"static": 20621, "residual": n}, n_alive=7000)
@@ -106,7 +117,8 @@ def test_clips_trained_before_say_what_to_expect():
     lines = texts(
         plan(clip=dataclasses.replace(NEXT, clip_index=4), is_source=True, reference=header(), history=siblings)
     )
-    assert lines["residual anchors"] == (9000, "expected, the middle of 3 clips trained before")
+    said = "expected, the middle of 3 clips trained before; at most 32,000 with the inherited ones in use"
+    assert lines["residual anchors"] == (9000, said)
 
 
 def test_one_frame():
