@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-STILL, CHANGES, LIGHT, ONE_VIEW, UNSEEN, NEAR_MOTION, USER_STATIC, USER_DYNAMIC, LEARNED_NOTHING, ALONE = range(10)
+STILL, CHANGES, LIGHT, ONE_VIEW, UNSEEN, NEAR_MOTION, USER_STATIC, USER_DYNAMIC, LEARNED_NOTHING, ALONE, INSIDE = range(
+    11
+)
 REASONS = (
     "still",
     "changes in several views",
@@ -14,6 +16,7 @@ REASONS = (
     "marked as dynamic",
     "had a dynamic feature and learned no change",
     "changes, but nothing beside it does",
+    "something else is seen in its place from all sides",
 )
 """In words, by code."""
 NO_REASON = 255

@@ -1,0 +1,345 @@
+"""Generated captures that are hard for "model only what a scene needs": light, shadows, exposure, what comes and goes.
+
+A floor with a soft pattern and things on it, seen from a ring of nine cameras that look down; every ray hits something,
+and rays meet planes, balls and boxes by formula. Pictures are made in memory and are the same on every machine that
+rounds alike. Scene units are arbitrary: the floor seen is about 3 across, a pixel on it 0.03.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from engine.capture.capture import Capture
+from engine.capture.rig import CameraRig
+from engine.synthetic import textures
+from engine.synthetic.scene import looking_at
+
+WIDTH, HEIGHT, FOCAL = 96, 72, 100.0
+N_CAMERAS = 9
+HELD_OUT = 4
+"""A camera inside the ring, so that what is measured there was never trained on."""
+SUPERSAMPLING = 2
+CLIP_LENGTH = 4
+SUN = np.array([0.4, -0.3, 0.86])
+
+Place = Callable[[int], tuple[float, float, float] | None]
+"""Frame of the capture -> centre of a thing; None while it is not there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Thing:
+    """A ball or an upright box.
+
+    Attributes:
+        place: Where it is.
+        size: Radius of a ball, or half edges of a box.
+        colors: Two colours of its pattern, six hex digits each.
+    """
+
+    place: Place
+    size: float | tuple[float, float, float]
+    colors: tuple[str, str] = ("d04030", "f0c060")
+
+
+def _steady(_frame: int, points: np.ndarray) -> np.ndarray:
+    return np.ones(len(points))
+
+
+def _level(_camera: int, _frame: int) -> float:
+    return 1.0
+
+
+def _at_rest(_frame: int) -> float:
+    return 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class HardScene:
+    """What happens in one capture.
+
+    Attributes:
+        n_clips: Of CLIP_LENGTH frames, unless `clip_length` says otherwise.
+        things: All things, whenever they are there.
+        light: (frame, points on the floor [P, 3]) -> factor of what they reflect. [P]
+        exposure: (camera, frame) -> factor of the whole picture.
+        slide: Frame -> how far the floor's pattern has moved along x.
+    """
+
+    name: str
+    n_clips: int = 2
+    things: tuple[Thing, ...] = ()
+    light: Callable[[int, np.ndarray], np.ndarray] = _steady
+    exposure: Callable[[int, int], float] = _level
+    slide: Callable[[int], float] = _at_rest
+    clip_length: int = CLIP_LENGTH
+
+    @property
+    def n_frames(self) -> int:
+        """Of the whole capture."""
+        return self.n_clips * self.clip_length
+
+    def capture(self) -> Capture:
+        """The pictures as an opened capture."""
+        rig = make_rig()
+        pixels = np.stack([self.video(camera) for camera in range(N_CAMERAS)])
+        return Capture(
+            path=Path(self.name),
+            format="made in memory",
+            rig=rig,
+            n_frames=self.n_frames,
+            fps=10.0,
+            scale=1.0,
+            native_rig=rig,
+            default_holdout=(rig.names[HELD_OUT],),
+            warnings=(),
+            fingerprint=f"{self.name}-{self.n_frames}",
+            store=_Pixels(pixels),  # type: ignore[arg-type]
+        )
+
+    def video(self, camera: int) -> np.ndarray:
+        """All frames of one camera. [T, H, W, 3] uint8"""
+        return np.stack([self._image(camera, frame) for frame in range(self.n_frames)])
+
+    def shows(self, camera: int, frame: int, *things: int) -> np.ndarray:
+        """Pixels of which these things cover at least half. [H, W] bool"""
+        return _pixels(np.isin(self._cast(camera, frame)[1], things).astype(np.float64)) >= 0.5
+
+    def without(self, *things: int) -> HardScene:
+        """The same scene as if these things never were there."""
+        return replace(self, things=tuple(t for i, t in enumerate(self.things) if i not in things))
+
+    def _image(self, camera: int, frame: int) -> np.ndarray:
+        colors, _ = self._cast(camera, frame)
+        shown = _pixels(colors) * self.exposure(camera, frame)
+        # half a level of fixed noise: pictures without any noise are like no camera's
+        noise = np.random.default_rng([camera, frame]).normal(0.0, 0.5, shown.shape)
+        return np.clip(np.floor(shown * 255.0 + noise + 0.5), 0, 255).astype(np.uint8)
+
+    def _cast(self, camera: int, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """Colour of every ray [R, 3], and the thing it meets, -1 for the floor [R]."""
+        origin, directions, floor = _rays(camera)
+        slide = self.slide(frame)
+        colors = _floor_colors(camera) if slide == 0.0 else _pattern(floor - [slide, 0.0, 0.0])
+        colors = colors * self.light(frame, floor)[:, None]
+        nearest, met = (floor[:, 2] - origin[2]) / directions[:, 2], np.full(len(directions), -1)
+        for index, thing in enumerate(self.things):
+            center = thing.place(frame)
+            if center is None:
+                continue
+            reach, normals = _meet(thing.size, origin - np.array(center), directions)
+            is_nearer = reach < nearest
+            points = origin + directions[is_nearer] * reach[is_nearer, None] - np.array(center)
+            share = textures.cloudy(points * 7.0 + 11.0, index)
+            albedo = textures.mix(*(textures.rgb(code) for code in thing.colors), share)
+            lit = 0.6 + 0.4 * np.maximum(normals[is_nearer] @ SUN, 0.0)
+            colors[is_nearer] = albedo * lit[:, None]
+            nearest[is_nearer], met[is_nearer] = reach[is_nearer], index
+        return colors, met
+
+
+class _Pixels:
+    """Frames in memory, in the place of engine.capture.frames.FrameStore."""
+
+    def __init__(self, pixels: np.ndarray) -> None:
+        self._pixels = pixels
+
+    def frames(self, camera_index: int, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
+        yield from self._pixels[camera_index, list(frame_indices)]
+
+    def close(self) -> None:
+        pass
+
+
+@cache
+def make_rig() -> CameraRig:
+    """Nine cameras on a ring, 55 degrees above the floor, so that neighbours see the same floor 23 degrees apart."""
+    poses = []
+    for i in range(N_CAMERAS):
+        azimuth, elevation = 2 * np.pi * i / N_CAMERAS, np.radians(57.0 if i % 2 else 52.0)
+        flat = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
+        center = 3.2 * np.array([*flat, np.sin(elevation)])
+        poses.append(looking_at(center, np.array([0.0, 0.0, 0.1])))
+    K = np.array([[FOCAL, 0.0, WIDTH / 2], [0.0, FOCAL, HEIGHT / 2], [0.0, 0.0, 1.0]])
+    sizes = np.tile(np.array([WIDTH, HEIGHT], dtype=np.int64), (N_CAMERAS, 1))
+    names = tuple(f"cam{i}" for i in range(N_CAMERAS))
+    return CameraRig(names, np.stack(poses), np.tile(K, (N_CAMERAS, 1, 1)), sizes)
+
+
+@cache
+def _rays(camera: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Camera centre [3], directions of all rays [R, 3], and where they meet the floor [R, 3]."""
+    rig, n = make_rig(), SUPERSAMPLING
+    x = ((np.arange(WIDTH * n) + 0.5) / n - WIDTH / 2) / FOCAL
+    y = ((np.arange(HEIGHT * n) + 0.5) / n - HEIGHT / 2) / FOCAL
+    x, y = np.meshgrid(x, y)
+    directions = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3) @ rig.world_to_camera[camera, :3, :3]
+    origin = rig.centers[camera]
+    return origin, directions, origin - directions * (origin[2] / directions[:, 2])[:, None]
+
+
+def _pixels(values: np.ndarray) -> np.ndarray:
+    """Means over the rays of each pixel. [R, ...] to [H, W, ...]"""
+    n = SUPERSAMPLING
+    return values.reshape(HEIGHT, n, WIDTH, n, *values.shape[1:]).mean(axis=(1, 3))
+
+
+@cache
+def _floor_colors(camera: int) -> np.ndarray:
+    return _pattern(_rays(camera)[2])
+
+
+def _pattern(points: np.ndarray) -> np.ndarray:
+    """What the floor reflects: soft patches about 0.3 across, between 70 and 170 of 255. [P, 3]"""
+    flat = points[:, :2]
+    first = textures.mix(textures.rgb("5f6f8f"), textures.rgb("a89878"), textures.cloudy(flat * 3.0, 1))
+    return first * (0.8 + 0.4 * textures.cloudy(flat * 4.5 + 7.0, 2))[:, None]
+
+
+def _meet(
+    size: float | tuple[float, float, float], origin: np.ndarray, directions: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """How far along each ray a ball or box around zero begins, infinite where it does not, and its normal there."""
+    if isinstance(size, tuple):
+        with np.errstate(divide="ignore"):
+            near, far = (-np.sign(directions) * np.array(size) - origin) / directions, np.inf
+            far = (np.sign(directions) * np.array(size) - origin) / directions
+        axis = near.argmax(axis=1)
+        start = near.max(axis=1)
+        reach = np.where((start < far.min(axis=1)) & (start > 0.0), start, np.inf)
+        normals = np.zeros_like(directions)
+        rows = np.arange(len(directions))
+        normals[rows, axis] = -np.sign(directions[rows, axis])
+        return reach, normals
+    a, b = (directions**2).sum(axis=1), directions @ origin
+    inside = b * b - a * (origin @ origin - size * size)
+    reach = np.where(inside > 0.0, (-b - np.sqrt(np.maximum(inside, 0.0))) / a, np.inf)
+    points = origin + directions * np.where(np.isfinite(reach), reach, 0.0)[:, None]
+    return reach, points / size
+
+
+# ---------------------------------------------------------------- the scenes
+
+CRATE = Thing(lambda _: (0.65, -0.6, 0.2), (0.22, 0.18, 0.2), ("307050", "80c0a0"))
+"""Stands still in all clips."""
+SPOT = (-0.45, -0.35)
+"""Where the lamp shines, far from the way of the ball."""
+
+
+def _rolling(frame: int) -> tuple[float, float, float]:
+    return (-0.7 + 0.11 * frame, 0.65, 0.25)
+
+
+BALL = Thing(_rolling, 0.22)
+"""Moves in all clips, along one edge of the scene."""
+
+
+def _soft(distance: np.ndarray, edge: float, width: float) -> np.ndarray:
+    """1 below the edge, 0 above, with a soft rim of this width."""
+    return 1.0 - textures.step(distance, edge, width)
+
+
+def _lamp(first_frame: int, change: float) -> Callable[[int, np.ndarray], np.ndarray]:
+    def light(frame: int, points: np.ndarray) -> np.ndarray:
+        distance = np.hypot(points[:, 0] - SPOT[0], points[:, 1] - SPOT[1])
+        return 1.0 + change * (frame >= first_frame) * _soft(distance, 0.45, 0.15)
+
+    return light
+
+
+def lamp(first_frame: int, change: float = 0.35) -> HardScene:
+    """A lamp that shines on a round spot of the floor from this frame on."""
+    return HardScene(f"lamp{first_frame}", things=(CRATE, BALL), light=_lamp(first_frame, change))
+
+
+def slow_shadow() -> HardScene:
+    """A soft shadow of something outside that creeps over the floor, a pixel a frame."""
+
+    def light(frame: int, points: np.ndarray) -> np.ndarray:
+        return 1.0 - 0.3 * _soft(points[:, 0], -0.75 + 0.05 * frame, 0.3) * (points[:, 1] < 0.2)
+
+    return HardScene("slow_shadow", things=(CRATE, BALL), light=light)
+
+
+DRIFTING = 2
+"""The camera whose exposure drifts."""
+
+
+def drifting_exposure() -> HardScene:
+    """One camera's pictures become brighter by 3 % a frame."""
+    return HardScene(
+        "drifting_exposure",
+        things=(CRATE, BALL),
+        exposure=lambda camera, frame: 1.0 + 0.03 * frame * (camera == DRIFTING),
+    )
+
+
+LID, TREASURE = 2, 3
+
+
+def lifted_lid() -> HardScene:
+    """A box that rests for two clips, then moves aside and uncovers a small one that nobody has seen before."""
+
+    def lid(frame: int) -> tuple[float, float, float]:
+        return (-0.3 + 0.18 * max(0, frame - 2 * CLIP_LENGTH + 1), -0.3, 0.2)
+
+    things = (
+        CRATE,
+        BALL,
+        Thing(lid, (0.24, 0.24, 0.2), ("6040a0", "a080d0")),
+        Thing(lambda _: (-0.3, -0.3, 0.1), (0.12, 0.12, 0.1), CRATE.colors),
+    )
+    return HardScene("lifted_lid", n_clips=3, things=things)
+
+
+LEAVING, RESTING, ENTERING = 2, 3, 4
+
+
+def coming_and_going() -> HardScene:
+    """One that moves and has left by clip 1, one that rests in clip 0 and has left by clip 1, one that comes in the
+    middle of clip 1."""
+
+    def leaving(frame: int) -> tuple[float, float, float] | None:
+        return (-0.6 + 0.1 * frame, 0.05, 0.2) if frame < CLIP_LENGTH else None
+
+    def resting(frame: int) -> tuple[float, float, float] | None:
+        return (-0.5, -0.6, 0.18) if frame < CLIP_LENGTH else None
+
+    def entering(frame: int) -> tuple[float, float, float] | None:
+        return (0.15 + 0.1 * (frame - 6), -0.25, 0.2) if frame >= CLIP_LENGTH + 2 else None
+
+    things = (
+        CRATE,
+        BALL,
+        Thing(leaving, 0.2, ("2060c0", "60a0f0")),
+        Thing(resting, 0.18, ("f0f0f0", "c0c0c0")),
+        Thing(entering, 0.2, ("c02080", "f070c0")),
+    )
+    return HardScene("coming_and_going", n_clips=2, things=things)
+
+
+def all_moving() -> HardScene:
+    """The floor's pattern slides and everything on it moves along: no pixel ever rests."""
+
+    def along(x: float, y: float, z: float) -> Place:
+        return lambda frame: (x + 0.12 * frame, y, z)
+
+    things = (
+        Thing(along(-0.5, 0.5, 0.25), 0.22),
+        Thing(along(-0.4, -0.4, 0.2), (0.22, 0.18, 0.2), ("307050", "80c0a0")),
+    )
+    return HardScene("all_moving", things=things, slide=lambda frame: 0.12 * frame)
+
+
+def all_still() -> HardScene:
+    """Nothing but noise ever changes."""
+    return HardScene("all_still", things=(CRATE,))
+
+
+def one_frame_clips() -> HardScene:
+    """Five clips of one frame each."""
+    return HardScene("one_frame_clips", n_clips=5, things=(CRATE, BALL), clip_length=1)

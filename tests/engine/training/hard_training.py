@@ -1,0 +1,129 @@
+"""Hard scenes trained for real, at tiny sizes, and what a user would see of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+
+from engine.capture.capture import Capture
+from engine.capture.clip import split_clips
+from engine.metrics.trained_clip import TrainedClip, camera_gain
+from engine.model.clip_model import load_clip_model
+from engine.model.clip_state import ClipState, read_clip_state
+from engine.model.compact import write_compact_clip
+from engine.model.view import REACH_SPACINGS, View, render_gaussians
+from engine.training.clip_training import ClipTraining
+from engine.training.config import TrainConfig
+from engine.training.report import Progress
+from tests.engine.training.hard_scenes import HELD_OUT, N_CAMERAS, HardScene
+
+SIZES: dict[str, Any] = {
+    "static_steps": 160,
+    "joint_steps": 160,
+    "source_steps": 160,
+    "max_static_points": 800,
+    "max_moving_points": 800,
+    "head_hidden": 16,
+    "field_hidden": 16,
+}
+TRAINED_ON = [camera for camera in range(N_CAMERAS) if camera != HELD_OUT]
+
+
+@dataclass
+class Trained:
+    """The clips of a scene as stored and read back, trained one after another.
+
+    Attributes:
+        states: One per clip.
+        trainings: Their trainings, finished.
+        said: What preparing each clip reported, by stage.
+    """
+
+    scene: HardScene
+    capture: Capture
+    folder: Path
+    settings: dict[str, Any]
+    states: list[ClipState] = field(default_factory=list)
+    trainings: list[ClipTraining] = field(default_factory=list)
+    said: list[dict[str, str]] = field(default_factory=list)
+
+    def training(self, clip_index: int, **settings: Any) -> ClipTraining:
+        """A training of a clip that is not prepared yet; clip 0 is the reference."""
+        said: dict[str, str] = {}
+
+        def note(progress: Progress) -> None:
+            if progress.message:
+                said[progress.stage] = progress.message
+
+        self.said.append(said)
+        return ClipTraining(
+            self.capture,
+            split_clips(self.scene.n_frames, self.scene.clip_length)[clip_index],
+            config=TrainConfig(**(SIZES | self.settings | settings)),
+            holdout=[HELD_OUT],
+            reference=self.states[0] if clip_index else None,
+            seed=0,
+            prep_dir=self.folder,
+            report=note,
+        )
+
+    def train(self, clip_index: int, **settings: Any) -> ClipState:
+        """Train a clip, store it, and read it back."""
+        training = self.training(clip_index, **settings)
+        training.prepare()
+        while not training.is_finished:
+            training.step()
+        path = self.folder / f"clip{clip_index}.safetensors"
+        write_compact_clip(path, training.finish())
+        self.trainings.append(training)
+        return read_clip_state(path)
+
+    def n_bytes(self, clip_index: int) -> int:
+        """Of a stored clip."""
+        return (self.folder / f"clip{clip_index}.safetensors").stat().st_size
+
+    def truth(self, camera: int, frame: int) -> np.ndarray:
+        """[H, W, 3] in 0..1"""
+        return self.capture.frame(camera, frame) / 255.0
+
+    def picture(self, camera: int, frame: int) -> np.ndarray:
+        """What the window would show through a camera at a frame of the capture. [H, W, 3]"""
+        clip_index, clip_time = self._when(frame)
+        return self._clip(clip_index).picture(self.capture.rig, camera, clip_time)
+
+    def static_picture(self, camera: int, frame: int) -> np.ndarray:
+        """Likewise of the reference's static anchors alone, as if nothing else had been learned."""
+        clip = self._clip(0)
+        width, height = (int(v) for v in self.capture.rig.image_sizes[camera])
+        rig, near = self.capture.rig, clip.base.header["near_plane"]
+        view = View.from_arrays(
+            rig.world_to_camera[camera], rig.Ks[camera], width=width, height=height, near_plane=near
+        )
+        rows = {role: torch.zeros(0, dtype=torch.int64) for role in clip.model.roles()}
+        is_seen = view.sees(
+            clip.model.anchor_set("static").positions, reach=REACH_SPACINGS * clip.base.header["spacing"]
+        )
+        rows["static"] = is_seen.nonzero()[:, 0]
+        image = render_gaussians(clip.model.decode(0.0, rows), view).image[0].numpy()
+        return image * camera_gain(clip.base, rig.names[camera])
+
+    def _when(self, frame: int) -> tuple[int, float]:
+        clip_index, frame_in_clip = divmod(frame, self.scene.clip_length)
+        return clip_index, frame_in_clip / self.scene.clip_length
+
+    def _clip(self, clip_index: int) -> TrainedClip:
+        model = load_clip_model(self.states[clip_index], self.states[0])
+        return TrainedClip(split_clips(self.scene.n_frames, self.scene.clip_length)[clip_index], model, self.states[0])
+
+
+def train_scene(scene: HardScene, folder: Path, *, n_clips: int | None = None, **settings: Any) -> Trained:
+    """Train the clips of a scene in order, the first as the reference."""
+    folder.mkdir(parents=True, exist_ok=True)
+    trained = Trained(scene, scene.capture(), folder, settings)
+    for clip_index in range(scene.n_clips if n_clips is None else n_clips):
+        trained.states.append(trained.train(clip_index))
+    return trained
