@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-STILL, CHANGES, LIGHT, ONE_VIEW, UNSEEN, NEAR_MOTION, USER_STATIC, USER_DYNAMIC, LEARNED_NOTHING, ALONE, INSIDE = range(
-    11
-)
+STILL, CHANGES, LIGHT, ONE_VIEW, UNSEEN, NEAR_MOTION = range(6)
+USER_STATIC, USER_DYNAMIC, LEARNED_NOTHING, ALONE, INSIDE = range(6, 11)
 REASONS = (
     "still",
     "changes in several views",

@@ -333,6 +333,7 @@ class ClipTraining:
         has_rest = name == "source" and self.config.tiles == "active" and not self.gains.requires_grad
         self._tiles = ActiveTiles(self.model) if has_rest and ActiveTiles.applies(self.model) else None
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
+            self._say("Nothing to learn", f"Nothing moves in this clip: no steps instead of {n_steps}")
             self.phases[index] = (name, steps_in_phase)
 
     def step(self) -> StepStats:

@@ -8,7 +8,7 @@ rounds alike. Scene units are arbitrary: the floor seen is about 3 across, a pix
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -25,6 +25,8 @@ HELD_OUT = 4
 """A camera inside the ring, so that what is measured there was never trained on."""
 SUPERSAMPLING = 2
 CLIP_LENGTH = 4
+NOISE = 0.5
+"""Of the cameras, grey levels: pictures without any are like no camera's."""
 SUN = np.array([0.4, -0.3, 0.86])
 
 Place = Callable[[int], tuple[float, float, float] | None]
@@ -109,15 +111,18 @@ class HardScene:
         """Pixels of which these things cover at least half. [H, W] bool"""
         return _pixels(np.isin(self._cast(camera, frame)[1], things).astype(np.float64)) >= 0.5
 
-    def without(self, *things: int) -> HardScene:
-        """The same scene as if these things never were there."""
-        return replace(self, things=tuple(t for i, t in enumerate(self.things) if i not in things))
+    def floor(self, camera: int, frame: int) -> np.ndarray:
+        """Pixels that show nothing but floor. [H, W] bool"""
+        return _pixels((self._cast(camera, frame)[1] >= 0).astype(np.float64)) == 0.0
+
+    def floor_under(self, camera: int, light: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """A function of points on the floor, as this camera sees it. [H, W]"""
+        return _pixels(light(_rays(camera)[2]))
 
     def _image(self, camera: int, frame: int) -> np.ndarray:
         colors, _ = self._cast(camera, frame)
         shown = _pixels(colors) * self.exposure(camera, frame)
-        # half a level of fixed noise: pictures without any noise are like no camera's
-        noise = np.random.default_rng([camera, frame]).normal(0.0, 0.5, shown.shape)
+        noise = np.random.default_rng([camera, frame]).normal(0.0, NOISE, shown.shape)
         return np.clip(np.floor(shown * 255.0 + noise + 0.5), 0, 255).astype(np.uint8)
 
     def _cast(self, camera: int, frame: int) -> tuple[np.ndarray, np.ndarray]:
@@ -226,8 +231,6 @@ def _meet(
 
 CRATE = Thing(lambda _: (0.65, -0.6, 0.2), (0.22, 0.18, 0.2), ("307050", "80c0a0"))
 """Stands still in all clips."""
-SPOT = (-0.45, -0.35)
-"""Where the lamp shines, far from the way of the ball."""
 
 
 def _rolling(frame: int) -> tuple[float, float, float]:
@@ -243,21 +246,36 @@ def _soft(distance: np.ndarray, edge: float, width: float) -> np.ndarray:
     return 1.0 - textures.step(distance, edge, width)
 
 
-def _lamp(first_frame: int, change: float) -> Callable[[int, np.ndarray], np.ndarray]:
+def spot(x: float, y: float, radius: float) -> Callable[[np.ndarray], np.ndarray]:
+    """How much of a lamp falls on points of the floor. [P, 3] to [P]"""
+    return lambda points: _soft(np.hypot(points[:, 0] - x, points[:, 1] - y), radius, 0.12)
+
+
+EARLY_SPOT, LATE_SPOT = spot(0.0, -0.1, 0.27), spot(-0.65, -0.5, 0.3)
+
+
+def lamps() -> HardScene:
+    """Two lamps that add a third: one is switched on between the clips, the other in the middle of clip 1."""
+
     def light(frame: int, points: np.ndarray) -> np.ndarray:
-        distance = np.hypot(points[:, 0] - SPOT[0], points[:, 1] - SPOT[1])
-        return 1.0 + change * (frame >= first_frame) * _soft(distance, 0.45, 0.15)
+        early, late = frame >= CLIP_LENGTH, frame >= CLIP_LENGTH + 2
+        return 1.0 + 0.35 * (early * EARLY_SPOT(points) + late * LATE_SPOT(points))
 
-    return light
+    return HardScene("lamps", things=(CRATE, BALL), light=light)
 
 
-def lamp(first_frame: int, change: float = 0.35) -> HardScene:
-    """A lamp that shines on a round spot of the floor from this frame on."""
-    return HardScene(f"lamp{first_frame}", things=(CRATE, BALL), light=_lamp(first_frame, change))
+SHADOW_WAY = (-0.9, -0.25)
+"""Where along x the edge of the slow shadow passes."""
+
+
+def in_shadow_way(points: np.ndarray) -> np.ndarray:
+    """1 on the strip of floor over which the edge of the slow shadow passes. [P, 3] to [P]"""
+    x, y = points[:, 0], points[:, 1]
+    return ((y < 0.2) & (x > SHADOW_WAY[0]) & (x < SHADOW_WAY[1])).astype(np.float64)
 
 
 def slow_shadow() -> HardScene:
-    """A soft shadow of something outside that creeps over the floor, a pixel a frame."""
+    """A soft shadow of something outside that creeps over the floor, a pixel and a half a frame."""
 
     def light(frame: int, points: np.ndarray) -> np.ndarray:
         return 1.0 - 0.3 * _soft(points[:, 0], -0.75 + 0.05 * frame, 0.3) * (points[:, 1] < 0.2)
@@ -340,6 +358,15 @@ def all_still() -> HardScene:
     return HardScene("all_still", things=(CRATE,))
 
 
-def one_frame_clips() -> HardScene:
-    """Five clips of one frame each."""
-    return HardScene("one_frame_clips", n_clips=5, things=(CRATE, BALL), clip_length=1)
+def plain() -> HardScene:
+    """The ball rolls, and that is all."""
+    return HardScene("plain", things=(CRATE, BALL))
+
+
+def one_frame_clips(n_clips: int = 3) -> HardScene:
+    """Clips of one frame each; the ball has gone its own width from one to the next."""
+
+    def jumping(frame: int) -> tuple[float, float, float]:
+        return _rolling(4 * frame)
+
+    return HardScene(f"{n_clips}_frames", n_clips=n_clips, things=(CRATE, Thing(jumping, 0.22)), clip_length=1)

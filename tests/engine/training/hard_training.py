@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import torch
 
 from engine.capture.capture import Capture
 from engine.capture.clip import split_clips
+from engine.metrics.psnr import psnr_of, squared_error
 from engine.metrics.trained_clip import TrainedClip, camera_gain
 from engine.model.clip_model import load_clip_model
 from engine.model.clip_state import ClipState, read_clip_state
 from engine.model.compact import write_compact_clip
-from engine.model.view import REACH_SPACINGS, View, render_gaussians
+from engine.model.view import View, render_gaussians
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from engine.training.report import Progress
@@ -82,6 +86,13 @@ class Trained:
         self.trainings.append(training)
         return read_clip_state(path)
 
+    def with_other(self, clip_index: int, **settings: Any) -> Trained:
+        """The same clips, but this one trained anew with other settings."""
+        other = replace(self, states=[*self.states], trainings=[*self.trainings], said=[*self.said])
+        with one_thread():
+            other.states[clip_index] = other.train(clip_index, **settings)
+        return other
+
     def n_bytes(self, clip_index: int) -> int:
         """Of a stored clip."""
         return (self.folder / f"clip{clip_index}.safetensors").stat().st_size
@@ -95,19 +106,19 @@ class Trained:
         clip_index, clip_time = self._when(frame)
         return self._clip(clip_index).picture(self.capture.rig, camera, clip_time)
 
-    def static_picture(self, camera: int, frame: int) -> np.ndarray:
+    def static_picture(self, camera: int) -> np.ndarray:
         """Likewise of the reference's static anchors alone, as if nothing else had been learned."""
-        clip = self._clip(0)
-        width, height = (int(v) for v in self.capture.rig.image_sizes[camera])
-        rig, near = self.capture.rig, clip.base.header["near_plane"]
+        clip, rig = self._clip(0), self.capture.rig
+        width, height = (int(v) for v in rig.image_sizes[camera])
         view = View.from_arrays(
-            rig.world_to_camera[camera], rig.Ks[camera], width=width, height=height, near_plane=near
+            rig.world_to_camera[camera],
+            rig.Ks[camera],
+            width=width,
+            height=height,
+            near_plane=clip.base.header["near_plane"],
         )
         rows = {role: torch.zeros(0, dtype=torch.int64) for role in clip.model.roles()}
-        is_seen = view.sees(
-            clip.model.anchor_set("static").positions, reach=REACH_SPACINGS * clip.base.header["spacing"]
-        )
-        rows["static"] = is_seen.nonzero()[:, 0]
+        rows["static"] = torch.arange(len(clip.model.anchor_set("static")))
         image = render_gaussians(clip.model.decode(0.0, rows), view).image[0].numpy()
         return image * camera_gain(clip.base, rig.names[camera])
 
@@ -124,6 +135,35 @@ def train_scene(scene: HardScene, folder: Path, *, n_clips: int | None = None, *
     """Train the clips of a scene in order, the first as the reference."""
     folder.mkdir(parents=True, exist_ok=True)
     trained = Trained(scene, scene.capture(), folder, settings)
-    for clip_index in range(scene.n_clips if n_clips is None else n_clips):
-        trained.states.append(trained.train(clip_index))
+    with one_thread():
+        for clip_index in range(scene.n_clips if n_clips is None else n_clips):
+            trained.states.append(trained.train(clip_index))
     return trained
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Pictures this small gain nothing from a second thread, and lose where another process wants it too."""
+    before = numba.get_num_threads(), torch.get_num_threads()
+    numba.set_num_threads(1)
+    torch.set_num_threads(1)
+    yield
+    numba.set_num_threads(before[0])
+    torch.set_num_threads(before[1])
+
+
+def pooled_psnr(
+    trained: Trained,
+    frames: Sequence[int],
+    chosen: Callable[[int, int], np.ndarray],
+    *,
+    cameras: Sequence[int] = range(N_CAMERAS),
+    static_only: bool = False,
+) -> float:
+    """PSNR over the chosen pixels of all these pictures together, dB. chosen: (camera, frame) -> [H, W] bool"""
+    errors = []
+    for camera in cameras:
+        for frame in frames:
+            image = trained.static_picture(camera) if static_only else trained.picture(camera, frame)
+            errors.append(squared_error(image, trained.truth(camera, frame))[chosen(camera, frame)])
+    return psnr_of(np.concatenate(errors))
