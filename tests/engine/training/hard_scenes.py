@@ -109,42 +109,53 @@ class HardScene:
 
     def shows(self, camera: int, frame: int, *things: int) -> np.ndarray:
         """Pixels of which these things cover at least half. [H, W] bool"""
-        return _pixels(np.isin(self._cast(camera, frame)[1], things).astype(np.float64)) >= 0.5
+        return _pixels(np.isin(_met(self, camera, frame), things).astype(np.float64)) >= 0.5
 
     def floor(self, camera: int, frame: int) -> np.ndarray:
         """Pixels that show nothing but floor. [H, W] bool"""
-        return _pixels((self._cast(camera, frame)[1] >= 0).astype(np.float64)) == 0.0
+        return _pixels((_met(self, camera, frame) >= 0).astype(np.float64)) == 0.0
 
     def floor_under(self, camera: int, light: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """A function of points on the floor, as this camera sees it. [H, W]"""
         return _pixels(light(_rays(camera)[2]))
 
     def _image(self, camera: int, frame: int) -> np.ndarray:
-        colors, _ = self._cast(camera, frame)
-        shown = _pixels(colors) * self.exposure(camera, frame)
+        shown = _pixels(self._colors(camera, frame)) * self.exposure(camera, frame)
         noise = np.random.default_rng([camera, frame]).normal(0.0, NOISE, shown.shape)
         return np.clip(np.floor(shown * 255.0 + noise + 0.5), 0, 255).astype(np.uint8)
 
-    def _cast(self, camera: int, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Colour of every ray [R, 3], and the thing it meets, -1 for the floor [R]."""
+    def _colors(self, camera: int, frame: int) -> np.ndarray:
+        """Colour of every ray. [R, 3]"""
         origin, directions, floor = _rays(camera)
         slide = self.slide(frame)
         colors = _floor_colors(camera) if slide == 0.0 else _pattern(floor - [slide, 0.0, 0.0])
         colors = colors * self.light(frame, floor)[:, None]
-        nearest, met = (floor[:, 2] - origin[2]) / directions[:, 2], np.full(len(directions), -1)
+        met, reach = self._hits(camera, frame)
+        for index in np.unique(met[met >= 0]):
+            thing, is_here = self.things[index], met == index
+            points = origin + directions[is_here] * reach[is_here, None] - np.array(thing.place(frame))
+            share = textures.cloudy(points * 7.0 + 11.0, int(index))
+            albedo = textures.mix(*(textures.rgb(code) for code in thing.colors), share)
+            lit = 0.6 + 0.4 * np.maximum(_normals(thing.size, points) @ SUN, 0.0)
+            colors[is_here] = albedo * lit[:, None]
+        return colors
+
+    def _hits(self, camera: int, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """The thing that every ray meets, -1 for the floor [R], and how far away in depths of the camera [R]."""
+        origin, directions, _ = _rays(camera)
+        nearest, met = -origin[2] / directions[:, 2], np.full(len(directions), -1, dtype=np.int8)
         for index, thing in enumerate(self.things):
             center = thing.place(frame)
-            if center is None:
-                continue
-            reach, normals = _meet(thing.size, origin - np.array(center), directions)
-            is_nearer = reach < nearest
-            points = origin + directions[is_nearer] * reach[is_nearer, None] - np.array(center)
-            share = textures.cloudy(points * 7.0 + 11.0, index)
-            albedo = textures.mix(*(textures.rgb(code) for code in thing.colors), share)
-            lit = 0.6 + 0.4 * np.maximum(normals[is_nearer] @ SUN, 0.0)
-            colors[is_nearer] = albedo * lit[:, None]
-            nearest[is_nearer], met[is_nearer] = reach[is_nearer], index
-        return colors, met
+            if center is not None:
+                reach = _meet(thing.size, origin - np.array(center), directions)
+                met[reach < nearest] = index
+                nearest = np.minimum(reach, nearest)
+        return met, nearest
+
+
+@cache
+def _met(scene: HardScene, camera: int, frame: int) -> np.ndarray:
+    return scene._hits(camera, frame)[0]
 
 
 class _Pixels:
@@ -205,26 +216,27 @@ def _pattern(points: np.ndarray) -> np.ndarray:
     return first * (0.8 + 0.4 * textures.cloudy(flat * 4.5 + 7.0, 2))[:, None]
 
 
-def _meet(
-    size: float | tuple[float, float, float], origin: np.ndarray, directions: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """How far along each ray a ball or box around zero begins, infinite where it does not, and its normal there."""
+def _meet(size: float | tuple[float, float, float], origin: np.ndarray, directions: np.ndarray) -> np.ndarray:
+    """How far along each ray a ball or box around zero begins, infinite where it does not. [R]"""
     if isinstance(size, tuple):
-        with np.errstate(divide="ignore"):
-            near, far = (-np.sign(directions) * np.array(size) - origin) / directions, np.inf
-            far = (np.sign(directions) * np.array(size) - origin) / directions
-        axis = near.argmax(axis=1)
-        start = near.max(axis=1)
-        reach = np.where((start < far.min(axis=1)) & (start > 0.0), start, np.inf)
-        normals = np.zeros_like(directions)
-        rows = np.arange(len(directions))
-        normals[rows, axis] = -np.sign(directions[rows, axis])
-        return reach, normals
+        to_faces = np.sign(directions) * np.array(size)
+        start = ((-to_faces - origin) / directions).max(axis=1)
+        end = ((to_faces - origin) / directions).min(axis=1)
+        return np.where((start < end) & (start > 0.0), start, np.inf)
     a, b = (directions**2).sum(axis=1), directions @ origin
     inside = b * b - a * (origin @ origin - size * size)
-    reach = np.where(inside > 0.0, (-b - np.sqrt(np.maximum(inside, 0.0))) / a, np.inf)
-    points = origin + directions * np.where(np.isfinite(reach), reach, 0.0)[:, None]
-    return reach, points / size
+    return np.where(inside > 0.0, (-b - np.sqrt(np.maximum(inside, 0.0))) / a, np.inf)
+
+
+def _normals(size: float | tuple[float, float, float], points: np.ndarray) -> np.ndarray:
+    """Of points on a ball or box around zero. [P, 3]"""
+    if not isinstance(size, tuple):
+        return points / size
+    parts = points / np.array(size)
+    axes = np.abs(parts).argmax(axis=1)[:, None]
+    normals = np.zeros_like(points)
+    np.put_along_axis(normals, axes, np.sign(np.take_along_axis(parts, axes, axis=1)), axis=1)
+    return normals
 
 
 # ---------------------------------------------------------------- the scenes

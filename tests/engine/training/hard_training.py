@@ -34,7 +34,7 @@ SIZES: dict[str, Any] = {
     "head_hidden": 16,
     "field_hidden": 16,
 }
-TRAINED_ON = [camera for camera in range(N_CAMERAS) if camera != HELD_OUT]
+STATIC_ONLY = -1  # in the place of a frame
 
 
 @dataclass
@@ -54,6 +54,8 @@ class Trained:
     states: list[ClipState] = field(default_factory=list)
     trainings: list[ClipTraining] = field(default_factory=list)
     said: list[dict[str, str]] = field(default_factory=list)
+    _clips: dict[int, TrainedClip] = field(default_factory=dict, init=False)
+    _pictures: dict[tuple[int, int], np.ndarray] = field(default_factory=dict, init=False)
 
     def training(self, clip_index: int, **settings: Any) -> ClipTraining:
         """A training of a clip that is not prepared yet; clip 0 is the reference."""
@@ -103,11 +105,19 @@ class Trained:
 
     def picture(self, camera: int, frame: int) -> np.ndarray:
         """What the window would show through a camera at a frame of the capture. [H, W, 3]"""
-        clip_index, clip_time = self._when(frame)
-        return self._clip(clip_index).picture(self.capture.rig, camera, clip_time)
+        if (camera, frame) not in self._pictures:
+            clip_index, frame_in_clip = divmod(frame, self.scene.clip_length)
+            clip_time = frame_in_clip / self.scene.clip_length
+            self._pictures[camera, frame] = self._clip(clip_index).picture(self.capture.rig, camera, clip_time)
+        return self._pictures[camera, frame]
 
     def static_picture(self, camera: int) -> np.ndarray:
         """Likewise of the reference's static anchors alone, as if nothing else had been learned."""
+        if (camera, STATIC_ONLY) not in self._pictures:
+            self._pictures[camera, STATIC_ONLY] = self._render_static(camera)
+        return self._pictures[camera, STATIC_ONLY]
+
+    def _render_static(self, camera: int) -> np.ndarray:
         clip, rig = self._clip(0), self.capture.rig
         width, height = (int(v) for v in rig.image_sizes[camera])
         view = View.from_arrays(
@@ -122,13 +132,12 @@ class Trained:
         image = render_gaussians(clip.model.decode(0.0, rows), view).image[0].numpy()
         return image * camera_gain(clip.base, rig.names[camera])
 
-    def _when(self, frame: int) -> tuple[int, float]:
-        clip_index, frame_in_clip = divmod(frame, self.scene.clip_length)
-        return clip_index, frame_in_clip / self.scene.clip_length
-
     def _clip(self, clip_index: int) -> TrainedClip:
-        model = load_clip_model(self.states[clip_index], self.states[0])
-        return TrainedClip(split_clips(self.scene.n_frames, self.scene.clip_length)[clip_index], model, self.states[0])
+        if clip_index not in self._clips:
+            model = load_clip_model(self.states[clip_index], self.states[0])
+            clip = split_clips(self.scene.n_frames, self.scene.clip_length)[clip_index]
+            self._clips[clip_index] = TrainedClip(clip, model, self.states[0])
+        return self._clips[clip_index]
 
 
 def train_scene(scene: HardScene, folder: Path, *, n_clips: int | None = None, **settings: Any) -> Trained:

@@ -6,6 +6,8 @@ seed; the figures are named), because a hundred and sixty steps leave a lot to c
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -140,5 +142,5 @@ def test_what_does_not_move_keeps_its_bits_beside_what_does(steady):
     ways = [np.any([steady.scene.shows(camera, frame, 1) for frame in range(8)], axis=0) for camera in range(N_CAMERAS)]
     for camera in (0, 4):
         pictures = [steady.picture(camera, frame) for frame in range(8)]
-        for one, other in zip(pictures, pictures[1:], strict=False):
+        for one, other in pairwise(pictures):
             assert (one == other).all(axis=-1)[~ways[camera]].mean() > 0.95  # 0.985
