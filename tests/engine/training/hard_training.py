@@ -23,7 +23,7 @@ from engine.model.view import View, render_gaussians
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from engine.training.report import Progress
-from tests.engine.training.hard_scenes import HELD_OUT, N_CAMERAS, HardScene
+from tests.engine.training.hard_stage import HELD_OUT, N_CAMERAS, HardScene
 
 SIZES: dict[str, Any] = {
     "static_steps": 160,

@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 
 from tests.engine.training.hard_scenes import (
-    CLIP_LENGTH,
     ENTERING,
     LEAVING,
     LID,
@@ -26,6 +25,7 @@ from tests.engine.training.hard_scenes import (
     coming_and_going,
     lifted_lid,
 )
+from tests.engine.training.hard_stage import CLIP_LENGTH
 from tests.engine.training.hard_training import Trained, pooled_psnr, train_scene
 
 FIRST, SECOND, THIRD = (range(clip * CLIP_LENGTH, (clip + 1) * CLIP_LENGTH) for clip in range(3))
