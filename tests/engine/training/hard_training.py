@@ -108,13 +108,15 @@ class Trained:
         if (camera, frame) not in self._pictures:
             clip_index, frame_in_clip = divmod(frame, self.scene.clip_length)
             clip_time = frame_in_clip / self.scene.clip_length
-            self._pictures[camera, frame] = self._clip(clip_index).picture(self.capture.rig, camera, clip_time)
+            with one_thread():
+                self._pictures[camera, frame] = self._clip(clip_index).picture(self.capture.rig, camera, clip_time)
         return self._pictures[camera, frame]
 
     def static_picture(self, camera: int) -> np.ndarray:
         """Likewise of the reference's static anchors alone, as if nothing else had been learned."""
         if (camera, STATIC_ONLY) not in self._pictures:
-            self._pictures[camera, STATIC_ONLY] = self._render_static(camera)
+            with one_thread():
+                self._pictures[camera, STATIC_ONLY] = self._render_static(camera)
         return self._pictures[camera, STATIC_ONLY]
 
     def _render_static(self, camera: int) -> np.ndarray:
@@ -156,9 +158,11 @@ def one_thread() -> Iterator[None]:
     before = numba.get_num_threads(), torch.get_num_threads()
     numba.set_num_threads(1)
     torch.set_num_threads(1)
-    yield
-    numba.set_num_threads(before[0])
-    torch.set_num_threads(before[1])
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before[0])
+        torch.set_num_threads(before[1])
 
 
 def pooled_psnr(
