@@ -25,6 +25,9 @@ TIE_SCORE = 4.0
 """Clusters whose variance is below this many noise variances are equally still. Among those the earliest wins: what
 appears later and stays can be added to a clip, but what the reference clip's background shows cannot be taken away."""
 N_BRIGHTNESS_BINS = 16
+MIN_REACH = 48.0
+"""Squared distance of colours, summed over RGB, within which frames always agree: 4 grey levels per channel, which
+compression alone can cause."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,15 +49,16 @@ def estimate_background(frames: np.ndarray) -> Background:
     Args:
         frames: Frames of one motionless camera, spread over as much of the capture as possible. [T, H, W, 3] uint8
     Returns:
-        Background. With fewer than 3 frames nothing can be told apart: the mean, all unstable.
+        Background. With fewer than 3 frames there is no majority: their mean, stable where they agree.
 
     Two passes: the first finds the least variance window and from it the camera's noise per brightness; the second
     compares windows by variance / noise variance, so that dark cloth, which is quiet, does not win over a bright wall.
     """
-    n_frames, height, width, _ = frames.shape
+    n_frames, height = frames.shape[:2]
     if n_frames < 3:
-        image = frames.astype(np.float32).mean(0) + 0.5
-        return Background(image.astype(np.uint8), np.zeros((height, width), dtype=bool))
+        mean = frames.astype(np.float32).mean(0)
+        is_agreed = (((frames - mean) ** 2).sum(-1) <= MIN_REACH).all(0)
+        return Background((mean + 0.5).astype(np.uint8), _without_specks(is_agreed))
     frames = np.ascontiguousarray(frames)
     window = max(3, int(np.ceil(CLUSTER_SHARE * n_frames)))
     flat = np.ones(N_BRIGHTNESS_BINS, dtype=np.float32)
@@ -157,9 +161,8 @@ def _cluster_rows(frames, window, noise, tie_score, order, keys, sums, colors, v
             mean_g = (sums[best_start + window, 1] - sums[best_start, 1]) / window
             mean_b = (sums[best_start + window, 2] - sums[best_start, 2]) / window
             level = noise[min(int((mean_r + mean_g + mean_b) * n_bins / 765.0), n_bins - 1)]
-            # a frame agrees within four standard deviations (window variances are short of the full noise: x 2),
-            # never tighter than 4 grey levels per channel, which compression alone can cause
-            reach = max(32.0 * level, 48.0)
+            # a frame agrees within four standard deviations (window variances are short of the full noise: x 2)
+            reach = max(32.0 * level, MIN_REACH)
             n_agree = 0
             total_r = 0.0
             total_g = 0.0

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-STILL, CHANGES, LIGHT, ONE_VIEW, UNSEEN, NEAR_MOTION, USER_STATIC, USER_DYNAMIC, LEARNED_NOTHING, ALONE = range(10)
+STILL, CHANGES, LIGHT, ONE_VIEW, UNSEEN, NEAR_MOTION = range(6)
+USER_STATIC, USER_DYNAMIC, LEARNED_NOTHING, ALONE, INSIDE = range(6, 11)
 REASONS = (
     "still",
     "changes in several views",
@@ -14,6 +15,7 @@ REASONS = (
     "marked as dynamic",
     "had a dynamic feature and learned no change",
     "changes, but nothing beside it does",
+    "something else is seen in its place from all sides",
 )
 """In words, by code."""
 NO_REASON = 255

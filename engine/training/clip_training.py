@@ -19,6 +19,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.cloud.gains import in_gauge
 from engine.cloud.gate import GateTable, measure_gate
+from engine.cloud.inside import frames_inside
 from engine.cloud.moving_cloud import MovingCloud
 from engine.cloud.range import near_plane
 from engine.cloud.regions import GateRegion
@@ -45,7 +46,7 @@ from engine.training.building import (
 from engine.training.config import TrainConfig
 from engine.training.demotion import demote
 from engine.training.fused_loss import LossWorkspace
-from engine.training.gating import nothing_measured, promote, with_regions, without_static_regions
+from engine.training.gating import nothing_measured, promote, with_inside, with_regions, without_static_regions
 from engine.training.half_size import HalfSize
 from engine.training.held_in import MEASURE_EVERY, Patience, held_in_items, steps_to_finish
 from engine.training.losses import photometric_loss
@@ -136,6 +137,7 @@ class ClipTraining:
         self._tiles: ActiveTiles | None = None
         self._reasons: dict[str, np.ndarray] = {}
         self._coverage: dict[str, int | float | str] | None = None
+        self._n_inside = np.zeros(0, np.int64)  # frames of each static anchor inside a hull
         n_cameras = len(self.camera_indices)
         self._held_in = held_in_items(n_cameras, clip.n_frames, seed) if config.patience else []
         self._patience: Patience | None = None
@@ -215,6 +217,8 @@ class ClipTraining:
     def _find_motion(self) -> MovingCloud:
         static_points = self.model.anchor_set("static").positions.numpy()
         masks = motion_masks(self.pictures, self.backgrounds, self.report)
+        if self.config.gate == "images":
+            self._n_inside = frames_inside(static_points, masks, self.rig)
         gains = self.gains.detach().numpy()
         voxel_size = None if self._base is None else self._base.header["moving_spacing"]
         cloud = moving_cloud(
@@ -251,7 +255,7 @@ class ClipTraining:
         self._say("Deciding what is static", table.summary())
 
     def _measure(self, cloud: MovingCloud) -> GateTable:
-        return measure_gate(
+        table = measure_gate(
             self.pictures.raw,
             self.clip.n_frames,
             self.backgrounds.images,
@@ -262,6 +266,7 @@ class ClipTraining:
             presence=cloud.presence,
             moving_spacing=float(cloud.spacing),
         )
+        return with_inside(table, self._n_inside, self.clip.n_frames)
 
     def _make_dynamic(self, cloud: MovingCloud) -> None:
         """Last step of preparation: the gate and the field."""
@@ -333,6 +338,7 @@ class ClipTraining:
         self._sight = {}  # a set may have become dynamic
         self._set_size(is_half=steps_in_phase < self.config.n_coarse_steps(n_steps))
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
+            self._say("Nothing to learn", f"Nothing moves in this clip: no steps instead of {n_steps}")
             self.phases[index] = (name, steps_in_phase)
 
     def _set_size(self, *, is_half: bool) -> None:

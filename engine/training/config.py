@@ -160,10 +160,11 @@ class TrainConfig:
     gate: str = "hull"
     """hull: static anchors have no dynamic feature, moving ones are decoded only at times where that frame's hull
     has them. images: likewise, but static anchors that two or more cameras see change where no hull is (lamps, soft
-    shadows) get a dynamic feature, and once a clip is trained, anchors that nobody sees and dynamic ones that learned
-    no change are left out. Where it finds neither, the result is that of hull, bit for bit. static: static anchors have
-    no dynamic feature, moving ones are decoded at all times; what the gate in time is worth. off: the published method,
-    every anchor is evaluated at every time."""
+    shadows), and those inside a hull (of what rested and was taken away), get a dynamic feature, and once a clip is
+    trained, anchors that nobody sees and dynamic ones that learned no change are left out. Where it finds none of
+    these, the result is that of hull, bit for bit. static: static anchors have no dynamic feature, moving ones are
+    decoded at all times; what the gate in time is worth. off: the published method, every anchor is evaluated at every
+    time."""
 
     # what a step of a source clip looks at
     tiles: str = "active"

@@ -65,6 +65,7 @@ def _without_unseen(
 ) -> tuple[dict[str, np.ndarray], int, int]:
     """Arrays without anchors that are never visible; how many own ones went, how many inherited ones rest."""
     n_dropped = n_cleared = 0
+    k = model.decoder.gaussians_per_anchor  # given, not found out: there may be no row at a time
     for role in model.roles():
         anchors = model.anchor_set(role)
         if anchors.presence is None or len(anchors) == 0:
@@ -74,7 +75,7 @@ def _without_unseen(
             rows = model.alive(role, clip_time)
             opacities = _decode(model, role, clip_time, rows).opacities
             # not a number counts as visible: it is for the writer of the clip to refuse
-            is_visible[rows] |= (~(opacities < MIN_OPACITY)).reshape(len(rows), -1).any(dim=1)
+            is_visible[rows] |= (~(opacities < MIN_OPACITY)).reshape(len(rows), k).any(dim=1)
         if anchors.is_trainable:
             n_dropped += int((~is_visible).sum())
             _keep_rows(arrays, role, is_visible.numpy())

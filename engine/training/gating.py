@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from engine.cloud.gate import GateTable
+from engine.cloud.gate import MIN_FRAMES, GateTable
 from engine.cloud.moving_cloud import MovingCloud
-from engine.cloud.reasons import STILL, USER_DYNAMIC, USER_STATIC
+from engine.cloud.reasons import INSIDE, STILL, USER_DYNAMIC, USER_STATIC
 from engine.cloud.regions import GateRegion, marked
 from engine.model.clip_model import ClipModel
 
@@ -26,6 +26,19 @@ def nothing_measured(n_anchors: int) -> GateTable:
     """The decision before any picture is looked at: everything is still."""
     reasons = np.full(n_anchors, STILL, dtype=np.uint8)
     return GateTable(np.zeros(n_anchors, dtype=bool), reasons, np.zeros(n_anchors, dtype=np.float32))
+
+
+def with_inside(table: GateTable, n_inside: np.ndarray, n_frames: int) -> GateTable:
+    """A decision with anchors that lie inside a hull: what they belong to may have gone, and only an anchor with a
+    dynamic feature can go with it; a static one stays as a ghost. Which of both is left to learning.
+
+    Args:
+        n_inside: Frames in which each static anchor lies inside, see engine.cloud.inside. [A]
+        n_frames: Of the clip.
+    """
+    is_inside = n_inside >= min(MIN_FRAMES, n_frames)
+    reasons = np.where(is_inside, INSIDE, table.reasons).astype(np.uint8)
+    return replace(table, is_dynamic=table.is_dynamic | is_inside, reasons=reasons)
 
 
 def with_regions(table: GateTable, points: np.ndarray, regions: Sequence[GateRegion]) -> GateTable:

@@ -132,7 +132,10 @@ def make_plan(
         is_still: Whether nothing is known to move in this clip.
     """
     history = [known for known in history if known.clip_index != clip.clip_index]
-    siblings = [known.counts for known in history if known.counts and known.is_source == is_source]
+    # a clip in which nothing moved says nothing about one in which something may
+    siblings = [
+        known.counts for known in history if known.counts and known.counts.n_alive and known.is_source == is_source
+    ]
     known = counts_of(reference)
     counts = expected_counts(footage, clip, config, reference=known, siblings=siblings, is_source=is_source)
     if is_still:

@@ -51,11 +51,17 @@ def test_what_appears_later_and_stays_is_not_background(wall: np.ndarray) -> Non
     assert not background.is_stable[12:28, 22:38].any()
 
 
-def test_background_of_two_frames_is_their_mean_and_never_trusted() -> None:
-    frames = np.stack([np.full((4, 5, 3), 10, np.uint8), np.full((4, 5, 3), 20, np.uint8)])
+def test_background_of_one_or_two_frames_is_their_mean_trusted_where_they_agree() -> None:
+    frames = np.stack([np.full((40, 50, 3), 10, np.uint8), np.full((40, 50, 3), 20, np.uint8)])
+    frames[1, :, :25] = 12
     background = estimate_background(frames)
-    assert (background.image == 15).all()
-    assert not background.is_stable.any()
+    assert (background.image[:, :25] == 11).all()
+    assert (background.image[:, 25:] == 15).all()
+    assert background.is_stable[:, :20].all()
+    assert not background.is_stable[:, 30:].any()
+    single = estimate_background(frames[1:])
+    assert np.array_equal(single.image, frames[1])
+    assert single.is_stable.all()
 
 
 def test_background_does_not_depend_on_thread_timing(wall: np.ndarray) -> None:

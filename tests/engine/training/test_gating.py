@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from engine.cloud.gate import GateTable
-from engine.cloud.reasons import LEARNED_NOTHING, LIGHT, STILL, USER_DYNAMIC, USER_STATIC
+from engine.cloud.gate import MIN_FRAMES, GateTable
+from engine.cloud.reasons import CHANGES, INSIDE, LEARNED_NOTHING, LIGHT, STILL, USER_DYNAMIC, USER_STATIC
 from engine.cloud.regions import GateRegion
 from engine.errors import NonFiniteLoss
 from engine.model.clip_model import ClipModel, load_clip_model
@@ -50,7 +50,7 @@ def learned(state: ClipState) -> dict[str, np.ndarray]:
 
 
 def seeing_light(monkeypatch: pytest.MonkeyPatch, rows: np.ndarray) -> None:
-    """Trainings measure that light changes on these static anchors."""
+    """Trainings measure that light changes on these static anchors, and that none lies inside a hull."""
 
     def measured(_frames, _n_frames, _backgrounds, _rig, points: np.ndarray, **_) -> GateTable:
         is_dynamic = np.zeros(len(points), dtype=bool)
@@ -59,6 +59,7 @@ def seeing_light(monkeypatch: pytest.MonkeyPatch, rows: np.ndarray) -> None:
         return GateTable(is_dynamic, reasons, is_dynamic.astype(np.float32) * 2)
 
     monkeypatch.setattr(clip_training, "measure_gate", measured)
+    monkeypatch.setattr(clip_training, "frames_inside", lambda points, *_: np.zeros(len(points), dtype=np.int64))
 
 
 def look_of(model: ClipModel, rows: np.ndarray) -> list[np.ndarray]:
@@ -80,9 +81,8 @@ def test_where_nothing_changes_the_gate_from_pictures_changes_no_bit(tiny: Tiny,
 
 
 def test_the_gate_from_pictures_finds_no_lamp_in_the_sample(tiny: Tiny, tmp_path):
-    training = tiny.prepared(1, gate="images", prep_dir=tmp_path)
-    assert "replacing" not in training.model.roles()
-    assert not training.model.hidden
+    reasons = tiny.prepared(1, gate="images", prep_dir=tmp_path).state().arrays["gate.static"]
+    assert not np.isin(reasons, (LIGHT, CHANGES)).any()
 
 
 def test_promoted_anchors_go_on_from_what_they_learned_and_every_clip_inherits_them(tiny: Tiny, tmp_path, monkeypatch):
@@ -179,6 +179,17 @@ def test_a_clip_that_streams_on_keeps_replaced_anchors_as_promoted_ones(tiny: Ti
     assert presence.all()
 
 
+def test_anchors_inside_a_hull_are_replaced_and_may_go(tiny: Tiny, tmp_path, monkeypatch):
+    seeing_light(monkeypatch, np.zeros(0, dtype=np.int64))
+    n_frames_inside = np.zeros(len(static_points(tiny.reference)), dtype=np.int64)
+    n_frames_inside[[7, 8]], n_frames_inside[9] = (MIN_FRAMES, CLIP_LENGTH), MIN_FRAMES - 1
+    monkeypatch.setattr(clip_training, "frames_inside", lambda *_: n_frames_inside)
+    training = tiny.prepared(1, gate="images", prep_dir=tmp_path)
+    assert np.flatnonzero(training.model.hidden["static"].numpy()).tolist() == [7, 8]
+    assert np.flatnonzero(training.state().arrays["gate.static"] == INSIDE).tolist() == [7, 8]
+    assert not tiny.prepared(1, prep_dir=tmp_path).model.hidden  # gate=hull leaves them as they are
+
+
 @pytest.mark.parametrize("gate", ["hull", "images"])
 def test_what_the_user_marks_as_dynamic_is(tiny: Tiny, tmp_path, gate):
     region, inside = around(static_points(tiny.reference), "dynamic")
@@ -245,6 +256,14 @@ def largest_opacities(state: ClipState) -> np.ndarray:
         found = gaussians.opacities.detach().reshape(len(rows), -1).amax(dim=1).numpy()
         largest[rows.numpy()] = np.maximum(largest[rows.numpy()], found)
     return largest
+
+
+def test_a_frame_without_anyone_is_no_obstacle(tiny: Tiny):
+    state = tiny.trained(1)
+    arrays = {name: array.copy() for name, array in state.arrays.items()}
+    arrays["inherited.moving.presence"][:, 2] = False
+    result, _ = demoted(tiny, tiny.training(1), replace(state, arrays=arrays))
+    assert not result.arrays["inherited.moving.presence"][:, 2].any()
 
 
 def test_inherited_anchors_that_nobody_sees_rest_in_the_clip(tiny: Tiny, monkeypatch):

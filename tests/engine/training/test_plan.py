@@ -121,6 +121,22 @@ def test_clips_trained_before_say_what_to_expect():
     assert lines["residual anchors"] == (9000, said)
 
 
+def test_a_still_clip_before_says_nothing_of_one_in_which_something_may_move():
+    nothing = {
+        "role": "source",
+        "step": 0,
+        "n_alive": 0,
+        "field": None,
+        "n_anchors": {"static": 20621, "moving": 26923},
+    }
+    still = measured_clip(header(clip_index=1, **nothing) | {"metrics": {}}, disk_mb=0.001, uncounted_s=0.0)
+    assert still is not None
+    later = dataclasses.replace(NEXT, clip_index=2, start=20)
+    arguments = {"clip": later, "is_source": True, "reference": header()}
+    with_it, without = (plan(history=[measured(), *known], **arguments) for known in ([still], []))
+    assert with_it == without
+
+
 def test_one_frame():
     one = plan(clip=dataclasses.replace(CLIP, n_frames=1))
     lines = texts(one)
