@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from torch import Tensor, nn
+from torch import nn
 
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -38,8 +38,10 @@ from engine.training.held_in import MEASURE_EVERY, Patience, held_in_items, step
 from engine.training.losses import photometric_loss
 from engine.training.optimizer import PhaseOptimizer, named_parameters
 from engine.training.order import ErrorOrder, Order, ShuffledOrder
+from engine.training.phases import phase_at, phases_of
 from engine.training.pictures import shared_image_size
 from engine.training.report import Progress, ReportProgress, StepStats
+from engine.training.sight import Sight, camera_views
 from engine.training.stopping import gradient_not_finite, loss_not_finite
 from engine.training.volume import volume_sum
 
@@ -96,23 +98,18 @@ class ClipTraining:
         self.width, self.height = shared_image_size(capture)
         self.rig = capture.rig.subset(self.camera_indices)
         self.near_plane = float(near_plane(self.rig)) if self._base is None else self._base.header["near_plane"]
-        n_pictures = len(self.camera_indices) * clip.n_frames
-        if self._base is None:
-            self.phases = [
-                ("static", config.n_static_steps(len(self.camera_indices))),
-                ("joint", config.n_joint_steps(n_pictures)),
-            ]
-        else:
-            self.phases = [("source", config.n_source_steps(n_pictures))]
+        n_cameras = len(self.camera_indices)
+        self.phases = phases_of(config, n_cameras=n_cameras, n_frames=clip.n_frames, is_source=self._base is not None)
         self.steps_done = 0
         self._generator = torch.Generator().manual_seed(seed)
-        self._views = [self._view(camera) for camera in range(len(capture.rig))]
+        self._views = camera_views(capture.rig, near_plane=self.near_plane)
+        self._training_views = [self._views[camera] for camera in self.camera_indices]
         self._preparation = ClipPreparation(
             capture,
             clip,
             config,
             camera_indices=self.camera_indices,
-            views=[self._views[camera] for camera in self.camera_indices],
+            views=self._training_views,
             base=self._base,
             previous=previous,
             regions=self.regions,
@@ -122,9 +119,7 @@ class ClipTraining:
             report=report,
         )
         self._workspace = LossWorkspace(self.height, self.width)
-        self._sight: dict[tuple[str, int], Tensor] = {}  # rows of static sets, flags of dynamic ones
         self._tiles: ActiveTiles | None = None
-        n_cameras = len(self.camera_indices)
         self._held_in = held_in_items(n_cameras, clip.n_frames, seed) if config.patience else []
         self._patience: Patience | None = None
 
@@ -139,14 +134,6 @@ class ClipTraining:
     def is_finished(self) -> bool:
         """Whether every step was done."""
         return self.steps_done >= self.n_steps
-
-    def _phase_at(self, step: int) -> tuple[int, int]:
-        """Phase index and steps done inside it."""
-        for index, (_, n) in enumerate(self.phases):
-            if step < n or index == len(self.phases) - 1:
-                return index, step
-            step -= n
-        raise AssertionError("a training has at least one phase")
 
     # ---------------------------------------------------------------- preparation
 
@@ -194,7 +181,7 @@ class ClipTraining:
         is_by_error = name == "source" and self.config.sampling == "error"
         self._order: Order = (ErrorOrder if is_by_error else ShuffledOrder)(len(self._items), seed=self.seed + index)
         self._phase_index = index
-        self._sight = {}  # a set may have become dynamic
+        self._sight = Sight(self.model, self._training_views, reach=self._reach)  # a set may have become dynamic
         self._set_size(is_half=steps_in_phase < self.config.n_coarse_steps(n_steps))
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self._say("Nothing to learn", f"Nothing moves in this clip: no steps instead of {n_steps}")
@@ -213,7 +200,7 @@ class ClipTraining:
         Raises:
             NonFiniteLoss: The loss or a gradient is not finite; names it. The model is as it was before this step.
         """
-        index, in_phase = self._phase_at(self.steps_done)
+        index, in_phase = phase_at(self.phases, self.steps_done)
         if index != self._phase_index:
             self._add_moving()
             self._start_phase(index, 0)
@@ -300,51 +287,23 @@ class ClipTraining:
         for item in self._held_in:
             camera_row, frame = divmod(item, self.clip.n_frames)
             clip_time = frame / self.clip.clip_length
-            view = self._views[self.camera_indices[camera_row]]
+            view = self._training_views[camera_row]
             with torch.no_grad():
-                gaussians = self.model.decode(clip_time, self._rows(camera_row, clip_time))
+                gaussians = self.model.decode(clip_time, self._sight.rows(camera_row, clip_time))
                 image = render_gaussians(gaussians, view).image[0] * self.gains[camera_row]
             values.append(psnr(image.numpy(), self.pictures.raw(camera_row, frame) / 255.0))
         return float(np.mean(values)) if values else float("nan")
 
     def _active_picture(self, camera_row: int, view: View, clip_time: float) -> ActivePicture:
-        rows = self._rows(camera_row, clip_time)
+        rows = self._sight.rows(camera_row, clip_time)
         if self._tiles is not None:
             return self._tiles.split(camera_row, view, clip_time, rows)
         gaussians = self.model.decode(clip_time, rows)
         return ActivePicture(gaussians, gaussians, len(gaussians))
 
-    def _rows(self, camera_row: int, clip_time: float) -> dict[str, Tensor]:
-        """Rows to decode for a training view; what a camera can see of fixed anchors never changes."""
-        rows = {}
-        for role in self.model.roles():
-            key, anchors = (role, camera_row), self.model.anchor_set(role)
-            if key not in self._sight:
-                view = self._views[self.camera_indices[camera_row]]
-                is_seen = view.sees(anchors.positions, reach=self._reach)
-                self._sight[key] = is_seen if anchors.is_dynamic else is_seen.nonzero()[:, 0]
-            rows[role] = self._sight[key]
-            if anchors.presence is not None:
-                is_seen = np.zeros(len(anchors), bool)  # by numpy: torch would wake its threads for it
-                for knot, _ in self.model.knots(clip_time):
-                    is_seen |= anchors.presence.numpy()[:, knot]
-                is_seen &= self._sight[key].numpy()
-                rows[role] = torch.from_numpy(is_seen.nonzero()[0])
-        return rows
-
     @property
     def _reach(self) -> float:
         return REACH_SPACINGS * self.spacing
-
-    def _view(self, camera: int) -> View:
-        rig = self.capture.rig
-        return View.from_arrays(
-            rig.world_to_camera[camera],
-            rig.Ks[camera],
-            width=self.width,
-            height=self.height,
-            near_plane=self.near_plane,
-        )
 
     # ---------------------------------------------------------------- what came of it
 
@@ -400,8 +359,7 @@ class ClipTraining:
         state = self.state()
         # another clip's field may show this one where fields go on: what it would show nobody knows yet
         if self.config.gate == "images" and self.config.field != "continue":
-            views = [self._views[camera] for camera in self.camera_indices]
-            state, said = demote(state, self.reference, views, reach=self._reach)
+            state, said = demote(state, self.reference, self._training_views, reach=self._reach)
             self._say("Leaving out what is not needed", said)
             self._reasons = {name: array for name, array in state.arrays.items() if name.startswith("gate.")}
             self.model = load_clip_model(state, self.reference, is_learning=True)
@@ -409,11 +367,12 @@ class ClipTraining:
         entries = None if self.config.field == "continue" else self.model.entries_in_use()
         compact = compact_clip(state, entries)
         self.model = load_clip_model(compact.state, self.reference, is_learning=True)
+        self._sight = Sight(self.model, self._training_views, reach=self._reach)
         return compact
 
     def write_checkpoint(self, path: Path | str) -> None:
         """State, optimiser, order of pictures and random state: enough to go on exactly."""
-        index, in_phase = self._phase_at(self.steps_done)
+        index, in_phase = phase_at(self.phases, self.steps_done)
         place = Place(
             phase_index=self._phase_index,
             steps_in_phase=in_phase if index == self._phase_index else self.phases[self._phase_index][1],
