@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import logging
+import sys
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from engine.capture.capture import Capture
 from engine.errors import ProjectError
 
-EXIT_OK, EXIT_BAD_INPUT = 0, 2
+logger = logging.getLogger(__name__)
+
+EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT = 0, 1, 2
 COMMANDS = {
     "train": "train clips of a capture, or go on where it stopped",
     "eval": "measure trained clips against every camera, and the seams between them",
@@ -22,6 +26,13 @@ COMMANDS = {
     "ablate": "train variants of the method and baselines, and compare them",
 }
 """Subcommands that app.cli serves without a window, and what each does."""
+
+
+def fail(code: int, message: str) -> int:
+    """Say in one line, and in the log, why a subcommand ends with this exit code. Returns the code."""
+    logger.error("exit %d: %s", code, message)
+    print(f"clipgstream: {message}", file=sys.stderr)
+    return code
 
 
 class PlainParser(argparse.ArgumentParser):

@@ -7,13 +7,22 @@ import json
 from pathlib import Path
 from typing import Any
 
-from app.arguments import EXIT_OK, parse_range
+from app.arguments import EXIT_OK, add_figure_choices, parse_range
 from app.evaluation import evaluate_project
 from app.headless import open_trained
 from app.progress import ProgressLine, row_progress
 from app.project import open_project
 from app.results import check_writable, write_text
 from app.training.service import Launch
+
+
+def add_eval_arguments(command: argparse.ArgumentParser) -> None:
+    """Arguments of `clipgstream eval`."""
+    command.add_argument("project", type=Path, help="project folder")
+    command.add_argument("--json", required=True, metavar="OUT", help="file for all rows and means; - prints them")
+    command.add_argument("--clips", default=":", metavar="A:B", help="clips to measure (default: all trained)")
+    add_figure_choices(command, default="all", said="all")
+    command.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def evaluate(options: argparse.Namespace, launch: Launch) -> int:

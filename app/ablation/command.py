@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import replace
+from pathlib import Path
 
-from app.arguments import EXIT_OK, overrides_of, parse_cameras
+from app.arguments import EXIT_OK, add_figure_choices, add_training_settings, overrides_of, parse_cameras
 from app.progress import ProgressLine, row_progress
 from app.project import check_settings, default_settings
 from app.results import check_writable
@@ -14,6 +15,28 @@ from app.training.lines import show_outcome, show_status
 from app.training.service import Launch
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError
+
+
+def add_ablate_arguments(command: argparse.ArgumentParser) -> None:
+    """Arguments of `clipgstream ablate`."""
+    command.add_argument("capture", type=Path, nargs="?", help="capture folder")
+    command.add_argument("--project", type=Path, help="folder for one project per variant and the table")
+    command.add_argument("--variants", metavar="NAMES", help="separated by commas (default: all; --list names them)")
+    command.add_argument("--list", action="store_true", help="say what the variants are and end")
+    command.add_argument("--n-clips", type=int, metavar="N", help="clips from the first (default: up to 4)")
+    command.add_argument(
+        "--source-steps",
+        metavar="N,M,...",
+        help="train source clips with each of these numbers of steps: quality over time",
+    )
+    command.add_argument("--seeds", default="0", help="separated by commas (default: 0)")
+    command.add_argument(
+        "--reference-clip", type=int, default=0, metavar="K", help="clip that others inherit from (default: 0)"
+    )
+    add_figure_choices(command, default="quick", said="quick")
+    add_training_settings(command)
+    command.add_argument("--json", action="store_true", help="print the table as JSON on standard output")
+    command.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def ablate(options: argparse.Namespace, launch: Launch) -> int:

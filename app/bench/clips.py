@@ -14,7 +14,7 @@ from engine.model.clip_model import ClipModel
 from engine.model.decoder import Decoder
 from engine.model.decoding import ChosenAnchors
 from engine.model.view import View
-from engine.training.building import fit_field
+from engine.training.clip_field import fit_field
 from engine.training.config import TrainConfig
 
 N_FRAMES = 10

@@ -18,6 +18,21 @@ DEFAULT_OUT = Path("bench_output")
 """Where the picture goes unless --out says so, in the current folder."""
 
 
+def add_bench_arguments(command: argparse.ArgumentParser) -> None:
+    """Arguments of `clipgstream bench`."""
+    command.add_argument(
+        "--out",
+        type=Path,
+        default=DEFAULT_OUT,
+        metavar="DIR",
+        help=f"folder for the picture {CHART_FILE} (default: {DEFAULT_OUT})",
+    )
+    command.add_argument("--json", metavar="FILE", help="file for all figures; - prints them instead of the table")
+    command.add_argument("--full", action="store_true", help="all scenes and sizes; takes some minutes, not one")
+    command.add_argument("--threads", type=int, metavar="N", help="threads to compute with (default: every core)")
+    command.add_argument("--quiet", action="store_true", help="no progress")
+
+
 def bench(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream bench: measure the kernels; prints the table. Returns the exit code."""
     chart = options.out / CHART_FILE

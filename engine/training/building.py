@@ -1,4 +1,4 @@
-"""From clouds to the parts of a ClipModel: anchor sets, decoder, field, and what a source clip inherits.
+"""From clouds to the parts of a ClipModel: anchor sets, decoder, and what a source clip inherits.
 
 Sizes follow the data and the reasons are returned as lines to report. Nothing here trains or looks at pixels.
 """
@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 import torch
 from scipy.spatial import KDTree
-from torch import Tensor
 
 from engine.capture.clip import Clip
 from engine.cloud.budget import NOBODY, choose_within_budget
@@ -21,8 +20,6 @@ from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel, decoder_sizes, inherit
 from engine.model.clip_state import ClipState
 from engine.model.decoder import Decoder
-from engine.model.field import FieldShape, SpatioTemporalField
-from engine.model.field_sizes import derive_cells, derive_log2_entries
 from engine.training.config import TrainConfig
 
 _REACH_SPACINGS = 1.05
@@ -243,61 +240,3 @@ def remove_gate(model: ClipModel, *, in_time_only: bool = False) -> None:
         anchors = model.anchor_set(role)
         if anchors.is_dynamic or not in_time_only:
             anchors.presence = torch.ones(len(anchors), model.n_frames, dtype=torch.bool)
-
-
-def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generator: torch.Generator) -> str:
-    """Attach a fresh field over the dynamic anchors alive in this clip; none when nothing moves. Says its size.
-
-    Args:
-        spacing: Distance between moving anchors, scene units.
-    """
-    positions, most_alive = _alive_positions(model), n_alive(model)
-    if len(positions) == 0:
-        return "no field: nothing moves in this clip"
-    # percentiles, so that one stray point does not stretch the grid; beyond them positions clamp to the border
-    lower, upper = positions.quantile(0.005, dim=0), positions.quantile(0.995, dim=0)
-    side = max(float((upper - lower).max()), 4 * spacing) + 2 * spacing
-    n_levels = config.field_levels or config.field_max_levels
-    is_shared = config.field_tables == "shared"
-    n_shared = model.n_frames if is_shared else 1
-    log2_entries = config.field_log2_entries or derive_log2_entries(most_alive, n_shared_knots=n_shared)
-    cells = derive_cells(
-        side=side,
-        spacing=0.0 if config.field_levels else spacing,  # a fixed number of levels does not look at the anchors
-        base=config.field_base_cells,
-        growth=config.field_growth,
-        max_levels=n_levels,
-    )
-    x, y, z = (lower - spacing).tolist()
-    shape = FieldShape(
-        n_knots=model.n_frames,
-        cells=cells,
-        n_entries=2**log2_entries,
-        channels=config.field_channels,
-        hidden=config.field_hidden,
-        feature_dim=config.dynamic_feature_dim,
-        bounds_min=(x, y, z),
-        side=side,
-        is_shared=is_shared,
-    )
-    model.attach_field(SpatioTemporalField(shape, generator))
-    return (
-        f"{len(cells)} levels up to {cells[-1]} cells (anchors {spacing:.3g} apart), "
-        f"2^{log2_entries} entries {'in all' if is_shared else 'per frame'} ({most_alive} anchors alive)"
-    )
-
-
-def n_alive(model: ClipModel) -> int:
-    """The most dynamic anchors that exist in one frame, summed over the sets."""
-    presences = [model.anchor_set(role).presence for role in model.roles()]
-    return sum(int(presence.sum(0).max()) for presence in presences if presence is not None and len(presence))
-
-
-def _alive_positions(model: ClipModel) -> Tensor:
-    """Positions of dynamic anchors that exist in some frame. [n, 3]"""
-    parts = [torch.zeros(0, 3)]
-    for role in model.roles():
-        anchors = model.anchor_set(role)
-        if anchors.presence is not None and len(anchors):
-            parts.append(anchors.positions[anchors.presence.any(1)])
-    return torch.cat(parts)

@@ -56,6 +56,30 @@ def without_static_regions(cloud: MovingCloud, regions: Sequence[GateRegion]) ->
     return replace(cloud, points=cloud.points[is_kept], colors=cloud.colors[is_kept], presence=cloud.presence[is_kept])
 
 
+def decide(
+    model: ClipModel, table: GateTable, regions: Sequence[GateRegion], *, is_source: bool
+) -> tuple[dict[str, np.ndarray], str]:
+    """Do what was decided to the static anchors, after the user's regions have overruled it.
+
+    Args:
+        model: Its static set is split; before a field is attached.
+        table: The decision from the pictures, by static anchor.
+        regions: Where the user overrules it.
+        is_source: Whether the clip inherits from another one.
+    Returns:
+        Reasons by the name under which the clip stores them, and the decision in one line.
+    """
+    static = model.anchor_set("static")
+    table = with_regions(table, static.positions.numpy(), regions)
+    reasons = {"gate.static": table.reasons}
+    if not is_source or static.is_trainable:  # otherwise the inherited set keeps its rows, of which some are hidden
+        role = "replacing" if is_source else "promoted"
+        reasons = {"gate.static": table.reasons[~table.is_dynamic]}
+        reasons |= {f"gate.{role}": table.reasons[table.is_dynamic]} if table.is_dynamic.any() else {}
+    promote(model, table.is_dynamic, is_source=is_source)
+    return reasons, table.summary()
+
+
 def promote(model: ClipModel, is_dynamic: np.ndarray, *, is_source: bool) -> None:
     """Give static anchors a dynamic feature. Before a field is attached; nothing happens where there are none.
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from engine.capture.rig import CameraRig
 from engine.cloud.image_filters import block_mean
-from engine.model.view import View
 from engine.training.fused_loss import LossWorkspace
+from engine.training.sight import camera_views
 
 
 class HalfSize:
@@ -33,10 +33,7 @@ class HalfSize:
         even = replace(rig, image_sizes=rig.image_sizes // 2 * 2)
         half = even.resized(even.image_sizes // 2)
         width, height = (int(side) for side in half.image_sizes[0])
-        self.views = [
-            View.from_arrays(pose, K, width=width, height=height, near_plane=near_plane)
-            for pose, K in zip(half.world_to_camera, half.Ks, strict=True)
-        ]
+        self.views = camera_views(half, near_plane=near_plane)
         self.workspace = LossWorkspace(height, width)
         self._truths: dict[int, tuple[np.ndarray, np.ndarray | None]] = {}
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from app.bench import speed
+from app.cli import main
 from app.commands import OpenCapture
 from app.project import Project
 from app.session import Session
@@ -45,6 +46,18 @@ def known_machine(monkeypatch: pytest.MonkeyPatch) -> None:
 def inline(job: TrainJob, project: Project, make_training: MakeTraining = make_fake) -> InlineWorker:
     """A launch function for sessions and services."""
     return InlineWorker(job, make_training)
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Runs a command; gives exit code, standard output and standard error."""
+
+    def run_command(*arguments: object, make_training=make_fake) -> tuple[int, str, str]:
+        code = main([str(part) for part in arguments], launch=partial(inline, make_training=make_training))
+        captured = capsys.readouterr()
+        return code, captured.out, captured.err
+
+    return run_command
 
 
 def poll_until(session: Session, is_done: Callable[[], bool], *, what: str = "the condition") -> None:

@@ -82,7 +82,7 @@ def test_no_touched_tile_is_missed_by_a_trained_clip(half):
         n_inactive += int(outside.sum())
         with torch.no_grad():
             assert not render_gaussians(part.learning, view).alpha[0, ..., 0][outside].any()
-            whole = training.model.decode(clip_time, training._rows(camera_row, clip_time))
+            whole = training.model.decode(clip_time, training._sight.rows(camera_row, clip_time))
             image = render_gaussians(whole, view).image[0]
             drawn = render_gaussians(part.gaussians, view, tile_mask=part.tile_mask).image[0]
         assert torch.equal(torch.where(outside[..., None], part.rest, drawn), image)

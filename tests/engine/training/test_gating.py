@@ -16,7 +16,7 @@ from engine.model.clip_model import ClipModel, load_clip_model
 from engine.model.clip_state import ClipState, read_clip_state
 from engine.model.compact import write_compact_clip
 from engine.model.view import REACH_SPACINGS
-from engine.training import clip_training, demotion
+from engine.training import clip_preparation, demotion
 from engine.training.building import merged
 from engine.training.clip_training import ClipTraining
 from tests.engine.training.tiny_training import (
@@ -58,8 +58,8 @@ def seeing_light(monkeypatch: pytest.MonkeyPatch, rows: np.ndarray) -> None:
         reasons = np.where(is_dynamic, LIGHT, STILL).astype(np.uint8)
         return GateTable(is_dynamic, reasons, is_dynamic.astype(np.float32) * 2)
 
-    monkeypatch.setattr(clip_training, "measure_gate", measured)
-    monkeypatch.setattr(clip_training, "frames_inside", lambda points, *_: np.zeros(len(points), dtype=np.int64))
+    monkeypatch.setattr(clip_preparation, "measure_gate", measured)
+    monkeypatch.setattr(clip_preparation, "frames_inside", lambda points, *_: np.zeros(len(points), dtype=np.int64))
 
 
 def look_of(model: ClipModel, rows: np.ndarray) -> list[np.ndarray]:
@@ -183,7 +183,7 @@ def test_anchors_inside_a_hull_are_replaced_and_may_go(tiny: Tiny, tmp_path, mon
     seeing_light(monkeypatch, np.zeros(0, dtype=np.int64))
     n_frames_inside = np.zeros(len(static_points(tiny.reference)), dtype=np.int64)
     n_frames_inside[[7, 8]], n_frames_inside[9] = (MIN_FRAMES, CLIP_LENGTH), MIN_FRAMES - 1
-    monkeypatch.setattr(clip_training, "frames_inside", lambda *_: n_frames_inside)
+    monkeypatch.setattr(clip_preparation, "frames_inside", lambda *_: n_frames_inside)
     training = tiny.prepared(1, gate="images", prep_dir=tmp_path)
     assert np.flatnonzero(training.model.hidden["static"].numpy()).tolist() == [7, 8]
     assert np.flatnonzero(training.state().arrays["gate.static"] == INSIDE).tolist() == [7, 8]

@@ -8,7 +8,7 @@ from safetensors.numpy import load_file
 from engine.model.clip_model import load_clip_model
 from engine.model.clip_state import read_clip_state
 from engine.model.compact import write_compact_clip
-from engine.training import clip_training
+from engine.training import clip_preparation
 from engine.training.expected_sizes import counts_of, footage_of
 from engine.training.pictures import TrainingPictures
 from engine.training.plan import make_plan
@@ -26,7 +26,7 @@ def still(tiny, monkeypatch):
         def raw(self, camera_row, frame_in_clip):
             return images[camera_row]
 
-    monkeypatch.setattr(clip_training, "TrainingPictures", StillPictures)
+    monkeypatch.setattr(clip_preparation, "TrainingPictures", StillPictures)
     return tiny.prepared(1)
 
 

@@ -1,0 +1,70 @@
+"""clipgstream inspect: a capture, and the clips of a project."""
+
+import json
+import re
+import shutil
+
+import pytest
+
+from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
+
+
+def test_inspecting_prints_stable_json(run, capture_folder):
+    code, out, _ = run("inspect", capture_folder, "--json")
+    assert code == 0
+    document = json.loads(out)
+    assert (document["schema"], document["n_cameras"], document["n_frames"]) == (1, 4, 6)
+    code, out, _ = run("inspect", capture_folder)
+    assert code == 0
+    assert "4 cameras, 6 frames" in out
+
+
+def test_inspecting_a_project_counts_the_bytes_of_its_clips(run, capture_folder, tmp_path):
+    project, capture = tmp_path / "p", tmp_path / "capture"
+    shutil.copytree(capture_folder, capture)
+    assert run("train", capture, "--project", project, "--clip-length", 3)[0] == 0
+    code, out, _ = run("inspect", project, "--json")
+    assert code == 0
+    found = json.loads(out)
+    sizes = [(project / "clips" / f"000{i}.safetensors").stat().st_size for i in range(2)]
+    assert [clip["n_bytes"] for clip in found["clips"]] == sizes
+    assert [sum(clip["components"].values()) for clip in found["clips"]] == sizes
+    assert found["components"]["positions"] == sum(clip["components"]["positions"] for clip in found["clips"]) > 0
+    assert found["reference_share"] == pytest.approx(sizes[0] / sum(sizes))
+    assert found["mb_per_minute"] == pytest.approx(sizes[1] / 3 * found["fps"] * 60 / 1e6)
+    code, out, _ = run("inspect", project)
+    assert code == 0
+    assert f"{found['mb_per_minute']:.1f} MB per minute" in out
+    assert re.search(r"positions +\d", out)
+    capture.rename(tmp_path / "elsewhere")
+    assert json.loads(run("inspect", project, "--json")[1])["mb_per_minute"] is None
+    assert "the capture is not there" in run("inspect", project)[1]
+
+
+def test_inspecting_a_project_says_how_much_of_what_moves_is_within_reach_of_an_anchor(run, capture_folder, tmp_path):
+    project = tmp_path / "p"
+    assert run("train", capture_folder, "--project", project, "--clip-length", 3)[0] == 0
+    assert "within reach" not in run("inspect", project)[1]  # nothing known, as in files of earlier versions
+    path = project / "clips" / "0001.safetensors"
+    state = read_clip_state(path)
+    coverage = {"n_points": 4000, "n_inherited": 500, "n_residual": 3000, "n_left_out": 500, "share": 0.9876}
+    write_clip_state(path, ClipState(state.arrays, state.header | {"coverage": coverage | {"reason": "at most 3500"}}))
+    clips = json.loads(run("inspect", project, "--json")[1])["clips"]
+    assert [clip["coverage"] and clip["coverage"]["share"] for clip in clips] == [None, 0.9876]
+    said = "clip 1 98.8 % with 3,000 anchors of its own, 500 points beyond the budget left to those beside them"
+    assert said in run("inspect", project)[1]
+
+
+def test_inspecting_a_project_without_clips_or_with_a_damaged_one_is_bad_input(run, capture_folder, tmp_path):
+    project = tmp_path / "p"
+    assert run("train", capture_folder, "--project", project, "--clip-length", 3)[0] == 0
+    clip = project / "clips" / "0001.safetensors"
+    clip.write_bytes(clip.read_bytes()[:50])
+    code, out, err = run("inspect", project)
+    assert (code, out) == (2, "")
+    assert "damaged" in err
+    for path in (project / "clips").iterdir():
+        path.unlink()
+    code, out, err = run("inspect", project)
+    assert (code, out) == (2, "")
+    assert "Nothing is trained" in err
