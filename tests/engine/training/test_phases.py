@@ -1,0 +1,28 @@
+"""Phases of a training: their steps, and where a step lies."""
+
+from __future__ import annotations
+
+import pytest
+
+from engine.training.config import TrainConfig
+from engine.training.phases import phase_at, phases_of
+
+SIZES = {"n_cameras": 3, "n_frames": 2}
+
+
+def test_a_reference_clip_has_two_phases_and_a_source_clip_one():
+    config = TrainConfig(static_steps=5, joint_steps=7, source_steps=4)
+    assert phases_of(config, **SIZES, is_source=False) == [("static", 5), ("joint", 7)]
+    assert phases_of(config, **SIZES, is_source=True) == [("source", 4)]
+
+
+@pytest.mark.parametrize(
+    ("step", "expected"), [(0, (0, 0)), (4, (0, 4)), (5, (1, 0)), (11, (1, 6)), (12, (1, 7)), (20, (1, 15))]
+)
+def test_a_step_lies_in_one_phase_and_the_last_has_no_end(step, expected):
+    assert phase_at([("static", 5), ("joint", 7)], step) == expected
+
+
+def test_a_phase_without_steps_is_passed_over_unless_it_is_the_last():
+    assert phase_at([("static", 0), ("joint", 7)], 0) == (1, 0)
+    assert phase_at([("source", 0)], 0) == (0, 0)
