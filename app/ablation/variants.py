@@ -13,6 +13,7 @@ from typing import Any
 
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
+from engine.training.presets import PUBLISHED_SIZES
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,18 +53,6 @@ class Variant:
 
 
 FULL = "full"
-PUBLISHED_SIZES: dict[str, Any] = {
-    "static_feature_dim": 64,
-    "dynamic_feature_dim": 64,
-    "gaussians_per_anchor": 10,
-    "head_hidden": 256,
-    "field_hidden": 128,
-    "field_base_cells": 16,
-    "field_growth": 2.0,
-    "field_levels": 16,
-    "field_log2_entries": 17,
-}
-"""Sizes of the published method. Its rates and lengths are not among them: what costs is compared at equal rates."""
 MIN_STEPS_PER_FRAME = 20
 """Of a stream, also where the clips of "full" have fewer."""
 VARIANTS = (
@@ -129,7 +118,8 @@ VARIANTS = (
         cut="first",
         shares_reference=False,
     ),
-    # from the published scheme to "full", one part after the other; only time changes where the tiles do
+    # from the published scheme to "full", one part after the other; only time changes where the tiles do. Rates and
+    # lengths are those of "full": what costs is compared at equal rates
     Variant(
         "published",
         "published sizes, every anchor at every time, all tiles",

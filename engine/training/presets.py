@@ -11,6 +11,19 @@ from typing import Any
 
 from engine.errors import ProjectError
 
+PUBLISHED_SIZES: dict[str, Any] = {
+    "static_feature_dim": 64,
+    "dynamic_feature_dim": 64,
+    "gaussians_per_anchor": 10,
+    "head_hidden": 256,
+    "field_hidden": 128,
+    "field_base_cells": 16,
+    "field_growth": 2.0,
+    "field_levels": 16,
+    "field_log2_entries": 17,
+}
+"""Of the model, without what depends on the capture."""
+
 PRESETS: dict[str, dict[str, Any]] = {
     "toy": {
         "gaussians_per_anchor": 4,
@@ -37,16 +50,8 @@ PRESETS: dict[str, dict[str, Any]] = {
     # scene scale (there, that of the reference clip is multiplied by the extent of the cameras); rates end with the
     # phase (there after 30,000 steps or more, so that most have hardly fallen when a clip is done); the volume is
     # measured in cubes of the anchor spacing (scene units); and the reference clip has a static phase before.
-    "paper": {
-        "static_feature_dim": 64,
-        "dynamic_feature_dim": 64,
-        "gaussians_per_anchor": 10,
-        "head_hidden": 256,
-        "field_hidden": 128,
-        "field_base_cells": 16,
-        "field_growth": 2.0,
-        "field_levels": 16,
-        "field_log2_entries": 17,
+    "paper": PUBLISHED_SIZES
+    | {
         "max_static_points": 1_000_000,
         "max_moving_points": 1_000_000,
         "color": "off",
