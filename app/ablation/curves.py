@@ -12,8 +12,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from app.ablation.variants import FULL, variant_called
+from app.later_clips import LATER_MOVING, LATER_PSNR, LATER_S
 
-FIGURES = {"later_psnr": "PSNR", "later_psnr_moving": "PSNR of moving pixels"}
+FIGURES = {LATER_PSNR: "PSNR", LATER_MOVING: "PSNR of moving pixels"}
 """What is set against time, and its name."""
 
 Points = Sequence[tuple[float, float]]
@@ -27,13 +28,14 @@ def curves_of(lines: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     Returns:
         Per variant: `variant`, `points` (each with source_steps, later_s and FIGURES, rising in steps) and, beside
         "full", `at_equal`: per figure the PSNR, `seconds`, `seconds_full`, `ratio`, and `is_least` where "full" is
-        already better at its first point, so that the ratio is at least that. None where the curves do not meet.
+        already better at its first point, so that the ratio is at least that. None where the curves do not meet, or
+        where the other one is already better at its first point: nobody knows how much earlier it was as good.
     """
     found: dict[str, list[dict[str, Any]]] = {}
     for line in lines:
         variant = variant_called(line["variant"])
-        if variant is not None and variant.base_name and line.get("later_s"):
-            point = {"source_steps": variant.overrides["source_steps"], "later_s": line["later_s"]}
+        if variant is not None and variant.base_name and line.get(LATER_S):
+            point = {"source_steps": variant.overrides["source_steps"], LATER_S: line[LATER_S]}
             found.setdefault(variant.base_name, []).append(point | {name: line.get(name) for name in FIGURES})
     curves = [{"variant": name, "points": points} for name, points in found.items() if len(points) > 1]
     full = next((curve["points"] for curve in curves if curve["variant"] == FULL), None)
@@ -80,7 +82,7 @@ def seconds_to(points: Points, psnr: float) -> float | None:
 
 
 def _pairs(points: Sequence[dict[str, Any]], name: str) -> list[tuple[float, float]]:
-    known = [(point["later_s"], point[name]) for point in points]
+    known = [(point[LATER_S], point[name]) for point in points]
     return [(seconds, value) for seconds, value in known if value is not None and math.isfinite(value)]
 
 
@@ -88,6 +90,8 @@ def _at_equal(full: Points, other: Points) -> dict[str, Any] | None:
     if not full or not other:
         return None
     psnr = min(max(value for _, value in full), max(value for _, value in other))
+    if min(other)[1] > psnr:
+        return None
     seconds, seconds_full = seconds_to(other, psnr), seconds_to(full, psnr)
     if seconds is None or seconds_full is None:
         return None

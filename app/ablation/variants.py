@@ -120,38 +120,22 @@ VARIANTS = (
     ),
     # from the published scheme to "full", one part after the other; only time changes where the tiles do. Rates and
     # lengths are those of "full": what costs is compared at equal rates
-    Variant(
-        "published",
-        "published sizes, every anchor at every time, all tiles",
-        PUBLISHED_SIZES | {"gate": "off", "tiles": "all"},
-        is_baseline=True,
-        shares_reference=False,
-        is_on_request=True,
-    ),
-    Variant(
-        "published-static",
-        "published sizes, static anchors decoded once",
-        PUBLISHED_SIZES | {"gate": "static", "tiles": "all"},
-        is_baseline=True,
-        shares_reference=False,
-        is_on_request=True,
-    ),
-    Variant(
-        "published-gate",
-        "published sizes, and moving anchors only where they can be",
-        PUBLISHED_SIZES | {"tiles": "all"},
-        is_baseline=True,
-        shares_reference=False,
-        is_on_request=True,
-    ),
-    Variant(
-        "published-tiles",
-        "published sizes, gate, and only active tiles",
-        PUBLISHED_SIZES,
-        is_baseline=True,
-        shares_reference=False,
-        reference_of="published-gate",
-        is_on_request=True,
+    *(
+        Variant(
+            name,
+            f"published sizes, {words}",
+            PUBLISHED_SIZES | changed,
+            is_baseline=True,
+            shares_reference=False,
+            reference_of=reference_of,
+            is_on_request=True,
+        )
+        for name, words, changed, reference_of in (
+            ("published", "every anchor at every time, all tiles", {"gate": "off", "tiles": "all"}, ""),
+            ("published-static", "static anchors decoded once", {"gate": "static", "tiles": "all"}, ""),
+            ("published-gate", "moving anchors only where they can be", {"tiles": "all"}, ""),
+            ("published-tiles", "gate, and only active tiles", {}, "published-gate"),
+        )
     ),
 )
 """Everything that `clipgstream ablate` can train, in the order of its table."""

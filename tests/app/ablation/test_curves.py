@@ -49,6 +49,14 @@ def test_where_full_begins_above_the_ratio_is_a_least_one():
     assert "full after at most 10 s: at least 40.0 times" in curve_lines([published])[0]
 
 
+def test_where_the_other_one_begins_above_nothing_is_said():
+    lines = [line("full-steps10", 10.0, 20.0), line("full-steps40", 40.0, 21.0),
+             line("published-steps10", 100.0, 27.0), line("published-steps40", 400.0, 29.0)]  # fmt: skip
+    curves = curves_of(lines)
+    assert curves[1]["at_equal"]["later_psnr"] is None  # it may have had 21 dB after ten seconds, too
+    assert curve_lines(curves) == []
+
+
 def test_one_point_or_a_line_without_a_time_is_no_curve():
     assert curves_of([line("full-steps10", 10.0, 28.0), line("full", 5.0, 20.0), line("full-steps20", 0.0, 1.0)]) == []
     two = curves_of(
