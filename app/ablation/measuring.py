@@ -12,6 +12,7 @@ from app.evaluation import evaluate_project
 from app.headless import open_trained
 from app.later_clips import later_figures
 from app.project import Project, ProjectSettings, open_project
+from app.report.facts import read_facts
 from app.results import write_text
 from engine.errors import ProjectError
 from engine.metrics.flicker import flicker_figures
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from engine.metrics.colors import Precision
     from engine.metrics.picture import Choice
 
-MEASURED_SCHEMA = 3
+MEASURED_SCHEMA = 4
 MEASURED_FILE = "measured.json"
 
 
@@ -64,7 +65,6 @@ def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None]) 
     if kept is not None:
         return kept
     opened = open_trained(project)
-    headers = [opened.header(i) for i in scope.clips]
     holdout = opened.capture.camera_indices(project.settings.holdout)
     document = evaluate_project(
         opened,
@@ -78,13 +78,10 @@ def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None]) 
     means = document["means"][group]
     figures: dict[str, float | None] = {name: value for name, value in means.items() if not isinstance(value, dict)}
     figures |= flicker_figures(document["seams"]["rows"], scope.borders)
-    times = [header.get("metrics") or {} for header in headers]
-    seconds = [time["preparation_s"] + time["training_s"] if "training_s" in time else None for time in times]
-    known = [second for second in seconds if second is not None]
-    figures["minutes"] = sum(known) / 60 if len(known) == len(headers) else None
-    source_s = {
-        i: second for i, header, second in zip(scope.clips, headers, seconds, strict=True) if header["role"] == "source"
-    }
+    clips = [clip for clip in read_facts(place, place.name).clips if clip.clip_index in scope.clips]
+    known = [clip.wall_s for clip in clips if clip.wall_s is not None]
+    figures["minutes"] = sum(known) / 60 if len(known) == len(clips) else None
+    source_s = {clip.clip_index: clip.wall_s for clip in clips if clip.role == "source"}
     figures |= later_figures(document["means"]["clips"], group, source_s)
     figures["megabytes"] = sum(project.clip_path(i).stat().st_size for i in scope.clips) / 1e6
     measured = Measured(figures, sum(opened.clips[i].n_frames for i in scope.clips))
