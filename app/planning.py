@@ -14,6 +14,7 @@ from app.training.stage_watch import stages_of
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.model.clip_state import read_clip_header
+from engine.training.config import TrainConfig
 from engine.training.expected_sizes import footage_of
 from engine.training.forecasting import UNKNOWN_MACHINE, MachineSpeed, MeasuredClip, measured_clip
 from engine.training.plan import TrainingPlan, make_plan
@@ -57,7 +58,18 @@ def plan_clip(
         reference=None if base is None else read_clip_header(project.clip_path(base)),
         history=history,
         machine=UNKNOWN_MACHINE if is_measured else measure_machine(),
+        is_still=base is not None and _looks_still(project, capture, clip, config),
     )
+
+
+def _looks_still(project: Project, capture: Capture, clip: Clip, config: TrainConfig) -> bool:
+    from engine.training.stillness import looks_still  # with numba, which the first picture of a window can wait for
+
+    if project.gate_regions():  # a region may make something move that no mask shows
+        return False
+    held_out = capture.camera_indices(project.settings.holdout)
+    camera_indices = [camera for camera in range(len(capture.rig)) if camera not in held_out]
+    return looks_still(capture, clip, camera_indices, config, project.prep_dir)
 
 
 def _measured(project: Project, clip_index: int) -> MeasuredClip | None:

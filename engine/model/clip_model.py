@@ -90,6 +90,7 @@ class ClipModel(nn.Module):
         self.hidden = dict(hidden or {})
         self.reasons: dict[str, np.ndarray] = {}  # what the gate said of the anchors of a role, for display
         self.decoder = decoder
+        self.decode_backend = "auto"  # of `decode_anchors`, where a call names none
         self.clip_length, self.n_frames = clip_length, n_frames
         self._corners: dict[str, CornerTable] = {}
         self._frozen: dict[str, Gaussians] = {}
@@ -160,18 +161,21 @@ class ClipModel(nn.Module):
         frames = [knot for knot, _ in self.knots(clip_time)]
         return anchors.presence[:, frames].any(1).nonzero()[:, 0]
 
-    def decode(self, clip_time: float, rows: dict[str, Tensor] | None = None, *, backend: str = "auto") -> Gaussians:
+    def decode(
+        self, clip_time: float, rows: dict[str, Tensor] | None = None, *, backend: str | None = None
+    ) -> Gaussians:
         """Gaussians at a time of the clip, in [0, 1).
 
         Args:
             clip_time: frame_in_clip / clip_length; times between frames are interpolated.
             rows: Rows per role to decode, for instance those a camera can see; None decodes all that exist. Rows of
                 dynamic sets should exist at this time, others are decoded all the same.
-            backend: Of `decode_anchors`. What never changes is kept as the first call decoded it.
+            backend: Of `decode_anchors`; None for `decode_backend`. What never changes is kept as the first call
+                decoded it.
         Returns:
             K Gaussians per row; sets follow each other in the order of `roles`.
         """
-        knots = self.knots(clip_time)
+        knots, backend = self.knots(clip_time), backend or self.decode_backend
         chosen = [
             ChosenAnchors(
                 anchors=self.anchor_set(role),
@@ -183,9 +187,10 @@ class ClipModel(nn.Module):
         ]
         return decode_anchors(chosen, self.decoder, self.field, knots, backend=backend)
 
-    def constant_gaussians(self, role: str, *, backend: str = "auto") -> Gaussians:
+    def constant_gaussians(self, role: str, *, backend: str | None = None) -> Gaussians:
         """Gaussians of a whole set that `is_constant`, K per anchor, decoded at the first call."""
         if role not in self._frozen:
+            backend = backend or self.decode_backend
             anchors = self.anchor_set(role)
             everything = ChosenAnchors(anchors=anchors, rows=torch.arange(len(anchors)))
             with torch.no_grad():

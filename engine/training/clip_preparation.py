@@ -42,6 +42,7 @@ from engine.training.preparation import (
     Backgrounds,
     correct_backgrounds,
     estimate_backgrounds,
+    key_of_corrected,
     motion_masks,
     moving_cloud,
     read_backgrounds,
@@ -197,15 +198,7 @@ class ClipPreparation:
         return correct_backgrounds(backgrounds, pictures, render, self._report)
 
     def _key_of_corrected(self) -> dict:
-        """What corrected backgrounds belong to."""
-        view = self._views[0]
-        return {
-            "capture": self._capture.fingerprint,
-            "cameras": list(self._rig.names),
-            "size": [view.width, view.height],
-            "frames": self._config.background_frames,
-            "is_corrected": True,
-        }
+        return key_of_corrected(self._capture, self._camera_indices, self._config)
 
     def _static_cloud(self, backgrounds: Backgrounds) -> StaticCloud:
         cloud = static_cloud(backgrounds, self._rig, self._config, self._report)

@@ -168,6 +168,7 @@ class ClipTraining:
 
     def _start_phase(self, index: int, steps_in_phase: int) -> None:
         name, n_steps = self.phases[index]
+        self.model.decode_backend = self.config.decode_backend
         has_gains = bool((self.gains != 1.0).any())  # all 1 where the cameras do not differ: nothing to learn
         self.gains.requires_grad_(self.reference is None and has_gains)
         parameters = named_parameters(self.model, self.gains, self.config)

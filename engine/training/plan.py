@@ -129,7 +129,7 @@ def make_plan(
         reference: Header of that other clip; None where it is not trained yet.
         history: Trained clips of the project, in any order; this one, when it is trained again, does not count.
         machine: What its speed is taken to be where no clip of the project was measured.
-        is_still: Whether nothing is known to move in this clip.
+        is_still: Whether nothing moves in this clip, by `engine.training.stillness.looks_still`.
     """
     history = [known for known in history if known.clip_index != clip.clip_index]
     # a clip in which nothing moved says nothing about one in which something may
@@ -142,7 +142,8 @@ def make_plan(
         counts = Counts(counts.n_static, 0, 0, 0)
     phases = _phase_lines(footage, clip, config, is_source=is_source)
     if is_still and is_source:
-        phases = [replace(line, value=0, reason="nothing moves, so there is nothing to learn") for line in phases]
+        nothing = "nothing moves in the pictures looked at, so there is nothing to learn"
+        phases = [replace(line, value=0, reason=nothing) for line in phases]
     sizes = clip_sizes(footage, clip, config, counts, is_source=is_source)
     lines = [
         *_picture_lines(footage, clip, config, is_source=is_source),

@@ -179,6 +179,18 @@ def moving_cloud(
     )
 
 
+def key_of_corrected(capture: Capture, camera_indices: Sequence[int], config: TrainConfig) -> dict:
+    """What corrected backgrounds belong to, as `write_backgrounds` keeps it beside them."""
+    rig = capture.rig.subset(list(camera_indices))
+    return {
+        "capture": capture.fingerprint,
+        "cameras": list(rig.names),
+        "size": [int(side) for side in rig.image_sizes[0]],
+        "frames": config.background_frames,
+        "is_corrected": True,
+    }
+
+
 def write_backgrounds(prep_dir: Path, backgrounds: Backgrounds, key: dict) -> None:
     """Keep backgrounds for source clips and resumed trainings, atomically. `key` says what they belong to."""
     arrays = {

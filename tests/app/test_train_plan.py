@@ -5,6 +5,8 @@ import re
 
 import pytest
 
+from engine.training import stillness
+
 
 def test_a_plan_is_printed_and_nothing_is_made(run, capture_folder, tmp_path):
     arguments = ("train", capture_folder, "--project", tmp_path / "p", "--clip-length", 3, "--plan")
@@ -77,3 +79,19 @@ def test_training_says_its_plan_and_how_right_it_was(run, capture_folder, tmp_pa
     figures = r"preparation \S+ against \S+ s, training \S+ against \S+ s, memory \S+ against \S+ MB, stored"
     assert len(re.findall(f"Forecast against measured: {figures}", err)) == 2
     assert "Forecast" not in run(*arguments)[2]  # trained already
+
+
+def test_a_later_clip_in_which_nothing_moves_takes_no_steps(run, capture_folder, tmp_path, monkeypatch):
+    looks = []
+    monkeypatch.setattr(stillness, "looks_still", lambda *arguments: looks.append(arguments) or True)
+    arguments = ("train", capture_folder, "--project", tmp_path / "p", "--clip-length", 3)
+    assert run(*arguments, "--clips", "0")[0] == 0
+    looks.clear()
+    code, out, err = run(*arguments, "--plan")
+    assert code == 0, err
+    assert re.search(r"source steps +0  nothing moves in the pictures looked at", out)
+    ((_, clip, camera_indices, _, prep_dir),) = looks
+    assert (clip.clip_index, camera_indices, prep_dir) == (1, [1, 2, 3], tmp_path / "p" / "prep")
+    assert run("gate", tmp_path / "p", "--dynamic-sphere", 0, 0, 0, 1)[0] == 0
+    assert re.search(r"source steps +[1-9]", run(*arguments, "--plan")[1])  # whatever it is, it may learn to change
+    assert len(looks) == 1

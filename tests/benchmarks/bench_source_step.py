@@ -88,15 +88,10 @@ def measure(capture: Capture, *, holdout: list[int], clip_length: int, n_runs: i
 
     def step(name: str) -> tuple[float]:
         source = sources[SCHEMES[name]]
-        decode = source.model.decode
-        if name == IN_TORCH:
-            source.model.decode = partial(decode, backend="reference")
-        try:
-            started = time.perf_counter()
-            n_gaussians[name] = source.step().n_gaussians
-            return ((time.perf_counter() - started) * 1e3,)
-        finally:
-            source.model.decode = decode
+        source.model.decode_backend = "reference" if name == IN_TORCH else "auto"
+        started = time.perf_counter()
+        n_gaussians[name] = source.step().n_gaussians
+        return ((time.perf_counter() - started) * 1e3,)
 
     timings = interleaved({name: partial(step, name) for name in SCHEMES}, n_runs, n_warm=N_WARM)
     return [Part(name, timings[name][0], n_gaussians[name]) for name in SCHEMES]
