@@ -1,6 +1,6 @@
 """Anchors as marks: which of them are shown, in which colour, and which one lies under the pointer. No GL.
 
-Colour says what an anchor is (static, moving, promoted, residual, replacing), shape whether this clip learned it.
+Colour says what an anchor is (engine.model.roles), shape whether this clip learned it.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ _WORDS = {
     "moving": "moving: on the surface of what moved in the reference clip",
     "promoted": "promoted: stands still and changes, as under a lamp",
     "residual": "residual: moves in this clip, where the reference has nothing",
+    "adapted": "moving, and learned on in this clip",
     "replacing": "promoted in this clip, in place of a static one",
 }
 

@@ -26,8 +26,16 @@ INHERITED = SKY
 """Inherited anchors; drawn as circles."""
 RESIDUAL = ORANGE
 """Residual anchors; drawn as diamonds."""
-ROLE_COLORS = {"static": SKY, "moving": GREEN, "promoted": VERMILLION, "residual": ORANGE, "replacing": VERMILLION}
-"""Anchors by what they are (engine.model.roles); replacing ones are promoted ones of one clip, drawn as diamonds."""
+ROLE_COLORS = {
+    "static": SKY,
+    "moving": GREEN,
+    "promoted": VERMILLION,
+    "residual": ORANGE,
+    "adapted": GREEN,
+    "replacing": VERMILLION,
+}
+"""Anchors by what they are (engine.model.roles). Adapted and replacing ones are moving and promoted ones of one clip,
+drawn as diamonds."""
 REGION_COLORS = {"static": SKY, "dynamic": VERMILLION}
 """Regions that the user marks, like the anchors they make; drawn with whole lines and with dashes."""
 HELD_OUT = PURPLE

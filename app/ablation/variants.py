@@ -61,6 +61,7 @@ VARIANTS = (
     Variant("decoder-finetune", "inherited heads go on learning in every source clip", {"decoder": "finetune"}),
     Variant("residual-none", "without residual anchors: inherited anchors only", {"residual": "none"}),
     Variant("residual-full", "residual anchors without deduplication", {"residual": "full"}),
+    Variant("inherit-moving", "inherited moving anchors go on learning, static ones stay", {"inherit": "moving"}),
     Variant("inherit-trainable", "inherited anchors go on learning in every source clip", {"inherit": "trainable"}),
     Variant("inherit-off", "without anchor inheritance: every source clip builds its own", {"inherit": "off"}),
     Variant(

@@ -1,4 +1,4 @@
-"""AnchorSet: named rows of anchors that share a role (static, moving, promoted, residual, replacing).
+"""AnchorSet: named rows of anchors that share a role (engine.model.roles).
 
 An anchor is a fixed position with a static feature and two sets of log scales; Gaussians are decoded from it. Sets
 are kept apart by name and never recovered by position in a concatenation. A set whose `presence` is None is static:

@@ -65,7 +65,12 @@ def inheriting_model(reference: ClipState, clip: Clip, config: TrainConfig) -> t
     }
     sets, decoder = inherit(reference, presence, is_trainable=config.inherit == "trainable")
     model = ClipModel(sets=sets, decoder=decoder, field=None, clip_length=clip.clip_length, n_frames=clip.n_frames)
-    words = {"frozen": "kept as they are", "trainable": "learning on", "off": "left out"}
+    words = {
+        "frozen": "kept as they are",
+        "moving": "kept as they are if static, learning on if moving",
+        "trainable": "learning on",
+        "off": "left out",
+    }
     heads = {"frozen": "kept as it is", "finetune": "learning on", "new": "new"}
     return model, f"inherited anchors {words[config.inherit]}, decoder {heads[config.decoder]}"
 
@@ -182,6 +187,8 @@ def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> C
         if moving is not None:
             _start_like_neighbors(residual, moving)
         model.add_set("residual", residual)
+    if moving is not None and config.inherit == "moving":
+        _adapt(model, moving, config)
     return Coverage(
         n_points=len(is_new),
         n_inherited=int((~is_new).sum()),
@@ -190,6 +197,16 @@ def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> C
         share=float(is_reached.mean()) if len(is_reached) else 1.0,
         reason=reason,
     )
+
+
+def _adapt(model: ClipModel, moving: AnchorSet, config: TrainConfig) -> None:
+    """inherit=moving: inherited moving anchors that exist in this clip become its own, as they are; others go."""
+    assert moving.presence is not None
+    has_gate_in_time = config.gate not in ("off", "static")
+    is_used = moving.presence.any(1) if has_gate_in_time else torch.ones(len(moving), dtype=torch.bool)
+    model.replace_sets({role: model.anchor_set(role) for role in model.roles() if role != "moving"})
+    if is_used.any():
+        model.add_set("adapted", moving.subset(is_used, is_trainable=True))
 
 
 def _residual_budget(presence: np.ndarray, n_used: int, config: TrainConfig) -> tuple[int, str]:

@@ -188,7 +188,8 @@ class TrainConfig:
     """dedup: residual anchors where the inherited ones leave space uncovered. none: inherited anchors only. full: all
     moving points of the clip become residual anchors, beside the inherited ones that cover them."""
     inherit: str = "frozen"
-    """frozen: inherited anchors keep feature and scales. trainable: they start from them and learn. off: the clip
+    """frozen: inherited anchors keep feature and scales. moving: static ones do, and those moving ones that the clip
+    uses go on learning as its own. trainable: they all start from them and learn. off: the clip
     builds static and moving anchors of its own; only the decoder is taken over."""
     field: str = "per_clip"
     """per_clip: every clip learns a field from nothing. continue: the field of the clip before goes on learning, and
@@ -307,7 +308,7 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "field_tables": ("shared", "per_frame"),
     "decoder": ("frozen", "finetune", "new"),
     "residual": ("dedup", "none", "full"),
-    "inherit": ("frozen", "trainable", "off"),
+    "inherit": ("frozen", "moving", "trainable", "off"),
     "field": ("per_clip", "continue", "joint"),
     "start": ("scratch", "previous"),
     "tiles": ("active", "all"),

@@ -27,6 +27,8 @@ _OWN_SHARE, _ALIVE_SHARE = 0.5, 1.2
 """Of a source clip against the reference clip's moving anchors: its own ones, and those alive in one frame."""
 _INHERITED_ALIVE_SHARE = 0.6
 """Likewise of those alive, where it has none of its own."""
+_ADAPTED_SHARE = 0.3
+"""Of the reference clip's moving anchors, those that a source clip uses; with inherit=moving they are its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,10 +92,10 @@ def counts_of(header: Mapping[str, Any] | None) -> Counts | None:
     try:
         assert header is not None
         anchors, field = header["n_anchors"], header.get("field")
-        own = "moving" if header["role"] == "reference" else "residual"
+        own = ("moving",) if header["role"] == "reference" else ("residual", "adapted")
         return Counts(
             n_static=int(anchors.get("static", 0)),
-            n_moving=int(anchors.get(own, 0)),
+            n_moving=sum(int(anchors.get(role, 0)) for role in own),
             n_alive=int(header["n_alive"]),
             n_table_values=0 if not field else _n_table_values(field),
         )
@@ -140,7 +142,7 @@ def expected_counts(
                 config.residual if config.inherit != "off" else "full"
             ]
             n_moving, n_alive = (
-                round(known.n_moving * share),
+                round(known.n_moving * (share + (_ADAPTED_SHARE if config.inherit == "moving" else 0.0))),
                 round(known.n_alive * (_ALIVE_SHARE if share else _INHERITED_ALIVE_SHARE)),
             )
     return Counts(n_static, n_moving, n_alive, _expected_table_values(clip, config, n_alive))
@@ -165,7 +167,7 @@ def clip_sizes(footage: Footage, clip: Clip, config: TrainConfig, counts: Counts
         counts: Of a trained clip, or expected ones.
         is_source: Whether it inherits; its static anchors and heads are frozen then unless the settings say otherwise.
     """
-    is_frozen = is_source and config.inherit == "frozen" and config.decoder == "frozen"
+    is_frozen = is_source and config.inherit in ("frozen", "moving") and config.decoder == "frozen"
     has_gate = config.gate != "off"
     n_at_all_times = {"static": counts.n_moving, "off": counts.n_static + counts.n_moving}
     n_alive = n_at_all_times.get(config.gate, counts.n_alive)
@@ -188,7 +190,7 @@ def clip_sizes(footage: Footage, clip: Clip, config: TrainConfig, counts: Counts
         ),
         is_source=is_source,
         is_frozen=is_frozen,
-        owns_static=not is_source or config.inherit != "frozen",
+        owns_static=not is_source or config.inherit in ("trainable", "off"),
         is_built=not is_source or config.inherit == "off",
         has_gate=has_gate,
         has_active_tiles=is_frozen and config.tiles == "active" and has_gate,

@@ -253,7 +253,12 @@ def _anchor_lines(
             PlanLine("static anchors", counts.n_static, "", past if n_siblings else static),
             PlanLine("moving anchors", counts.n_moving, "", past if n_siblings else moving),
         ]
-    words = {"frozen": "kept as they are", "trainable": "they go on learning", "off": "left out, the clip has its own"}
+    words = {
+        "frozen": "kept as they are",
+        "moving": "kept as they are",
+        "trainable": "they go on learning",
+        "off": "left out, the clip has its own",
+    }
     known = "counted in the reference clip" if reference else "expected, the reference clip is not trained yet"
     residual = {
         "dedup": f"expected; those that inherited anchors do not cover, {limit}",
@@ -264,6 +269,8 @@ def _anchor_lines(
         residual = "nothing moves"
     elif n_siblings:
         residual = f"{past}; {limit}" if config.residual == "dedup" else past
+    if counts.n_alive and config.inherit == "moving":
+        residual += ", and inherited ones that go on learning"
     return [
         PlanLine("static anchors", counts.n_static, "", f"{words[config.inherit]}; {known}"),
         PlanLine("residual anchors", counts.n_moving, "", residual),

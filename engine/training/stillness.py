@@ -17,8 +17,6 @@ from engine.training.preparation import key_of_corrected, read_backgrounds
 MAX_PICTURES = 3
 """Looked at per camera: the middle, the end and the beginning, so that motion shows in the first picture or two."""
 
-_STILL_LEARNS_NOTHING = ("hull", "frozen", "frozen", "per_clip")  # gate, inherit, decoder, field
-
 
 def looks_still(
     capture: Capture, clip: Clip, camera_indices: Sequence[int], config: TrainConfig, prep_dir: Path
@@ -37,8 +35,8 @@ def looks_still(
     Raises:
         CaptureError: A picture cannot be read.
     """
-    learns_anyway = (config.gate, config.inherit, config.decoder, config.field) != _STILL_LEARNS_NOTHING
-    if learns_anyway:
+    has_frozen_static = config.inherit in ("frozen", "moving") and config.decoder == "frozen"
+    if config.gate != "hull" or not has_frozen_static or config.field != "per_clip":
         return False
     backgrounds = read_backgrounds(prep_dir, key_of_corrected(capture, camera_indices, config))
     if backgrounds is None:

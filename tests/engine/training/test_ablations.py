@@ -23,6 +23,7 @@ SWITCHES: dict[str, dict[str, str]] = {
     "none": {"residual": "none"},
     "all_points": {"residual": "full"},
     "trainable": {"inherit": "trainable"},
+    "moving": {"inherit": "moving"},
     "off": {"inherit": "off"},
     "both": {"inherit": "trainable", "residual": "full"},
     "continue": {"field": "continue"},
@@ -35,6 +36,7 @@ LEARNS: dict[str, set[str]] = {
     "none": {"field"},
     "all_points": {"residual", "field"},
     "trainable": {"static", "moving", "residual", "field"},
+    "moving": {"adapted", "residual", "field"},
     "off": {"static", "residual", "field"},
     "both": {"static", "moving", "residual", "field"},
     "continue": {"residual", "field"},
@@ -90,7 +92,7 @@ def test_a_clip_stores_what_it_learned_and_nothing_it_inherits(source_clips, nam
     arrays = source_clips[name].arrays
     assert learned_parts(key for key in arrays if not key.startswith("inherited.")) == LEARNS[name]
     inherited = {key for key in arrays if key.startswith("inherited.")}
-    is_kept = "moving" not in LEARNS[name] and name != "off"
+    is_kept = not {"moving", "adapted"} & LEARNS[name] and name != "off"
     assert inherited == ({"inherited.moving.presence"} if is_kept else set())
 
 
@@ -166,6 +168,36 @@ def test_inherited_anchors_that_learn_start_as_the_reference_has_them(tiny, sour
             assert np.array_equal(started[key], tiny.reference.arrays[key]), key
     learned = source_clips["trainable"].arrays
     assert not np.array_equal(learned["sets.static.features"], tiny.reference.arrays["sets.static.features"])
+
+
+def test_moving_anchors_that_learn_on_are_those_that_the_clip_uses(tiny, source_clips):
+    """The static part stays as it is; the others begin as the reference has them, in the frames they are used in."""
+    presence = source_clips["full"].arrays["inherited.moving.presence"]
+    is_used = presence.any(1)
+    assert 0 < is_used.sum() < len(is_used)
+    model = tiny.prepared(1, inherit="moving").model
+    assert model.roles() == ["static", "residual", "adapted"]
+    adapted = model.anchor_set("adapted")
+    for name in ("positions", "color_logits", "features", "log_base_scales", "log_offset_scales"):
+        value = getattr(adapted, name).detach().numpy()
+        assert np.array_equal(value, tiny.reference.arrays[f"sets.moving.{name}"][is_used]), name
+    assert np.array_equal(adapted.presence.numpy(), presence[is_used])
+    learned = source_clips["moving"].arrays
+    assert np.array_equal(learned["sets.adapted.positions"], adapted.positions.numpy())
+    assert not np.array_equal(learned["sets.adapted.features"], adapted.features.detach().numpy())
+    shown = load_clip_model(source_clips["moving"], tiny.reference)
+    assert shown.roles() == ["static", "residual", "adapted"]
+    assert np.array_equal(
+        shown.anchors().inherited_positions, tiny.reference.arrays["sets.static.positions"]
+    )  # no moving anchor is there twice
+
+
+@pytest.mark.parametrize("gate", ["off", "static"])
+def test_without_a_gate_in_time_all_moving_anchors_learn_on(tiny, gate):
+    model = tiny.prepared(1, inherit="moving", gate=gate).model
+    adapted = model.anchor_set("adapted")
+    assert len(adapted) == len(tiny.reference.arrays["sets.moving.positions"])
+    assert adapted.presence.all()
 
 
 def test_without_inheritance_no_anchor_of_the_reference_is_shown(tiny, source_clips):
@@ -284,7 +316,7 @@ def test_merging_makes_residual_anchors_moving_ones(streamed):
         ({"start": "previous"}, "needs independent=true"),
         ({"decoder": "fresh"}, "'frozen', 'finetune' or 'new'"),
         ({"residual": "some"}, "'dedup', 'none' or 'full'"),
-        ({"inherit": "no"}, "'frozen', 'trainable' or 'off'"),
+        ({"inherit": "no"}, "'frozen', 'moving', 'trainable' or 'off'"),
         ({"field": "one"}, "'per_clip', 'continue' or 'joint'"),
         ({"field_tables": "none"}, "'shared' or 'per_frame'"),
         ({"passes": -1.0}, "passes is -1.0"),
