@@ -36,6 +36,7 @@ from engine.synthetic.scene import make_scene
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig, parse_overrides
 from engine.training.report import Progress
+from tests.benchmarks.options import ending_on_bad_input
 
 COLUMNS = (
     "psnr",
@@ -164,10 +165,11 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     args = parser.parse_args()
     configure_threads()
-    capture = open_capture(args.capture, scale=args.scale)
-    names = args.holdout.split(",") if args.holdout else list(capture.default_holdout)
-    holdout = capture.camera_indices(names)
-    config = TrainConfig(**parse_overrides(args.set))
+    with ending_on_bad_input():
+        capture = open_capture(args.capture, scale=args.scale)
+        names = args.holdout.split(",") if args.holdout else list(capture.default_holdout)
+        holdout = capture.camera_indices(names)
+        config = TrainConfig(**parse_overrides(args.set))
     clips = split_clips(capture.n_frames, args.clip_length)[: args.clips]
     versions = f"torch {torch.__version__}, Python {platform.python_version()}, {torch.get_num_threads()} threads"
     versions += f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""

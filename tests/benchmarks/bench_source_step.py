@@ -29,6 +29,7 @@ from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
+from tests.benchmarks.options import ending_on_bad_input
 
 SCHEMES = {
     "published, decode in torch": "published",
@@ -120,9 +121,10 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="also write the figures here")
     options = parser.parse_args()
     use_threads(None)
-    capture = open_capture(options.capture)
-    names = list(capture.default_holdout) if options.holdout is None else options.holdout.split(",")
-    holdout = capture.camera_indices(names)
+    with ending_on_bad_input():
+        capture = open_capture(options.capture)
+        names = list(capture.default_holdout) if options.holdout is None else options.holdout.split(",")
+        holdout = capture.camera_indices(names)
     parts = measure(capture, holdout=holdout, clip_length=options.clip_length, n_runs=options.runs)
     print(table(parts))
     if options.json:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from app.bench.suite import Plan, document, run_plan
 from app.bench.table import report_text
+from engine.errors import EngineError
 
 
 def make_parser(description: str | None, *, n_runs: int) -> argparse.ArgumentParser:
@@ -27,6 +30,16 @@ def names(text: str, known: list[str], parser: argparse.ArgumentParser) -> tuple
     if unknown:
         parser.error(f"there is no {', '.join(unknown)}; known are {', '.join(known)}")
     return chosen
+
+
+@contextmanager
+def ending_on_bad_input() -> Iterator[None]:
+    """What the engine says of a capture or a setting ends the program with one message and code 2."""
+    try:
+        yield
+    except EngineError as error:
+        print(error, file=sys.stderr)
+        sys.exit(2)
 
 
 def run(plan: Plan, options: argparse.Namespace) -> None:
