@@ -119,7 +119,8 @@ class TrainConfig:
     patience: int = 0
     """Early stop. 0: never. Else 2 % of the training pictures, at least four, are not trained on; when their mean PSNR
     has not risen by 0.02 dB over so many looks, 150 steps apart, the rates fall to their end within a fifth of the
-    steps done. Off because nobody has measured that the time saved is worth the pictures left out."""
+    steps done. Off because it saves little and costs: source clip of the basketball, validation cameras, patience=3,
+    5,400 instead of 6,000 steps, 94 s instead of 104, 29.33 to 29.26 dB, 25.29 to 25.04 on moving pixels."""
 
     # learning rates; all fall log-linearly over the phase, to `final_lr_ratio` of their start
     feature_lr: float = 7.5e-3
@@ -189,8 +190,12 @@ class TrainConfig:
     moving points of the clip become residual anchors, beside the inherited ones that cover them."""
     inherit: str = "frozen"
     """frozen: inherited anchors keep feature and scales. moving: static ones do, and those moving ones that the clip
-    uses go on learning as its own. trainable: they all start from them and learn. off: the clip
-    builds static and moving anchors of its own; only the decoder is taken over."""
+    uses go on learning as its own. trainable: they all start from them and learn. off: the clip builds static and
+    moving anchors of its own; only the decoder is taken over.
+
+    moving against frozen, held-out cameras, later clips: basketball, default steps, moving pixels 26.92 and 26.70 dB,
+    all 29.27 and 29.24, an eighth more bytes; sample, passes=8, 23.1 and 22.4, 27.8 and 27.6, a quarter more bytes.
+    Not the default, since the method freezes all anchors and the gain is smallest where trainings are long."""
     field: str = "per_clip"
     """per_clip: every clip learns a field from nothing. continue: the field of the clip before goes on learning, and
     its last state shows all clips. joint: one clip, and so one field, for the whole capture."""
