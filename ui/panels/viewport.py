@@ -391,7 +391,8 @@ class ViewportPanel:
             rows.append(("circle", theme.INHERITED, f"{grouped(counts.n_inherited)} {kind} anchors"))
             rows += _role_rows("circle", counts.inherited_roles)
         if session.overlays.show_residual and counts.n_residual:
-            rows.append(("diamond", theme.RESIDUAL, f"{grouped(counts.n_residual)} residual anchors"))
+            kind = "residual" if len(counts.residual_roles) < 2 else "own"
+            rows.append(("diamond", theme.RESIDUAL, f"{grouped(counts.n_residual)} {kind} anchors"))
             rows += _role_rows("diamond", counts.residual_roles)
         if session.overlays.show_regions:
             for treat, words in REGION_WORDS.items():
