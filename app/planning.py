@@ -68,8 +68,7 @@ def _looks_still(project: Project, capture: Capture, clip: Clip, config: TrainCo
     if project.gate_regions():  # a region may make something move that no mask shows
         return False
     held_out = capture.camera_indices(project.settings.holdout)
-    camera_indices = [camera for camera in range(len(capture.rig)) if camera not in held_out]
-    return looks_still(capture, clip, camera_indices, config, project.prep_dir)
+    return looks_still(capture, clip, capture.training_cameras(held_out), config, project.prep_dir)
 
 
 def _measured(project: Project, clip_index: int) -> MeasuredClip | None:

@@ -100,7 +100,7 @@ def write_cloud(capture_path: str, holdout: tuple[int, ...], path: str) -> None:
         widest = int(capture.rig.image_sizes[:, 0].max())
         if widest > CLOUD_WIDTH_PX:
             capture = open_capture(capture_path, scale=CLOUD_WIDTH_PX / widest)
-        cameras = [camera for camera in range(len(capture.rig)) if camera not in holdout]
+        cameras = capture.training_cameras(holdout)
         pictures = np.stack([capture.frame(camera, 0) for camera in cameras])
         cloud = build_static_cloud(
             pictures,

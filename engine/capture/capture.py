@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -99,6 +99,10 @@ class Capture:
                 path=self.path,
             )
         return [self.rig.names.index(name) for name in names]
+
+    def training_cameras(self, holdout: Collection[int]) -> list[int]:
+        """Rows of the rig that are trained on: all but the held-out ones, in order."""
+        return [camera for camera in range(len(self.rig)) if camera not in holdout]
 
     def close(self) -> None:
         """Let go of open files and cached frames. The capture can still be used; files are opened again."""

@@ -4,5 +4,5 @@ from __future__ import annotations
 
 ROLES = ("static", "moving", "promoted", "residual", "adapted", "replacing")
 """static: no dynamic feature. moving: on the hulls of the reference clip. promoted: static in space, changing in the
-reference clip, as under a lamp. residual: what a source clip adds. adapted: moving ones that go
-on learning in a source clip. replacing: likewise promoted, in a source clip."""
+reference clip, as under a lamp. residual: what a source clip adds. adapted: moving ones that go on
+learning in a source clip. replacing: promoted in a source clip, in place of static ones."""

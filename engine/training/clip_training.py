@@ -87,7 +87,7 @@ class ClipTraining:
         self.capture, self.clip, self.config, self.reference = (capture, clip, config, reference)
         self.regions = tuple(regions)
         self.holdout = sorted(set(holdout))
-        self.camera_indices = [c for c in range(len(capture.rig)) if c not in self.holdout]
+        self.camera_indices = capture.training_cameras(self.holdout)
         if len(self.camera_indices) < 2:
             raise PreparationError(
                 f"Only {len(self.camera_indices)} of {len(capture.rig)} cameras are left for training; two are needed.",

@@ -245,6 +245,11 @@ class TrainConfig:
         learning = {"inherit": "trainable", "decoder": "finetune", "field": "continue"}
         return replace(self, independent=False, start="scratch", **learning)
 
+    @property
+    def keeps_static(self) -> bool:
+        """Whether a source clip shows the reference clip's static anchors exactly as they are there."""
+        return self.inherit in ("frozen", "moving") and self.decoder == "frozen"
+
     def n_static_steps(self, n_cameras: int) -> int:
         """Steps of the static phase for this many training cameras."""
         return self.static_steps or STATIC_RULE.steps(n_cameras)

@@ -167,7 +167,7 @@ def clip_sizes(footage: Footage, clip: Clip, config: TrainConfig, counts: Counts
         counts: Of a trained clip, or expected ones.
         is_source: Whether it inherits; its static anchors and heads are frozen then unless the settings say otherwise.
     """
-    is_frozen = is_source and config.inherit in ("frozen", "moving") and config.decoder == "frozen"
+    is_frozen = is_source and config.keeps_static
     has_gate = config.gate != "off"
     n_at_all_times = {"static": counts.n_moving, "off": counts.n_static + counts.n_moving}
     n_alive = n_at_all_times.get(config.gate, counts.n_alive)

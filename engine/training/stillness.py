@@ -14,14 +14,12 @@ from engine.cloud.masks import motion_mask
 from engine.training.config import TrainConfig
 from engine.training.preparation import key_of_corrected, read_backgrounds
 
-MAX_PICTURES = 3
-"""Looked at per camera: the middle, the end and the beginning, so that motion shows in the first picture or two."""
-
 
 def looks_still(
     capture: Capture, clip: Clip, camera_indices: Sequence[int], config: TrainConfig, prep_dir: Path
 ) -> bool:
-    """Whether no training camera sees anything move at a few instants of a source clip.
+    """Whether no training camera sees anything move in the middle, at the end and at the beginning of a
+    source clip.
 
     It ends at the first picture in which something moves. False where nobody knows, for there are no backgrounds yet,
     and where a clip learns something even if nothing moves.
@@ -35,14 +33,13 @@ def looks_still(
     Raises:
         CaptureError: A picture cannot be read.
     """
-    has_frozen_static = config.inherit in ("frozen", "moving") and config.decoder == "frozen"
-    if config.gate != "hull" or not has_frozen_static or config.field != "per_clip":
+    if config.gate != "hull" or not config.keeps_static or config.field != "per_clip":
         return False
     backgrounds = read_backgrounds(prep_dir, key_of_corrected(capture, camera_indices, config))
     if backgrounds is None:
         return False
     last = clip.n_frames - 1
-    instants = list(dict.fromkeys((last // 2, last, 0)))[:MAX_PICTURES]
+    instants = dict.fromkeys((last // 2, last, 0))  # each once; most motion shows in the first picture or two
     return not any(
         motion_mask(capture.frame(camera, clip.start + instant), background).any()
         for instant in instants
