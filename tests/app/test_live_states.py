@@ -15,7 +15,7 @@ from tests.app.fakes import DECODER, HEADS, N_ANCHORS, make_slow
 
 @pytest.fixture
 def live_session(make_session, monkeypatch):
-    """A session whose reference clip trains for as long as anybody looks, with a snapshot whenever one may be written."""
+    """A session whose reference clip trains for as long as anybody looks, with snapshots as often as they are read."""
     monkeypatch.setattr(run, "SNAPSHOT_EVERY_S", 0.0)
     monkeypatch.setattr(run, "SNAPSHOT_SHARE", 1.0)
     session = make_session(make_training=make_slow)
