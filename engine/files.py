@@ -21,17 +21,18 @@ _DTYPES = {
 
 
 @contextmanager
-def atomic_path(path: Path | str) -> Iterator[Path]:
+def atomic_path(path: Path | str, *, makes_parents: bool = True) -> Iterator[Path]:
     """Write to the yielded path; it becomes `path` when the block ends well and disappears when it does not.
 
     Args:
-        path: Final name. Missing folders are made. The suffix is kept, so that writers which look at it work.
+        path: Final name. The suffix is kept, so that writers which look at it work.
+        makes_parents: Make all missing folders, or only the one that holds the file.
     Raises:
         OSError: The disk refused; nothing is left behind.
     """
     path = Path(path)
     partial = path.with_name(f".partial-{os.getpid()}-{path.name}")
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(parents=makes_parents, exist_ok=True)
     try:
         yield partial
         os.replace(partial, path)
@@ -51,7 +52,7 @@ def checked_path(path: Path | str, *, what: str) -> Iterator[Path]:
         DiskError: The disk refused; nothing is left behind.
     """
     try:
-        with atomic_path(path) as partial:
+        with atomic_path(path, makes_parents=False) as partial:  # a project that was deleted is not made again
             yield partial
     except OSError as error:
         raise disk_error(error, what=what, path=path) from error
