@@ -351,12 +351,14 @@ class TrainingRun:
             logger.warning("clip %d: gradients were scaled down in %s", self._job.clip_index, found)
             title = f"Clip {self._job.clip_index} had gradients above max_gradient_norm"
             self._send(WarningRaised(title, f"They were scaled down in {found}."))
-        self._send(ClipTrained(str(path), training.steps_done, (clip.state.header.get("metrics") or {}).get("held_out_psnr")))
+        self._send(
+            ClipTrained(str(path), training.steps_done, (clip.state.header.get("metrics") or {}).get("held_out_psnr"))
+        )
 
     # ---------------------------------------------------------------- commands
 
     def _obey(self, wait_s: float = 0.0) -> None:
-        """Take every command that waits, or comes within so many seconds; sit here while paused when that is allowed."""
+        """Take every command that waits or comes within so many seconds; sit here while paused when that is allowed."""
         wait_s = min(wait_s, 1.0) if self._can_wait else 0.0
         while True:
             try:
