@@ -200,9 +200,7 @@ def down_columns(worker, arguments):
     for y in range(height * worker // job.n_workers, height * (worker + 1) // job.n_workers):
         source, target = filtered[0, y + RADIUS].ctypes.data, planes[0, y].ctypes.data
         for x in range(0, padded, 16):
-            filter_down(
-                source + 4 * x, 4 * filtered.shape[1] * padded, 4 * padded, target + 4 * x, 4 * height * padded
-            )
+            filter_down(source + 4 * x, 4 * filtered.shape[1] * padded, 4 * padded, target + 4 * x, 4 * height * padded)
 
 
 @routine(WORKER)

@@ -1,4 +1,4 @@
-"""FLIP in lanes: colours to opponent space, the filters of contrast, edges and points, and the difference of two pixels.
+"""FLIP in lanes: colours to opponent space, filters of contrast, edges and points, and the difference of two pixels.
 
 Vector code for `engine.metrics.flip`, sixteen pixels at a time. All arguments are byte addresses and counts.
 Source: Andersson et al. 2020, with the constants and the separated filters of the authors' code, version 1.7.
