@@ -63,6 +63,7 @@ class PointsRequest:
     generation: int
     path: Path | None = None
     capture: Capture | None = field(default=None, compare=False)
+    is_live: bool = field(default=False, compare=False)
 
 
 class Session:
@@ -119,10 +120,10 @@ class Session:
         self.regions: RegionsStatus = self._marking.status([])
         self._unread: SnapshotWritten | None = None
         self._anchor_counts: dict[int, tuple[int, int]] = {}
-        self._seen: tuple[object, ...] = ()
         self._is_closed = False
         self._is_preloading = is_preloading
         self._first_cloud: Job | None = None
+        self._seen = self._finished_keys()
         if is_preloading:
             self._renderer.worker.start()
             self._playback.worker.start()
@@ -402,8 +403,7 @@ class Session:
             if found is None:
                 continue
             request, error = found
-            is_live = getattr(request, "revision", "").startswith("live-")
-            if is_live:
+            if isinstance(request, FrameRequest | PointsRequest) and request.is_live:
                 if self._unread is not None:  # it may have been replaced meanwhile; the next one comes soon
                     self._with_service(TrainingService.snapshot_now)
                     self._drop_unread()
@@ -491,6 +491,7 @@ class Session:
             path=known.file,
             reference_path=self._inherited_path(clip.clip_index),
             clip=clip,
+            is_live=self._is_live(known),
         )
 
     def wanted_frame(self) -> WantedFrame | None:
@@ -512,6 +513,10 @@ class Session:
             is_loaded=self._playback.is_loaded(request),
             has_failed=self._playback.has_failed(request) or self._renderer.has_failed,
         )
+
+    def _is_live(self, known: ClipProgress) -> bool:
+        """Whether the state of a clip is a snapshot, which its worker replaces and removes as it goes on."""
+        return known.file is not None and self.project is not None and known.file.parent == self.project.live_dir
 
     @property
     def reference_index(self) -> int:
@@ -540,7 +545,8 @@ class Session:
         generation = self._points.generation
         reference = self._known(self.reference_index)
         if reference is not None and reference.file is not None:
-            request = PointsRequest("cloud", reference.revision, generation, reference.file)
+            is_live = self._is_live(reference)
+            request = PointsRequest("cloud", reference.revision, generation, reference.file, is_live=is_live)
         elif self.project is not None and self.project.first_cloud_path.is_file():
             request = PointsRequest("first cloud", "", generation, self.project.first_cloud_path)
         else:
