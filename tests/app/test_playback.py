@@ -18,7 +18,7 @@ WAIT_S = 30.0
 
 
 def write_clip(path: Path, *, shift: float, step: int = 1) -> Path:
-    """A reference clip that can be decoded; its anchors are moved along x, so that one clip can be told from another."""
+    """A reference clip that can be decoded; its anchors are moved along x, to tell clips apart."""
     arrays = anchor_arrays("static") | decoder_arrays()
     arrays["sets.static.positions"] = arrays["sets.static.positions"] + np.array([shift, 0.0, 0.0], np.float32)
     header = {
