@@ -40,6 +40,8 @@ class FrameRequest:
         revision: Names the state; with clip and frame it is the identity of the result.
         path, reference_path: Files to load when the model is not loaded yet.
         clip: For the conversion to clip time.
+        is_live: Whether the file is a snapshot of a running training: it may be gone before it is read, and another
+            one follows soon.
     """
 
     clip_index: int
@@ -48,6 +50,7 @@ class FrameRequest:
     path: Path = field(compare=False)
     reference_path: Path | None = field(compare=False)
     clip: Clip = field(compare=False)
+    is_live: bool = field(default=False, compare=False)
 
     @property
     def key(self) -> tuple[int, str, int]:

@@ -57,6 +57,7 @@ class PointsRequest:
     revision: str
     path: Path | None = field(default=None, compare=False)
     capture: Capture | None = field(default=None, compare=False)
+    is_live: bool = field(default=False, compare=False)
 
 
 class Session:
@@ -113,10 +114,10 @@ class Session:
         self.regions: RegionsStatus = self._marking.status([])
         self._unread: SnapshotWritten | None = None
         self._anchor_counts: dict[int, tuple[int, int]] = {}
-        self._seen: tuple[object, ...] = ()
         self._is_closed = False
         self._is_preloading = is_preloading
         self._first_cloud: Job | None = None
+        self._seen = self._finished_keys()
         if is_preloading:
             self._renderer.worker.start()
             self._playback.worker.start()
@@ -395,8 +396,7 @@ class Session:
             if found is None:
                 continue
             request, error = found
-            is_live = getattr(request, "revision", "").startswith("live-")
-            if is_live:
+            if isinstance(request, FrameRequest | PointsRequest) and request.is_live:
                 if self._unread is not None:  # it may have been replaced meanwhile; the next one comes soon
                     self._with_service(TrainingService.snapshot_now)
                     self._drop_unread()
@@ -480,8 +480,13 @@ class Session:
                 path=known.file,
                 reference_path=self._inherited_path(clip.clip_index),
                 clip=clip,
+                is_live=self._is_live(known),
             )
         )
+
+    def _is_live(self, known: ClipProgress) -> bool:
+        """Whether the state of a clip is a snapshot, which its worker replaces and removes as it goes on."""
+        return known.file is not None and self.project is not None and known.file.parent == self.project.live_dir
 
     @property
     def reference_index(self) -> int:
@@ -509,7 +514,7 @@ class Session:
             return None
         reference = self._known(self.reference_index)
         if reference is not None and reference.file is not None:
-            request = PointsRequest("cloud", reference.revision, path=reference.file)
+            request = PointsRequest("cloud", reference.revision, path=reference.file, is_live=self._is_live(reference))
         elif self.project is not None and self.project.first_cloud_path.is_file():
             request = PointsRequest("first cloud", self.capture.fingerprint, path=self.project.first_cloud_path)
         else:

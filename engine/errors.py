@@ -3,6 +3,7 @@
 EngineError
 |-- CaptureError      a capture folder cannot be used; carries every problem found
 |-- ProjectError      a project folder, clip state or configuration cannot be used
+|   |-- DiskError     a file could not be written: nothing is wrong with what was asked for
 |-- PreparationError  clouds or masks could not be built from this capture
 |-- TrainingError     training could not go on
     |-- NonFiniteLoss the loss or a gradient stopped being a number
@@ -77,6 +78,10 @@ class CaptureError(EngineError):
 
 class ProjectError(EngineError):
     """A project folder, a clip state or a configuration value cannot be used."""
+
+
+class DiskError(ProjectError):
+    """A file could not be written, for instance on a full disk: a failure, and no bad input."""
 
 
 class PreparationError(EngineError):
