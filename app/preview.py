@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save_file
 
 from app.arrays import PointArrays
 from app.jobs import JobContext
@@ -21,7 +20,7 @@ from app.playback import point_spacing
 from app.priority import lower_process
 from engine.capture.capture import Capture, open_capture
 from engine.errors import EngineError, PreparationError, ProjectError
-from engine.files import atomic_path
+from engine.files import write_arrays
 
 logger = logging.getLogger(__name__)
 
@@ -58,7 +57,7 @@ def picture_hint(capture: Capture, frame_index: int) -> PointArrays:
         np.concatenate(points).astype(np.float32),
         np.concatenate(colors).astype(np.float32),
         ("hint", capture.fingerprint, frame_index),
-        is_hint=True,
+        kind="pictures",
     )
 
 
@@ -109,15 +108,14 @@ def write_cloud(capture_path: str, holdout: tuple[int, ...], path: str) -> None:
             max_points=MAX_CLOUD_POINTS,
             report=logger.debug,
         )
+        arrays = {
+            "points": np.ascontiguousarray(cloud.points, np.float32),
+            "colors": np.ascontiguousarray(np.clip(cloud.colors, 0.0, 1.0), np.float32),
+        }
+        write_arrays(path, arrays, {}, what="The first cloud")
     except (EngineError, ValueError) as error:  # ValueError: cameras of different sizes cannot be stacked
         logger.warning("no first cloud: %s", error)
         raise SystemExit(1) from error
-    arrays = {
-        "points": np.ascontiguousarray(cloud.points, np.float32),
-        "colors": np.ascontiguousarray(np.clip(cloud.colors, 0.0, 1.0), np.float32),
-    }
-    with atomic_path(path) as partial:
-        save_file(arrays, partial)
 
 
 def read_cloud(path: Path) -> PointArrays:
@@ -131,4 +129,5 @@ def read_cloud(path: Path) -> PointArrays:
             points, colors = file.get_tensor("points"), file.get_tensor("colors")
     except (OSError, SafetensorError) as error:
         raise ProjectError(f"The first cloud cannot be read ({error}).", path=path) from error
-    return PointArrays(points, colors, ("first cloud", str(path)), spacing=point_spacing(points))
+    key = ("first cloud", str(path), path.stat().st_mtime_ns)
+    return PointArrays(points, colors, key, kind="moment", spacing=point_spacing(points))

@@ -28,7 +28,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip, split_clips
 from engine.cloud.regions import GateRegion, parse_region
 from engine.errors import ProjectError
-from engine.files import atomic_path
+from engine.files import checked_path
 from engine.training.config import TrainConfig
 
 logger = logging.getLogger(__name__)
@@ -407,13 +407,8 @@ def read_settings(folder: Path) -> ProjectSettings:
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:
-    try:
-        with atomic_path(path) as partial:
-            partial.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise ProjectError(
-            f"The project could not be saved ({error.strerror}).", hint="Free some space and try again.", path=path
-        ) from error
+    with checked_path(path, what="The project") as partial:
+        partial.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:

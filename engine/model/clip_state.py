@@ -18,10 +18,9 @@ from typing import Any
 
 import numpy as np
 from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save_file
 
 from engine.errors import ProjectError
-from engine.files import atomic_path
+from engine.files import write_arrays
 from engine.model.coding import CodedArray, CodingError, decode_array
 
 SCHEMA = 2
@@ -62,33 +61,20 @@ def write_clip_state(path: Path | str, state: ClipState) -> None:
     """Write atomically: a complete file appears under `path`, or none.
 
     Raises:
-        ProjectError: The disk refused.
+        DiskError: The disk refused.
     """
-    arrays = {name: np.ascontiguousarray(array) for name, array in state.arrays.items()}
-    _write(path, arrays, {"header": json.dumps(state.header)})
+    write_arrays(path, state.arrays, {"header": json.dumps(state.header)}, what="The clip")
 
 
 def write_coded_arrays(path: Path | str, coded: dict[str, CodedArray], header: dict[str, Any]) -> None:
     """Likewise, with every array in its compact form; `read_clip_state` gives the arrays that these decode to.
 
     Raises:
-        ProjectError: The disk refused.
+        DiskError: The disk refused.
     """
     specs = {name: array.spec for name, array in coded.items()}
     metadata = {"header": json.dumps(header), "coding": json.dumps(specs, separators=(",", ":"))}
-    _write(path, {name: array.payload for name, array in coded.items()}, metadata)
-
-
-def _write(path: Path | str, arrays: dict[str, np.ndarray], metadata: dict[str, str]) -> None:
-    try:
-        with atomic_path(path) as partial:
-            save_file(arrays, partial, metadata=metadata)
-    except OSError as error:
-        raise ProjectError(
-            f"The clip could not be written ({error.strerror}).",
-            hint="Free some space and try again.",
-            path=path,
-        ) from error
+    write_arrays(path, {name: array.payload for name, array in coded.items()}, metadata, what="The clip")
 
 
 def read_clip_state(path: Path | str) -> ClipState:

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save_file
 
 from engine.capture.capture import Capture
 from engine.capture.rig import CameraRig
@@ -24,7 +23,7 @@ from engine.cloud.moving_cloud import MovingCloud, build_moving_cloud, motion_bo
 from engine.cloud.recheck import recheck_background
 from engine.cloud.sparse import triangulate
 from engine.cloud.static_cloud import StaticCloud, build_static_cloud
-from engine.files import atomic_path
+from engine.files import write_arrays
 from engine.training.config import TrainConfig
 from engine.training.pictures import TrainingPictures
 from engine.training.report import Progress, ReportProgress
@@ -192,13 +191,17 @@ def key_of_corrected(capture: Capture, camera_indices: Sequence[int], config: Tr
 
 
 def write_backgrounds(prep_dir: Path, backgrounds: Backgrounds, key: dict) -> None:
-    """Keep backgrounds for source clips and resumed trainings, atomically. `key` says what they belong to."""
+    """Keep backgrounds for source clips and resumed trainings, atomically. `key` says what they belong to.
+
+    Raises:
+        DiskError: The disk refused.
+    """
     arrays = {
         "images": backgrounds.images,
         "is_stable": np.packbits(backgrounds.is_stable, axis=-1),
     }
-    with atomic_path(prep_dir / BACKGROUNDS_FILE) as partial:
-        save_file(arrays, partial, metadata={"key": json.dumps(key, sort_keys=True)})
+    metadata = {"key": json.dumps(key, sort_keys=True)}
+    write_arrays(prep_dir / BACKGROUNDS_FILE, arrays, metadata, what="The backgrounds")
 
 
 def read_backgrounds(prep_dir: Path, key: dict) -> Backgrounds | None:
