@@ -12,8 +12,8 @@ from engine.metrics.flip_lanes import PIXELS_PER_DEGREE
 from tests.engine.metrics.pictures import disturbed, scene
 
 PIXEL_ERROR = 5e-4
-"""Largest seen 1.1e-4 where the features of both pictures are equal, else 2.2e-5: they enter by the square root of their
-difference, which magnifies rounding near zero, in the authors' code as here."""
+"""Largest seen 1.1e-4 where the features of both pictures are equal, else 2.2e-5: they enter by the square root of
+their difference, which magnifies rounding near zero, in the authors' code as here."""
 MEAN_ERROR = 1e-6
 """Of pictures with texture; largest seen 1.7e-7."""
 
