@@ -207,6 +207,7 @@ class ViewportPanel:
         for name, label, key_label in rows:
             if imgui.menu_item(label, key_label, bool(getattr(session.overlays, name)), True)[0]:
                 dispatch(ToggleOverlay(name))
+            ui.mark(f"show.{name}")
         imgui.separator()
         imgui.text_disabled("Tab hides or shows cameras and anchors")
         imgui.end_popup()
