@@ -38,7 +38,7 @@ from app.telling import tell
 from app.timeline import Timeline
 from app.training.messages import ENDINGS, Event, SnapshotWritten, TrainJob
 from app.training.process import ProcessWorker, Worker
-from app.training.service import ClipProgress, Launch, TrainingService
+from app.training.service import Launch, TrainingService
 from app.view import OrbitView
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -281,9 +281,8 @@ class Session:
 
     def _build_first_cloud(self, capture: Capture, project: Project) -> None:
         """Something of the scene to look at until the first training has built the real cloud."""
-        reference = self._known(self.reference_index)
         path = project.first_cloud_path
-        if path.is_file() or (reference is not None and reference.file is not None):
+        if path.is_file() or self._state_of(self.reference_index) is not None:
             return
         capture_path, holdout = capture.path, self.holdout
 
@@ -321,6 +320,7 @@ class Session:
         if service is None or project is None:
             return
         if service.worker is None:
+            service.close()
             project.close()
             return
         self._closing.append((service, project))
@@ -356,6 +356,8 @@ class Session:
 
     def _finished_keys(self) -> tuple[object, ...]:
         workers = (self._playback.worker, self._renderer.worker, self._pictures.viewing, self._pictures.thumbnails)
+        if self._service is not None:
+            workers = (*workers, self._service.curves.worker)
         newest = [worker.newest for worker in (*workers, self._points, self._next_plan)]
         statuses = [(job.name, job.done, job.message) for job in self.jobs]
         return (*(None if found is None else found[0] for found in newest), *statuses, self.notices.revision)
@@ -426,8 +428,8 @@ class Session:
             return
         clip = self.timeline.clip
         if clip is not None:
-            known = self._service.progress[clip.clip_index]
-            anchors = self._playback.anchors(clip.clip_index, known.revision)
+            known = self._service.shown_state(clip.clip_index)
+            anchors = None if known is None else self._playback.anchors(clip.clip_index, known[1])
             if anchors is not None:
                 counts = (len(anchors.inherited_positions), len(anchors.own_positions))
                 self._anchor_counts[clip.clip_index] = counts
@@ -458,8 +460,9 @@ class Session:
 
     # ---------------------------------------------------------------- pictures and arrays
 
-    def _known(self, clip_index: int) -> ClipProgress | None:
-        return None if self._service is None else self._service.progress[clip_index]
+    def _state_of(self, clip_index: int) -> tuple[Path, str] | None:
+        """File and revision of the state to show of a clip."""
+        return None if self._service is None else self._service.shown_state(clip_index)
 
     def shown_gaussians(self) -> GaussianArrays | None:
         """Gaussians of the shown frame; the newest ones there are until those are decoded; None where nothing is
@@ -469,15 +472,15 @@ class Session:
 
     def _shown_frame(self) -> ShownFrame | None:
         clip = self.timeline.clip
-        known = None if clip is None else self._known(clip.clip_index)
-        if clip is None or known is None or known.file is None or self.project is None:
+        known = None if clip is None else self._state_of(clip.clip_index)
+        if clip is None or known is None or self.project is None:
             return None
         return self._playback.frame(
             FrameRequest(
                 clip_index=clip.clip_index,
-                revision=known.revision,
+                revision=known[1],
                 frame_index=self.timeline.frame_index,
-                path=known.file,
+                path=known[0],
                 reference_path=self._inherited_path(clip.clip_index),
                 clip=clip,
             )
@@ -507,9 +510,9 @@ class Session:
         """
         if self.capture is None:
             return None
-        reference = self._known(self.reference_index)
-        if reference is not None and reference.file is not None:
-            request = PointsRequest("cloud", reference.revision, path=reference.file)
+        reference = self._state_of(self.reference_index)
+        if reference is not None:
+            request = PointsRequest("cloud", reference[1], path=reference[0])
         elif self.project is not None and self.project.first_cloud_path.is_file():
             request = PointsRequest("first cloud", self.capture.fingerprint, path=self.project.first_cloud_path)
         else:
