@@ -218,14 +218,14 @@ class ClipCatalog:
                 resume_step, resume_n_steps = kept.header["step"], kept.header["n_steps"]
         resume = {"resume_step": resume_step, "resume_n_steps": resume_n_steps, "blocked_by": basis.blocked_by}
         header = self._good(index)
-        if resume_step is not None and (found is None or (header is not None and basis.reason)):
+        if kept is not None and resume_step is not None and (found is None or (header is not None and basis.reason)):
             return ClipRecord(
                 "stopped",
                 resume_step,
                 resume_n_steps,
                 self._curve_psnr.get(index),
                 self._project.checkpoint_path(index),
-                f"stopped-{resume_step}",
+                f"stopped-{resume_step}-{kept.header.get('fingerprint', '')}",
                 **resume,
             )
         if found is None:

@@ -70,6 +70,20 @@ class Run:
     revision: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class ShownState:
+    """A state of a clip as a file.
+
+    Attributes:
+        revision: Names the state.
+        is_live: Whether it is a snapshot, which its worker replaces and removes as it goes on.
+    """
+
+    file: Path
+    revision: str
+    is_live: bool = False
+
+
 class TrainingService:
     """Queue and worker of one project.
 
@@ -106,6 +120,7 @@ class TrainingService:
         self._is_paused = False
         self._is_stopping = False
         self._ending: Event | None = None
+        self._n_runs = 0  # in the names of live states: each worker counts its own from one
         self._statuses: list[ClipStatus] = []
         self._statuses_of: tuple[object, ...] = ()
 
@@ -114,13 +129,12 @@ class TrainingService:
         """The clip that trains; None while nothing does."""
         return None if self.worker is None else self.worker.job.clip_index
 
-    def shown_state(self, clip_index: int) -> tuple[Path, str] | None:
-        """File and revision of the state of a clip to look at: the newest snapshot while it trains, else what is on
-        disk; None when there is none."""
+    def shown_state(self, clip_index: int) -> ShownState | None:
+        """The state of a clip to look at: the newest snapshot while it trains, else what is on disk, if anything."""
         if clip_index == self.running_clip and self._run is not None and self._run.file is not None:
-            return self._run.file, self._run.revision
+            return ShownState(self._run.file, self._run.revision, is_live=True)
         record = self.catalog[clip_index]
-        return None if record.file is None else (record.file, record.revision)
+        return None if record.file is None else ShownState(record.file, record.revision)
 
     # ---------------------------------------------------------------- commands
 
@@ -234,6 +248,7 @@ class TrainingService:
             curves = read_curves(self.project.curve_path(clip_index, is_finished=False))
             self._run = Run(clip_index, record.resume_step, record.resume_n_steps, curves=curves)
             self._run.held_out_psnr = curves.psnr[-1][1] if curves.psnr else None
+        self._n_runs += 1
         self.worker = self._launch(job, self.project)
 
     # ---------------------------------------------------------------- events
@@ -274,7 +289,7 @@ class TrainingService:
                 run.held_out_psnr = event.psnr
                 append_thinned(run.curves.psnr, (event.step, event.psnr))
             case SnapshotWritten():
-                run.file, run.revision = Path(event.path), f"live-{event.revision}"
+                run.file, run.revision = Path(event.path), f"live-{self._n_runs}-{event.revision}"
             case TrainingPaused():
                 self._is_paused = True
             case TrainingResumed():

@@ -28,7 +28,10 @@ BEST_ANGLES_DEG = (6.0, 18.0)
 
 
 def preferred_angle_deg(rig: CameraRig) -> float:
-    """Triangulation angle worth aiming for: an eighth of the spread of viewing directions, within BEST_ANGLES_DEG."""
+    """Triangulation angle worth aiming for, within BEST_ANGLES_DEG.
+
+    A third of the median angle between a camera's viewing direction and the mean of all.
+    """
     mean = rig.forwards.mean(0)
     mean /= max(float(np.linalg.norm(mean)), 1e-9)
     spread = np.degrees(np.arccos(np.clip(rig.forwards @ mean, -1.0, 1.0)))

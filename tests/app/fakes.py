@@ -1,4 +1,6 @@
-"""A tiny capture and a tiny training for tests of the application: real files, real messages, no torch, no clouds."""
+"""A tiny capture and a tiny training for tests of the application: real files that the window can show, real messages,
+no torch, no clouds.
+"""
 
 from __future__ import annotations
 
@@ -20,6 +22,9 @@ from engine.model.compact import CompactClip, compact_clip
 from engine.training.report import Progress, StepStats
 
 N_STEPS = 6
+N_ANCHORS = 12
+DECODER = {"static_dim": 2, "dynamic_dim": 2, "gaussians_per_anchor": 1, "hidden": 4}
+HEADS = {"opacity": 1, "color": 3, "shape": 7, "offset": 3}
 
 
 def look_at(eye: np.ndarray, target: np.ndarray, up: np.ndarray) -> np.ndarray:
@@ -63,6 +68,32 @@ def write_capture(folder: Path, *, n_cameras: int = 4, n_frames: int = 6, size: 
         }
         (folder / name).write_text(json.dumps(meta))
     return folder
+
+
+def anchor_arrays(role: str) -> dict[str, np.ndarray]:
+    """Anchors on a diagonal that exist at all times, as a clip file names them."""
+    positions = np.linspace(0, 1, 3 * N_ANCHORS, dtype=np.float32).reshape(N_ANCHORS, 3)
+    log_scales = np.full((N_ANCHORS, 3), -2.0, np.float32)
+    return {
+        f"sets.{role}.positions": positions,
+        f"sets.{role}.color_logits": positions - 0.5,
+        f"sets.{role}.features": np.zeros((N_ANCHORS, DECODER["static_dim"]), np.float32),
+        f"sets.{role}.log_offset_scales": log_scales,
+        f"sets.{role}.log_base_scales": log_scales,
+    }
+
+
+def decoder_arrays() -> dict[str, np.ndarray]:
+    """Heads that give every anchor one Gaussian of its own colour, unrotated."""
+    hidden, n_in = DECODER["hidden"], DECODER["static_dim"] + DECODER["dynamic_dim"]
+    arrays = {}
+    for head, width in HEADS.items():
+        arrays[f"decoder.first.{head}"] = np.zeros((n_in, hidden), np.float32)
+        arrays[f"decoder.first_bias.{head}"] = np.zeros(hidden, np.float32)
+        arrays[f"decoder.second.{head}"] = np.zeros((hidden, width), np.float32)
+        arrays[f"decoder.second_bias.{head}"] = np.zeros(width, np.float32)
+    arrays["decoder.second_bias.shape"][3] = 1.0
+    return arrays
 
 
 @dataclass
@@ -110,12 +141,11 @@ class FakeTraining:
             header["reference_fingerprint"] = self.reference.header["fingerprint"]
         if self.previous is not None:
             header["previous_fingerprint"] = self.previous.header["fingerprint"]
-        points = np.linspace(0, 1, 36, dtype=np.float32).reshape(12, 3)
-        arrays = {
-            "sets.static.positions": points,
-            "sets.static.color_logits": points - 0.5,
-            "value": np.array([self.value], np.float32),
-        }
+        role = "static" if self.reference is None else "residual"
+        arrays = {**anchor_arrays(role), "value": np.array([self.value], np.float32)}
+        if self.reference is None:
+            header["decoder"] = DECODER
+            arrays |= decoder_arrays()
         state = ClipState(arrays, header)
         header["fingerprint"] = state.fingerprint
         return state

@@ -25,7 +25,7 @@ def train_next(session):
 def test_a_fresh_session_is_empty_but_answers(make_session):
     session = make_session(is_open=False)
     assert session.capture is None
-    assert session.poll() in (True, False)
+    assert session.poll() is False
     assert (session.clips, session.clip_states, session.training.state) == ([], [], "idle")
     assert session.shown_gaussians() is None
     assert session.shown_points() is None
