@@ -24,7 +24,7 @@ def live_session(make_session, monkeypatch):
 
 
 def revision_of(session) -> str:
-    return session._service.progress[0].revision
+    return session._service.shown_state(0).revision
 
 
 def test_the_states_of_the_fake_training_are_those_of_a_clip(make_session):
