@@ -37,7 +37,7 @@ from app.project import (
 from app.training.lines import PlanLines, show_event, show_outcome, show_status
 from app.training.service import Launch, TrainingService
 from engine.capture.capture import Capture, open_capture
-from engine.errors import CaptureError, ProjectError
+from engine.errors import CaptureError, DiskError, ProjectError
 
 BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
 """Failures of a worker that are the input's and not the program's."""
@@ -66,7 +66,7 @@ def train(options: argparse.Namespace, launch: Launch) -> int:
         return _plan(options)
     was_folder, was_project = options.project.exists(), (options.project / PROJECT_FILE).is_file()
     project, capture = _open_for_training(options)
-    is_refused = False
+    is_refused, outcomes = False, []
     line = ProgressLine(is_quiet=options.quiet)
     service: TrainingService | None = None
     try:
@@ -100,14 +100,15 @@ def train(options: argparse.Namespace, launch: Launch) -> int:
         line.finish()
         if options.json:
             print(json.dumps(train_document(project, capture, outcomes), indent=2))
-    except (CaptureError, ProjectError):
-        is_refused = True
+    except (CaptureError, ProjectError) as error:
+        is_refused = not isinstance(error, DiskError)
         raise
     finally:
         line.finish()
         if service is not None:
             service.close()
-        if is_refused and not was_project and not project.has_progress:  # bad input leaves nothing behind
+        has_learned = project.has_progress or any(outcome.step for outcome in outcomes)
+        if is_refused and not was_project and not has_learned:  # bad input leaves nothing behind
             project.remove_files()
         project.close()
         if is_refused and not was_folder:
