@@ -9,6 +9,7 @@ import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -28,18 +29,19 @@ STALE_AFTER_S = 24 * 3600.0
 
 
 @contextmanager
-def atomic_path(path: Path | str, *, is_durable: bool = False) -> Iterator[Path]:
+def atomic_path(path: Path | str, *, makes_parents: bool = True, is_durable: bool = False) -> Iterator[Path]:
     """Write to the yielded path; it becomes `path` when the block ends well and disappears when it does not.
 
     Args:
-        path: Final name. Missing folders are made. The suffix is kept, so that writers which look at it work.
+        path: Final name. The suffix is kept, so that writers which look at it work.
+        makes_parents: Make all missing folders, or only the one that holds the file.
         is_durable: Whether content and name must outlive a power cut from here on; takes the time the disk takes.
     Raises:
         OSError: The disk refused; nothing is left behind.
     """
     path = Path(path)
     partial = path.with_name(f"{PARTIAL_PREFIX}{os.getpid()}-{path.name}")
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(parents=makes_parents, exist_ok=True)
     try:
         yield partial
         replace_file(partial, path, is_durable=is_durable)
@@ -84,7 +86,8 @@ def checked_path(path: Path | str, *, what: str, is_durable: bool = False) -> It
         DiskError: The disk refused; nothing is left behind.
     """
     try:
-        with atomic_path(path, is_durable=is_durable) as partial:
+        # only the last folder is made: a project that was deleted is not made again
+        with atomic_path(path, makes_parents=False, is_durable=is_durable) as partial:
             yield partial
     except OSError as error:
         raise disk_error(error, what=what, path=path) from error
@@ -92,16 +95,16 @@ def checked_path(path: Path | str, *, what: str, is_durable: bool = False) -> It
 
 def disk_error(error: OSError, *, what: str, path: Path | str) -> DiskError:
     """What to raise when a file could not be written."""
-    reason = error.strerror or str(error)
-    return DiskError(f"{what} could not be written ({reason}).", hint="Free some space and try again.", path=path)
+    is_full = error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
+    hint = "Free some space and try again." if is_full else "Check the disk and the rights of the folder."
+    return DiskError(f"{what} could not be written ({error.strerror or error}).", hint=hint, path=path)
 
 
-def read_bytes(path: Path | str, *, max_bytes: int) -> bytes:
-    """The content of a regular file.
+def open_regular(path: Path | str) -> BinaryIO:
+    """Open a regular file for reading bytes; a pipe or a device, which would block or never end, is refused.
 
     Raises:
-        OSError: It is missing, cannot be read, is no regular file (a pipe or a device would block or never end), or
-            is larger than `max_bytes`. `strerror` says which, in words.
+        OSError: It is missing, cannot be read or is no regular file. `strerror` says which, in words.
     """
     try:
         # without O_NONBLOCK, opening a pipe waits for its writer
@@ -109,14 +112,24 @@ def read_bytes(path: Path | str, *, max_bytes: int) -> bytes:
     except ValueError as error:  # a NUL or half a character in the name
         raise OSError(errno.EINVAL, f"not a file name: {error}", str(path)) from error
     try:
-        found = os.fstat(handle)
-        _check_regular(found, path)
-        if found.st_size > max_bytes:
-            raise OSError(errno.EFBIG, f"{found.st_size} bytes, at most {max_bytes} are read", str(path))
-        with open(handle, "rb", closefd=False) as file:
-            data = file.read(max_bytes + 1)
-    finally:
+        _check_regular(os.fstat(handle), path)
+        return open(handle, "rb")
+    except OSError:
         os.close(handle)
+        raise
+
+
+def read_bytes(path: Path | str, *, max_bytes: int) -> bytes:
+    """The content of a regular file.
+
+    Raises:
+        OSError: As of `open_regular`, or it is larger than `max_bytes`. `strerror` says which, in words.
+    """
+    with open_regular(path) as file:
+        n_bytes = os.fstat(file.fileno()).st_size
+        if n_bytes > max_bytes:
+            raise OSError(errno.EFBIG, f"{n_bytes} bytes, at most {max_bytes} are read", str(path))
+        data = file.read(max_bytes + 1)
     if len(data) > max_bytes:  # it grew, or its size is not known, as in /proc
         raise OSError(errno.EFBIG, f"more than {max_bytes} bytes", str(path))
     return data
