@@ -20,13 +20,14 @@ RENDERED, CLOUD, FIRST_CLOUD, HINT, CAPTURED, MARKS = (
     "Captured picture",
     "Cameras only",
 )
-_MISSING = {
-    CLOUD: "point cloud of what stands still, moving objects are missing",
+_STANDS_IN = {
+    CLOUD: "point cloud of what stands still",
     FIRST_CLOUD: "rough point cloud of frame 0",
     HINT: "captured pictures placed in space",
     CAPTURED: "captured picture",
     MARKS: "cameras only",
 }
+"""What is seen where there is no rendered picture."""
 
 
 @dataclass(frozen=True)
@@ -133,8 +134,9 @@ def pane_text(kind: str, frame_index: int | None, other_frame_index: int | None)
 
 def count_text(n_alive: int, n_all: int, words: str, frame_index: int | None) -> str:
     """A number of anchors, which says whether it is that of a frame or that of the clip."""
-    if frame_index is None or n_all < n_alive:
-        return f"{format_count(n_alive)} {words}"
+    if n_all < n_alive:  # how many the clip has is not known
+        where = "" if frame_index is None else f" in frame {frame_index}"
+        return f"{format_count(n_alive)} {words}{where}"
     if n_alive == n_all:
         return f"{format_count(n_all)} {words}"
     return f"{format_count(n_alive)} of {format_count(n_all)} {words} alive in frame {frame_index}"
@@ -209,8 +211,13 @@ def _note(shown: ShownPicture, wanted: WantedFrame, state: str, state_words: str
             return ""
         step = "" if shown.step is None else f", picture of step {format_count(shown.step)}"
         return f"clip {wanted.clip_index} {state_words}{step}"
+    what = _STANDS_IN[shown.kind]
+    if wanted.has_failed:
+        return f"{what}, not the trained result"
     if wanted.revision:
-        until = "could not be loaded" if wanted.has_failed else "not the trained result yet"
-        return f"{_MISSING[shown.kind]}: {until}"
+        missing = ": moving objects are missing until then" if shown.kind == CLOUD else ""
+        return f"{what}, not the trained result{missing}"
+    if shown.kind == CLOUD:
+        what += ", moving objects are missing"
     verb = "is " if state in ("untrained", "stale", "queued") else ""
-    return f"{_MISSING[shown.kind]}: clip {wanted.clip_index} {verb}{state_words}"
+    return f"{what}: clip {wanted.clip_index} {verb}{state_words}"

@@ -31,6 +31,7 @@ class PictureRate:
 
     def __init__(self) -> None:
         self._started_s: float | None = None
+        self._before_s = 0.0  # the last change before those that are counted
         self._frame: int | None = None
         self._changes: deque[tuple[float, bool]] = deque()
 
@@ -47,20 +48,25 @@ class PictureRate:
             now_s: Seconds of a clock that never goes back.
         """
         if self._started_s is None or self._frame is None:
-            self._started_s, self._frame = now_s, frame_index
+            self._started_s = self._before_s = now_s
+            self._frame = frame_index
             return
         if frame_index != self._frame:
             has_skipped = frame_index != (self._frame + 1) % max(n_frames, 1)
             self._changes.append((now_s, has_skipped))
             self._frame = frame_index
-        while self._changes and self._changes[0][0] <= now_s - WINDOW_S:
-            self._changes.popleft()
 
     def rate(self, now_s: float, *, is_every_frame: bool = False) -> ShownRate:
         """What was counted up to now."""
-        if self._started_s is None:
+        recent = self._changes
+        while recent and recent[0][0] <= now_s - WINDOW_S:
+            self._before_s = recent.popleft()[0]
+        if self._started_s is None or now_s - self._started_s < LEAST_S:
             return ShownRate(None, is_every_frame=is_every_frame)
-        recent = [has_skipped for at_s, has_skipped in self._changes if at_s > now_s - WINDOW_S]
-        seconds = min(now_s - self._started_s, WINDOW_S)
-        per_s = len(recent) / seconds if seconds >= LEAST_S else None
-        return ShownRate(per_s, any(recent), is_every_frame)
+        if not recent:
+            return ShownRate(0.0, is_every_frame=is_every_frame)
+        # From change to change, so that where the window happens to begin does not matter; what is late counts.
+        seconds = recent[-1][0] - self._before_s
+        late_s = now_s - recent[-1][0] - seconds / len(recent)
+        per_s = len(recent) / max(seconds + max(late_s, 0.0), 1e-3)
+        return ShownRate(per_s, any(has_skipped for _, has_skipped in recent), is_every_frame)
