@@ -25,7 +25,8 @@ from ui.hud_text import CLOUD, RENDERED, HudText
 from ui.screenshot import read_window
 
 pytestmark = pytest.mark.gl
-WAIT_S = 30.0
+WAIT_S = 120.0
+"""Only a hang takes longer, or the first start, which compiles the kernels."""
 
 
 @pytest.fixture
