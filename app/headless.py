@@ -19,7 +19,7 @@ from app.training.service import TrainingService
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
-from engine.model.clip_state import ClipState, read_clip_header, read_clip_state
+from engine.model.clip_state import ClipState, DamagedClip, look_at_clip, read_clip_header, read_clip_state
 
 if TYPE_CHECKING:
     from engine.metrics.features_apart import Features
@@ -36,7 +36,8 @@ class ClipOutcome:
     """How the training of one clip ended.
 
     Attributes:
-        state: trained, skipped (it was trained before), stopped or failed.
+        state: trained, skipped (it was trained before), damaged (so it was, and its file cannot be read), stopped or
+            failed.
         step: Steps done.
         held_out_psnr: dB; None when not measured.
         seconds: Wall time of this run, preparation included.
@@ -78,7 +79,10 @@ def train_clips(
     outcomes: list[ClipOutcome] = []
     for clip_index in clip_indices:
         known = service.progress[clip_index]
-        if known.state == "trained":
+        found = look_at_clip(service.project.clip_path(clip_index))
+        if isinstance(found, DamagedClip):
+            outcome = damaged_outcome(clip_index, found)
+        elif known.state == "trained":
             outcome = ClipOutcome(clip_index, "skipped", known.step, known.held_out_psnr)
         else:
             on_begin(clip_index)
@@ -88,6 +92,17 @@ def train_clips(
         if outcome.state == "failed":
             break
     return outcomes
+
+
+def damaged_outcome(clip_index: int, clip: DamagedClip) -> ClipOutcome:
+    """Of a clip whose file cannot be read: it stays as it is until the user says what should become of it."""
+    error = ProjectError(
+        f"The file of clip {clip_index} is damaged ({clip.reason}); it was left as it is.",
+        hint="Restore it from a copy, or remove it to train the clip again.",
+        path=clip.path,
+    )
+    message, hint = error.told_apart()
+    return ClipOutcome(clip_index, "damaged", message=message, hint=hint, kind="ProjectError")
 
 
 def _train_clip(

@@ -105,10 +105,11 @@ def train(options: argparse.Namespace, launch: Launch) -> int:
         if is_refused and not was_folder:
             with contextlib.suppress(OSError):  # not empty: something was learned
                 options.project.rmdir()
-    last = outcomes[-1]
-    if last.state == "failed":
-        code = EXIT_BAD_INPUT if last.kind in BAD_INPUT_KINDS else EXIT_FAILED
-        return fail(code, " ".join(part for part in (last.message, last.hint) if part))
+    unfinished = [outcome for outcome in outcomes if outcome.state in ("damaged", "failed")]
+    if unfinished:
+        code = EXIT_BAD_INPUT if unfinished[-1].kind in BAD_INPUT_KINDS else EXIT_FAILED
+        said = (" ".join(part for part in (clip.message, clip.hint) if part) for clip in unfinished)
+        return fail(code, "\n".join(said))
     return EXIT_OK
 
 

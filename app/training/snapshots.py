@@ -10,6 +10,7 @@ import numpy as np
 
 from app.training.messages import SnapshotWritten
 from engine.errors import ProjectError
+from engine.files import replace_file
 from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.model.compact import CompactClip, write_compact_clip
 
@@ -104,7 +105,7 @@ def keep_clip(clip: CompactClip, path: Path, live_dir: Path) -> None:
                 path=path,
             )
         path.parent.mkdir(parents=True, exist_ok=True)
-        os.replace(draft, path)
+        replace_file(draft, path, is_durable=True)
     except OSError as error:
         raise ProjectError(
             f"The clip could not be put in its place ({error.strerror}).", hint="Free some space.", path=path

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from safetensors import safe_open
 
+from engine.array_files import write_arrays
 from engine.errors import DiskError
-from engine.files import checked_path, write_arrays
+from engine.files import checked_path
 from engine.model.clip_state import ClipState, write_clip_state
 from engine.training.preparation import BACKGROUNDS_FILE, Backgrounds, write_backgrounds
 

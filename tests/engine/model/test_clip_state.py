@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from engine.errors import ProjectError
-from engine.model.clip_state import SCHEMA, ClipState, read_clip_state, write_clip_state
+from engine.model.clip_header import SCHEMA
+from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
 
 
 def make_state() -> ClipState:
     arrays = {"a": np.arange(6, dtype=np.float32).reshape(2, 3), "b": np.array([True, False]), "none": np.zeros((0, 3))}
-    return ClipState(arrays, {"schema": SCHEMA, "role": "reference", "clip_index": 0})
+    return ClipState(arrays, {"schema": SCHEMA, "role": "reference", "clip_index": 0, "step": 3})
 
 
 def test_round_trip_keeps_arrays_and_header(tmp_path):
