@@ -56,7 +56,7 @@ def picture_hint(capture: Capture, frame_index: int) -> PointArrays:
         np.concatenate(points).astype(np.float32),
         np.concatenate(colors).astype(np.float32),
         ("hint", capture.fingerprint, frame_index),
-        is_hint=True,
+        kind="pictures",
     )
 
 
@@ -132,4 +132,5 @@ def read_cloud(path: Path) -> PointArrays:
             raise ArraysError("its numbers are not finite floats")
     except (OSError, ArraysError, KeyError) as error:
         raise ProjectError(f"The first cloud cannot be read ({error}).", path=path) from error
-    return PointArrays(points, colors, ("first cloud", str(path)), spacing=point_spacing(points))
+    key = ("first cloud", str(path), path.stat().st_mtime_ns)
+    return PointArrays(points, colors, key, kind="moment", spacing=point_spacing(points))

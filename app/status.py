@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 from engine.cloud.regions import GateRegion
@@ -27,6 +27,28 @@ class Overlays:
     show_regions: bool = True
     compare: str = "off"
     wipe_position: float = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class WantedFrame:
+    """What ought to be on screen, whatever is there by now.
+
+    Attributes:
+        clip_index, frame_index: Under the playhead.
+        revision: The state of the clip that is to be shown; empty where none can be: it is not trained.
+        camera_index: The capture camera looked through; None for a free view.
+        look: From where and through which lens; see OrbitView.look_key.
+        is_loaded: Whether the clip is in memory, so that only its frame has to be made.
+        has_failed: Whether the frame or its picture could not be made, so that it is not on its way.
+    """
+
+    clip_index: int
+    frame_index: int
+    revision: str = ""
+    camera_index: int | None = None
+    look: Hashable = None
+    is_loaded: bool = False
+    has_failed: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from engine.errors import DiskError
 
@@ -86,12 +87,11 @@ def disk_error(error: OSError, *, what: str, path: Path | str) -> DiskError:
     return DiskError(f"{what} could not be written ({reason}).", hint="Free some space and try again.", path=path)
 
 
-def read_bytes(path: Path | str, *, max_bytes: int) -> bytes:
-    """The content of a regular file.
+def open_regular(path: Path | str) -> BinaryIO:
+    """Open a regular file for reading bytes; a pipe or a device, which would block or never end, is refused.
 
     Raises:
-        OSError: It is missing, cannot be read, is no regular file (a pipe or a device would block or never end), or
-            is larger than `max_bytes`. `strerror` says which, in words.
+        OSError: It is missing, cannot be read or is no regular file. `strerror` says which, in words.
     """
     try:
         # without O_NONBLOCK, opening a pipe waits for its writer
@@ -99,14 +99,24 @@ def read_bytes(path: Path | str, *, max_bytes: int) -> bytes:
     except ValueError as error:  # a NUL or half a character in the name
         raise OSError(errno.EINVAL, f"not a file name: {error}", str(path)) from error
     try:
-        found = os.fstat(handle)
-        _check_regular(found, path)
-        if found.st_size > max_bytes:
-            raise OSError(errno.EFBIG, f"{found.st_size} bytes, at most {max_bytes} are read", str(path))
-        with open(handle, "rb", closefd=False) as file:
-            data = file.read(max_bytes + 1)
-    finally:
+        _check_regular(os.fstat(handle), path)
+        return open(handle, "rb")
+    except OSError:
         os.close(handle)
+        raise
+
+
+def read_bytes(path: Path | str, *, max_bytes: int) -> bytes:
+    """The content of a regular file.
+
+    Raises:
+        OSError: As of `open_regular`, or it is larger than `max_bytes`. `strerror` says which, in words.
+    """
+    with open_regular(path) as file:
+        n_bytes = os.fstat(file.fileno()).st_size
+        if n_bytes > max_bytes:
+            raise OSError(errno.EFBIG, f"{n_bytes} bytes, at most {max_bytes} are read", str(path))
+        data = file.read(max_bytes + 1)
     if len(data) > max_bytes:  # it grew, or its size is not known, as in /proc
         raise OSError(errno.EFBIG, f"more than {max_bytes} bytes", str(path))
     return data

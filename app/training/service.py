@@ -101,6 +101,7 @@ class TrainingService:
         self._is_stopping = False
         self._ending: Event | None = None
         self._shown_clip: int | None = None
+        self._n_runs = 0  # in the names of live states: each worker counts its own from one
         for clip in self.clips:
             self.read_clip(clip.clip_index)
 
@@ -119,7 +120,7 @@ class TrainingService:
         if unfinished is not None and (header is None or known.state == "stale"):
             header = unfinished
             known.state = "paused"
-            known.file, known.revision = checkpoint, f"stopped-{header.get('step', 0)}"
+            known.file, known.revision = checkpoint, f"stopped-{header.get('step', 0)}-{header.get('fingerprint', '')}"
         known.step, known.n_steps = (int(header[key]) for key in ("step", "n_steps")) if header else (0, 0)
         rows = read_metrics(self.project.metrics_path(clip_index))
         known.loss_history = thinned([(row["step"], row["loss"]) for row in rows if _is_number(row.get("loss"))])
@@ -252,6 +253,7 @@ class TrainingService:
         if not self.project.checkpoint_path(clip_index).is_file():
             known.loss_history, known.psnr_history, known.held_out_psnr = [], [], None
             known.step = 0
+        self._n_runs += 1
         self.worker = self._launch(job, self.project)
 
     # ---------------------------------------------------------------- events
@@ -291,7 +293,7 @@ class TrainingService:
                 known.held_out_psnr = event.psnr
                 append_thinned(known.psnr_history, (event.step, event.psnr))
             case SnapshotWritten():
-                known.file, known.revision = Path(event.path), f"live-{event.revision}"
+                known.file, known.revision = Path(event.path), f"live-{self._n_runs}-{event.revision}"
             case TrainingPaused():
                 self._is_paused = True
             case TrainingResumed():
