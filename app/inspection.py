@@ -35,7 +35,7 @@ def describe_project(folder: Path) -> dict[str, Any]:
     Raises:
         ProjectError: It is no project, nothing is trained yet, or none of what is trained can be read.
     """
-    facts = read_facts(folder, folder.name)
+    facts = read_facts(folder, folder.name, leave_out_damaged=True)
     try:
         fps = float(open_capture_of(facts.settings, folder).fps)
     except (CaptureError, ProjectError):  # bytes can be counted without it

@@ -119,7 +119,7 @@ def _read(
                 if sums is not None and _sum_of(arrays[name]) != sums[_DIGITS * i : _DIGITS * (i + 1)]:
                     raise ArraysError(f"the numbers of {name} do not fit their checksum")
     except SafetensorError as error:
-        raise ArraysError(str(error)) from error
+        raise ArraysError(str(error).removeprefix("Error while deserializing header: ")) from error
     return arrays, metadata, table
 
 

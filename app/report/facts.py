@@ -82,19 +82,23 @@ class ProjectFacts:
         return sum(sum(clip.storage.values()) for clip in self.clips)
 
 
-def read_facts(folder: Path, name: str) -> ProjectFacts:
+def read_facts(folder: Path, name: str, *, leave_out_damaged: bool = False) -> ProjectFacts:
     """Look at a project's files.
 
+    Args:
+        name: Of the result.
+        leave_out_damaged: List files of clips that cannot be read beside the others, as long as there are others.
+
     Raises:
-        ProjectError: It is no project, nothing is trained yet, or none of what is trained can be read.
+        ProjectError: It is not a project, nothing is trained yet, or a clip cannot be read.
     """
     project = open_project(folder, is_writable=False)
     found = [_read_clip(path) for path in sorted((folder / "clips").glob("[0-9]*.safetensors"))]
     clips = [clip for clip in found if isinstance(clip, ClipFacts)]
     damaged = tuple(clip for clip in found if isinstance(clip, DamagedClip))
-    if damaged and not clips:
+    if damaged and not (clips and leave_out_damaged):
         raise ProjectError(
-            f"The clip file is damaged or not a clip file ({damaged[0].reason}); no other clip is trained.",
+            f"The clip file is damaged or not a clip file ({damaged[0].reason}).",
             hint="Restore it from a copy, or remove it and train the clip again.",
             path=damaged[0].path,
         )
