@@ -19,18 +19,19 @@ STALE_AFTER_S = 24 * 3600.0
 
 
 @contextmanager
-def atomic_path(path: Path | str, *, is_durable: bool = False) -> Iterator[Path]:
+def atomic_path(path: Path | str, *, makes_parents: bool = True, is_durable: bool = False) -> Iterator[Path]:
     """Write to the yielded path; it becomes `path` when the block ends well and disappears when it does not.
 
     Args:
-        path: Final name. Missing folders are made. The suffix is kept, so that writers which look at it work.
+        path: Final name. The suffix is kept, so that writers which look at it work.
+        makes_parents: Make all missing folders, or only the one that holds the file.
         is_durable: Whether content and name must outlive a power cut from here on; takes the time the disk takes.
     Raises:
         OSError: The disk refused; nothing is left behind.
     """
     path = Path(path)
     partial = path.with_name(f"{PARTIAL_PREFIX}{os.getpid()}-{path.name}")
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(parents=makes_parents, exist_ok=True)
     try:
         yield partial
         replace_file(partial, path, is_durable=is_durable)
@@ -75,7 +76,8 @@ def checked_path(path: Path | str, *, what: str, is_durable: bool = False) -> It
         DiskError: The disk refused; nothing is left behind.
     """
     try:
-        with atomic_path(path, is_durable=is_durable) as partial:
+        # only the last folder is made: a project that was deleted is not made again
+        with atomic_path(path, makes_parents=False, is_durable=is_durable) as partial:
             yield partial
     except OSError as error:
         raise disk_error(error, what=what, path=path) from error
@@ -83,8 +85,9 @@ def checked_path(path: Path | str, *, what: str, is_durable: bool = False) -> It
 
 def disk_error(error: OSError, *, what: str, path: Path | str) -> DiskError:
     """What to raise when a file could not be written."""
-    reason = error.strerror or str(error)
-    return DiskError(f"{what} could not be written ({reason}).", hint="Free some space and try again.", path=path)
+    is_full = error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
+    hint = "Free some space and try again." if is_full else "Check the disk and the rights of the folder."
+    return DiskError(f"{what} could not be written ({error.strerror or error}).", hint=hint, path=path)
 
 
 def open_regular(path: Path | str) -> BinaryIO:

@@ -30,7 +30,7 @@ def check_header(header: dict[str, Any]) -> dict[str, Any]:
     Raises:
         HeaderError: An entry is missing or of the wrong kind; names it.
     """
-    missing = [name for name in ("role", "clip_index", "step") if name not in header]
+    missing = [name for name in ("role", "clip_index", "step", "n_steps") if name not in header]
     if missing:
         raise HeaderError(f"its header has no {missing[0]}")
     for name, is_right in _ENTRIES.items():

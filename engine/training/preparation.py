@@ -45,6 +45,10 @@ class Backgrounds:
     images: np.ndarray
     is_stable: np.ndarray
 
+    def equals(self, other: Backgrounds) -> bool:
+        """Whether both are the same in every pixel."""
+        return np.array_equal(self.images, other.images) and np.array_equal(self.is_stable, other.is_stable)
+
 
 def spread_frames(n_frames: int, at_most: int) -> list[int]:
     """Frame indices spread evenly over a capture."""

@@ -255,7 +255,7 @@ def test_a_state_that_is_no_number_is_not_kept(bench):
     assert not it.checkpoint.exists()
 
 
-HEADER = {"schema": 1, "role": "reference", "clip_index": 0, "step": 1}
+HEADER = {"schema": 1, "role": "reference", "clip_index": 0, "step": 1, "n_steps": 1}
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
@@ -284,8 +284,11 @@ def test_what_is_dear_is_done_less_often():
     assert not cadence.is_due(0.0)
     assert cadence.is_due(2.0)
     cadence.done(2.0, 3.0)  # it took a second: nine more pass before the next
-    assert not cadence.is_due(12.9)
-    assert cadence.is_due(13.0)
+    assert not cadence.is_due(11.9)
+    assert cadence.is_due(12.0)
+    cadence.done(20.0, 20.1)
+    assert not cadence.is_due(21.9)
+    assert cadence.is_due(22.0)  # counted from the start of the last one
 
 
 def test_the_rate_follows_and_leaves_pauses_out():

@@ -64,6 +64,7 @@ def state_of(model: ClipModel, *, role: str, clip_index: int = 0, reference: Cli
         "role": role,
         "clip_index": clip_index,
         "step": 1,
+        "n_steps": 1,
         "clip_length": N_FRAMES,
         "n_frames": N_FRAMES,
         "decoder": decoder_sizes(model.decoder),

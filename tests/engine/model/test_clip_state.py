@@ -20,7 +20,7 @@ from engine.model.clip_state import (
 
 def make_state() -> ClipState:
     arrays = {"a": np.arange(6, dtype=np.float32).reshape(2, 3), "b": np.array([True, False]), "none": np.zeros((0, 3))}
-    return ClipState(arrays, {"schema": SCHEMA, "role": "reference", "clip_index": 0, "step": 3})
+    return ClipState(arrays, {"schema": SCHEMA, "role": "reference", "clip_index": 0, "step": 3, "n_steps": 3})
 
 
 def test_round_trip_keeps_arrays_and_header(tmp_path):
