@@ -18,6 +18,8 @@ class Overlays:
     Attributes:
         compare: "off", "wipe" or "side": the captured picture over or beside the rendered one.
         wipe_position: Share of the width that shows the captured picture, 0..1.
+        mark_size: Of anchor marks, 1 as designed.
+        mark_opacity: Of anchor marks that nothing hides, 0..1.
     """
 
     show_frusta: bool = True
@@ -27,6 +29,8 @@ class Overlays:
     show_regions: bool = True
     compare: str = "off"
     wipe_position: float = 0.5
+    mark_size: float = 1.0
+    mark_opacity: float = 0.9
 
 
 @dataclass(frozen=True, slots=True)
