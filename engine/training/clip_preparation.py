@@ -179,7 +179,9 @@ class ClipPreparation:
         self._say("Taking over the reference", said)
         backgrounds = read_backgrounds(self._prep_dir, self._key_of_corrected())
         if backgrounds is None:
-            backgrounds = self._corrected(self._estimated(), model, gains, pictures)
+            estimated = self._estimated()
+            keep = self._keep_after(model, gains, estimated)
+            backgrounds = self._corrected(estimated, model, gains, pictures, keep)
         choose_decoder(model, self._config, seed=self._seed)
         if self._config.inherit == "off":
             own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
