@@ -13,9 +13,9 @@ from app.project import (
     create_project,
     default_settings,
     open_project,
-    read_metrics,
     read_settings,
 )
+from app.project_files import read_metrics
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError
 
