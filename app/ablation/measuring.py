@@ -12,6 +12,7 @@ from app.headless import open_trained
 from app.later_clips import later_figures
 from app.project import Project, ProjectSettings, open_project
 from app.report.facts import read_facts
+from app.results import named_failure
 from engine.errors import ProjectError
 from engine.json_files import JsonError, read_checked_json, write_checked_json
 from engine.metrics.flicker import flicker_figures
