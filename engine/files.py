@@ -1,9 +1,11 @@
-"""Atomic files: a complete file appears under its final name, or none does."""
+"""Files: written complete or not at all, read only where they are regular files of a bounded size."""
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -19,39 +21,70 @@ _DTYPES = {
 }
 """Names of number types in safetensors files."""
 
+PARTIAL_PREFIX = ".partial-"
+"""Half-written files begin with this, then with the id of the process that writes them."""
+STALE_AFTER_S = 24 * 3600.0
+"""A half-written file this old belongs to nobody, whoever may have its process id by now."""
+
 
 @contextmanager
-def atomic_path(path: Path | str) -> Iterator[Path]:
+def atomic_path(path: Path | str, *, is_durable: bool = False) -> Iterator[Path]:
     """Write to the yielded path; it becomes `path` when the block ends well and disappears when it does not.
 
     Args:
         path: Final name. Missing folders are made. The suffix is kept, so that writers which look at it work.
+        is_durable: Whether content and name must outlive a power cut from here on; takes the time the disk takes.
     Raises:
         OSError: The disk refused; nothing is left behind.
     """
     path = Path(path)
-    partial = path.with_name(f".partial-{os.getpid()}-{path.name}")
+    partial = path.with_name(f"{PARTIAL_PREFIX}{os.getpid()}-{path.name}")
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         yield partial
-        os.replace(partial, path)
+        replace_file(partial, path, is_durable=is_durable)
     finally:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
 
 
+def replace_file(source: Path, target: Path, *, is_durable: bool = False) -> None:
+    """Rename a complete file to its final name, replacing what has that name.
+
+    Args:
+        is_durable: First the content goes to the disk, then the name: after a power cut there is the old file or the
+            new one, never an empty one.
+    Raises:
+        OSError: The disk refused; `target` is as it was.
+    """
+    if is_durable:
+        _to_disk(source, os.O_RDWR)
+    os.replace(source, target)
+    if is_durable and os.name != "nt":  # Windows has no handle of a folder to flush
+        with suppress(OSError):  # the file is in its place; some network file systems refuse to flush a folder
+            _to_disk(target.parent, os.O_RDONLY)
+
+
+def _to_disk(path: Path, flags: int) -> None:
+    handle = os.open(path, flags)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
 @contextmanager
-def checked_path(path: Path | str, *, what: str) -> Iterator[Path]:
+def checked_path(path: Path | str, *, what: str, is_durable: bool = False) -> Iterator[Path]:
     """`atomic_path` for files of a project: whatever the disk refuses is a DiskError.
 
     Args:
-        path: As of `atomic_path`.
+        path, is_durable: As of `atomic_path`.
         what: Names the file in the message, as "The clip".
     Raises:
         DiskError: The disk refused; nothing is left behind.
     """
     try:
-        with atomic_path(path) as partial:
+        with atomic_path(path, is_durable=is_durable) as partial:
             yield partial
     except OSError as error:
         raise disk_error(error, what=what, path=path) from error
@@ -61,6 +94,53 @@ def disk_error(error: OSError, *, what: str, path: Path | str) -> DiskError:
     """What to raise when a file could not be written."""
     reason = error.strerror or str(error)
     return DiskError(f"{what} could not be written ({reason}).", hint="Free some space and try again.", path=path)
+
+
+def read_bytes(path: Path | str, *, max_bytes: int) -> bytes:
+    """The content of a regular file.
+
+    Raises:
+        OSError: It is missing, cannot be read, is no regular file (a pipe or a device would block or never end), or
+            is larger than `max_bytes`. `strerror` says which, in words.
+    """
+    try:
+        # without O_NONBLOCK, opening a pipe waits for its writer
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except ValueError as error:  # a NUL or half a character in the name
+        raise OSError(errno.EINVAL, f"not a file name: {error}", str(path)) from error
+    try:
+        found = os.fstat(handle)
+        _check_regular(found, path)
+        if found.st_size > max_bytes:
+            raise OSError(errno.EFBIG, f"{found.st_size} bytes, at most {max_bytes} are read", str(path))
+        with open(handle, "rb", closefd=False) as file:
+            data = file.read(max_bytes + 1)
+    finally:
+        os.close(handle)
+    if len(data) > max_bytes:  # it grew, or its size is not known, as in /proc
+        raise OSError(errno.EFBIG, f"more than {max_bytes} bytes", str(path))
+    return data
+
+
+def check_regular(path: Path | str) -> int:
+    """See that libraries which open by name will open a regular file. Returns its size in bytes.
+
+    Raises:
+        OSError: It is missing or something else; `strerror` says what.
+    """
+    try:
+        found = os.stat(path)
+    except ValueError as error:
+        raise OSError(errno.EINVAL, f"not a file name: {error}", str(path)) from error
+    _check_regular(found, path)
+    return found.st_size
+
+
+def _check_regular(found: os.stat_result, path: Path | str) -> None:
+    if stat.S_ISDIR(found.st_mode):
+        raise IsADirectoryError(errno.EISDIR, "it is a folder, not a file", str(path))
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(errno.EINVAL, "it is a pipe or a device, not a file", str(path))
 
 
 def write_arrays(path: Path | str, arrays: Mapping[str, np.ndarray], metadata: Mapping[str, str], *, what: str) -> None:

@@ -16,33 +16,33 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from ui import theme
 from ui.dialogs import OpenFolderDialog, draw_help
-from ui.gl import ImageTexture, free_dropped
+from ui.gl import ImageTexture, free_dropped, n_changes
 from ui.imgui_backend import ImGuiBackend
 from ui.panels.capture import CapturePanel
+from ui.panels.menu_bar import draw_menu_bar
 from ui.panels.notices import NoticesPanel
-from ui.panels.regions import TITLE as REGIONS
 from ui.panels.regions import draw_regions
+from ui.panels.status_bar import HEIGHT as STATUS_BAR_HEIGHT
+from ui.panels.status_bar import draw_status_bar
 from ui.panels.timeline import draw_timeline
-from ui.panels.training import draw_training, duration_text
+from ui.panels.training import draw_training
 from ui.panels.viewport import ViewportPanel
-from ui.panels.welcome import SAMPLE_PATH
+from ui.redraw import FRAMES_AFTER_INPUT, RedrawPlan
 from ui.scene import Scene
-from ui.shortcuts import SHORTCUTS, handle_shortcuts, train_or_pause
-from ui.state import Dispatch, Rect, UiState
-from ui.theme import Icon
+from ui.shortcuts import handle_shortcuts
+from ui.state import CAPTURE, REGIONS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
+from ui.ui_scale import UiScale
 
 logger = logging.getLogger(__name__)
 
-FRAMES_AFTER_INPUT = 2
-"""ImGui takes in a press and its release in two frames."""
+FIRST_FRAMES = 6
+"""A new layout: docked panels get their tabs, then their sizes, then they lose scrollbars that are not needed."""
 TRAINING_REFRESH_S = 0.2
 """Often enough for numbers that nobody waits for; each frame is taken from the training where the CPU draws."""
 ATTENDED_S = 0.5
 """For this long after an input, every picture that arrives is shown at once."""
 MAX_TICK_S = 0.25
-STATUS_BAR_HEIGHT = 28.0
 NOTHING = ImVec4(0, 0, 0, 0)
-VIEWPORT, TIMELINE, TRAINING, CAPTURE = "Viewport", "Timeline", "Training", "Capture"
 
 
 def _recover(stack: Any) -> None:
@@ -65,6 +65,7 @@ class Frame:
         session: The program's state; see app.session.Session.
         fixed_delta_s: Seconds per frame as told to ImGui; tests fix it.
         on_input: Called after each input that wants a frame, so that it need not wait for the next tick.
+        scale: How large everything is drawn.
     """
 
     def __init__(
@@ -75,19 +76,23 @@ class Frame:
         *,
         fixed_delta_s: float | None = None,
         on_input: Callable[[], None] = lambda: None,
+        scale: UiScale | None = None,
     ) -> None:
         self._window = window
         self._ctx = ctx
         self.session = session
-        self.backend = ImGuiBackend(window, on_input=self._input_came, fixed_delta_s=fixed_delta_s)
+        self.scale = scale or UiScale()
+        self.backend = ImGuiBackend(window, on_input=self._input_came, fixed_delta_s=fixed_delta_s, scale=self.scale)
         self._on_input = on_input
-        self.ui = UiState(fonts=theme.load_fonts())
+        self.ui = UiState(fonts=theme.load_fonts(), scale=self.scale)
         theme.apply_style()
         self.viewport = ViewportPanel(Scene(ctx))
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
         self.notices = NoticesPanel()
         self.dialog = OpenFolderDialog()
-        self._frames_wanted = FRAMES_AFTER_INPUT
+        self._redraw = RedrawPlan()
+        self._redraw.request(FIRST_FRAMES)
+        self._shown: tuple[int, int] | None = None
         self._drawn_s = -1e9
         self._input_s = -1e9
         self._has_news = False
@@ -107,7 +112,12 @@ class Frame:
     def request_redraw(self, frames: int = FRAMES_AFTER_INPUT) -> None:
         """Draw at least this many frames from now on: the user did something."""
         self._input_s = time.perf_counter()
-        self._frames_wanted = max(self._frames_wanted, frames)
+        self._redraw.request(frames)
+
+    def forget_shown(self) -> None:
+        """What was drawn is on the screen no more, as after a resize; draw it again even if it is the same."""
+        self._shown = None
+        self.request_redraw()
 
     def _input_came(self) -> None:
         self.request_redraw()
@@ -119,8 +129,13 @@ class Frame:
         has_news = session.poll()
         has_news |= session.timeline.tick(min(dt_s, MAX_TICK_S))
         self._has_news |= has_news or self.viewport.has_news(session)
-        if self._frames_wanted > 0 or self.backend.needs_follow_up:
-            return True
+        if not self._redraw.is_due and (self.backend.needs_follow_up or self._is_news_due()):
+            self._redraw.request(1)
+        return self._redraw.is_due
+
+    def _is_news_due(self) -> bool:
+        """Is it time to show what came without input?"""
+        session = self.session
         since_s = time.perf_counter() - self._drawn_s
         if self.ui.redraw_in_s is not None and since_s >= self.ui.redraw_in_s:
             return True
@@ -133,28 +148,33 @@ class Frame:
 
     # ---- one frame -------------------------------------------------------------------------------------------
 
-    def draw(self) -> None:
-        """Draw one frame into the window's framebuffer."""
-        started_s = time.perf_counter()
-        self._frames_wanted = max(self._frames_wanted - 1, 0)
+    def draw(self) -> bool:
+        """Draw one frame into the window's framebuffer. False when it already holds just that."""
         self._has_news = False
         self.ui.redraw_in_s = None
         self.ui.rects.clear()
         self.backend.new_frame()
+        self.ui.is_popup_open = self.backend.is_popup_open
+        self.ui.is_menu_wanted |= self.backend.take_alt_tap() and not self.ui.is_popup_open
         self._guard("Window", self._compose)
-        self._ctx.screen.use()
-        self._ctx.viewport = (0, 0, *self._window.get_framebuffer_size())
-        self._ctx.clear(*theme.PANEL)
-        self.backend.end_frame()
+        drawn = (self.backend.end_frame(), n_changes())
+        is_new, self._shown = drawn != self._shown, drawn
+        self._redraw.note_drawn(drawn[0], has_more_input=self.backend.needs_follow_up)
+        if is_new:
+            self._ctx.screen.use()
+            self._ctx.viewport = (0, 0, *self._window.get_framebuffer_size())
+            self._ctx.clear(*theme.PANEL)
+            self.backend.present()
         free_dropped(self._ctx)
         self._drawn_s = time.perf_counter()
-        self.ui.frame_ms = (self._drawn_s - started_s) * 1e3
+        return is_new
 
     def _compose(self) -> None:
         session, ui, dispatch = self.session, self.ui, self.dispatch
         self._guard("Keys", lambda: handle_shortcuts(session, dispatch, ui))
-        self._guard("Menu", self._draw_menu_bar)
-        self._guard("Status bar", self._draw_status_bar)
+        self._guard("Menu", lambda: draw_menu_bar(session, dispatch, ui))
+        is_software = self.viewport.scene.is_software
+        self._guard("Status bar", lambda: draw_status_bar(session, ui, is_software=is_software))
         imgui.push_style_color(imgui.Col_.window_bg, NOTHING)  # the frame is cleared to the panels' colour
         dock_id = imgui.dock_space_over_viewport(0, imgui.get_main_viewport(), imgui.DockNodeFlags_.none)
         imgui.pop_style_color()
@@ -175,7 +195,7 @@ class Frame:
     def dispatch(self, command: object) -> None:
         """Hand a command to the session and plan a redraw."""
         self.session.dispatch(command)
-        self.request_redraw(2)
+        self.request_redraw()
 
     def open_path(self, path: Path) -> None:
         """Open a capture folder, or the folder of a file that was dropped."""
@@ -255,96 +275,9 @@ class Frame:
         ):
             internal.dock_builder_dock_window(title, node)
         self.ui.wanted_panel = TRAINING  # of the two that lie over each other
-        internal.dock_builder_get_node(middle).set_local_flags(internal.DockNodeFlagsPrivate_.no_tab_bar)
+        node = internal.dock_builder_get_node(middle)  # keeps its flags: the central node is the one that gives way
+        node.set_local_flags(node.local_flags | internal.DockNodeFlagsPrivate_.no_tab_bar)
         internal.dock_builder_finish(dock_id)
-
-    # ---- menu and status bar ---------------------------------------------------------------------------------
-
-    def _draw_menu_bar(self) -> None:
-        session, ui = self.session, self.ui
-        if not imgui.begin_main_menu_bar():
-            return
-        has_capture = session.capture is not None
-        if imgui.begin_menu("File"):
-            if imgui.menu_item(f"{Icon.FOLDER}  Open a capture folder", "Ctrl+O", False, True)[0]:
-                ui.is_open_requested = True
-            if SAMPLE_PATH.is_dir() and imgui.menu_item(f"{Icon.FILM}  Open the sample capture", "", False, True)[0]:
-                self.open_path(SAMPLE_PATH)
-            imgui.separator()
-            if imgui.menu_item("Quit", "Ctrl+Q", False, True)[0]:
-                ui.quit_requested = True
-            imgui.end_menu()
-        self._draw_table_menu("View", ("View", "Show and compare"), has_capture)
-        if imgui.begin_menu("Train", has_capture):
-            is_going = session.training.state in ("starting", "preparing", "running")
-            label = "Pause" if is_going else "Resume" if session.training.state == "paused" else "Train next clip"
-            if imgui.menu_item(f"{Icon.TRAIN}  {label}", "T", False, True)[0]:
-                train_or_pause(session, self.dispatch)
-            imgui.end_menu()
-        self._draw_table_menu("Mark", ("Mark regions",), has_capture)
-        if imgui.begin_menu("Window"):
-            if imgui.menu_item("Reset the layout", "", False, True)[0]:
-                ui.is_layout_reset_requested = True
-            if imgui.menu_item(f"{Icon.HELP}  Keys and mouse", "F1", ui.is_help_open, True)[0]:
-                ui.is_help_open = not ui.is_help_open
-            imgui.end_menu()
-        name = session.capture.path.name if has_capture else "no capture open"
-        width = imgui.calc_text_size(name).x
-        imgui.same_line(imgui.get_window_width() - width - 24)
-        imgui.text_disabled(name)
-        imgui.end_main_menu_bar()
-
-    def _draw_table_menu(self, title: str, groups: tuple[str, ...], is_enabled: bool) -> None:
-        if not imgui.begin_menu(title, is_enabled):
-            return
-        for shortcut in SHORTCUTS:
-            if shortcut.group not in groups:
-                continue
-            is_offered = self.ui.regions.is_active or not shortcut.needs_choosing
-            if imgui.menu_item(shortcut.text, shortcut.label, False, is_offered)[0]:
-                shortcut.action(self.session, self.dispatch, self.ui)
-        imgui.end_menu()
-
-    def _draw_status_bar(self) -> None:
-        flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_docking
-        imgui.push_style_color(imgui.Col_.window_bg, ImVec4(*theme.STATUS_BAR))
-        imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.STATUS_TEXT))
-        imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(14, 5))
-        viewport = imgui.get_main_viewport()
-        if imgui.internal.begin_viewport_side_bar("##status", viewport, imgui.Dir.down, STATUS_BAR_HEIGHT, flags):
-            imgui.text(self._status_text())
-            right = self._status_right()
-            imgui.same_line(max(imgui.get_window_width() - imgui.calc_text_size(right).x - 14, 0))
-            imgui.text(right)
-        imgui.end()
-        imgui.pop_style_var()
-        imgui.pop_style_color(2)
-
-    def _status_text(self) -> str:
-        session = self.session
-        if session.jobs:
-            job = session.jobs[0]
-            share = f"{job.done * 100:.0f} %" if job.done > 0 else ""
-            return "  ".join(part for part in (job.name, share, job.message) if part)
-        status = session.training
-        if status.state == "running":
-            return (
-                f"Training clip {status.clip_index}: step {status.step} of {status.n_steps}, "
-                f"{duration_text(status.eta_s)} left"
-            )
-        if status.state in ("starting", "preparing", "stopping", "paused"):
-            words = {"starting": "Starting", "preparing": "Preparing", "stopping": "Stopping", "paused": "Paused:"}
-            return f"{words[status.state]} clip {status.clip_index}  {status.message or ''}"
-        if session.capture is None:
-            return "Open a capture folder to begin"
-        trained = sum(state.state == "trained" for state in session.clip_states)
-        return f"{trained} of {len(session.clips)} clips trained"
-
-    def _status_right(self) -> str:
-        worst = [notice for notice in self.session.notices if notice.kind != "info"]
-        notices = f"{Icon.WARNING} {len(worst)}    " if worst else ""
-        renderer = "software drawing" if self.viewport.scene.is_software else "graphics card"
-        return f"{notices}{renderer}    {self.ui.frame_ms:.0f} ms"
 
     def close(self) -> None:
         """Release GL objects and ImGui. The GL context must still be current."""

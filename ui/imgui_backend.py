@@ -16,6 +16,9 @@ from imgui_bundle import ImVec2, imgui, implot
 from pyglet.event import EVENT_HANDLED
 from pyglet.window import key, mouse
 
+from ui.redraw import fingerprint
+from ui.ui_scale import UiScale
+
 _FAR = -3.4e38  # ImGui's "no pointer here"
 
 _NAMED_KEYS: dict[str, str] = {
@@ -108,9 +111,21 @@ def _build_key_map() -> dict[int, Any]:
 
 
 _KEY_MAP = _build_key_map()
+_TYPING = frozenset(
+    int(getattr(imgui.Key, name))
+    for name in (
+        *"abcdefghijklmnopqrstuvwxyz",
+        *(f"_{digit}" for digit in range(10)),
+        *_SHIFTED.values(),
+        *("comma", "period", "slash", "space"),
+    )
+)
+"""Keys that do nothing in a text field but type."""
 _MODIFIER_OF: dict[int, Any] = {
     int(getattr(imgui.Key, side)): getattr(imgui.Key, modifier) for side, modifier in _MODIFIERS.items()
 }
+_ALT = frozenset({key.LALT, key.RALT})
+_SHIFT = frozenset({int(imgui.Key.mod_shift)})
 _BUTTONS = {mouse.LEFT: 0, mouse.RIGHT: 1, mouse.MIDDLE: 2, 8: 3, 16: 4}
 
 
@@ -128,6 +143,11 @@ class ImGuiBackend:
         window: A pyglet window whose GL context is current.
         on_input: Called after each event that was forwarded, so that the owner can plan a redraw.
         fixed_delta_s: Seconds per frame as told to ImGui; None measures real time. Tests fix it.
+        scale: How large everything is drawn.
+
+    Attributes:
+        pixels_per_unit: Of the newest frame. Everything that ImGui is told and tells is in units (ui.ui_scale).
+        is_popup_open: Was a menu or another popup open when the newest frame began?
     """
 
     def __init__(
@@ -136,8 +156,15 @@ class ImGuiBackend:
         *,
         on_input: Callable[[], None] = lambda: None,
         fixed_delta_s: float | None = None,
+        scale: UiScale | None = None,
     ) -> None:
         self._window = window
+        self.scale = scale or UiScale()
+        self.pixels_per_unit = 1.0
+        self.is_popup_open = False
+        self._held_modifiers: set[int] = set()
+        self._is_alt_alone = False
+        self._was_alt_tapped = False
         self._on_input = on_input
         self._fixed_delta_s = fixed_delta_s
         self._last_frame_s = time.perf_counter()
@@ -180,13 +207,21 @@ class ImGuiBackend:
         """True while input waits for the next frame: ImGui takes in what came at once one after the other."""
         return bool(self._held_releases) or len(self.context.input_events_queue) > 0
 
+    def take_alt_tap(self) -> bool:
+        """Was Alt pressed and released with nothing between since this was last asked?"""
+        was_tapped, self._was_alt_tapped = self._was_alt_tapped, False
+        return was_tapped
+
     def new_frame(self) -> None:
         """Begin an ImGui frame sized to the window."""
         io = imgui.get_io()
-        width, height = self._window.get_size()
         pixel_width, pixel_height = self._window.get_framebuffer_size()
-        io.display_size = ImVec2(max(width, 1), max(height, 1))
-        io.display_framebuffer_scale = ImVec2(pixel_width / max(width, 1), pixel_height / max(height, 1))
+        self.pixels_per_unit = self.scale.fitting(pixel_width, pixel_height)
+        io.display_size = ImVec2(
+            max(pixel_width, 1) / self.pixels_per_unit, max(pixel_height, 1) / self.pixels_per_unit
+        )
+        io.display_framebuffer_scale = ImVec2(self.pixels_per_unit, self.pixels_per_unit)
+        self._offer_menu_keys()
         now_s = time.perf_counter()
         measured_s = now_s - self._last_frame_s
         self._last_frame_s = now_s
@@ -194,11 +229,25 @@ class ImGuiBackend:
         imgui.backends.opengl3_new_frame()
         imgui.new_frame()
 
-    def end_frame(self) -> None:
-        """Finish the frame and draw it into the bound framebuffer."""
+    def _offer_menu_keys(self) -> None:
+        """Arrow keys, Enter and Escape belong to a menu or popup while one is open, and to the shortcuts otherwise."""
+        io = imgui.get_io()
+        self.is_popup_open = len(self.context.open_popup_stack) > 0
+        if self.is_popup_open:
+            io.config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
+        elif io.config_flags & imgui.ConfigFlags_.nav_enable_keyboard:
+            io.config_flags &= ~imgui.ConfigFlags_.nav_enable_keyboard
+            imgui.set_nav_cursor_visible(False)
+
+    def end_frame(self) -> int:
+        """Finish the frame; returns the fingerprint of what it draws (ui.redraw)."""
         imgui.render()
-        imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
         self._after_frame()
+        return fingerprint(imgui.get_draw_data())
+
+    def present(self) -> None:
+        """Draw the finished frame into the bound framebuffer."""
+        imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
 
     def _after_frame(self) -> None:
         self._keys_pressed_since_frame = False
@@ -217,7 +266,9 @@ class ImGuiBackend:
     # ---- events ----------------------------------------------------------------------------------------------
 
     def _move_to(self, x: float, y: float) -> None:
-        imgui.get_io().add_mouse_pos_event(float(x), float(self._window.height - self._row_offset - y))
+        width, height = self._window.get_size()
+        units = self._window.get_framebuffer_size()[0] / max(width, 1) / self.pixels_per_unit
+        imgui.get_io().add_mouse_pos_event(float(x) * units, float(height - self._row_offset - y) * units)
 
     def _mouse_motion(self, x: float, y: float, dx: float, dy: float) -> None:
         self._move_to(x, y)
@@ -234,6 +285,7 @@ class ImGuiBackend:
         self._click(x, y, button, False)
 
     def _click(self, x: float, y: float, button: int, is_down: bool) -> None:
+        self._is_alt_alone = False
         self._move_to(x, y)
         if button in _BUTTONS:
             imgui.get_io().add_mouse_button_event(_BUTTONS[button], is_down)
@@ -257,12 +309,15 @@ class ImGuiBackend:
         self._on_input()
 
     def _deactivate(self) -> None:
+        self._held_modifiers.clear()
+        self._is_alt_alone = False
         imgui.get_io().add_focus_event(False)
         self._on_input()
 
     def _key_press(self, symbol: int, modifiers: int) -> bool | None:
         imgui_key = _KEY_MAP.get(symbol)
-        if imgui_key is not None:
+        self._is_alt_alone = symbol in _ALT and not self._held_modifiers
+        if imgui_key is not None and not self._is_only_text(imgui_key):
             if int(imgui_key) not in _MODIFIER_OF:
                 self._keys_pressed_since_frame = True
             self._add_key(imgui_key, True)
@@ -271,6 +326,7 @@ class ImGuiBackend:
         return EVENT_HANDLED if symbol == key.ESCAPE else None
 
     def _key_release(self, symbol: int, modifiers: int) -> None:
+        self._was_alt_tapped |= symbol in _ALT and self._is_alt_alone
         imgui_key = _KEY_MAP.get(symbol)
         if imgui_key is None:
             return
@@ -281,10 +337,17 @@ class ImGuiBackend:
             self._add_key(imgui_key, False)
         self._on_input()
 
+    def _is_only_text(self, imgui_key: Any) -> bool:
+        """Is this key of interest only for the character it types? ImGui takes in one key per frame but any number of
+        characters: without this what is typed fast would appear slowly."""
+        is_chord = bool(self._held_modifiers - _SHIFT)
+        return imgui.get_io().want_text_input and not is_chord and int(imgui_key) in _TYPING
+
     def _add_key(self, imgui_key: Any, is_down: bool) -> None:
         io = imgui.get_io()
         modifier = _MODIFIER_OF.get(int(imgui_key))
         if modifier is not None:
+            (self._held_modifiers.add if is_down else self._held_modifiers.discard)(int(modifier))
             io.add_key_event(modifier, is_down)
         io.add_key_event(imgui_key, is_down)
 

@@ -24,10 +24,10 @@ from app.commands import (
     UndoMark,
 )
 from app.status import COMPARE_MODES
-from ui.panels.regions import TITLE as REGIONS
 from ui.panels.regions import begin_choosing
 from ui.region_tool import GROWTH
-from ui.state import Dispatch, UiState
+from ui.state import REGIONS, Dispatch, UiState
+from ui.ui_scale import next_choice
 
 Action = Callable[[Any, Dispatch, UiState], None]
 
@@ -46,6 +46,7 @@ class Shortcut:
         needs_choosing: Ignored unless a region is being chosen.
         repeats: Holding the key repeats the action.
         is_any_shift: With Shift or without, for signs that need it on some keyboards.
+        is_on: Of what can be on or off, whether it is; menus show a tick.
     """
 
     key_name: str
@@ -59,6 +60,7 @@ class Shortcut:
     needs_choosing: bool = False
     repeats: bool = False
     is_any_shift: bool = False
+    is_on: Callable[[Any], bool] | None = None
 
     @property
     def key(self) -> Any:
@@ -158,8 +160,16 @@ def _cycle_compare(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     set_compare(session, dispatch, COMPARE_MODES[(shown + 1) % len(COMPARE_MODES)])
 
 
+def _is_shown(name: str) -> Callable[[Any], bool]:
+    return lambda session: bool(getattr(session.overlays, name))
+
+
+def _are_marks_shown(session: Any) -> bool:
+    return all(getattr(session.overlays, name) for name in MARK_NAMES)
+
+
 def _toggle_overlays(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    is_all_shown = all(getattr(session.overlays, name) for name in MARK_NAMES)
+    is_all_shown = _are_marks_shown(session)
     for name in MARK_NAMES:
         if getattr(session.overlays, name) == is_all_shown:
             dispatch(ToggleOverlay(name))
@@ -233,6 +243,27 @@ def _undo_mark(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(UndoMark())
 
 
+def choose_scale(ui: UiState, scale: float | None) -> None:
+    """Draw the interface at another size from the next frame on; None follows the screen."""
+    ui.scale.chosen = scale
+    ui.redraw_within(0.0)
+
+
+def _scale_by(step: int) -> Action:
+    def change(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        choose_scale(ui, next_choice(ui.scale.wanted, step))
+
+    return change
+
+
+def _reset_scale(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    choose_scale(ui, None)
+
+
+def _menu(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    ui.is_menu_wanted = True
+
+
 def _help(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_help_open = not ui.is_help_open
 
@@ -247,7 +278,13 @@ def _quit(session: Any, dispatch: Dispatch, ui: UiState) -> None:
 
 TIME, VIEW, COMPARE, MARK, TRAIN, WINDOW = "Time", "View", "Show and compare", "Mark regions", "Train", "Window"
 
-_STEERING = {"needs_choosing": True, "repeats": True}
+_STEERING: dict[str, Any] = {"needs_choosing": True, "repeats": True}
+_SCALING: dict[str, Any] = {"is_ctrl": True, "is_any_shift": True, "needs_capture": False}
+
+
+def _overlay_row(digit: str, name: str, what: str) -> Shortcut:
+    return Shortcut(f"_{digit}", digit, f"Show or hide {what}", COMPARE, _toggle_overlay(name), is_on=_is_shown(name))
+
 
 SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("space", "Space", "Play or pause", TIME, _toggle_play),
@@ -264,12 +301,42 @@ SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("left_bracket", "[", "Look through the previous camera", VIEW, _camera_by(-1), repeats=True),
     Shortcut("right_bracket", "]", "Look through the next camera", VIEW, _camera_by(1), repeats=True),
     Shortcut("g", "G", "Compare with the captured picture: wipe, side by side, off", COMPARE, _cycle_compare),
-    Shortcut("tab", "Tab", "Show or hide cameras and anchors", COMPARE, _toggle_overlays),
-    Shortcut("_1", "1", "Show or hide cameras", COMPARE, _toggle_overlay("show_frusta")),
-    Shortcut("_2", "2", "Show or hide inherited anchors", COMPARE, _toggle_overlay("show_inherited")),
-    Shortcut("_3", "3", "Show or hide residual anchors", COMPARE, _toggle_overlay("show_residual")),
-    Shortcut("_4", "4", "Show or hide the point cloud", COMPARE, _toggle_overlay("show_points")),
-    Shortcut("_5", "5", "Show or hide marked regions", COMPARE, _toggle_overlay("show_regions")),
+    Shortcut("tab", "Tab", "Show or hide cameras and anchors", COMPARE, _toggle_overlays, is_on=_are_marks_shown),
+    Shortcut(
+        "_1", "1", "Show or hide cameras", COMPARE, _toggle_overlay("show_frusta"), is_on=_is_shown("show_frusta")
+    ),
+    Shortcut(
+        "_2",
+        "2",
+        "Show or hide inherited anchors",
+        COMPARE,
+        _toggle_overlay("show_inherited"),
+        is_on=_is_shown("show_inherited"),
+    ),
+    Shortcut(
+        "_3",
+        "3",
+        "Show or hide residual anchors",
+        COMPARE,
+        _toggle_overlay("show_residual"),
+        is_on=_is_shown("show_residual"),
+    ),
+    Shortcut(
+        "_4",
+        "4",
+        "Show or hide the point cloud",
+        COMPARE,
+        _toggle_overlay("show_points"),
+        is_on=_is_shown("show_points"),
+    ),
+    Shortcut(
+        "_5",
+        "5",
+        "Show or hide marked regions",
+        COMPARE,
+        _toggle_overlay("show_regions"),
+        is_on=_is_shown("show_regions"),
+    ),
     Shortcut("m", "M", "Mark a sphere as static or moving; again to switch", MARK, _choose_region),
     Shortcut("enter", "Enter", "Mark the chosen sphere", MARK, _mark_chosen, needs_choosing=True),
     Shortcut("escape", "Escape", "Leave without marking", MARK, _leave_choosing, needs_choosing=True),
@@ -287,6 +354,10 @@ SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("t", "T", "Train the next clip, pause or resume", TRAIN, _train),
     Shortcut("t", "Ctrl+T", "Stop training and keep what was learned", TRAIN, _stop_training, is_ctrl=True),
     Shortcut("o", "Ctrl+O", "Open a capture folder", WINDOW, _open, is_ctrl=True, needs_capture=False),
+    Shortcut("equal", "Ctrl++", "Larger interface", WINDOW, _scale_by(1), **_SCALING),
+    Shortcut("minus", "Ctrl+-", "Smaller interface", WINDOW, _scale_by(-1), **_SCALING),
+    Shortcut("_0", "Ctrl+0", "Interface at the screen's own size", WINDOW, _reset_scale, **_SCALING),
+    Shortcut("f10", "F10", "Menus (also Alt); arrow keys work in them", WINDOW, _menu, needs_capture=False),
     Shortcut("f1", "F1", "This sheet", WINDOW, _help, needs_capture=False),
     Shortcut("q", "Ctrl+Q", "Quit; what was learned is kept", WINDOW, _quit, is_ctrl=True, needs_capture=False),
 )
@@ -308,7 +379,7 @@ def handle_shortcuts(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     if ui.is_help_open and imgui.is_key_pressed(imgui.Key.escape, False):
         ui.is_help_open = False
         return
-    if io.want_text_input:
+    if io.want_text_input or ui.is_popup_open:  # the key that closes a menu does nothing else
         return
     for shortcut in SHORTCUTS:
         is_shift_right = shortcut.is_any_shift or shortcut.is_shift == io.key_shift

@@ -13,7 +13,11 @@ from imgui_bundle import ImVec2, imgui
 from ui.gl.image import Rect as PixelRect
 from ui.region_tool import RegionTool
 from ui.theme import Fonts
+from ui.ui_scale import UiScale
 
+VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
+PANELS = (CAPTURE, TRAINING, REGIONS, TIMELINE)
+"""Titles of the panels around the picture."""
 Dispatch = Callable[[object], None]
 """Takes one command of app.commands."""
 
@@ -48,21 +52,26 @@ class UiState:
 
     Attributes:
         fonts: Loaded faces.
+        scale: How large everything is drawn.
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
         regions: The region that is being chosen, and the one that stands out.
+        is_popup_open: Is a menu or another popup open, so that keys belong to it?
+        is_menu_wanted: Open the first menu, for the keyboard.
         wanted_panel: Title of a panel that is to come to the front, or None.
         redraw_in_s: Shortest wait after which some panel wants to be drawn again, or None.
     """
 
     fonts: Fonts = field(default_factory=Fonts)
+    scale: UiScale = field(default_factory=UiScale)
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
     wanted_panel: str | None = None
     is_help_open: bool = False
+    is_popup_open: bool = False
+    is_menu_wanted: bool = False
     is_open_requested: bool = False
     is_layout_reset_requested: bool = False
     redraw_in_s: float | None = None
-    frame_ms: float = 0.0
     quit_requested: bool = False
 
     def mark(self, name: str) -> None:

@@ -47,8 +47,6 @@ OUTLINE = rgb(58, 65, 77)
 TEXT = rgb(226, 230, 236)
 TEXT_DIM = rgb(150, 159, 173)
 TEXT_ON_ACCENT = rgb(10, 20, 30)
-STATUS_BAR = rgb(216, 221, 228)
-STATUS_TEXT = rgb(32, 38, 46)
 
 PLAYHEAD = rgb(255, 255, 255)
 
@@ -170,7 +168,7 @@ def apply_style() -> None:
         col.text_disabled: TEXT_DIM,
         col.window_bg: PANEL,
         col.child_bg: faded(PANEL, 0.0),
-        col.popup_bg: rgb(38, 43, 51, 0.98),
+        col.popup_bg: rgb(38, 43, 51),
         col.border: OUTLINE,
         col.frame_bg: BACKDROP,
         col.frame_bg_hovered: RAISED,

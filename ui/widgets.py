@@ -58,6 +58,20 @@ def chip(draw: Any, x: float, y: float, text: str, *, color: theme.Color = theme
     return plate.x1
 
 
-def grouped(number: int) -> str:
-    """An integer with thin spaces between thousands."""
-    return f"{number:,}".replace(",", "\u2009")
+def elided(text: str, width: float) -> str:
+    """The text, or as much of its beginning as fits into a width, with three dots."""
+    if imgui.calc_text_size(text).x <= width:
+        return text
+    fits, too_long = 0, len(text)
+    while too_long - fits > 1:
+        middle = (fits + too_long) // 2
+        if imgui.calc_text_size(f"{text[:middle].rstrip()}...").x <= width:
+            fits = middle
+        else:
+            too_long = middle
+    return f"{text[:fits].rstrip()}..."
+
+
+def format_count(number: int) -> str:
+    """A count as it is written everywhere: 4,320."""
+    return f"{number:,}"

@@ -132,8 +132,8 @@ class StudioWindow:
     def draw(self) -> None:
         """Draw one frame now."""
         self.window.switch_to()
-        self.frame.draw()
-        self.window.flip()
+        if self.frame.draw():
+            self.window.flip()
 
     def settle(self, frames: int = 4, *, until_idle_s: float = 0.0) -> None:
         """Draw some frames without an event loop, for tests and pictures of the window.
@@ -167,11 +167,11 @@ class StudioWindow:
         return EVENT_HANDLED  # the default would close the window before GL objects are released
 
     def _resized(self, width: int, height: int) -> bool:
-        self.frame.request_redraw()
+        self.frame.forget_shown()
         return EVENT_HANDLED
 
     def _exposed(self) -> None:
-        self.frame.request_redraw()
+        self.frame.forget_shown()
 
     def close(self) -> None:
         """Stop the session, then release GL, ImGui and the window. Safe to call twice."""

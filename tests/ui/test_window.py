@@ -380,7 +380,8 @@ def test_screenshot_is_upright_and_written_whole(pilot: Pilot, tmp_path: Path) -
     with Image.open(path) as stored:
         image = np.asarray(stored)
     assert image.shape == (800, 1280, 3)
-    assert image[-4:].mean() > 180, "the light status bar is at the bottom"
+    assert image[-20:, :300].max() > 140, "the status bar's text is at the bottom left"
+    assert image[-20:, 300:900].max() < 60, "the status bar is dark as the menu bar is"
     assert image[:4].mean() < 60, "the dark menu bar is at the top"
     assert [entry.name for entry in path.parent.iterdir()] == ["window.png"]
 

@@ -4,6 +4,7 @@ Whoever makes one of these objects releases it, on the thread of its context.
 """
 
 from ui.gl.camera import NEAR, clip_matrix, resized_K
+from ui.gl.changes import n_changes, note_change
 from ui.gl.context import ContextError, free_dropped, is_software, make_headless_context, renderer_name
 from ui.gl.image import ImagePainter, ImageTexture, Rect, fit_rect
 from ui.gl.lines import LineRenderer, frusta_lines
@@ -29,6 +30,8 @@ __all__ = [
     "frusta_lines",
     "is_software",
     "make_headless_context",
+    "n_changes",
+    "note_change",
     "renderer_name",
     "resized_K",
 ]

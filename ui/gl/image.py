@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
+from ui.gl.changes import note_change
 from ui.gl.shaders import load_program
 
 if TYPE_CHECKING:
@@ -109,6 +110,7 @@ class ImageTexture:
             self._texture.repeat_x = self._texture.repeat_y = False
         self._texture.write(np.ascontiguousarray(image), alignment=1)
         self._key = key
+        note_change()
         return True
 
     def release(self) -> None:

@@ -11,6 +11,7 @@ from typing import Literal
 import moderngl
 import numpy as np
 
+from ui.gl.changes import note_change
 from ui.gl.image import ImagePainter, ImageTexture, Rect
 from ui.gl.shaders import load_program
 
@@ -135,6 +136,7 @@ class Target:
         Returns:
             The RGBA8 picture, also at `texture`; opaque unless background is None.
         """
+        note_change()
         if self.is_direct:
             return self.texture
         assert self._color is not None, "the target was released"

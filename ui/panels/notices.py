@@ -62,7 +62,7 @@ class NoticesPanel:
         flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_move
         flags |= imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_focus_on_appearing
         flags |= imgui.WindowFlags_.no_nav | imgui.WindowFlags_.always_auto_resize
-        imgui.push_style_color(imgui.Col_.window_bg, ImVec4(*theme.rgb(44, 49, 58, 0.98)))
+        imgui.push_style_color(imgui.Col_.window_bg, ImVec4(*theme.RAISED))
         imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(18, 12))
         imgui.begin(f"##toast{id(notice)}", None, flags)
         imgui.pop_style_var()

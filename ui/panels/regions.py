@@ -10,18 +10,17 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from app.commands import RemoveRegion, UndoMark
 from ui import theme
 from ui.region_tool import REGION_WORDS
-from ui.state import Dispatch, Rect, UiState
+from ui.state import REGIONS, Dispatch, Rect, UiState
 from ui.theme import Icon
-from ui.widgets import chip, grouped, primary_button, text_wrapped_dim
+from ui.widgets import chip, format_count, primary_button, text_wrapped_dim
 
-TITLE = "Regions"
 MEANINGS = {"static": "Nothing moves or changes in here.", "dynamic": "Everything in here may move or change."}
 ROW_HEIGHT = 44.0
 
 
 def begin_choosing(session: Any, ui: UiState) -> None:
     """Start choosing a sphere, or switch what it means; where nothing can be marked the panel says why."""
-    ui.wanted_panel = TITLE
+    ui.wanted_panel = REGIONS
     if session.regions.can_mark:
         ui.regions.begin()
     else:
@@ -186,4 +185,4 @@ def draw_chosen_sphere(ui: UiState, draw: Any, area: Rect, counts: dict[str, int
 def _held_text(counts: dict[str, int]) -> str:
     if not counts:
         return ""
-    return ",  holds " + ", ".join(f"{grouped(n)} {role}" for role, n in counts.items()) + " anchors"
+    return ",  holds " + ", ".join(f"{format_count(n)} {role}" for role, n in counts.items()) + " anchors"

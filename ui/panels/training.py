@@ -14,7 +14,7 @@ from ui.panels.plan import draw_plan
 from ui.panels.timeline import STATE_WORDS
 from ui.state import Dispatch, UiState
 from ui.theme import Icon
-from ui.widgets import grouped, primary_button, text_right, text_wrapped_dim
+from ui.widgets import format_count, primary_button, text_right, text_wrapped_dim
 
 MAX_PLOT_POINTS = 600
 
@@ -115,7 +115,7 @@ def _draw_progress(status: Any, ui: UiState) -> None:
     imgui.pop_style_color()
     ui.mark("training.progress")
     if is_stepping:
-        _pair(f"Step {grouped(status.step)} of {grouped(status.n_steps)}", f"{share * 100:.0f} %")
+        _pair(f"Step {format_count(status.step)} of {format_count(status.n_steps)}", f"{share * 100:.0f} %")
         rate = f"{status.steps_per_s:.1f} steps/s" if status.steps_per_s else "–"
         _pair(rate, f"{duration_text(status.eta_s)} left")
     elif status.eta_s is not None:
@@ -193,7 +193,7 @@ def _draw_clips(session: Any) -> None:
         imgui.table_next_column()
         imgui.text("–" if status.held_out_psnr is None else f"{status.held_out_psnr:.1f}")
         imgui.table_next_column()
-        imgui.text(grouped(status.n_inherited) if status.n_inherited else "–")
+        imgui.text(format_count(status.n_inherited) if status.n_inherited else "–")
         imgui.table_next_column()
-        imgui.text(grouped(status.n_own) if status.n_own else "–")
+        imgui.text(format_count(status.n_own) if status.n_own else "–")
     imgui.end_table()

@@ -23,7 +23,7 @@ from ui.scene import Scene, SceneView
 from ui.shortcuts import set_compare, shown_compare
 from ui.state import Dispatch, Rect, UiState
 from ui.theme import Icon
-from ui.widgets import chip, grouped
+from ui.widgets import chip, format_count
 
 MOVING_S = 0.22
 """The view counts as moving for this long after the last change of it."""
@@ -388,11 +388,11 @@ class ViewportPanel:
         rows = []
         if session.overlays.show_inherited and counts.n_inherited:
             kind = "reference" if counts.is_reference else "inherited"
-            rows.append(("circle", theme.INHERITED, f"{grouped(counts.n_inherited)} {kind} anchors"))
+            rows.append(("circle", theme.INHERITED, f"{format_count(counts.n_inherited)} {kind} anchors"))
             rows += _role_rows("circle", counts.inherited_roles)
         if session.overlays.show_residual and counts.n_residual:
             kind = "residual" if len(counts.residual_roles) < 2 else "own"
-            rows.append(("diamond", theme.RESIDUAL, f"{grouped(counts.n_residual)} {kind} anchors"))
+            rows.append(("diamond", theme.RESIDUAL, f"{format_count(counts.n_residual)} {kind} anchors"))
             rows += _role_rows("diamond", counts.residual_roles)
         if session.overlays.show_regions:
             for treat, words in REGION_WORDS.items():
@@ -422,7 +422,7 @@ def _role_rows(shape: str, counts: dict[str, int]) -> list[tuple[str, theme.Colo
     """Legend of anchors by what they are; nothing where they are all the same."""
     if len(counts) < 2:
         return []
-    return [(shape, theme.ROLE_COLORS[role], f"{grouped(n)} {role}") for role, n in counts.items()]
+    return [(shape, theme.ROLE_COLORS[role], f"{format_count(n)} {role}") for role, n in counts.items()]
 
 
 def _segment(label: str, is_on: bool) -> bool:

@@ -1,0 +1,113 @@
+"""The menu bar. Entries that have a key come from the table of shortcuts, so that both say the same."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from imgui_bundle import imgui
+
+from app.commands import OpenCapture
+from ui.panels.welcome import SAMPLE_PATH
+from ui.shortcuts import COMPARE, MARK, SHORTCUTS, VIEW, choose_scale, train_or_pause
+from ui.state import PANELS, Dispatch, UiState
+from ui.theme import Icon
+from ui.ui_scale import CHOICES, scale_text
+
+FIRST_MENU = "File"
+
+
+def draw_menu_bar(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    """All menus, and the name of what is open at the right end."""
+    if not imgui.begin_main_menu_bar():
+        return
+    if ui.is_menu_wanted:
+        ui.is_menu_wanted = False
+        imgui.open_popup(FIRST_MENU)
+    has_capture = session.capture is not None
+    if _begin_menu(FIRST_MENU, ui):
+        if _item(ui, f"{Icon.FOLDER}  Open a capture folder", "Ctrl+O"):
+            ui.is_open_requested = True
+        if SAMPLE_PATH.is_dir() and _item(ui, f"{Icon.FILM}  Open the sample capture"):
+            dispatch(OpenCapture(SAMPLE_PATH))
+        imgui.separator()
+        if _item(ui, "Quit", "Ctrl+Q"):
+            ui.quit_requested = True
+        imgui.end_menu()
+    if _begin_menu("View", ui):
+        imgui.begin_disabled(not has_capture)
+        _draw_rows((VIEW, COMPARE), session, dispatch, ui)
+        imgui.end_disabled()
+        imgui.separator()
+        _draw_scale_menu(ui)
+        imgui.end_menu()
+    if _begin_menu("Train", ui, is_enabled=has_capture):
+        is_going = session.training.state in ("starting", "preparing", "running")
+        label = "Pause" if is_going else "Resume" if session.training.state == "paused" else "Train next clip"
+        if _item(ui, f"{Icon.TRAIN}  {label}", "T"):
+            train_or_pause(session, dispatch)
+        imgui.end_menu()
+    if _begin_menu("Mark", ui, is_enabled=has_capture):
+        _draw_rows((MARK,), session, dispatch, ui)
+        imgui.end_menu()
+    if _begin_menu("Window", ui):
+        _draw_window_menu(ui)
+        imgui.end_menu()
+    _draw_name(session)
+    imgui.end_main_menu_bar()
+
+
+def _begin_menu(title: str, ui: UiState, *, is_enabled: bool = True) -> bool:
+    is_open = imgui.begin_menu(title, is_enabled)
+    if not is_open:
+        ui.mark(f"menu.{title}")
+    return is_open
+
+
+def _item(ui: UiState, label: str, key_label: str = "", *, is_on: bool = False) -> bool:
+    is_chosen = imgui.menu_item(label, key_label, is_on, True)[0]
+    ui.mark(f"menu.{label.rpartition('  ')[2]}")
+    return is_chosen
+
+
+def _draw_rows(groups: tuple[str, ...], session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    for shortcut in SHORTCUTS:
+        if shortcut.group not in groups or (shortcut.needs_choosing and not ui.regions.is_active):
+            continue
+        is_on = shortcut.is_on is not None and session.capture is not None and shortcut.is_on(session)
+        if _item(ui, shortcut.text, shortcut.label, is_on=is_on):
+            shortcut.action(session, dispatch, ui)
+
+
+def _draw_scale_menu(ui: UiState) -> None:
+    if not imgui.begin_menu("Size of the interface"):
+        ui.mark("menu.scale")
+        return
+    scale = ui.scale
+    if _item(ui, f"Automatic ({scale_text(scale.of_screen)})", "Ctrl+0", is_on=scale.chosen is None):
+        choose_scale(ui, None)
+    for choice in CHOICES:
+        if _item(ui, scale_text(choice), is_on=scale.chosen == choice):
+            choose_scale(ui, choice)
+    imgui.separator()
+    imgui.text_disabled("Ctrl + plus and Ctrl + minus change it, too")
+    imgui.end_menu()
+
+
+def _draw_window_menu(ui: UiState) -> None:
+    for title in PANELS:
+        if _item(ui, title):
+            ui.wanted_panel = title
+    imgui.separator()
+    if _item(ui, "Reset the layout"):
+        ui.is_layout_reset_requested = True
+    if _item(ui, f"{Icon.HELP}  Keys and mouse", "F1", is_on=ui.is_help_open):
+        ui.is_help_open = not ui.is_help_open
+
+
+def _draw_name(session: Any) -> None:
+    name = session.capture.path.name if session.capture is not None else "no capture open"
+    width = imgui.calc_text_size(name).x
+    left = imgui.get_window_width() - width - 24
+    if left > imgui.get_cursor_pos_x():
+        imgui.same_line(left)
+        imgui.text_disabled(name)
