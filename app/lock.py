@@ -26,13 +26,13 @@ from typing import TYPE_CHECKING
 from app.printable import printable
 from engine.errors import ProjectError
 from engine.files import atomic_path
+from engine.json_files import JsonError, read_json_object
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock
 
 MAX_OWNER_BYTES = 4096
 """What says who owns a lock is shorter; a longer file is something else."""
-_MAX_WORD = 120
 _UNSUPPORTED = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL}
 """What file systems answer that have no locks."""
 
@@ -245,16 +245,12 @@ class ProcessLock:
 def read_owner(path: Path) -> LockOwner | None:
     """Who owns a lock; None where no file says so, or one that no program of ours can have written."""
     try:
-        if not stat.S_ISREG(path.lstat().st_mode):
-            return None
-        with path.open("rb") as file:
-            data = file.read(MAX_OWNER_BYTES + 1)
-        content = json.loads(data.decode("utf-8")) if len(data) <= MAX_OWNER_BYTES else None
-        if not isinstance(content, dict) or type(content.get("pid")) is not int:
-            return None
-        words = {name: content.get(name, "") for name in ("start", "host", "machine", "boot", "since")}
-    except (OSError, ValueError, RecursionError):
+        content = read_json_object(path, max_bytes=MAX_OWNER_BYTES)
+    except (OSError, JsonError):
         return None
-    if not all(isinstance(word, str) and len(word) <= _MAX_WORD for word in words.values()):
+    if type(content.get("pid")) is not int:
+        return None
+    words = {name: content.get(name, "") for name in ("start", "host", "machine", "boot", "since")}
+    if not all(isinstance(word, str) for word in words.values()):
         return None
     return LockOwner(content["pid"], **words)

@@ -15,8 +15,12 @@ from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from engine.kernels.cache import is_cache_warm, use_kernel_cache, write_marker
+
+if TYPE_CHECKING:
+    from filelock import BaseFileLock
 
 logger = logging.getLogger(__name__)
 
@@ -37,8 +41,6 @@ MAX_PROCESSES = 4
 TIME_LIMIT_S = 180.0
 POLL_S = 0.05
 LOCK = "compiling.lock"
-LOCK_STALE_S = 10.0
-"""A lock that was not renewed for so long belongs to a process that has died."""
 
 ReportGroups = Callable[[int, int, str], None]
 """Groups done, groups in all, and what is compiled now. Called often; may raise to cancel."""
@@ -71,10 +73,11 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
     report = report or (lambda done, n, what: None)
     folder = use_kernel_cache()
     n = len(GROUPS)
-    lock = folder / LOCK
-    while not _take(lock):
+    lock = _take(folder / LOCK)
+    while lock is not None and not lock.is_locked:
         report(0, n, "another program compiles")
         time.sleep(POLL_S)
+        lock = _take(folder / LOCK)
     running: list[tuple[_Bundle, subprocess.Popen[bytes], float]] = []
     n_done, is_fine = 0, True
     try:
@@ -84,7 +87,6 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
             running.append((bundle, _start(bundle), time.monotonic()))
         while running:
             report(n_done, n, " and ".join(_names(bundle) for bundle, _, _ in running))
-            _renew(lock)
             time.sleep(POLL_S)
             for item in list(running):
                 bundle, process, started_s = item
@@ -102,8 +104,9 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
         for _, process, _ in running:
             process.kill()
             process.communicate()
-        with suppress(OSError):
-            lock.unlink(missing_ok=True)
+        if lock is not None:
+            with suppress(OSError):
+                lock.release()
 
 
 _Bundle = tuple[tuple[str, str, float], ...]
@@ -150,24 +153,22 @@ def _end(name: str, process: subprocess.Popen[bytes], seconds: float) -> bool:
     return False
 
 
-def _take(lock: Path) -> bool:
-    """Whether the lock is ours now. True as well where no lock can be made: better twice than never."""
+def _take(path: Path) -> BaseFileLock | None:
+    """The system's lock on a file, which ends with this process; `is_locked` says whether it is ours now.
+
+    None where no lock can be made: compiling twice is better than never.
+    """
+    from filelock import FileLock, Timeout  # only where there is something to compile
+
+    lock = FileLock(path)
     try:
-        lock.parent.mkdir(parents=True, exist_ok=True)
-        os.close(os.open(lock, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
-    except FileExistsError:
-        with suppress(OSError):
-            if time.time() - lock.stat().st_mtime > LOCK_STALE_S:
-                lock.unlink(missing_ok=True)
-        return False
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock.acquire(blocking=False)
+    except Timeout:
+        return lock
     except OSError:
-        return True
-    return True
-
-
-def _renew(lock: Path) -> None:
-    with suppress(OSError):
-        os.utime(lock)
+        return None
+    return lock
 
 
 def _n_cores() -> int:
