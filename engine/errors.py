@@ -16,6 +16,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from engine.text import printable
+
+MAX_LISTED_PROBLEMS = 20
+"""Problems of a capture that its message lists; all are kept."""
+
 
 class EngineError(Exception):
     """A failure with a cause, a hint and where it happened.
@@ -27,19 +32,23 @@ class EngineError(Exception):
     """
 
     def __init__(self, message: str, *, hint: str = "", path: Path | str | None = None) -> None:
-        self.message = message
-        self.hint = hint
+        self.message = printable(message)  # names and values of files go into it
+        self.hint = printable(hint)
         self.path = None if path is None else Path(path)
         super().__init__(str(self))
 
     def __str__(self) -> str:
         text = " ".join(part for part in (self.message, self.hint) if part)
-        return f"{text} - {self.path}" if self.path is not None else text
+        return f"{text} - {self._place}" if self.path is not None else text
+
+    @property
+    def _place(self) -> str:
+        return printable(str(self.path)).replace("\n", "\\n")
 
     def told_apart(self) -> tuple[str, str]:
         """What happened and what to do, for those who show them apart. Joined by a space they are str(self)."""
         if self.hint and self.path is not None:
-            return self.message, f"{self.hint} - {self.path}"
+            return self.message, f"{self.hint} - {self._place}"
         return str(EngineError(self.message, path=self.path)), self.hint
 
     def __reduce__(self) -> tuple[Any, ...]:  # keeps keyword-only arguments through a process boundary
@@ -69,7 +78,9 @@ class CaptureError(EngineError):
         return (_rebuild_capture_error, (self.message, self.hint, self.path, self.problems))
 
     def __str__(self) -> str:
-        return "\n".join([super().__str__(), *(f"  {problem}" for problem in self.problems)])
+        listed = [f"  {problem}" for problem in self.problems[:MAX_LISTED_PROBLEMS]]
+        n_more = len(self.problems) - len(listed)
+        return "\n".join([super().__str__(), *listed, *([f"  and {n_more} more like these."] if n_more else [])])
 
     def told_apart(self) -> tuple[str, str]:
         """As of every error; listed problems carry their own hints and stand with what happened."""

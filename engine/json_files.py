@@ -7,6 +7,7 @@ it by hand takes the entry out. It covers the values, not the spaces between the
 from __future__ import annotations
 
 import json
+import math
 import re
 import zlib
 from pathlib import Path
@@ -119,6 +120,29 @@ def read_json_object(path: Path | str, *, max_bytes: int = MAX_JSON_BYTES) -> di
         JsonError: See `parse_object`.
     """
     return parse_object(read_bytes(path, max_bytes=max_bytes))
+
+
+def json_text(document: Any, *, indent: int | None = None) -> str:
+    """A document as JSON for others to read: what is not a finite number becomes null, since JSON has no NaN.
+
+    Only ASCII characters, so that it can be printed anywhere, whatever names it holds.
+    """
+    try:
+        return json.dumps(document, indent=indent, allow_nan=False)
+    except ValueError:  # NaN is rare
+        return json.dumps(_without_nan(document), indent=indent, allow_nan=False)
+
+
+def _without_nan(value: Any) -> Any:
+    match value:
+        case float():
+            return value if math.isfinite(value) else None
+        case dict():
+            return {key: _without_nan(child) for key, child in value.items()}
+        case list() | tuple():
+            return [_without_nan(child) for child in value]
+        case _:
+            return value
 
 
 def write_checked_json(path: Path | str, document: dict[str, Any], *, is_durable: bool = False) -> None:

@@ -9,6 +9,7 @@ from engine.json_files import (
     CHECKSUM,
     JsonError,
     checked_line,
+    json_text,
     parse_json,
     read_checked_json,
     read_checked_lines,
@@ -146,3 +147,10 @@ def test_content_and_folder_are_flushed_around_the_rename(tmp_path: Path, monkey
     write_checked_json(tmp_path / "a.json", {}, is_durable=True)
     assert done == ["rename", "file", "rename", "folder"]
     assert json_files.read_checked_json(tmp_path / "a.json") == {}
+
+
+def test_json_for_others_has_null_where_there_is_no_number_and_is_ascii() -> None:
+    found = json_text({"a": [float("nan"), 1.5, (float("inf"),)], "b": {"c": -float("inf")}, "d": "half \ud800 \x1b"})
+    assert json.loads(found) == {"a": [None, 1.5, [None]], "b": {"c": None}, "d": "half \ud800 \x1b"}
+    assert found.isascii()
+    assert found.isprintable()

@@ -22,6 +22,8 @@ def draw_menu_bar(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         return
     if ui.is_menu_wanted:
         ui.is_menu_wanted = False
+        bar = imgui.internal.get_current_window()
+        imgui.internal.set_focus_id(bar.get_id(FIRST_MENU), bar)  # from there the arrow keys go to the other menus
         imgui.open_popup(FIRST_MENU)
     has_capture = session.capture is not None
     if _begin_menu(FIRST_MENU, ui):
@@ -57,6 +59,9 @@ def draw_menu_bar(session: Any, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _begin_menu(title: str, ui: UiState, *, is_enabled: bool = True) -> bool:
+    menu_id = imgui.internal.get_current_window().get_id(title)
+    if is_enabled and imgui.get_current_context().nav_just_moved_to_id == menu_id:
+        imgui.open_popup(title)  # an arrow key went on to this menu: it opens as under the pointer
     is_open = imgui.begin_menu(title, is_enabled)
     if not is_open:
         ui.mark(f"menu.{title}")

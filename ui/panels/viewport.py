@@ -31,6 +31,8 @@ WIPE_GRAB_PX = 9.0
 CLICK_PX = 4.0
 """A press that moves less than this before its release is a click, where clicks mean something."""
 TOOLBAR_HEIGHT = 38.0
+TOOLBAR_WIDTH = 610.0
+"""With less room, words give way to symbols."""
 STALE_AFTER_S = 0.15
 COMPARE_WORDS = {"off": "Off", "wipe": "Wipe", "side": "Side by side"}
 
@@ -134,10 +136,13 @@ class ViewportPanel:
         imgui.set_cursor_pos(ImVec2(imgui.get_cursor_pos_x() + 8, imgui.get_cursor_pos_y() + 6))
         shown = session.view.look_through
         names = session.rig.names
+        room = imgui.get_content_region_avail().x
+        is_roomy = room > TOOLBAR_WIDTH
         imgui.align_text_to_frame_padding()
-        imgui.text_disabled("View")
-        imgui.same_line()
-        imgui.set_next_item_width(150)
+        if is_roomy:
+            imgui.text_disabled("View")
+            imgui.same_line()
+        imgui.set_next_item_width(150 if is_roomy else min(120, max(room - 230, 40)))
         if imgui.begin_combo("##camera", "Free" if shown is None else names[shown]):
             if imgui.selectable("Free", shown is None)[0]:
                 dispatch(LookThrough(None))
@@ -147,22 +152,25 @@ class ViewportPanel:
             imgui.end_combo()
         ui.mark("viewport.camera")
         imgui.set_item_tooltip("Look through a capture camera ([ and ])")
-        imgui.same_line(0, 18)
-        imgui.text_disabled("Compare")
-        for mode in COMPARE_MODES:
-            imgui.same_line(0, 8 if mode == "off" else 2)
-            if _segment(COMPARE_WORDS[mode], shown_compare(session) == mode):
-                set_compare(session, dispatch, mode)
-            ui.mark(f"viewport.compare.{mode}")
-            imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")
-        imgui.same_line(0, 18)
-        if imgui.button(f"{Icon.EYE}  Show"):
+        imgui.same_line(0, 18 if is_roomy else 8)
+        if is_roomy:
+            imgui.text_disabled("Compare")
+            for mode in COMPARE_MODES:
+                imgui.same_line(0, 8 if mode == "off" else 2)
+                if _segment(COMPARE_WORDS[mode], shown_compare(session) == mode):
+                    set_compare(session, dispatch, mode)
+                ui.mark(f"viewport.compare.{mode}")
+                imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")
+        else:
+            self._draw_compare_box(session, dispatch, ui)
+        imgui.same_line(0, 18 if is_roomy else 8)
+        if imgui.button(f"{Icon.EYE}  Show" if is_roomy else f"{Icon.EYE}##show"):
             imgui.open_popup("overlays")
         ui.mark("viewport.overlays")
         self._draw_overlay_menu(session, dispatch, ui)
         imgui.same_line(0, 8)
         imgui.begin_disabled(not session.regions.can_mark)
-        if _segment(f"{Icon.REGION}  Mark", ui.regions.is_active):
+        if _segment(f"{Icon.REGION}  Mark" if is_roomy else Icon.REGION, ui.regions.is_active):
             if ui.regions.is_active:
                 ui.regions.leave()
             else:
@@ -172,6 +180,19 @@ class ViewportPanel:
         words = session.regions.why_not or "Say of a part of the scene that it is static, or that it moves (M)"
         if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
             imgui.set_tooltip(words)
+
+    def _draw_compare_box(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        """All ways to compare in one place, where there is no room for buttons."""
+        shown = shown_compare(session)
+        imgui.set_next_item_width(118)
+        if imgui.begin_combo("##compare", "Compare" if shown == "off" else COMPARE_WORDS[shown]):
+            for mode in COMPARE_MODES:
+                if imgui.selectable(COMPARE_WORDS[mode], shown == mode)[0]:
+                    set_compare(session, dispatch, mode)
+                ui.mark(f"viewport.compare.{mode}")
+            imgui.end_combo()
+        ui.mark("viewport.compare")
+        imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")
 
     def _draw_overlay_menu(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
         if not imgui.begin_popup("overlays"):
@@ -186,6 +207,7 @@ class ViewportPanel:
         for name, label, key_label in rows:
             if imgui.menu_item(label, key_label, bool(getattr(session.overlays, name)), True)[0]:
                 dispatch(ToggleOverlay(name))
+            ui.mark(f"show.{name}")
         imgui.separator()
         imgui.text_disabled("Tab hides or shows cameras and anchors")
         imgui.end_popup()

@@ -1,0 +1,27 @@
+"""Text that came from a file or a path, made fit for a message: no control characters, not endless."""
+
+from __future__ import annotations
+
+MAX_SHOWN = 60
+"""Characters of a value from a file that one message repeats."""
+
+
+def printable(text: str) -> str:
+    """The text with everything but line breaks that a terminal would obey, or could not print, written as an escape.
+
+    ESC sequences, other control characters, marks that turn the reading direction and halves of characters become
+    backslash escapes; ordinary text, in any script, stays as it is.
+    """
+    if text.isprintable():
+        return text
+    return "".join(sign if sign.isprintable() or sign in "\n\u00a0" else _escaped(sign) for sign in text)
+
+
+def shown(value: object) -> str:
+    """A value as a message repeats it: as Python writes it, cut off after MAX_SHOWN characters."""
+    text = repr(value if not isinstance(value, str) else value[: MAX_SHOWN + 1])
+    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."
+
+
+def _escaped(sign: str) -> str:
+    return sign.encode("unicode_escape").decode("ascii")
