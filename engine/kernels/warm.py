@@ -17,7 +17,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from engine.kernels.cache import is_cache_warm, use_kernel_cache, write_marker
+from engine.kernels.cache import VARIABLE, current_key, kernel_folder, read_marker, write_marker
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock
@@ -68,10 +68,10 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
         report: See `warm_up_all`.
         n_processes: How many at a time; as many as cores when None, MAX_PROCESSES at most.
     """
-    if is_cache_warm():
+    folder = kernel_folder()
+    if read_marker(folder) == current_key():
         return True
     report = report or (lambda done, n, what: None)
-    folder = use_kernel_cache()
     n = len(GROUPS)
     lock = _take(folder / LOCK)
     while lock is not None and not lock.is_locked:
@@ -81,10 +81,10 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
     running: list[tuple[_Bundle, subprocess.Popen[bytes], float]] = []
     n_done, is_fine = 0, True
     try:
-        if is_cache_warm():  # the program we waited for has done it
+        if read_marker(folder) == current_key():  # the program we waited for has done it
             return True
         for bundle in _bundles(min(n_processes or _n_cores(), MAX_PROCESSES)):
-            running.append((bundle, _start(bundle), time.monotonic()))
+            running.append((bundle, _start(bundle, folder), time.monotonic()))
         while running:
             report(n_done, n, " and ".join(_names(bundle) for bundle, _, _ in running))
             time.sleep(POLL_S)
@@ -126,14 +126,14 @@ def _names(bundle: _Bundle) -> str:
     return ", ".join(name for name, _, _ in bundle)
 
 
-def _start(bundle: _Bundle) -> subprocess.Popen[bytes]:
+def _start(bundle: _Bundle, folder: Path) -> subprocess.Popen[bytes]:
     root = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
     calls = "; ".join(f"import_module({module!r}).warm_up()" for _, module, _ in bundle)
     return subprocess.Popen(
         # a compiler makes millions of objects that live on: looking for garbage among them takes a fifth of the time
         [sys.executable, "-c", f"import gc; gc.disable(); from importlib import import_module; {calls}"],
-        env={**os.environ, "PYTHONPATH": path},
+        env={**os.environ, "PYTHONPATH": path, VARIABLE: str(folder)},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,

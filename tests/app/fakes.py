@@ -5,6 +5,7 @@ no torch, no clouds.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -194,9 +195,14 @@ def make_slow(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining
     return training
 
 
+def make_telling(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
+    """Like make_fake; the environment of its process goes to a file in the project."""
+    (Path(job.project) / "environment.json").write_text(json.dumps(dict(os.environ)))
+    return make_fake(job, report)
+
+
 def make_crashing(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
     """Ends its process without a word."""
-    import os
     import signal
 
     os.kill(os.getpid(), signal.SIGKILL)

@@ -206,13 +206,30 @@ def test_no_home_at_all_is_no_failure(monkeypatch):
     assert use_kernel_cache().is_relative_to(tempfile.gettempdir())
 
 
-def test_importing_engine_sets_the_folder_and_imports_no_numba(tmp_path):
-    probe = "import engine, os, sys; print(os.environ['NUMBA_CACHE_DIR']); print('numba' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", probe], cwd=ROOT, capture_output=True, text=True, check=True)
-    folder, has_numba = done.stdout.split()
-    assert Path(folder).name == current_key().folder_name
-    assert Path(folder).is_relative_to(tmp_path)
-    assert has_numba == "False"
+IMPORTS = """
+import os
+before = dict(os.environ)
+import engine, engine.kernels.cache, engine.kernels.warm, engine.errors
+assert "numba" not in __import__("sys").modules
+import numba, torch
+between = dict(os.environ)
+import engine.kernels.threads, engine.model.decoding, engine.raster.rasterize
+import engine.cloud.sweep, engine.training.losses
+after = dict(os.environ)
+from numba.core import config
+print(sorted(set(after.items()) ^ set(between.items())), repr(config.CACHE_DIR))
+print([name for name in after if name.startswith(("NUMBA", "GOMP")) and name not in before])
+print(engine.kernels.cache.current_key.cache_info().currsize)
+"""
+
+
+def test_importing_engine_leaves_the_process_as_it_is():
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA", "GOMP"))}
+    done = subprocess.run(
+        [sys.executable, "-c", IMPORTS], cwd=ROOT, capture_output=True, text=True, check=False, env=environment
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines() == ["[] ''", "[]", "0"]  # no setting, no folder, no hash of the sources
 
 
 # ---------------------------------------------------------------- the marker
