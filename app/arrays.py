@@ -21,7 +21,8 @@ class GaussianArrays:
         colors: [N, 3] in 0..1.
         key: Changes when the content does.
         near_plane: Nearest depth that should be drawn, scene units.
-        clip_index, frame_index: What it shows.
+        clip_index, frame_index, revision: What it shows: a frame, and the state of the clip it was decoded from.
+        step: Training steps behind that state; None when unknown.
     """
 
     means: np.ndarray
@@ -33,6 +34,8 @@ class GaussianArrays:
     near_plane: float = 0.01
     clip_index: int = 0
     frame_index: int = 0
+    revision: str = ""
+    step: int | None = None
 
     def __len__(self) -> int:
         return len(self.means)
@@ -54,6 +57,7 @@ class AnchorArrays:
         inherited_roles, own_roles: What each anchor is, in engine.model.roles.ROLES; None where nobody says.
             [A0], [A] uint8
         inherited_reasons, own_reasons: Why the gate decided so, codes of engine.cloud.reasons. [A0], [A] uint8
+        clip_index, frame_index: What they are of; None for all anchors of the clip.
     """
 
     inherited_positions: np.ndarray
@@ -63,6 +67,8 @@ class AnchorArrays:
     own_roles: np.ndarray | None = None
     inherited_reasons: np.ndarray | None = None
     own_reasons: np.ndarray | None = None
+    clip_index: int | None = None
+    frame_index: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,15 +76,21 @@ class PointArrays:
     """A coloured cloud: points [P, 3] scene units and colors [P, 3] in 0..1, float32. Unpacks as points, colors, key.
 
     Attributes:
-        is_hint: Captured pictures placed in space, because there is no cloud yet.
+        kind: What it is of: "static" (what stands still in a trained reference clip), "moment" (a first rough cloud
+            of one frame) or "pictures" (captured pictures placed in space, because there is no cloud yet).
         spacing: Usual distance between neighbours, scene units; 0 when unknown.
     """
 
     points: np.ndarray
     colors: np.ndarray
     key: Hashable
-    is_hint: bool = False
+    kind: str = "static"
     spacing: float = 0.0
+
+    @property
+    def is_hint(self) -> bool:
+        """Whether it only hints at the scene: pictures, no cloud."""
+        return self.kind == "pictures"
 
     def __iter__(self) -> Iterator[Any]:
         return iter((self.points, self.colors, self.key))
@@ -91,11 +103,26 @@ class Picture:
     Attributes:
         image: [H, W, 3] uint8 RGB.
         key: What it shows; equal keys mean equal pictures.
-        is_stale: It is not what was asked for now, but the newest there is; the right one is on its way.
+        is_stale: It is not what was asked for now, but the newest there is. What it is says the rest:
         duration_s: How long it took to make; 0 when unknown.
+        clip_index, frame_index, revision, step: The frame it shows, and the state of the clip; None and "" where that
+            is not known or, for a captured picture, without meaning.
+        camera_index: The capture camera that took it, or that a rendered one looks through; None for a free view.
+        look: From where and through which lens it was rendered, whatever its size; see OrbitView.look_key.
     """
 
     image: np.ndarray
     key: Hashable
     is_stale: bool = False
     duration_s: float = 0.0
+    clip_index: int | None = None
+    frame_index: int | None = None
+    revision: str = ""
+    step: int | None = None
+    camera_index: int | None = None
+    look: Hashable = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, px."""
+        return self.image.shape[1], self.image.shape[0]

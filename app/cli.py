@@ -27,7 +27,7 @@ from app.report.command import add_report_arguments, report
 from app.train_command import add_train_arguments, train
 from app.training.process import ProcessWorker
 from app.training.service import Launch
-from engine.errors import CaptureError, EngineError, ProjectError
+from engine.errors import CaptureError, DiskError, EngineError, ProjectError
 
 logger = logging.getLogger(__name__)
 
@@ -69,6 +69,8 @@ def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -
     try:
         with _terminating_like_ctrl_c():
             return _COMMANDS[options.command].run(options, launch)
+    except DiskError as error:
+        return fail(EXIT_FAILED, str(error))
     except (CaptureError, ProjectError) as error:
         return fail(EXIT_BAD_INPUT, str(error))
     except EngineError as error:

@@ -39,6 +39,8 @@ class LatestWorker(Generic[Request, Result]):
         self._finished: tuple[Request, Result] | None = None
         self._error: tuple[Request, Exception] | None = None
         self._failed: list[Request] = []  # zero or one
+        self._generation = 0
+        self._running_generation = 0
         self._is_closed = False
         self._thread: threading.Thread | None = None
 
@@ -51,7 +53,8 @@ class LatestWorker(Generic[Request, Result]):
         with self._condition:
             if self._is_closed or request in self._pending or request in self._failed:
                 return
-            if not self._pending and request in self._running:
+            is_running = request in self._running and self._running_generation == self._generation
+            if not self._pending and is_running:
                 return
             self._pending = [request]
             self._start_thread()
@@ -73,12 +76,23 @@ class LatestWorker(Generic[Request, Result]):
         """The result finished last, with its request; None before the first."""
         return self._finished
 
+    @property
+    def generation(self) -> int:
+        """Goes up with every `forget`. A request that carries it is never equal to one from before."""
+        return self._generation
+
     def forget(self) -> None:
-        """Drop the last result and what waits; what runs finishes and is kept."""
+        """Drop the last result, what waits, and what comes of the request that runs."""
         with self._condition:
+            self._generation += 1
             self._pending, self._failed = [], []
             self._finished = None
             self._error = None
+
+    def has_failed(self, request: Request) -> bool:
+        """Whether this request failed, so that nothing will come of it."""
+        with self._condition:
+            return request in self._failed
 
     def take_error(self) -> tuple[Request, Exception] | None:
         """The last failure, once."""
@@ -123,6 +137,7 @@ class LatestWorker(Generic[Request, Result]):
                 if self._is_closed:
                     return
                 self._running, self._pending = self._pending, []
+                self._running_generation = self._generation
             request = self._running[0]
             try:
                 outcome = (request, self._compute(request))
@@ -132,9 +147,10 @@ class LatestWorker(Generic[Request, Result]):
                 logger.debug("%s failed", self._name, exc_info=True)
             with self._condition:
                 self._running = []
-                if outcome is not None:
+                is_wanted = self._running_generation == self._generation
+                if outcome is not None and is_wanted:
                     self._finished = outcome
-                if error is not None:
+                if error is not None and is_wanted:
                     self._error = (request, error)
                     self._failed = [request]
                 self._condition.notify_all()

@@ -19,8 +19,13 @@ THUMBNAIL_WIDTH_PX = 200
 
 @dataclass(frozen=True, slots=True)
 class PictureRequest:
-    """One camera at one frame, at most this wide."""
+    """One camera at one frame, at most this wide.
 
+    Attributes:
+        generation: Of the pictures that were asked. Two takes with the same cameras have the same fingerprint.
+    """
+
+    generation: int
     fingerprint: str
     camera_index: int
     frame_index: int
@@ -42,7 +47,8 @@ class CapturedPictures:
 
         Meanwhile the last picture of the same camera is returned as stale, except for thumbnails: None.
         """
-        request = PictureRequest(capture.fingerprint, camera_index, frame_index, max_width, capture)
+        generation = self.viewing.generation
+        request = PictureRequest(generation, capture.fingerprint, camera_index, frame_index, max_width, capture)
         known = self._cache.get(request)
         is_thumbnail = max_width <= THUMBNAIL_WIDTH_PX
         if known is None:
@@ -54,7 +60,7 @@ class CapturedPictures:
         return known
 
     def clear(self) -> None:
-        """Forget everything, as when another capture was opened."""
+        """Forget everything, as when another capture was opened; what is being decoded is dropped."""
         self.viewing.forget()
         self.thumbnails.forget()
         self._cache.clear()
@@ -67,14 +73,26 @@ class CapturedPictures:
 
     def _compute(self, request: PictureRequest) -> Picture:
         frame = request.capture.frame(request.camera_index, request.frame_index)
-        picture = Picture(downsized(frame, request.max_width), request_key(request))
-        self._cache.put(request, picture, picture.image.nbytes)
+        picture = Picture(
+            downsized(frame, request.max_width),
+            request_key(request),
+            frame_index=request.frame_index,
+            camera_index=request.camera_index,
+        )
+        if request.generation == self.viewing.generation:
+            self._cache.put(request, picture, picture.image.nbytes)
         return picture
 
 
-def request_key(request: PictureRequest) -> tuple[str, int, int, int]:
+def request_key(request: PictureRequest) -> tuple[int, str, int, int, int]:
     """Identity of a picture."""
-    return request.fingerprint, request.camera_index, request.frame_index, request.max_width
+    return (
+        request.generation,
+        request.fingerprint,
+        request.camera_index,
+        request.frame_index,
+        request.max_width,
+    )
 
 
 def downsized(image: np.ndarray, max_width: int) -> np.ndarray:

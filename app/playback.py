@@ -1,6 +1,7 @@
 """Playback: a frame of a trained clip as arrays to draw. Loads states and decodes on one thread; keeps results by key.
 
-A key is (clip_index, revision, frame_index): a new revision of a live clip makes its older frames worthless.
+A key is (generation, path, clip_index, revision, frame_index). The generation goes up when another project is opened:
+what the thread finishes for the one before is dropped. A new revision of a live clip makes its older frames worthless.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import threading
 from collections import OrderedDict
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,30 +33,41 @@ MAX_MODELS = 3
 """Loaded clips kept in memory: the shown one, its reference, and the one shown before."""
 
 
+ModelKey = tuple[int, str, int, str]
+"""generation, path, clip_index, revision"""
+
+
 @dataclass(frozen=True, slots=True)
 class FrameRequest:
     """A frame of one state of a clip.
 
     Attributes:
-        revision: Names the state; with clip and frame it is the identity of the result.
+        revision: Names the state; with the file, clip and frame it is the identity of the result.
         path, reference_path: Files to load when the model is not loaded yet.
         clip: For the conversion to clip time.
         is_live: Whether the file is a snapshot of a running training: it may be gone before it is read, and another
             one follows soon.
+        generation: Of the playback that was asked; set by it.
     """
 
     clip_index: int
     revision: str
     frame_index: int
-    path: Path = field(compare=False)
+    path: Path
     reference_path: Path | None = field(compare=False)
     clip: Clip = field(compare=False)
     is_live: bool = field(default=False, compare=False)
+    generation: int = 0
 
     @property
-    def key(self) -> tuple[int, str, int]:
+    def model_key(self) -> ModelKey:
+        """Identity of the model."""
+        return self.generation, str(self.path), self.clip_index, self.revision
+
+    @property
+    def key(self) -> tuple[int, str, int, str, int]:
         """Identity of the result."""
-        return self.clip_index, self.revision, self.frame_index
+        return *self.model_key, self.frame_index
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +77,7 @@ class LoadedClip:
     model: Any
     anchors: AnchorArrays
     near_plane: float
+    step: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +138,7 @@ class Playback:
 
     def __init__(self, *, cache_bytes: int = CACHE_BYTES) -> None:
         self._cache = ByteCache(cache_bytes)
-        self._models: OrderedDict[tuple[int, str], LoadedClip] = OrderedDict()
+        self._models: OrderedDict[ModelKey, LoadedClip] = OrderedDict()
         self._reference: tuple[tuple[str, int], ClipState] | None = None
         self._last: ShownFrame | None = None
         self.worker: LatestWorker[FrameRequest, ShownFrame] = LatestWorker(
@@ -133,7 +146,11 @@ class Playback:
         )
 
     def frame(self, request: FrameRequest) -> ShownFrame | None:
-        """The frame if it is ready; otherwise it is asked for and the newest finished one is returned."""
+        """The frame if it is ready; otherwise it is asked for and the newest finished one is returned.
+
+        What comes back says itself which frame of which clip it is.
+        """
+        request = self._of_now(request)
         known = self._cache.get(request.key)
         if known is not None:
             self._last = known
@@ -144,18 +161,25 @@ class Playback:
             self._last = newest[1]
         return self._last
 
-    def anchors(self, clip_index: int, revision: str) -> AnchorArrays | None:
+    def anchors(self, request: FrameRequest) -> AnchorArrays | None:
         """All anchors of a state; None until it was loaded."""
-        loaded = self._models.get((clip_index, revision))
+        loaded = self._models.get(self._of_now(request).model_key)
         return None if loaded is None else loaded.anchors
 
-    def is_loaded(self, clip_index: int, revision: str) -> bool:
+    def is_loaded(self, request: FrameRequest) -> bool:
         """Whether the file of this state is not needed any more."""
-        return (clip_index, revision) in self._models
+        return self._of_now(request).model_key in self._models
+
+    def has_failed(self, request: FrameRequest) -> bool:
+        """Whether this frame could not be made, so that it is not on its way."""
+        return self.worker.has_failed(self._of_now(request))
+
+    def _of_now(self, request: FrameRequest) -> FrameRequest:
+        return replace(request, generation=self.worker.generation)
 
     def clear(self) -> None:
         """Forget everything, as when another capture was opened."""
-        self.worker.forget()
+        self.worker.forget()  # first: from here on the thread keeps nothing of what it is working on
         self._cache.clear()
         self._models = OrderedDict()
         self._reference = self._last = None
@@ -174,6 +198,7 @@ class Playback:
         with torch.no_grad():
             gaussians = loaded.model.decode(clip_time)
         anchors = _anchor_arrays(loaded.model.anchors(clip_time), request.key)
+        anchors = replace(anchors, clip_index=request.clip_index, frame_index=request.frame_index)
         values = [np.ascontiguousarray(tensor.numpy(), np.float32) for tensor in gaussians.tensors()]
         arrays = GaussianArrays(
             *values,
@@ -181,14 +206,17 @@ class Playback:
             near_plane=loaded.near_plane,
             clip_index=request.clip_index,
             frame_index=request.frame_index,
+            revision=request.revision,
+            step=loaded.step,
         )
         shown = ShownFrame(arrays, anchors)
-        n_bytes = arrays.n_bytes + anchors.inherited_positions.nbytes + anchors.own_positions.nbytes
-        self._cache.put(request.key, shown, n_bytes)
+        if request.generation == self.worker.generation:
+            n_bytes = arrays.n_bytes + anchors.inherited_positions.nbytes + anchors.own_positions.nbytes
+            self._cache.put(request.key, shown, n_bytes)
         return shown
 
     def _load(self, request: FrameRequest) -> LoadedClip:
-        identity = (request.clip_index, request.revision)
+        identity = request.model_key
         models = self._models
         if identity in models:
             models.move_to_end(identity)
@@ -199,9 +227,11 @@ class Playback:
         reference = None if state.is_reference else self._read_reference(request.reference_path)
         model = load_clip_model(state, reference)
         anchors = _anchor_arrays(model.anchors(), identity)
-        loaded = LoadedClip(model, anchors, float(state.header["near_plane"]))
-        self._cache.drop(lambda key: key[0] == request.clip_index and key[1] != request.revision)
-        kept = [(key, value) for key, value in models.items() if key[0] != request.clip_index]
+        loaded = LoadedClip(model, anchors, float(state.header["near_plane"]), state.header.get("step"))
+        if request.generation != self.worker.generation:
+            return loaded
+        self._cache.drop(lambda key: key[2] == request.clip_index and key[3] != request.revision)
+        kept = [(key, value) for key, value in models.items() if key[2] != request.clip_index]
         # replaced as a whole, so that the other thread never sees it half changed
         self._models = OrderedDict([*kept[-(MAX_MODELS - 1) :], (identity, loaded)])
         return loaded
@@ -247,4 +277,5 @@ def static_points(path: Path, revision: str) -> PointArrays:
     logits = state.arrays["sets.static.color_logits"].astype(np.float32, copy=False)
     colors = 1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0)))
     spacing = point_spacing(points)
-    return PointArrays(np.ascontiguousarray(points), colors.astype(np.float32), ("cloud", revision), spacing=spacing)
+    key = ("cloud", str(path), revision)
+    return PointArrays(np.ascontiguousarray(points), colors.astype(np.float32), key, spacing=spacing)

@@ -33,12 +33,13 @@ from app.status import (
     PlanStatus,
     RegionsStatus,
     TrainingStatus,
+    WantedFrame,
 )
 from app.telling import tell
 from app.timeline import Timeline
 from app.training.messages import ENDINGS, Event, SnapshotWritten, TrainJob
 from app.training.process import ProcessWorker, Worker
-from app.training.service import ClipProgress, Launch, TrainingService
+from app.training.service import Launch, ShownState, TrainingService
 from app.view import OrbitView
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -51,11 +52,16 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class PointsRequest:
-    """A cloud to show where nothing is trained: of a reference state, or the hint made of pictures."""
+    """A cloud to show where nothing is trained: of a reference state, or the hint made of pictures.
+
+    Attributes:
+        generation: Goes up when another project is opened; see app.latest.
+    """
 
     kind: str
     revision: str
-    path: Path | None = field(default=None, compare=False)
+    generation: int
+    path: Path | None = None
     capture: Capture | None = field(default=None, compare=False)
     is_live: bool = field(default=False, compare=False)
 
@@ -282,9 +288,8 @@ class Session:
 
     def _build_first_cloud(self, capture: Capture, project: Project) -> None:
         """Something of the scene to look at until the first training has built the real cloud."""
-        reference = self._known(self.reference_index)
         path = project.first_cloud_path
-        if path.is_file() or (reference is not None and reference.file is not None):
+        if path.is_file() or self._state_of(self.reference_index) is not None:
             return
         capture_path, holdout = capture.path, self.holdout
 
@@ -322,6 +327,7 @@ class Session:
         if service is None or project is None:
             return
         if service.worker is None:
+            service.close()
             project.close()
             return
         self._closing.append((service, project))
@@ -357,6 +363,8 @@ class Session:
 
     def _finished_keys(self) -> tuple[object, ...]:
         workers = (self._playback.worker, self._renderer.worker, self._pictures.viewing, self._pictures.thumbnails)
+        if self._service is not None:
+            workers = (*workers, self._service.curves.worker)
         newest = [worker.newest for worker in (*workers, self._points, self._next_plan)]
         statuses = [(job.name, job.done, job.message) for job in self.jobs]
         return (*(None if found is None else found[0] for found in newest), *statuses, self.notices.revision)
@@ -378,7 +386,8 @@ class Session:
         is_shown = shown is not None and shown.clip_index == clip_index
         if is_shown:
             self.shown_gaussians()  # asks for it, should the window not have done so
-        if not is_shown or self._playback.is_loaded(clip_index, f"live-{unread.revision}"):
+        request = self._frame_request()
+        if not is_shown or (request is not None and self._playback.is_loaded(request)):
             service.snapshot_consumed(clip_index, unread.revision)
             self._unread = None
 
@@ -425,9 +434,9 @@ class Session:
             self.regions = self._marking.status([])
             return
         clip = self.timeline.clip
-        if clip is not None:
-            known = self._service.progress[clip.clip_index]
-            anchors = self._playback.anchors(clip.clip_index, known.revision)
+        request = self._frame_request()
+        if clip is not None and request is not None:
+            anchors = self._playback.anchors(request)
             if anchors is not None:
                 counts = (len(anchors.inherited_positions), len(anchors.own_positions))
                 self._anchor_counts[clip.clip_index] = counts
@@ -458,8 +467,9 @@ class Session:
 
     # ---------------------------------------------------------------- pictures and arrays
 
-    def _known(self, clip_index: int) -> ClipProgress | None:
-        return None if self._service is None else self._service.progress[clip_index]
+    def _state_of(self, clip_index: int) -> ShownState | None:
+        """The state of a clip to look at."""
+        return None if self._service is None else self._service.shown_state(clip_index)
 
     def shown_gaussians(self) -> GaussianArrays | None:
         """Gaussians of the shown frame; the newest ones there are until those are decoded; None where nothing is
@@ -468,25 +478,44 @@ class Session:
         return None if shown is None else shown.gaussians
 
     def _shown_frame(self) -> ShownFrame | None:
+        request = self._frame_request()
+        return None if request is None else self._playback.frame(request)
+
+    def _frame_request(self) -> FrameRequest | None:
+        """What is to be decoded for the playhead; None where nothing is trained."""
         clip = self.timeline.clip
-        known = None if clip is None else self._known(clip.clip_index)
-        if clip is None or known is None or known.file is None or self.project is None:
+        known = None if clip is None else self._state_of(clip.clip_index)
+        if clip is None or known is None or self.project is None:
             return None
-        return self._playback.frame(
-            FrameRequest(
-                clip_index=clip.clip_index,
-                revision=known.revision,
-                frame_index=self.timeline.frame_index,
-                path=known.file,
-                reference_path=self._inherited_path(clip.clip_index),
-                clip=clip,
-                is_live=self._is_live(known),
-            )
+        return FrameRequest(
+            clip_index=clip.clip_index,
+            revision=known.revision,
+            frame_index=self.timeline.frame_index,
+            path=known.file,
+            reference_path=self._inherited_path(clip.clip_index),
+            clip=clip,
+            is_live=known.is_live,
         )
 
-    def _is_live(self, known: ClipProgress) -> bool:
-        """Whether the state of a clip is a snapshot, which its worker replaces and removes as it goes on."""
-        return known.file is not None and self.project is not None and known.file.parent == self.project.live_dir
+    def wanted_frame(self) -> WantedFrame | None:
+        """What ought to be on screen; None without a capture. What is there says itself what it is."""
+        clip, request = self.timeline.clip, self._frame_request()
+        if clip is None:
+            return None
+        wanted = WantedFrame(
+            clip.clip_index,
+            self.timeline.frame_index,
+            camera_index=self.view.look_through,
+            look=self.view.look_key,
+        )
+        if request is None:
+            return wanted
+        return replace(
+            wanted,
+            revision=request.revision,
+            is_loaded=self._playback.is_loaded(request),
+            has_failed=self._playback.has_failed(request) or self._renderer.has_failed,
+        )
 
     @property
     def reference_index(self) -> int:
@@ -512,13 +541,15 @@ class Session:
         """
         if self.capture is None:
             return None
-        reference = self._known(self.reference_index)
-        if reference is not None and reference.file is not None:
-            request = PointsRequest("cloud", reference.revision, path=reference.file, is_live=self._is_live(reference))
+        generation = self._points.generation
+        reference = self._state_of(self.reference_index)
+        if reference is not None:
+            is_live = reference.is_live
+            request = PointsRequest("cloud", reference.revision, generation, reference.file, is_live=is_live)
         elif self.project is not None and self.project.first_cloud_path.is_file():
-            request = PointsRequest("first cloud", self.capture.fingerprint, path=self.project.first_cloud_path)
+            request = PointsRequest("first cloud", "", generation, self.project.first_cloud_path)
         else:
-            request = PointsRequest("hint", self.capture.fingerprint, capture=self.capture)
+            request = PointsRequest("hint", "", generation, capture=self.capture)
         newest = self._points.newest
         if newest is None or newest[0] != request:
             self._points.request(request)
@@ -527,12 +558,22 @@ class Session:
         return newest[1]
 
     def request_render(self, width: int, height: int) -> Picture | None:
-        """The rasterizer's picture of the shown frame and view; None where nothing is trained or ready."""
-        gaussians = self.shown_gaussians()
-        if gaussians is None:
+        """The rasterizer's picture of the frame and view; None where nothing is trained or ready.
+
+        Stale where it is of another frame, view, size or state of the clip; it says of which.
+        """
+        request, gaussians = self._frame_request(), self.shown_gaussians()
+        if request is None or gaussians is None:
             return None
-        K = self.view.K(width, height)
-        return self._renderer.picture(gaussians, self.view.world_to_camera(), K, width, height)
+        picture = self._renderer.picture(gaussians, self.view, width, height)
+        if picture is None or picture.is_stale:
+            return picture
+        is_of_now = (picture.clip_index, picture.frame_index, picture.revision) == (
+            request.clip_index,
+            request.frame_index,
+            request.revision,
+        )
+        return picture if is_of_now else replace(picture, is_stale=True)
 
     def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None:
         """The captured picture, at most `max_width` pixels wide; None until it was decoded."""

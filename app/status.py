@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 from engine.cloud.regions import GateRegion
 
-OVERLAY_NAMES = ("show_frusta", "show_inherited", "show_residual", "show_points", "show_regions")
+OVERLAY_NAMES = ("show_frusta", "show_inherited", "show_residual", "show_points", "show_cloud", "show_regions")
 COMPARE_MODES = ("off", "wipe", "side")
 
 
@@ -16,17 +16,46 @@ class Overlays:
     """What is drawn over or beside the scene.
 
     Attributes:
+        show_points: The point cloud where a clip is not trained.
+        show_cloud: The point cloud in place of the picture of a trained clip.
         compare: "off", "wipe" or "side": the captured picture over or beside the rendered one.
         wipe_position: Share of the width that shows the captured picture, 0..1.
+        mark_size: Of anchor marks, 1 as designed.
+        mark_opacity: Of anchor marks that nothing hides, 0..1.
     """
 
     show_frusta: bool = True
     show_inherited: bool = False
     show_residual: bool = False
     show_points: bool = True
+    show_cloud: bool = False
     show_regions: bool = True
     compare: str = "off"
     wipe_position: float = 0.5
+    mark_size: float = 1.0
+    mark_opacity: float = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class WantedFrame:
+    """What ought to be on screen, whatever is there by now.
+
+    Attributes:
+        clip_index, frame_index: Under the playhead.
+        revision: The state of the clip that is to be shown; empty where none can be: it is not trained.
+        camera_index: The capture camera looked through; None for a free view.
+        look: From where and through which lens; see OrbitView.look_key.
+        is_loaded: Whether the clip is in memory, so that only its frame has to be made.
+        has_failed: Whether the frame or its picture could not be made, so that it is not on its way.
+    """
+
+    clip_index: int
+    frame_index: int
+    revision: str = ""
+    camera_index: int | None = None
+    look: Hashable = None
+    is_loaded: bool = False
+    has_failed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,10 +72,12 @@ class TrainingStatus:
         steps_per_s: Smoothed rate; 0 when unknown.
         eta_s: Seconds until the clip is finished; None when unknown.
         curve_clip_index: Clip of the histories: the one that trains, else the one at the playhead; None without one.
+            While a clip is trained again they are those of its finished version until the first new figures come.
         gradient_norm: Largest norm over all gradients since the last report, before clipping; None when unknown.
         loss_history, psnr_history: (step, value) of that clip; PSNR is of held-out pictures, dB.
         can_train_next: Whether TrainNextClip would start something.
         next_clip_index: The clip that TrainNextClip would train; None when all are trained.
+        resume_step: The step that it would go on from; None when it would start from the beginning.
         queue: Clips that wait.
     """
 
@@ -65,6 +96,7 @@ class TrainingStatus:
     psnr_history: Sequence[tuple[int, float]] = ()
     can_train_next: bool = False
     next_clip_index: int | None = None
+    resume_step: int | None = None
     queue: tuple[int, ...] = ()
 
 
@@ -73,12 +105,15 @@ class ClipStatus:
     """One clip of the project.
 
     Attributes:
-        state: untrained, queued, preparing, training, paused, trained, failed, or stale (its reference was
-            trained again, or the clip that it goes on from). A clip that was stopped before its end is paused:
-            training it again goes on there.
+        state: untrained, queued, preparing, training, paused (its training holds and waits), stopped (its training
+            has ended before the last step and goes on there), trained, failed, stale (its reference was trained
+            again, or the clip that it goes on from), or damaged (finished, but its file cannot be read).
         progress: Share of its steps, 0..1.
         held_out_psnr: Newest figure, dB; None when not measured.
         n_inherited, n_own: Anchors of the shown model; 0 until it was loaded.
+        resume_step: The step that its training goes on from; None when there is nothing to go on from. A clip that
+            was being trained again when that was stopped is trained and has one.
+        reason: Why it is stale or damaged; empty otherwise.
     """
 
     state: str = "untrained"
@@ -86,6 +121,8 @@ class ClipStatus:
     held_out_psnr: float | None = None
     n_inherited: int = 0
     n_own: int = 0
+    resume_step: int | None = None
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)

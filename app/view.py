@@ -6,6 +6,7 @@ A free view orbits a pivot and stays upright; looking through a capture camera t
 from __future__ import annotations
 
 import math
+from collections.abc import Hashable
 
 import numpy as np
 
@@ -100,6 +101,11 @@ class OrbitView:
             return K
         focal = height / (2.0 * math.tan(self.fov_y / 2.0))
         return np.array([[focal, 0.0, width / 2.0], [0.0, focal, height / 2.0], [0.0, 0.0, 1.0]])
+
+    @property
+    def look_key(self) -> Hashable:
+        """Identity of where from and through which lens, whatever the size of the picture."""
+        return self.look_through, self.fov_y, self.world_to_camera().tobytes()
 
     # ---------------------------------------------------------------- moving it
 

@@ -3,24 +3,14 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-import numpy as np
-
 from engine.errors import DiskError
-
-_DTYPES = {
-    **{f"{kind}{bits}": f"{kind[0].upper()}{bits}" for kind in ("int", "uint") for bits in (8, 16, 32, 64)},
-    **{f"float{bits}": f"F{bits}" for bits in (16, 32, 64)},
-    "bool": "BOOL",
-}
-"""Names of number types in safetensors files."""
 
 PARTIAL_PREFIX = ".partial-"
 """Half-written files begin with this, then with the id of the process that writes them."""
@@ -29,18 +19,19 @@ STALE_AFTER_S = 24 * 3600.0
 
 
 @contextmanager
-def atomic_path(path: Path | str, *, is_durable: bool = False) -> Iterator[Path]:
+def atomic_path(path: Path | str, *, makes_parents: bool = True, is_durable: bool = False) -> Iterator[Path]:
     """Write to the yielded path; it becomes `path` when the block ends well and disappears when it does not.
 
     Args:
-        path: Final name. Missing folders are made. The suffix is kept, so that writers which look at it work.
+        path: Final name. The suffix is kept, so that writers which look at it work.
+        makes_parents: Make all missing folders, or only the one that holds the file.
         is_durable: Whether content and name must outlive a power cut from here on; takes the time the disk takes.
     Raises:
         OSError: The disk refused; nothing is left behind.
     """
     path = Path(path)
     partial = path.with_name(f"{PARTIAL_PREFIX}{os.getpid()}-{path.name}")
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(parents=makes_parents, exist_ok=True)
     try:
         yield partial
         replace_file(partial, path, is_durable=is_durable)
@@ -85,7 +76,8 @@ def checked_path(path: Path | str, *, what: str, is_durable: bool = False) -> It
         DiskError: The disk refused; nothing is left behind.
     """
     try:
-        with atomic_path(path, is_durable=is_durable) as partial:
+        # only the last folder is made: a project that was deleted is not made again
+        with atomic_path(path, makes_parents=False, is_durable=is_durable) as partial:
             yield partial
     except OSError as error:
         raise disk_error(error, what=what, path=path) from error
@@ -93,8 +85,9 @@ def checked_path(path: Path | str, *, what: str, is_durable: bool = False) -> It
 
 def disk_error(error: OSError, *, what: str, path: Path | str) -> DiskError:
     """What to raise when a file could not be written."""
-    reason = error.strerror or str(error)
-    return DiskError(f"{what} could not be written ({reason}).", hint="Free some space and try again.", path=path)
+    is_full = error.errno in (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
+    hint = "Free some space and try again." if is_full else "Check the disk and the rights of the folder."
+    return DiskError(f"{what} could not be written ({error.strerror or error}).", hint=hint, path=path)
 
 
 def open_regular(path: Path | str) -> BinaryIO:
@@ -151,36 +144,3 @@ def _check_regular(found: os.stat_result, path: Path | str) -> None:
         raise IsADirectoryError(errno.EISDIR, "it is a folder, not a file", str(path))
     if not stat.S_ISREG(found.st_mode):
         raise OSError(errno.EINVAL, "it is a pipe or a device, not a file", str(path))
-
-
-def write_arrays(path: Path | str, arrays: Mapping[str, np.ndarray], metadata: Mapping[str, str], *, what: str) -> None:
-    """Write named arrays as a safetensors file, atomically.
-
-    The package's own writer makes a temporary file under a name that nobody can predict, which a killed process leaves
-    behind, and wraps what the system says in an error of its own. Its reader is used to read.
-
-    Args:
-        path: As of `atomic_path`.
-        arrays: Any shapes; numbers or bool.
-        metadata: Texts beside them.
-        what: Names the file in the message, as "The clip".
-    Raises:
-        DiskError: The disk refused; nothing is left behind.
-    """
-    # widest numbers first keeps all of them aligned
-    names = sorted(arrays, key=lambda name: (-arrays[name].dtype.itemsize, name))
-    header: dict[str, object] = {"__metadata__": dict(metadata)}
-    end = 0
-    for name in names:
-        start, end = end, end + arrays[name].nbytes
-        header[name] = {
-            "dtype": _DTYPES[arrays[name].dtype.name],
-            "shape": list(arrays[name].shape),
-            "data_offsets": [start, end],
-        }
-    text = json.dumps(header, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 8)
-    with checked_path(path, what=what) as partial, partial.open("wb") as file:
-        file.write(len(text).to_bytes(8, "little") + text)
-        for name in names:
-            file.write(np.ascontiguousarray(arrays[name]).view(np.uint8).data if arrays[name].size else b"")

@@ -28,10 +28,10 @@ Measure = Callable[..., dict[str, Any]]
 
 def evaluation_key(facts: ProjectFacts, metrics: Choice, precision: Precision) -> str:
     """Names everything that the figures depend on: clips, cameras, size, choices, what this machine measures."""
-    from engine.metrics import flip, lpips
+    from engine.metrics import lpips
 
     settings = facts.settings
-    missing = [flip.why_missing(), lpips.why_missing()] if metrics == "all" else []
+    missing = [lpips.why_missing()] if metrics == "all" else []
     content = {
         "schemas": [CACHE_SCHEMA, EVAL_SCHEMA],
         "capture": settings.fingerprint,

@@ -19,6 +19,7 @@ from typing import Any, Protocol
 
 from app.memory import peak_bytes
 from app.project import Project, open_project, read_metrics
+from app.training.keeping import FolderWatch, ProjectGone, Refusals, Retries
 from app.training.messages import (
     ClipTrained,
     Command,
@@ -42,7 +43,7 @@ from app.training.messages import (
 from app.training.rate import Rate
 from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
 from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch, stages_of
-from engine.errors import EngineError, NonFiniteLoss, ProjectError
+from engine.errors import DiskError, EngineError, NonFiniteLoss, ProjectError
 from engine.model.clip_state import ClipState, read_clip_header
 from engine.model.compact import CompactClip
 from engine.training.report import Progress, ReportProgress, StepStats
@@ -55,8 +56,10 @@ SNAPSHOT_SHARE = 0.05
 """Share of the time that snapshots may cost."""
 HELD_OUT_EVERY_S = 5.0
 HELD_OUT_SHARE = 0.03
-CHECKPOINT_EVERY_S = 30.0
-CHECKPOINT_SHARE = 0.03
+CHECKPOINT_EVERY_S = 25.0
+"""From the start of one to the start of the next: a step and the writing included, a kill costs at most 30 s."""
+CHECKPOINT_SHARE = 0.5
+"""Only a disk on which writing takes longer than that delays the next one."""
 METRICS_EVERY_S = 0.5
 
 
@@ -86,7 +89,9 @@ class Training(Protocol):
         ...
 
     def finish(self) -> CompactClip:
-        """The model as it is stored; what is measured after that is what is stored."""
+        """The model as it is stored; what is measured after that is what is stored. A checkpoint written later still
+        holds what was trained. Raises DiskError, before anything has changed, where what other clips share cannot be
+        kept."""
         ...
 
     def write_checkpoint(self, path: Path | str) -> None:
@@ -159,17 +164,22 @@ class TrainingRun:
         self._metrics_cadence = Cadence(METRICS_EVERY_S)
         self._is_snapshot_wanted = False
         self._snapshots = SnapshotWriter(Path(job.project) / "live", job.clip_index)
+        self._snapshot_refusals = Refusals("The live view could not be written", send)
+        self._checkpoint_refusals = Refusals("What was learned so far could not be kept", send)
+        self._folder: FolderWatch | None = None
+        self._finished: CompactClip | None = None
+        """Trained to the end, but not in its place yet."""
+        self._retries = Retries(is_endless=job.is_window_open, clock=clock)
 
     # ---------------------------------------------------------------- the loop
 
     def advance(self) -> bool:
         """Prepare, or do one step and what is due after it. False when the run has ended and said so."""
         try:
-            return self._advance()
-        except StopRequested:
-            self._end_stopped(can_write=not self._is_in_step)
-        except EngineError as error:
-            self._end_failed(error)
+            try:
+                return self._advance()
+            except StopRequested:
+                self._end_stopped(can_write=not self._is_in_step)
         except Exception as error:  # noqa: BLE001 - the edge of the worker loop: reported, never lost
             self._end_failed(error)
         return False
@@ -183,8 +193,7 @@ class TrainingRun:
         if self._is_paused:
             return True
         if training.steps_done >= training.n_steps:
-            self._finish(training)
-            return False
+            return self._finish(training)
         self._is_in_step, self._is_checkpointed_in_step = True, False
         self._watch.enter(TRAINING)
         stats = training.step()
@@ -195,6 +204,7 @@ class TrainingRun:
     def _start(self) -> Training:
         job = self._job
         self._watch.enter(STARTING)
+        self._folder = FolderWatch(Path(job.project))
         self._project = open_project(job.project, is_writable=False)
         checkpoint = self._project.checkpoint_path(job.clip_index)
         self._send(WorkerReady(pid=os.getpid(), n_threads=self._n_threads))
@@ -204,10 +214,12 @@ class TrainingRun:
             try:
                 training.restore_checkpoint(checkpoint)
                 is_restored = True
+                self._take_up_curves()
                 self._recall_times(training.steps_done)
                 logger.info("clip %d goes on at step %d", job.clip_index, training.steps_done)
             except ProjectError as error:
-                self._send(WarningRaised(f"Clip {job.clip_index} starts from the beginning", str(error)))
+                said = str(ProjectError(error.message, path=checkpoint))
+                self._send(WarningRaised(f"Clip {job.clip_index} starts from the beginning", said))
                 training = self._make(job, self._report)
         if not is_restored:
             self._project.discard_progress(job.clip_index)
@@ -239,6 +251,7 @@ class TrainingRun:
         is_last = training.steps_done >= training.n_steps
         if self._report_cadence.is_due(now_s) or is_last:
             self._report_cadence.done(now_s, now_s)
+            self._check_folder()
             self._rate.update(stats.step, now_s)
             loss = sum(self._losses) / len(self._losses)
             gradient_norm = max(self._gradient_norms[-len(self._losses) :])
@@ -267,7 +280,44 @@ class TrainingRun:
         if self._checkpoint_cadence.is_due(now_s) and not is_last:
             self._write_checkpoint(training)
 
-    def _finish(self, training: Training) -> None:
+    def _finish(self, training: Training) -> bool:
+        """Put the finished clip in its place. Whether that has to be tried again."""
+        self._check_folder()
+        if self._retries.wait_s > 0:
+            self._obey(self._retries.wait_s)
+            return True
+        self._watch.enter(KEEPING)
+        try:
+            if self._finished is None:
+                self._finished = self._finished_clip(training)
+            self._keep(self._finished, training)
+        except DiskError as error:
+            return self._try_again(training, error)
+        return False
+
+    def _try_again(self, training: Training, error: DiskError) -> bool:
+        """The disk refused a finished clip: keep it as a checkpoint meanwhile. Whether to go on trying.
+
+        Raises:
+            DiskError: It is given up.
+        """
+        is_first = self._retries.is_first
+        is_kept = self._checkpoint_step() == training.steps_done or self._write_checkpoint(training)
+        if not self._retries.failed(is_kept=is_kept):
+            raise error
+        if is_first:
+            where = "All of it is kept as a checkpoint" if is_kept else "It is in memory only"
+            title = f"Clip {self._job.clip_index} is trained, but could not be written"
+            self._send(WarningRaised(title, f"{error} {where}, and writing is tried again."))
+            self._send(StageReported("Waiting for room on the disk", 1.0))
+        return True
+
+    def _finished_clip(self, training: Training) -> CompactClip:
+        """The clip as it is stored, with its figures.
+
+        Raises:
+            DiskError: What other clips share could not be kept.
+        """
         assert self._project is not None
         clip = training.finish()
         value = self._measure(training)
@@ -283,8 +333,21 @@ class TrainingRun:
         with suppress(NotImplementedError):
             metrics["memory_mb"] = round(peak_bytes() / 1e6, 1)
         self._note({"step": training.steps_done, **times})
+        return clip.with_header(metrics=metrics)
+
+    def _keep(self, clip: CompactClip, training: Training) -> None:
+        """Put the clip in its place, and what is not needed any more away.
+
+        Raises:
+            DiskError: The disk refused; everything is as it was.
+        """
+        assert self._project is not None
         path = self._project.clip_path(self._job.clip_index)
-        keep_clip(clip.with_header(metrics=metrics), path, self._project.live_dir)
+        keep_clip(clip, path, self._project.live_dir)
+        try:
+            self._project.keep_curves(self._job.clip_index)
+        except OSError as error:
+            logger.warning("the curves could not be put in their place (%s)", error.strerror)
         with suppress(OSError):
             self._project.checkpoint_path(self._job.clip_index).unlink(missing_ok=True)
         self._snapshots.clear()
@@ -294,13 +357,15 @@ class TrainingRun:
             logger.warning("clip %d: gradients were scaled down in %s", self._job.clip_index, found)
             title = f"Clip {self._job.clip_index} had gradients above max_gradient_norm"
             self._send(WarningRaised(title, f"They were scaled down in {found}."))
-        self._send(ClipTrained(str(path), training.steps_done, value))
+        self._send(
+            ClipTrained(str(path), training.steps_done, (clip.state.header.get("metrics") or {}).get("held_out_psnr"))
+        )
 
     # ---------------------------------------------------------------- commands
 
-    def _obey(self) -> None:
-        """Take every command that waits; sit here while paused when that is allowed."""
-        wait_s = 0.0
+    def _obey(self, wait_s: float = 0.0) -> None:
+        """Take every command that waits or comes within so many seconds; sit here while paused when that is allowed."""
+        wait_s = min(wait_s, 1.0) if self._can_wait else 0.0
         while True:
             try:
                 command = self._receive(wait_s)
@@ -352,6 +417,7 @@ class TrainingRun:
             if progress.message and message != progress.message:
                 logger.info("%s: %s", progress.stage, progress.message)
             self._reported = (progress.stage, progress.message, now_s)
+            self._check_folder()
             self._send(StageReported(progress.stage, float(progress.done), progress.message))
         self._obey()
 
@@ -360,28 +426,49 @@ class TrainingRun:
         self._is_snapshot_wanted = False
         try:
             self._send(self._snapshots.write(training.state()))
+            self._snapshot_refusals.written()
         except ProjectError as error:  # a full disk must not end the training; the next snapshot may fit again
-            self._send(WarningRaised("The live view could not be written", str(error), error.hint))
+            self._snapshot_refusals.refused(error)
         self._snapshot_cadence.done(started_s, self._clock())
 
     def _write_checkpoint(self, training: Training) -> bool:
         assert self._project is not None
+        self._check_folder()
         started_s = self._clock()
         is_written = True
         try:
             training.write_checkpoint(self._project.checkpoint_path(self._job.clip_index))
+            self._checkpoint_refusals.written()
         except ProjectError as error:
             is_written = False
-            self._send(WarningRaised("What was learned so far could not be kept", str(error), error.hint))
+            self._checkpoint_refusals.refused(error)
         if is_written:  # beside the checkpoint, so that a run that goes on from it knows what it took
             self._note({"step": training.steps_done, **self._watch.document()})
         self._checkpoint_cadence.done(started_s, self._clock())
         return is_written
 
+    def _checkpoint_step(self) -> int | None:
+        """Steps that the checkpoint on disk holds."""
+        assert self._project is not None
+        header = read_clip_header(self._project.checkpoint_path(self._job.clip_index))
+        return None if header is None else header.get("step")
+
+    def _check_folder(self) -> None:
+        """Raises ProjectGone."""
+        if self._folder is not None:
+            self._folder.check()
+
+    def _take_up_curves(self) -> None:
+        """Curves of a training that an earlier version stopped lie where those of finished clips do now."""
+        assert self._project is not None
+        found = self._project.curve_path(self._job.clip_index, is_finished=False)
+        with suppress(OSError):
+            found.rename(self._project.unfinished_metrics_path(self._job.clip_index))
+
     def _recall_times(self, step: int) -> None:
         """Add what earlier runs took up to the checkpoint that this one goes on from."""
         assert self._project is not None
-        rows = read_metrics(self._project.metrics_path(self._job.clip_index))
+        rows = read_metrics(self._project.unfinished_metrics_path(self._job.clip_index))
         known = [stages_of(row) for row in rows if row["step"] <= step and "stages_s" in row]
         for stage, seconds in (known[-1] if known else {}).items():
             self._watch.seconds[stage] = self._watch.seconds.get(stage, 0.0) + seconds
@@ -399,10 +486,10 @@ class TrainingRun:
     def _note(self, row: dict[str, Any]) -> None:
         """Append one line to the metrics file, so that a restarted window has the whole curve."""
         assert self._project is not None
-        path = self._project.metrics_path(self._job.clip_index)
+        path = self._project.unfinished_metrics_path(self._job.clip_index)
         row = {key: round(value, 6) if isinstance(value, float) else value for key, value in row.items()}
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
+            path.parent.mkdir(exist_ok=True)  # not the project itself, which may be gone
             with path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")
         except OSError as error:
@@ -416,6 +503,7 @@ class TrainingRun:
         if self._stop is not None and not self._stop.keep:
             self._project.discard_progress(self._job.clip_index)
         elif can_write and self._training is not None:
+            self._checkpoint_refusals.written()  # said again if it is refused now
             self._write_checkpoint(self._training)
         self._snapshots.clear()
         self._send(TrainingStopped(str(checkpoint) if checkpoint.is_file() else "", self._steps_done))
@@ -431,24 +519,25 @@ class TrainingRun:
         else:
             message = f"{type(error).__name__}: {error}"
             hint = "This is a fault of the program; the log has the details."
-        if isinstance(error, NonFiniteLoss) and self._training is not None:
-            message = f"{message} {self._keep_last_good(self._training)}"
+        training = self._training
+        is_whole = not self._is_in_step or isinstance(error, NonFiniteLoss)  # such a step has changed nothing
+        has_learned = training is not None and (training.steps_done > 0 or isinstance(error, NonFiniteLoss))
+        if training is not None and is_whole and has_learned and not isinstance(error, ProjectGone):
+            message = f"{message} {self._keep_last_good(training)}"
         self._snapshots.clear()
         self._send(TrainingFailed(type(error).__name__, message, hint, trace))
 
     def _keep_last_good(self, training: Training) -> str:
-        """Keep what was learned before a step that failed, if it is any good. Says what is kept now."""
-        assert self._project is not None
+        """Keep what was learned before a failure, if it is any good. Says what is kept now."""
         try:
             is_good = is_finite(training.state())
         except EngineError:
             is_good = False
-        if is_good and self._write_checkpoint(training):
-            return f"Step {training.steps_done} is kept; training again with the same command goes on from there."
-        kept = read_clip_header(self._project.checkpoint_path(self._job.clip_index))
+        step = training.steps_done
+        if is_good and (self._checkpoint_step() == step or self._write_checkpoint(training)):
+            return f"Step {step} is kept; training again with the same command goes on from there."
+        kept = self._checkpoint_step()
         why = "could not be kept" if is_good else "holds numbers that are not finite"
         if kept is None:
-            return f"Step {training.steps_done} {why}; training again starts from the beginning."
-        return (
-            f"Step {training.steps_done} {why}; training again with the same command goes on from step {kept['step']}."
-        )
+            return f"Step {step} {why}; training again starts from the beginning."
+        return f"Step {step} {why}; training again with the same command goes on from step {kept}."

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
 from app.training.messages import SnapshotWritten
-from engine.errors import ProjectError
+from engine.errors import DiskError, ProjectError
+from engine.files import disk_error, replace_file
 from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.model.compact import CompactClip, write_compact_clip
 
@@ -18,7 +18,7 @@ class Cadence:
     """When something that costs time is due again: not more often than `every_s`, nor than its share of time allows.
 
     Args:
-        every_s: Shortest time from one to the next, seconds.
+        every_s: Shortest time from the start of one to the start of the next, seconds.
         max_share: Share of all time that it may take.
     """
 
@@ -34,7 +34,7 @@ class Cadence:
 
     def done(self, started_s: float, now_s: float) -> None:
         """Tell when it was done, from and until."""
-        self._next_s = now_s + max(self._every_s, (now_s - started_s) / self._max_share)
+        self._next_s = started_s + max(self._every_s, (now_s - started_s) / self._max_share)
 
 
 class SnapshotWriter:
@@ -60,12 +60,13 @@ class SnapshotWriter:
         """Write the next revision.
 
         Raises:
-            ProjectError: The disk refused.
+            DiskError: The disk refused.
         """
-        self.revision += 1
-        path = self._live_dir / f"clip-{self._clip_index:04d}-r{self.revision:04d}.safetensors"
+        revision = self.revision + 1
+        path = self._live_dir / f"clip-{self._clip_index:04d}-r{revision:04d}.safetensors"
         write_clip_state(path, state)
-        self._paths[self.revision] = path
+        self.revision = revision  # one that could not be written is not waited for
+        self._paths[revision] = path
         return SnapshotWritten(self.revision, int(state.header["step"]), str(path))
 
     def consumed(self, revision: int) -> None:
@@ -92,23 +93,28 @@ def keep_clip(clip: CompactClip, path: Path, live_dir: Path) -> None:
     """Put a finished clip in its place, after it was written elsewhere, read back and found equal.
 
     Raises:
-        ProjectError: The disk refused, or what was read back differs.
+        DiskError: The disk refused, or what was read back differs.
     """
     draft = live_dir / f"{path.stem}-final{path.suffix}"
-    write_compact_clip(draft, clip)
     try:
-        if read_clip_state(draft).fingerprint != clip.state.fingerprint:
-            raise ProjectError(
+        write_compact_clip(draft, clip)
+        if not _reads_back(draft, clip):
+            raise DiskError(
                 "The clip read back differs from the clip written; the disk may be damaged.",
                 hint="Check the disk, or move the project to another one.",
                 path=path,
             )
-        path.parent.mkdir(parents=True, exist_ok=True)
-        os.replace(draft, path)
+        path.parent.mkdir(exist_ok=True)
+        replace_file(draft, path, is_durable=True)
     except OSError as error:
-        raise ProjectError(
-            f"The clip could not be put in its place ({error.strerror}).", hint="Free some space.", path=path
-        ) from error
+        raise disk_error(error, what="The clip", path=path) from error
     finally:
         with suppress(OSError):
             draft.unlink(missing_ok=True)
+
+
+def _reads_back(path: Path, clip: CompactClip) -> bool:
+    try:
+        return read_clip_state(path).fingerprint == clip.state.fingerprint
+    except ProjectError:
+        return False

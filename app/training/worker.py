@@ -47,19 +47,37 @@ def main(job_bytes: bytes, commands: Connection, events: Connection, log_path: s
     while run.advance():
         pass
     logger.info("worker %d ends", os.getpid())
-    logging.shutdown()
+    _flush_output()
 
 
 def _redirect_output(path: Path) -> None:
-    """Everything printed, by us, by libraries or by a crash, goes to the log file."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    descriptor = os.open(path, os.O_CREAT | os.O_WRONLY | os.O_APPEND, 0o644)
+    """Everything printed, by us, by libraries or by a crash, goes to the log file; nowhere where that cannot be."""
+    try:
+        path.parent.mkdir(exist_ok=True)  # not the project itself, which may be gone
+        descriptor = os.open(path, os.O_CREAT | os.O_WRONLY | os.O_APPEND, 0o644)
+    except OSError:
+        descriptor = os.open(os.devnull, os.O_WRONLY)
     sys.stdout.flush()
     sys.stderr.flush()
+    _point_output_to(descriptor)
+    logging.raiseExceptions = False  # a log on a full disk is not worth a word, and must not end anything
+    logging.basicConfig(level=logging.INFO, format=FORMAT, stream=sys.stderr, force=True)
+
+
+def _point_output_to(descriptor: int) -> None:
     os.dup2(descriptor, 1)
     os.dup2(descriptor, 2)
     os.close(descriptor)
-    logging.basicConfig(level=logging.INFO, format=FORMAT, stream=sys.stderr, force=True)
+
+
+def _flush_output() -> None:
+    """Write what is left. What a full disk does not take is dropped: Python would end with an error because of it."""
+    logging.shutdown()
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError:
+        _point_output_to(os.open(os.devnull, os.O_WRONLY))
 
 
 def _set_threads(*, is_window_open: bool) -> int:

@@ -25,7 +25,7 @@ GROUPS = (
     ("decoder", "engine.model.warm", 4.1),
     ("rasterizer", "engine.raster.cpu.warm", 4.9),
     ("loss and optimiser", "engine.training.warm", 5.0),
-    ("figures", "engine.metrics.window", 0.5),
+    ("figures", "engine.metrics.warm", 1.5),
 )
 """Name, module, and about how long compiling takes, of each group. Every module has a `warm_up()` that runs each of its
 kernels once. Groups share no cached kernel but the entry of `routines.run`, or two processes would compile it at the

@@ -30,7 +30,7 @@ _BASES = (
     Column("dssim1", "1", False, True, "(1 - SSIM) / 2, data range 1"),
     Column("dssim_range2", "1", False, False, "(1 - SSIM) / 2, constants of data range 2 for pictures in 0..1"),
     Column("dssim_ms", "1", False, False, "(1 - MS-SSIM) / 2, five scales; sides of 176 px and more"),
-    Column("flip", "1", False, False, "mean LDR-FLIP, 67 pixels per degree, by flip-evaluator"),
+    Column("flip", "1", False, False, "mean LDR-FLIP, 67 pixels per degree"),
     Column("lpips", "1", False, False, "LPIPS with VGG-16, version 0.1, inputs in -1..1"),
     Column("lpips_unscaled", "1", False, False, "the same with inputs left in 0..1, as many tables have it"),
 )

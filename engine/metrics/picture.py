@@ -14,7 +14,7 @@ from engine.metrics.columns import COLUMNS
 from engine.metrics.psnr import psnr_of, squared_error
 from engine.metrics.similarity import (
     MS_MIN_SIDE_PX,
-    Moments,
+    Similarity,
     dssim_ms_of,
     dssim_range2_of,
     masked_mean,
@@ -52,29 +52,29 @@ def measure_picture(
         image: Rendered, any float type; clamped, and rounded if `precision` says so. [H, W, 3]
         pixels: What the camera took. [H, W, 3] uint8
         is_moving: Which pixels move. [H, W] bool
-        metrics: "quick" is PSNR, SSIM and DSSIM1; "all" is every column, at about ten times the time (mostly FLIP).
+        metrics: "quick" is PSNR, SSIM and DSSIM1; "all" is every column, at about twice the time.
         precision: See engine.metrics.colors.as_shown. The colour fit starts from that picture and is not rounded again.
     """
     if not np.isfinite(image).all():
         return _filled({}, "the picture has values that are not finite", metrics, is_moving, image.shape)
     truth = pixels.astype(np.float32) / np.float32(255.0)
     shown = as_shown(image, precision)
+    truth_seen = flip.seen(truth) if metrics == "all" else None
     found: dict[str, float | None] = {"moving_share": float(is_moving.mean())}
     parts = {"": None, "_moving": is_moving, "_rest": ~is_moving}
     for fit, picture in (("", shown), ("_fit", np.clip(fit_colors(shown, truth), 0.0, 1.0).astype(np.float32))):
-        moments = Moments(picture, truth)
-        error, similarity = squared_error(picture, truth), ssim_pixels(moments)
+        similarity = Similarity.of(picture, truth)
+        error, alike = squared_error(picture, truth), ssim_pixels(similarity)
         for part, mask in parts.items():
             found[f"psnr{fit}{part}"] = psnr_of(error, mask)
-            found[f"ssim{fit}{part}"] = masked_mean(similarity, mask)
-        found[f"dssim1{fit}"] = 0.5 * (1.0 - masked_mean(similarity, None))
-        if metrics == "quick":
+            found[f"ssim{fit}{part}"] = masked_mean(alike, mask)
+        found[f"dssim1{fit}"] = 0.5 * (1.0 - masked_mean(alike, None))
+        if truth_seen is None:  # the quick choice
             continue
-        found[f"dssim_range2{fit}"] = dssim_range2_of(moments)
-        found[f"dssim_ms{fit}"] = dssim_ms_of(picture, truth, moments)
-        if flip.why_missing() is None:
-            noticed = flip.flip_map(picture, truth)
-            found |= {f"flip{fit}{part}": masked_mean(noticed, mask) for part, mask in parts.items()}
+        found[f"dssim_range2{fit}"] = dssim_range2_of(similarity)
+        found[f"dssim_ms{fit}"] = dssim_ms_of(picture, truth, similarity)
+        noticed = flip.flip_of(flip.seen(picture), truth_seen)
+        found |= {f"flip{fit}{part}": masked_mean(noticed, mask) for part, mask in parts.items()}
         found[f"lpips{fit}"] = lpips.lpips(picture, truth)
     if metrics == "all":
         found["lpips_unscaled"] = lpips.lpips_unscaled(shown, truth)
@@ -96,8 +96,6 @@ def _filled(
             missing[name] = "not measured: the quick choice of metrics"
         elif fault is not None:
             missing[name] = fault
-        elif name.startswith("flip") and (reason := flip.why_missing()):
-            missing[name] = reason
         elif name.startswith("lpips"):
             missing[name] = lpips.why_missing() or "the network gave no finite value"
         elif name.startswith("dssim_ms"):

@@ -8,45 +8,43 @@ Pictures are [H, W, 3] in 0..1 and are clamped to that first; masks [H, W] bool.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from engine.metrics.window import RADIUS, blur_along_rows, similarity_of_rows
+from engine.metrics.window import RADIUS, similarity_maps
 
-K1, K2 = 0.01, 0.03
-"""Constants of SSIM, as shares of the data range: C1 = (K1 L)^2, C2 = (K2 L)^2."""
 MS_WEIGHTS = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333)
 """Exponents of the five scales of MS-SSIM, finest first. Source: Wang, Simoncelli, Bovik 2003."""
 MS_MIN_SIDE_PX = 11 * 2 ** (len(MS_WEIGHTS) - 1)
 """Below this side the coarsest of the five scales is smaller than the window."""
 
 
-class Moments:
-    """Two pictures blurred along x: means, squares and product, shared by all figures of one pair of pictures.
+class Similarity(NamedTuple):
+    """What all figures of one pair of pictures share, of each pixel and channel. All [H, W, 3] float32
 
     Attributes:
-        rows: Blurred a, b, a^2, b^2, ab with five zero rows above and below. [5, H + 10, 3 W] float32
+        ssim: SSIM with data range 1.
+        structure: Its contrast-structure factor.
+        ssim_range2: SSIM with data range 2.
     """
 
-    def __init__(self, image: np.ndarray, truth: np.ndarray) -> None:
+    ssim: np.ndarray
+    structure: np.ndarray
+    ssim_range2: np.ndarray
+
+    @classmethod
+    def of(cls, image: np.ndarray, truth: np.ndarray) -> Similarity:
+        """Compare two pictures; zeros beyond their edge."""
         height, width, _ = image.shape
-        self.rows = np.zeros((5, height + 2 * RADIUS, 3 * width), np.float32)
         a, b = (np.clip(p, 0.0, 1.0).astype(np.float32, copy=False) for p in (image, truth))
-        a, b = (np.ascontiguousarray(p).reshape(height, 3 * width) for p in (a, b))
-        blur_along_rows(a, b, self.rows)
-
-    def maps(self, data_range: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """SSIM, and its contrast-structure factor, of each pixel and channel. Both [H, W, 3] float32"""
-        height, width3 = self.rows.shape[1] - 2 * RADIUS, self.rows.shape[2]
-        ssim, structure = np.empty((height, width3), np.float32), np.empty((height, width3), np.float32)
-        c1, c2 = ((k * data_range) ** 2 for k in (K1, K2))
-        similarity_of_rows(self.rows, c1, c2, ssim, structure)
-        return ssim.reshape(height, -1, 3), structure.reshape(height, -1, 3)
+        maps = similarity_maps(a, b)
+        return cls(*(values.reshape(height, width, 3) for values in maps))
 
 
-def ssim_pixels(moments: Moments) -> np.ndarray:
+def ssim_pixels(similarity: Similarity) -> np.ndarray:
     """SSIM of each pixel, mean over its channels, data range 1. [H, W] float32"""
-    return np.einsum("hwc->hw", moments.maps()[0]) / np.float32(3)  # many times faster than mean over a short axis
+    return np.einsum("hwc->hw", similarity.ssim) / np.float32(3)  # many times faster than mean over a short axis
 
 
 def ssim(image: np.ndarray, truth: np.ndarray, mask: np.ndarray | None = None) -> float:
@@ -56,7 +54,7 @@ def ssim(image: np.ndarray, truth: np.ndarray, mask: np.ndarray | None = None) -
     pixels count, unlike in scikit-image and torchmetrics, which cut them off or mirror the picture. Checked against
     engine.training.losses.ssim_map, and inside the border against scikit-image and torchmetrics.
     """
-    return masked_mean(ssim_pixels(Moments(image, truth)), mask)
+    return masked_mean(ssim_pixels(Similarity.of(image, truth)), mask)
 
 
 def dssim1(image: np.ndarray, truth: np.ndarray) -> float:
@@ -70,12 +68,12 @@ def dssim_range2(image: np.ndarray, truth: np.ndarray) -> float:
     Smaller than dssim1 for the same pictures. Source: SpacetimeGaussians' tables, which use pictures in 0..1 with the
     range of -1..1. Checked against scikit-image and torchmetrics inside the border.
     """
-    return dssim_range2_of(Moments(image, truth))
+    return dssim_range2_of(Similarity.of(image, truth))
 
 
-def dssim_range2_of(moments: Moments) -> float:
-    """`dssim_range2` from moments that are there already."""
-    return 0.5 * (1.0 - float(moments.maps(2.0)[0].mean(dtype=np.float64)))
+def dssim_range2_of(similarity: Similarity) -> float:
+    """`dssim_range2` from maps that are there already."""
+    return 0.5 * (1.0 - float(similarity.ssim_range2.mean(dtype=np.float64)))
 
 
 def dssim_ms(image: np.ndarray, truth: np.ndarray) -> float:
@@ -86,11 +84,11 @@ def dssim_ms(image: np.ndarray, truth: np.ndarray) -> float:
     negative averages count as zero. Source: Wang, Simoncelli, Bovik 2003, in the form of torchmetrics, which
     ClipGStream's figures come from; checked against torchmetrics.
     """
-    return dssim_ms_of(image, truth, Moments(image, truth))
+    return dssim_ms_of(image, truth, Similarity.of(image, truth))
 
 
-def dssim_ms_of(image: np.ndarray, truth: np.ndarray, moments: Moments) -> float:
-    """`dssim_ms` with the moments of the finest scale given."""
+def dssim_ms_of(image: np.ndarray, truth: np.ndarray, similarity: Similarity) -> float:
+    """`dssim_ms` with the maps of the finest scale given."""
     if min(image.shape[:2]) < MS_MIN_SIDE_PX:
         return math.nan
     a, b = (np.clip(p, 0.0, 1.0).astype(np.float32, copy=False) for p in (image, truth))
@@ -100,9 +98,8 @@ def dssim_ms_of(image: np.ndarray, truth: np.ndarray, moments: Moments) -> float
         is_coarsest = scale == len(MS_WEIGHTS) - 1
         if scale:
             a, b = _halve(a), _halve(b)
-            moments = Moments(_mirrored(a), _mirrored(b)) if is_coarsest else Moments(a, b)
-        ssim_map, structure = moments.maps()
-        factor = (ssim_map if is_coarsest else structure)[inside, inside]
+            similarity = Similarity.of(_mirrored(a), _mirrored(b)) if is_coarsest else Similarity.of(a, b)
+        factor = (similarity.ssim if is_coarsest else similarity.structure)[inside, inside]
         product *= max(float(factor.mean(dtype=np.float64)), 0.0) ** weight
     return 0.5 * (1.0 - product)
 

@@ -1,149 +1,147 @@
-"""The 11 x 11 Gaussian window of SSIM over pictures, and the formula, as two kernels over rows on all threads.
+"""SSIM of every value of two pictures: the 11 x 11 Gaussian window and the formula, as one kernel over bands of rows.
 
-Pictures are rows of interleaved RGB, so that a horizontal neighbour lies 3 values away. Every row is written by one
-worker and nothing is summed over rows: the same numbers for any number of threads.
+Pictures are rows of interleaved RGB, so that a horizontal neighbour lies 3 values away. Nothing is summed over rows and
+every row is computed alike: the same numbers for any number of threads. The blur along rows is the training loss's.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import get_num_threads
+from numba import get_num_threads, types
 
-from engine.kernels.arrays import Floats1, Floats2, Floats3, job_reader, pack
-from engine.kernels.lanes import kernel_intrinsic
+from engine.kernels.arrays import Floats2, Floats3, job_reader, pack
+from engine.kernels.lanes import LaneBuilder, Lanes, kernel_intrinsic
+from engine.kernels.memory import RecycledMemory
 from engine.kernels.routines import WORKER, routine, run
+from engine.kernels.workspace import WorkspacePool
+from engine.training.ssim_lanes import RADIUS, WINDOW, blur_moments
 
-RADIUS = 5
-_TAPS = np.exp(-((np.arange(2 * RADIUS + 1) - RADIUS) ** 2) / (2 * 1.5**2))
-WINDOW = (_TAPS / _TAPS.sum()).astype(np.float32)
-_MARGIN = 3 * RADIUS
-_FASTMATH = {"contract"}
+K1, K2 = 0.01, 0.03
+"""Constants of SSIM, as shares of the data range: C1 = (K1 L)^2, C2 = (K2 L)^2."""
+N_MAPS = 3
+"""SSIM and its contrast-structure factor with data range 1, SSIM with data range 2."""
+_N_MOMENTS = 4
+_MARGIN = 16
+"""Zeros on both ends of a row; the window reaches 15 values."""
+_POOL, _MEMORY = WorkspacePool(), RecycledMemory()
 
 
-class BlurJob(NamedTuple):
-    """Arguments of `blur_rows`.
+class SimilarityJob(NamedTuple):
+    """Arguments of `blur_rows` and `compare_rows`.
 
     Attributes:
         a, b: The pictures. [H, 3 W]
-        taps: The window. [11]
-        padded: Scratch, five rows a worker, zeros before. [5 workers, 3 W + 30]
-        rows: Written: a, b, a^2, b^2, ab blurred along x, from row 5 on. [5, H + 10, 3 W]
+        padded: Scratch, two rows a worker, zeros before. [2 workers, padded 3 W + 32]
+        moments: a, b, a^2 + b^2, a b blurred along rows; RADIUS rows of zeros at both ends. [4, H + 10, padded 3 W]
+        maps: Written. [3, H, padded 3 W]
         n_workers: How many workers share the rows.
     """
 
     a: Floats2
     b: Floats2
-    taps: Floats1
     padded: Floats2
-    rows: Floats3
+    moments: Floats3
+    maps: Floats3
     n_workers: int
 
 
-class SimilarityJob(NamedTuple):
-    """Arguments of `compare_rows`.
+def similarity_maps(image: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """SSIM maps of two pictures in 0..1 with zeros beyond their edge. [N_MAPS, H, 3 W] float32
 
-    Attributes:
-        rows: Of `blur_rows`. [5, H + 10, 3 W]
-        taps: The window. [11]
-        means: Scratch, five rows a worker. [5 workers, 3 W]
-        c1, c2: Constants of SSIM.
-        ssim, structure: Written. [H, 3 W]
-        n_workers: How many workers share the rows.
+    Args:
+        image, truth: [H, W, 3] float32
     """
-
-    rows: Floats3
-    taps: Floats1
-    means: Floats2
-    c1: float
-    c2: float
-    ssim: Floats2
-    structure: Floats2
-    n_workers: int
-
-
-def blur_along_rows(a: np.ndarray, b: np.ndarray, rows: np.ndarray) -> None:
-    """Blur two pictures, their squares and their product along x. See `BlurJob`; all float32, zeros beyond the edge."""
-    height, width3 = a.shape
+    height, width, _ = image.shape
+    a, b = (np.ascontiguousarray(picture).reshape(height, 3 * width) for picture in (image, truth))
+    row = -(-3 * width // 16) * 16
     n_workers = max(1, min(get_num_threads(), height))
-    padded = np.zeros((5 * n_workers, width3 + 2 * _MARGIN), np.float32)
-    run(blur_rows, pack(BlurJob(a, b, WINDOW, padded, rows, n_workers)), n_workers)
-
-
-def similarity_of_rows(rows: np.ndarray, c1: float, c2: float, ssim: np.ndarray, structure: np.ndarray) -> None:
-    """Blur along y, and write SSIM and its contrast-structure factor of each value. See `SimilarityJob`."""
-    height, width3 = ssim.shape
-    n_workers = max(1, min(get_num_threads(), height))
-    means = np.empty((5 * n_workers, width3), np.float32)
-    run(compare_rows, pack(SimilarityJob(rows, WINDOW, means, c1, c2, ssim, structure, n_workers)), n_workers)
+    maps = _MEMORY.empty(N_MAPS, height, row)
+    workspace = _POOL.take()
+    padded = workspace.array("padded", (2 * n_workers, row + 2 * _MARGIN), np.float32)
+    moments = workspace.array("moments", (_N_MOMENTS, height + 2 * RADIUS, row), np.float32)
+    padded[:], moments[:, :RADIUS], moments[:, -RADIUS:] = 0.0, 0.0, 0.0
+    job = pack(SimilarityJob(a, b, padded, moments, maps, n_workers))
+    run(blur_rows, job, n_workers)
+    run(compare_rows, job, n_workers)
+    _POOL.give_back(workspace)
+    return maps.numpy()[..., : 3 * width]
 
 
 def warm_up() -> None:
     """Compile both kernels, or load them from the cache, by comparing pictures of one pixel."""
-    pixel, rows = np.zeros((1, 3), np.float32), np.zeros((5, 1 + 2 * RADIUS, 3), np.float32)
-    blur_along_rows(pixel, pixel, rows)
-    similarity_of_rows(rows, 1.0, 1.0, pixel.copy(), pixel.copy())
+    similarity_maps(np.zeros((1, 1, 3), np.float32), np.zeros((1, 1, 3), np.float32))
+
+
+def _blur_down(build: LaneBuilder, center: Any, row_bytes: Any) -> Lanes:
+    """Sixteen values under the window along their columns."""
+    total: Lanes | None = None
+    for tap, weight in enumerate(WINDOW):
+        value = build.load(center, build.ir.mul(row_bytes, build.int64(tap - RADIUS)))
+        total = value * float(weight) if total is None else value.times_plus(float(weight), total)
+    assert total is not None
+    return total
 
 
 @kernel_intrinsic
-def _read_blur_job(typing_context, address):
-    """The BlurJob at an address."""
-    return job_reader(BlurJob)
+def _similarity(typing_context, moments, plane_bytes, row_bytes, target, target_plane_bytes):
+    """The N_MAPS of sixteen values."""
+    signature = types.void(*[types.int64] * 5)
+
+    def generate(context, builder, signature, arguments):
+        moments, plane_bytes, row_bytes, target, target_plane_bytes = arguments
+        build = LaneBuilder(builder)
+        mean_a, mean_b, squares, product = (
+            _blur_down(build, build.address(moments, builder.mul(plane_bytes, build.int64(i))), row_bytes)
+            for i in range(_N_MOMENTS)
+        )
+        mean_product = mean_a * mean_b
+        mean_squares = mean_a.times_plus(mean_a, mean_b * mean_b)
+        covariance, variances = (product - mean_product) * 2.0, squares - mean_squares
+        maps = []
+        for data_range in (1.0, 2.0):
+            c1, c2 = ((k * data_range) ** 2 for k in (K1, K2))
+            structure = (covariance + c2) / (variances + c2)
+            maps += [structure * (mean_product.times_plus(2.0, c1) / (mean_squares + c1)), structure]
+        for index, value in enumerate(maps[:N_MAPS]):
+            build.store(value, build.address(target, builder.mul(target_plane_bytes, build.int64(index))))
+        return context.get_dummy_value()
+
+    return signature, generate
 
 
 @kernel_intrinsic
-def _read_similarity_job(typing_context, address):
+def _read_job(typing_context, address):
     """The SimilarityJob at an address."""
     return job_reader(SimilarityJob)
 
 
-@routine(WORKER, fastmath=_FASTMATH)
+@routine(WORKER)
 def blur_rows(worker, arguments):
-    """See BlurJob."""
-    job = _read_blur_job(arguments)
-    a, b, taps, padded, rows = job.a, job.b, job.taps, job.padded, job.rows
+    """See SimilarityJob."""
+    job = _read_job(arguments)
+    a, b, padded, moments = job.a, job.b, job.padded, job.moments
     height, width3 = a.shape
-    first = 5 * worker
+    plane_bytes = 4 * moments.shape[1] * moments.shape[2]
+    row_a, row_b = padded[2 * worker], padded[2 * worker + 1]
+    from_a, from_b = row_a.ctypes.data + 4 * _MARGIN, row_b.ctypes.data + 4 * _MARGIN
     for y in range(height * worker // job.n_workers, height * (worker + 1) // job.n_workers):
         for x in range(width3):
-            va, vb = a[y, x], b[y, x]
-            padded[first, x + 15] = va
-            padded[first + 1, x + 15] = vb
-            padded[first + 2, x + 15] = va * va
-            padded[first + 3, x + 15] = vb * vb
-            padded[first + 4, x + 15] = va * vb
-        for m in range(5):
-            for x in range(width3):
-                rows[m, y + 5, x] = taps[5] * padded[first + m, x + 15]
-            for j in range(5):
-                weight = taps[j]
-                for x in range(width3):
-                    both = padded[first + m, x + 3 * j] + padded[first + m, x + 30 - 3 * j]
-                    rows[m, y + 5, x] += weight * both
+            row_a[_MARGIN + x] = a[y, x]
+            row_b[_MARGIN + x] = b[y, x]
+        target = moments[0, y + RADIUS].ctypes.data
+        for x in range(0, moments.shape[2], 16):
+            blur_moments(from_a + 4 * x, from_b + 4 * x, target + 4 * x, plane_bytes)
 
 
-@routine(WORKER, fastmath=_FASTMATH)
+@routine(WORKER)
 def compare_rows(worker, arguments):
     """See SimilarityJob."""
-    job = _read_similarity_job(arguments)
-    rows, taps, means, ssim, structure = job.rows, job.taps, job.means, job.ssim, job.structure
-    c1, c2, two = np.float32(job.c1), np.float32(job.c2), np.float32(2)
-    height, width3 = ssim.shape
-    first = 5 * worker
+    job = _read_job(arguments)
+    moments, maps = job.moments, job.maps
+    height, row = maps.shape[1], maps.shape[2]
     for y in range(height * worker // job.n_workers, height * (worker + 1) // job.n_workers):
-        for m in range(5):
-            for x in range(width3):
-                means[first + m, x] = taps[5] * rows[m, y + 5, x]
-            for j in range(5):
-                weight = taps[j]
-                for x in range(width3):
-                    means[first + m, x] += weight * (rows[m, y + j, x] + rows[m, y + 10 - j, x])
-        for x in range(width3):
-            mu_a, mu_b = means[first, x], means[first + 1, x]
-            product = mu_a * mu_b
-            squares = mu_a * mu_a + mu_b * mu_b
-            contrast = two * (means[first + 4, x] - product) + c2
-            contrast /= means[first + 2, x] + means[first + 3, x] - squares + c2
-            structure[y, x] = contrast
-            ssim[y, x] = contrast * (two * product + c1) / (squares + c1)
+        source, target = moments[0, y + RADIUS].ctypes.data, maps[0, y].ctypes.data
+        for x in range(0, row, 16):
+            _similarity(source + 4 * x, 4 * moments.shape[1] * row, 4 * row, target + 4 * x, 4 * height * row)

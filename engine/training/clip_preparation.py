@@ -21,7 +21,7 @@ from engine.cloud.inside import frames_inside
 from engine.cloud.moving_cloud import MovingCloud
 from engine.cloud.regions import GateRegion
 from engine.cloud.static_cloud import StaticCloud
-from engine.errors import PreparationError, ProjectError
+from engine.errors import DiskError, PreparationError, ProjectError
 from engine.model.clip_model import ClipModel
 from engine.model.clip_state import ClipState
 from engine.model.view import View, render_gaussians
@@ -145,7 +145,10 @@ class ClipPreparation:
     def with_motion(self, parts: ClipParts, pictures: TrainingPictures) -> ClipParts:
         """A reference clip whose static anchors were trained, with corrected backgrounds and what moves."""
         backgrounds = self._corrected(parts.backgrounds, parts.model, parts.gains, pictures)
-        write_backgrounds(self._prep_dir, backgrounds, self._key_of_corrected())
+        try:
+            self.keep_backgrounds(backgrounds)
+        except DiskError as error:  # clips after this one need them, this one does not: tried again at its end
+            self._say("Checking backgrounds", f"{error.message} Tried again when the clip is finished")
         parts = replace(parts, backgrounds=backgrounds)
         cloud, n_inside, moving_spacing = self._find_motion(parts, pictures)
         if len(cloud.points):
@@ -183,6 +186,17 @@ class ClipPreparation:
         self._say("Comparing with the reference", coverage.text)
         reasons = self._make_dynamic(parts, pictures, cloud, n_inside)
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage.as_dict())
+
+    def keep_backgrounds(self, backgrounds: Backgrounds) -> None:
+        """Keep a reference clip's corrected backgrounds for source clips, unless they are kept already.
+
+        Raises:
+            DiskError: The disk refused.
+        """
+        key = self._key_of_corrected()
+        kept = read_backgrounds(self._prep_dir, key)
+        if kept is None or not kept.equals(backgrounds):
+            write_backgrounds(self._prep_dir, backgrounds, key)
 
     # ---------------------------------------------------------------- what does not move
 

@@ -21,13 +21,14 @@ from engine.cloud.range import near_plane
 from engine.cloud.regions import GateRegion
 from engine.errors import NonFiniteLoss, PreparationError
 from engine.metrics.psnr import psnr
-from engine.model.clip_model import decoder_sizes, load_clip_model
-from engine.model.clip_state import SCHEMA, ClipState
+from engine.model.clip_header import SCHEMA
+from engine.model.clip_model import ClipModel, decoder_sizes, load_clip_model
+from engine.model.clip_state import ClipState
 from engine.model.compact import CompactClip, compact_clip
 from engine.model.view import REACH_SPACINGS, View, render_gaussians, render_model
 from engine.training.active_tiles import ActivePicture, ActiveTiles
 from engine.training.building import merged
-from engine.training.checkpoint import Checkpoint, Place, read_checkpoint, write_checkpoint
+from engine.training.checkpoint import Checkpoint, Place, damaged_checkpoint, read_checkpoint, write_checkpoint
 from engine.training.clip_field import n_alive
 from engine.training.clip_preparation import ClipParts, ClipPreparation
 from engine.training.config import TrainConfig
@@ -121,6 +122,8 @@ class ClipTraining:
         self._workspace = LossWorkspace(self.height, self.width)
         self._tiles: ActiveTiles | None = None
         self._held_in = held_in_items(n_cameras, clip.n_frames, seed) if config.patience else []
+        self._trained: tuple[ClipModel, dict[str, np.ndarray]] | None = None
+        """Model and reasons of the gate before they took over the values that are stored."""
         self._patience: Patience | None = None
 
     # ---------------------------------------------------------------- where we are
@@ -319,7 +322,10 @@ class ClipTraining:
 
     def state(self) -> ClipState:
         """Snapshot of everything the clip owns. Copies, so that training can go on."""
-        arrays = self.model.own_arrays() | self._reasons
+        return self._state_of(self.model, self._reasons)
+
+    def _state_of(self, model: ClipModel, reasons: dict[str, np.ndarray]) -> ClipState:
+        arrays = model.own_arrays() | reasons
         header = {
             "schema": SCHEMA,
             "role": "reference" if self.reference is None else "source",
@@ -335,11 +341,11 @@ class ClipTraining:
             "near_plane": self.near_plane,
             "spacing": self.spacing,
             "moving_spacing": self.moving_spacing,
-            "n_anchors": {role: len(self.model.anchor_set(role)) for role in self.model.roles()},
-            "n_alive": n_alive(self.model),
+            "n_anchors": {role: len(model.anchor_set(role)) for role in model.roles()},
+            "n_alive": n_alive(model),
             "coverage": self._coverage,
-            "decoder": decoder_sizes(self.model.decoder),
-            "field": None if self.model.field is None else self.model.field.shape.as_dict(),
+            "decoder": decoder_sizes(model.decoder),
+            "field": None if model.field is None else model.field.shape.as_dict(),
         }
         if self.reference is None:
             arrays["gains"] = self.gains.detach().numpy().copy()
@@ -354,10 +360,16 @@ class ClipTraining:
     def finish(self) -> CompactClip:
         """The trained clip as it is stored. The model takes its values over: what is measured from here on is that.
 
+        A checkpoint that is written later still holds what was trained.
+
         Raises:
             NonFiniteLoss: An array holds numbers that are not finite.
+            DiskError: The backgrounds that source clips share could not be kept; nothing has changed.
         """
+        if self._base is None and self.phases[self._phase_index][0] != "static":
+            self._preparation.keep_backgrounds(self.backgrounds)
         state = self.state()
+        self._trained = self.model, self._reasons
         # another clip's field may show this one where fields go on: what it would show nobody knows yet
         if self.config.gate == "images" and self.config.field != "continue":
             state, said = demote(state, self.reference, self._training_views, reach=self._reach)
@@ -383,7 +395,7 @@ class ClipTraining:
             patience=None if self._patience is None else self._patience.state(),
             generator=self._generator.get_state().numpy().tolist(),
         )
-        state = self.state()
+        state = self._state_of(*(self._trained or (self.model, self._reasons)))
         state = ClipState(state.arrays | self._optimizer.arrays(), state.header)
         write_checkpoint(path, Checkpoint(state, self.gains.detach().numpy().copy(), self.backgrounds, place))
 
@@ -396,6 +408,24 @@ class ClipTraining:
         expected = {"clip_index": self.clip.clip_index, "camera_names": list(self.rig.names), "seed": self.seed}
         kept = read_checkpoint(path, expected)
         self.pictures = self._preparation.read_pictures()
+        try:
+            self._go_on(kept)
+        except (
+            ArithmeticError,
+            AssertionError,
+            AttributeError,
+            LookupError,
+            RuntimeError,
+            TypeError,
+            ValueError,
+        ) as error:
+            raise damaged_checkpoint(error, path) from error
+
+    def _go_on(self, kept: Checkpoint) -> None:
+        width, height = shared_image_size(self.capture)
+        if kept.backgrounds.images.shape != (len(self.rig), height, width, 3) or kept.gains.shape != (len(self.rig), 3):
+            found = f"{kept.backgrounds.images.shape} and {kept.gains.shape}"
+            raise ValueError(f"backgrounds and gains are {found}, not of {len(self.rig)} cameras of {width}x{height}")
         header, arrays, place = kept.state.header, kept.state.arrays, kept.place
         parts = ClipParts(
             load_clip_model(kept.state, self.reference, is_learning=True),

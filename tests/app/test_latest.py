@@ -86,3 +86,28 @@ def test_after_closing_nothing_is_computed():
     worker.request(1)
     assert worker.newest is None
     assert not worker.is_busy
+
+
+def test_what_runs_while_everything_is_forgotten_is_dropped_and_can_be_asked_for_again():
+    started, go_on = threading.Event(), threading.Event()
+    computed = []
+
+    def compute(value: int) -> int:
+        computed.append(value)
+        started.set()
+        assert go_on.wait(WAIT_S)
+        if len(computed) == 1:
+            raise ValueError("of what was before")
+        return value * 10
+
+    worker = LatestWorker("test", compute)
+    worker.request(1)
+    assert started.wait(WAIT_S)
+    worker.forget()
+    worker.request(1)
+    go_on.set()
+    assert worker.wait_idle(WAIT_S)
+    assert worker.take_error() is None
+    assert not worker.has_failed(1)
+    assert (computed, worker.newest) == ([1, 1], (1, 10))
+    worker.close()

@@ -24,7 +24,8 @@ def live_session(make_session, monkeypatch):
 
 
 def revision_of(session) -> str:
-    return session._service.progress[0].revision
+    shown = session._service.shown_state(0)
+    return "" if shown is None else shown.revision
 
 
 def test_the_states_of_the_fake_training_are_those_of_a_clip(make_session):
@@ -59,7 +60,7 @@ def test_a_live_state_is_shown_and_given_back(live_session, caplog):
     assert len(session.shown_gaussians().means) == N_ANCHORS
     assert np.isfinite(session.shown_gaussians().means).all()
     # the worker writes the next one only when the last was given back, and removes what came before it
-    poll_until(session, lambda: revision_of(session) not in ("", "live-1", "live-2"))
+    poll_until(session, lambda: revision_of(session) not in ("", "live-1-1", "live-1-2"))
     names = sorted(path.name for path in session.project.live_dir.iterdir())
     assert len(names) <= 2
     assert "clip-0000-r0001.safetensors" not in names
@@ -73,8 +74,8 @@ def test_a_live_state_is_given_back_when_nobody_looks_at_its_clip(make_session, 
     session.dispatch(c.SetClipLength(3))
     session.dispatch(c.SetFrame(4))
     session.dispatch(c.TrainNextClip())
-    poll_until(session, lambda: revision_of(session) == "live-3", what="snapshots that nobody waits for")
-    assert not session._playback.is_loaded(0, "live-1")
+    poll_until(session, lambda: revision_of(session) == "live-1-3", what="snapshots that nobody waits for")
+    assert session._playback.worker.newest is None
 
 
 def test_a_live_state_that_is_gone_costs_no_notice_and_the_next_one_is_shown(live_session, monkeypatch):
@@ -82,10 +83,10 @@ def test_a_live_state_that_is_gone_costs_no_notice_and_the_next_one_is_shown(liv
     poll_until(session, lambda: revision_of(session) != "")
     poll_until(session, lambda: session.shown_gaussians() is not None, what="the first live state")
     session._playback.clear()  # so that the snapshot is read from its file again
-    snapshot = session._service.progress[0].file
+    snapshot = session._service.shown_state(0).file
     snapshot.unlink()
-    poll_until(session, lambda: session._service.progress[0].file != snapshot, what="the next snapshot")
-    poll_until(session, lambda: session._playback.is_loaded(0, revision_of(session)), what="a live state after that")
+    poll_until(session, lambda: session._service.shown_state(0).file != snapshot, what="the next snapshot")
+    poll_until(session, lambda: session.wanted_frame().is_loaded, what="a live state after that")
     assert len(session.notices) == 0
 
 
@@ -98,3 +99,23 @@ def test_a_trained_state_that_is_gone_is_told(make_session):
     session.shown_gaussians()
     poll_until(session, lambda: any(notice.kind == "error" for notice in session.notices))
     assert session.notices[-1].kind == "error"
+
+
+def test_states_of_a_clip_that_is_trained_again_have_names_of_their_own(make_session):
+    """Each worker counts its snapshots from one; the picture of an old state must not pass for the new one."""
+    session = make_session()
+    session.dispatch(c.SetClipLength(3))
+    names: list[set[str]] = []
+    for _ in range(2):
+        session.dispatch(c.TrainClip(0))
+        seen: set[str] = set()
+
+        def is_done(seen: set[str] = seen) -> bool:
+            seen.add(revision_of(session))
+            return session.training.state == "idle"
+
+        poll_until(session, is_done)
+        names.append({name for name in seen if name.startswith("live-")})
+    assert names[0]
+    assert names[1]
+    assert names[0].isdisjoint(names[1])

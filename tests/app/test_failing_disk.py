@@ -1,0 +1,256 @@
+"""A disk that refuses, and a project folder that goes away: what was learned is kept, the training goes on or says why.
+
+The loop with a small training and a clock of its own; `tests.faults` does the same to real processes on a full disk.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from app.training import keeping
+from app.training import messages as m
+from app.training.messages import Pause, SnapshotConsumed, Stop
+from engine.errors import CaptureError
+from engine.model.clip_state import read_clip_state
+from tests.app.fakes import make_fake
+from tests.app.test_run import Bench
+
+
+@pytest.fixture
+def bench(tmp_path, capture_folder):
+    def make(**options) -> Bench:
+        return Bench(tmp_path / "p", capture_folder, **options)
+
+    return make
+
+
+class Disk:
+    """Refuses to put files of some folders in their place, for as long as it is full."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *folders: str, number: int = errno.ENOSPC) -> None:
+        self.is_full, self.n_refused = True, 0
+        replace = os.replace
+
+        def refuse(source, target):
+            if self.is_full and Path(target).parent.name in folders:
+                self.n_refused += 1
+                raise OSError(number, os.strerror(number), str(target))
+            replace(source, target)
+
+        monkeypatch.setattr("os.replace", refuse)
+
+
+def without_window(it: Bench) -> Bench:
+    """A training of the command line."""
+    it.job = replace(it.job, is_window_open=False)
+    it.start()
+    return it
+
+
+def finished(it: Bench) -> dict:
+    """Arrays of the clip in its place."""
+    return read_clip_state(it.project.clip_path(0)).arrays
+
+
+def test_live_snapshots_come_back_when_there_is_room_again(bench, monkeypatch):
+    it = bench()
+    disk = Disk(monkeypatch, "live")
+    it.steps(20)
+    assert disk.n_refused > 3
+    assert len(it.of(m.WarningRaised)) == 1  # said once, and not every two seconds
+    disk.is_full = False
+    it.steps(5)
+    assert [event.revision for event in it.of(m.SnapshotWritten)] == [1]
+    it.commands.append(SnapshotConsumed(1))
+    disk.is_full = True
+    it.steps(5)
+    assert len(it.of(m.WarningRaised)) == 2  # full again is news
+
+
+def test_a_checkpoint_is_due_by_the_clock_however_slowly_it_is_written(bench, monkeypatch):
+    it = bench(n_steps=1000)
+    it.steps(1)
+    kept_s = []
+    write = it.training.write_checkpoint
+
+    def slowly(path):
+        kept_s.append(it.now_s)
+        write(path)
+        it.now_s += 4.0
+
+    it.training.write_checkpoint = slowly
+    it.steps(200)
+    gaps = [later - earlier for earlier, later in pairwise(kept_s)]
+    assert kept_s[0] <= 30.0
+    assert len(gaps) >= 5
+    # a kill just before one is complete costs the time since the start of the one before, and the writing
+    assert max(gaps) + 4.0 <= 30.0
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EROFS, errno.ESTALE])
+def test_a_clip_that_cannot_be_put_in_its_place_is_a_checkpoint_until_it_can(bench, monkeypatch, number):
+    it = bench(n_steps=5)
+    disk = Disk(monkeypatch, "clips", number=number)
+    assert it.steps(8) is True
+    assert not it.project.is_trained(0)
+    assert read_clip_state(it.checkpoint).header["step"] == 5
+    (told,) = it.of(m.WarningRaised)
+    assert "trained, but could not be written" in told.title
+    assert os.strerror(number) in told.detail
+    assert "kept as a checkpoint" in told.detail
+    disk.is_full = False
+    assert it.steps(20) is False
+    assert isinstance(it.events[-1], m.ClipTrained)
+    assert not it.checkpoint.exists()
+
+
+def test_without_a_window_it_gives_up_after_some_tries_and_the_same_command_finishes(bench, monkeypatch):
+    it = without_window(bench(n_steps=5))
+    assert it.steps(10) is False
+    expected = finished(it)
+    it.project.clip_path(0).unlink()  # and the same once more
+    it.start()
+    disk = Disk(monkeypatch, "clips")
+    assert it.steps(200) is False
+    assert 2 <= disk.n_refused <= 6
+    failed = it.events[-1]
+    assert isinstance(failed, m.TrainingFailed)
+    assert failed.kind == "DiskError"
+    assert "No space left on device" in failed.message
+    assert "Step 5 is kept; training again with the same command goes on from there." in failed.message
+    assert "fault of the program" not in failed.message + failed.hint
+    disk.is_full = False
+    it.start()
+    assert it.steps(20) is False
+    assert isinstance(it.events[-1], m.ClipTrained)
+    assert finished(it).keys() == expected.keys()
+    assert all((finished(it)[name] == expected[name]).all() for name in expected)
+
+
+def test_where_nothing_can_be_kept_it_waits_longer_and_says_so(bench, monkeypatch):
+    it = without_window(bench(n_steps=5))
+    Disk(monkeypatch, "clips", "checkpoints")
+    assert it.steps(int(keeping.PATIENCE_UNKEPT_S) - 5) is True
+    assert "in memory only" in it.of(m.WarningRaised)[-1].detail
+    assert it.steps(60) is False
+    assert "Step 5 could not be kept; training again starts from the beginning." in it.events[-1].message
+
+
+def test_a_clip_that_waits_for_room_can_be_stopped(bench, monkeypatch):
+    it = bench(n_steps=5)
+    Disk(monkeypatch, "clips")
+    it.steps(8)
+    it.commands.append(Stop(keep=True))
+    assert it.steps(1) is False
+    assert it.events[-1] == m.TrainingStopped(str(it.checkpoint), 5)
+
+
+def test_a_failure_between_steps_keeps_what_was_learned(bench):
+    def break_measuring(it):
+        def measure():
+            if it.training.steps_done:
+                raise CaptureError("The picture is damaged.")
+            return 20.0
+
+        it.training.held_out_psnr = measure
+
+    it = bench(change=break_measuring)
+    assert it.steps(20) is False
+    failed = it.events[-1]
+    assert failed.kind == "CaptureError"
+    step = read_clip_state(it.checkpoint).header["step"]
+    assert step > 0
+    assert f"Step {step} is kept" in failed.message
+
+
+@pytest.mark.parametrize("is_moved", [False, True])
+@pytest.mark.parametrize("at", ["step", "stop", "pause", "finish"])
+def test_a_project_that_is_gone_is_noticed_and_not_made_again(bench, is_moved, at, tmp_path):
+    it = bench(n_steps=5 if at == "finish" else 100)
+    it.steps(3)
+    if is_moved:
+        it.project.folder.rename(tmp_path / "elsewhere")
+    else:
+        shutil.rmtree(it.project.folder)
+    if at == "stop":
+        it.commands.append(Stop(keep=True))
+    if at == "pause":
+        it.commands.append(Pause())
+    assert it.steps(50) is False
+    failed = it.events[-1]
+    assert isinstance(failed, m.TrainingFailed)
+    assert failed.kind == "ProjectGone"
+    assert "deleted or moved" in failed.message
+    assert not it.project.folder.exists()
+
+
+def test_another_folder_in_the_place_of_a_project_is_left_alone(bench, tmp_path):
+    it = bench()
+    it.steps(3)
+    it.project.folder.rename(tmp_path / "elsewhere")
+    shutil.copytree(tmp_path / "elsewhere", it.project.folder)
+    before = sorted(it.project.folder.rglob("*"))
+    assert it.steps(50) is False
+    assert it.events[-1].kind == "ProjectGone"
+    assert "another folder" in it.events[-1].message
+    assert set(it.project.folder.rglob("*")) <= set(before)
+
+
+def test_the_command_ends_with_1_deletes_nothing_and_goes_on_with_room(run, capture_folder, tmp_path, monkeypatch):
+    monkeypatch.setattr(keeping, "PATIENCE_S", 0.0)
+    disk = Disk(monkeypatch, "clips")
+    arguments = ("train", capture_folder, "--project", tmp_path / "p")
+    code, _, err = run(*arguments)
+    assert code == 1
+    assert "No space left on device" in err
+    assert "fault of the program" not in err
+    assert (tmp_path / "p" / "checkpoints" / "0000.safetensors").is_file()
+    disk.is_full = False
+    code, out, err = run(*arguments, "--json")
+    assert (code, err.count("is trained")) == (0, 1)
+    assert '"state": "trained"' in out
+
+
+def test_a_new_project_in_which_something_was_learned_is_not_taken_back(run, capture_folder, tmp_path):
+    code, _, err = run("train", capture_folder, "--project", tmp_path / "p", make_training=_breaks_at_the_end)
+    assert code == 2
+    assert "The picture is damaged" in err
+    assert read_clip_state(tmp_path / "p" / "checkpoints" / "0000.safetensors").header["step"] > 0
+
+
+def _breaks_at_the_end(job, report):
+    training = make_fake(job, report)
+
+    def measure() -> float:
+        if training.steps_done:
+            raise CaptureError("The picture is damaged.")
+        return 20.0
+
+    training.held_out_psnr = measure
+    return training
+
+
+def test_a_project_deleted_while_training_ends_with_1_and_is_not_made_again(run, capture_folder, tmp_path):
+    def deletes_itself(job, report):
+        training = make_fake(job, report)
+        ordinary = training.step
+
+        def step():
+            if training.steps_done == 2:
+                shutil.rmtree(job.project)
+            return ordinary()
+
+        training.step = step
+        return training
+
+    code, _, err = run("train", capture_folder, "--project", tmp_path / "p", make_training=deletes_itself)
+    assert code == 1
+    assert "The project folder is gone" in err
+    assert not (tmp_path / "p").exists()
