@@ -69,6 +69,7 @@ def take(path: Path) -> None:
 
 def test_the_owner_is_named_with_machine_process_and_time(path, holder):
     owner = read_owner(path)
+    assert owner is not None
     assert (owner.pid, owner.host) == (holder.pid, socket.gethostname())
     assert owner.start == process_start(holder.pid)
     with pytest.raises(ProjectError) as caught:
