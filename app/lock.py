@@ -11,7 +11,7 @@ from __future__ import annotations
 import errno
 import json
 import os
-import socket
+import platform
 import stat
 import sys
 import uuid
@@ -112,7 +112,7 @@ class LockOwner:
         """Whether this machine would know if the owner lives."""
         if not self.host or (self.boot and self.boot == boot_id()):
             return True
-        return (self.host, self.machine) == (socket.gethostname(), machine_id())
+        return (self.host, self.machine) == (platform.node(), machine_id())
 
     @property
     def is_alive(self) -> bool:
@@ -205,7 +205,7 @@ class ProcessLock:
         self._owner = LockOwner(
             os.getpid(),
             process_start(os.getpid()),
-            socket.gethostname(),
+            platform.node(),
             machine_id(),
             boot_id(),
             datetime.now().astimezone().isoformat(timespec="seconds"),

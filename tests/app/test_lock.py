@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import re
 import signal
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -70,7 +70,7 @@ def take(path: Path) -> None:
 def test_the_owner_is_named_with_machine_process_and_time(path, holder):
     owner = read_owner(path)
     assert owner is not None
-    assert (owner.pid, owner.host) == (holder.pid, socket.gethostname())
+    assert (owner.pid, owner.host) == (holder.pid, platform.node())
     assert owner.start == process_start(holder.pid)
     with pytest.raises(ProjectError) as caught:
         ProcessLock(path).acquire()
@@ -120,7 +120,7 @@ def test_what_no_living_process_has_written_is_taken_over(path, content, dead_pi
     for name, value in (
         ("OWN", os.getpid()),
         ("DEAD", dead_pid),
-        ("HERE", socket.gethostname()),
+        ("HERE", platform.node()),
         ("MACHINE", machine_id()),
     ):
         content = content.replace(name.encode(), str(value).encode())
@@ -179,7 +179,7 @@ def test_a_lock_of_another_machine_is_never_taken_over(path, dead_pid, machine):
 
 
 def test_a_machine_that_was_started_again_finds_its_own_lock(path, dead_pid):
-    owner = {"pid": dead_pid, "start": "5", "host": socket.gethostname(), "machine": machine_id(), "boot": "before"}
+    owner = {"pid": dead_pid, "start": "5", "host": platform.node(), "machine": machine_id(), "boot": "before"}
     path.write_text(json.dumps(owner))
     take(path)
 
