@@ -110,7 +110,9 @@ class ClipStatus:
             again, or the clip that it goes on from), or damaged (finished, but its file cannot be read).
         progress: Share of its steps, 0..1.
         held_out_psnr: Newest figure, dB; None when not measured.
-        n_inherited, n_own: Anchors of the shown model; 0 until it was loaded.
+        n_inherited, n_own: All anchors of the clip, whatever frames they are alive in: those it inherits from the
+            reference clip, and those it holds itself (all of the reference clip, residual ones of another). 0 where
+            there are none yet.
         resume_step: The step that its training goes on from; None when there is nothing to go on from. A clip that
             was being trained again when that was stopped is trained and has one.
         reason: Why it is stale or damaged; empty otherwise.

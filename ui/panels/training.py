@@ -17,6 +17,9 @@ from ui.theme import Icon
 from ui.widgets import format_count, primary_button, text_right, text_wrapped_dim
 
 MAX_PLOT_POINTS = 600
+ANCHORS_TOOLTIP = """All anchors of a clip, whichever frames they are alive in.
+Reference clip: reference anchors, which later clips inherit.
+Later clips: inherited + residual anchors."""
 
 
 def duration_text(seconds: float | None) -> str:
@@ -171,17 +174,24 @@ def _draw_curve(
     implot.end_plot()
 
 
+def anchors_text(n_inherited: int, n_own: int) -> str:
+    """Anchors of a clip: of the reference clip a number, of a later one a sum; a dash where there are none yet."""
+    if not n_inherited and not n_own:
+        return "–"
+    return f"{format_count(n_inherited)} + {format_count(n_own)}" if n_inherited else format_count(n_own)
+
+
 def _draw_clips(session: Any) -> None:
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.borders_inner_h | imgui.TableFlags_.scroll_y
     flags |= imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.pad_outer_x
-    if not imgui.begin_table("clips", 4, flags, ImVec2(0, max(imgui.get_content_region_avail().y - 4, 90))):
+    if not imgui.begin_table("clips", 3, flags, ImVec2(0, max(imgui.get_content_region_avail().y - 4, 90))):
         return
     imgui.table_setup_scroll_freeze(0, 1)
     imgui.table_setup_column("Clip", imgui.TableColumnFlags_.width_stretch)
     imgui.table_setup_column("PSNR")
-    imgui.table_setup_column("Inherited")
-    imgui.table_setup_column("Own")
+    imgui.table_setup_column("Anchors")
     imgui.table_headers_row()
+    imgui.set_item_tooltip(ANCHORS_TOOLTIP)
     for clip, status in zip(session.clips, session.clip_states, strict=False):
         imgui.table_next_row()
         imgui.table_next_column()
@@ -193,7 +203,6 @@ def _draw_clips(session: Any) -> None:
         imgui.table_next_column()
         imgui.text("–" if status.held_out_psnr is None else f"{status.held_out_psnr:.1f}")
         imgui.table_next_column()
-        imgui.text(format_count(status.n_inherited) if status.n_inherited else "–")
-        imgui.table_next_column()
-        imgui.text(format_count(status.n_own) if status.n_own else "–")
+        imgui.text(anchors_text(status.n_inherited, status.n_own))
+        imgui.set_item_tooltip(ANCHORS_TOOLTIP)
     imgui.end_table()
