@@ -68,6 +68,7 @@ class TrainingStatus:
         step, n_steps: Optimiser steps of that clip.
         progress: Share of the current stage while preparing, of all steps later. 0..1
         stage: What is done at the moment, as shown to the user.
+        stage_number, n_stages: Which stage of the preparation that is, from 1; 0 where they are not counted.
         message: One line with counts and reasons.
         steps_per_s: Smoothed rate; 0 when unknown.
         eta_s: Seconds until the clip is finished; None when unknown.
@@ -87,6 +88,8 @@ class TrainingStatus:
     n_steps: int = 0
     progress: float = 0.0
     stage: str = ""
+    stage_number: int = 0
+    n_stages: int = 0
     message: str = ""
     steps_per_s: float = 0.0
     eta_s: float | None = None

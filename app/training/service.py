@@ -39,6 +39,7 @@ from app.training.messages import (
     WorkerReady,
 )
 from app.training.process import ProcessWorker, Worker
+from app.training.stage_order import stage_number
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
 
@@ -339,6 +340,9 @@ class TrainingService:
         rate = step.steps_per_s if step is not None else 0.0
         left = 0 if step is None else step.n_steps - step.step
         upcoming = self.next_clip_index
+        settings = self.project.settings
+        is_reference = clip_index == settings.reference_clip or settings.config().independent
+        number, n_stages = stage_number(self._stage.stage, is_reference=is_reference) if step is None else (0, 0)
         return TrainingStatus(
             state=state,
             clip_index=clip_index,
@@ -346,6 +350,8 @@ class TrainingService:
             n_steps=0 if run is None else run.n_steps,
             progress=self._stage.done if step is None else step.step / max(step.n_steps, 1),
             stage=self._stage.stage,
+            stage_number=number,
+            n_stages=n_stages,
             message=self._message(state),
             steps_per_s=rate if state == "running" else 0.0,
             eta_s=left / rate if rate > 0 and state == "running" else None,

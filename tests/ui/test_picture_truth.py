@@ -26,7 +26,7 @@ from ui.panels.hud import legend_rows
 from ui.screenshot import read_window
 
 pytestmark = pytest.mark.gl
-WAIT_S = 120.0
+WAIT_S = 300.0
 """Only a hang takes longer, or the first start, which compiles the kernels."""
 
 

@@ -12,6 +12,7 @@ from app.commands import PauseTraining, ResumeTraining, StopTraining, TrainNextC
 from ui import theme
 from ui.panels.plan import draw_plan
 from ui.panels.timeline import STATE_WORDS
+from ui.progress_words import stage_words
 from ui.state import Dispatch, UiState
 from ui.theme import Icon
 from ui.widgets import format_count, primary_button, text_right, text_wrapped_dim
@@ -111,7 +112,7 @@ def _draw_progress(status: Any, ui: UiState) -> None:
     imgui.text(f"{words[status.state]} clip {status.clip_index}")
     if status.stage:
         imgui.same_line()
-        imgui.text_disabled(str(status.stage))
+        imgui.text_disabled(stage_words(status))
     bar_color = theme.YELLOW if status.state == "paused" else theme.SKY
     imgui.push_style_color(imgui.Col_.plot_histogram, ImVec4(*bar_color))
     imgui.progress_bar(min(max(share, 0.0), 1.0), ImVec2(-1, 8), "")
@@ -121,8 +122,9 @@ def _draw_progress(status: Any, ui: UiState) -> None:
         _pair(f"Step {format_count(status.step)} of {format_count(status.n_steps)}", f"{share * 100:.0f} %")
         rate = f"{status.steps_per_s:.1f} steps/s" if status.steps_per_s else "–"
         _pair(rate, f"{duration_text(status.eta_s)} left")
-    elif status.eta_s is not None:
-        _pair("", f"about {duration_text(status.eta_s)} left")
+    else:
+        left = "" if status.eta_s is None else f"about {duration_text(status.eta_s)} left"
+        _pair(left, f"{share * 100:.0f} % of this stage" if status.stage else "")
     if status.message:
         text_wrapped_dim(str(status.message))
 
