@@ -9,6 +9,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -125,7 +126,7 @@ class FakeTraining:
         )
 
     def state(self) -> ClipState:
-        header = {
+        header: dict[str, Any] = {
             "schema": 1,
             "role": "reference" if self.reference is None else "source",
             "clip_index": self.clip.clip_index,
@@ -138,7 +139,9 @@ class FakeTraining:
             "spacing": 0.1,
             "metrics": {},
         }
+        header["n_anchors"] = {"static": N_ANCHORS}
         if self.reference is not None:
+            header["n_anchors"]["residual"] = N_ANCHORS
             header["reference_fingerprint"] = self.reference.header["fingerprint"]
         if self.previous is not None:
             header["previous_fingerprint"] = self.previous.header["fingerprint"]
