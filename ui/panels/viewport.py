@@ -159,6 +159,7 @@ class ViewportPanel:
             for index, name in enumerate(names):
                 imgui.push_id(index)  # names may be equal before a "##", which is all that ImGui would tell apart
                 is_chosen = imgui.selectable("##camera", shown == index)[0]
+                ui.mark(f"viewport.camera{index}")
                 imgui.same_line(0, 0)
                 imgui.text(name)
                 imgui.pop_id()
