@@ -218,6 +218,14 @@ class Project:
 # ---------------------------------------------------------------- opening
 
 
+def is_project(folder: Path) -> bool:
+    """Whether the folder is a project rather than a capture; a path that cannot even be looked at is none."""
+    try:
+        return (folder / PROJECT_FILE).is_file()
+    except OSError:
+        return False
+
+
 def default_settings(
     capture: Capture,
     *,
@@ -242,6 +250,7 @@ def default_settings(
         seed=seed,
         overrides=dict(overrides or {}),
         reference_clip=reference_clip,
+        follow_links=capture.follow_links,
     )
     check_settings(settings, capture)
     return settings

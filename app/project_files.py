@@ -51,6 +51,7 @@ class ProjectSettings:
         seed: Fixes initial values and the order of pictures.
         overrides: Training settings that differ from the defaults.
         reference_clip: Index of the clip that the others inherit from.
+        follow_links: Whether the user allowed the capture's files to lie outside of its folder.
     """
 
     capture: str
@@ -61,6 +62,7 @@ class ProjectSettings:
     seed: int = 0
     overrides: dict[str, Any] = field(default_factory=dict)
     reference_clip: int = 0
+    follow_links: bool = False
     schema: int = SCHEMA
 
     def clips(self, n_frames: int) -> list[Clip]:
@@ -120,6 +122,7 @@ def read_settings(folder: Path) -> ProjectSettings:
             seed=_count(content.get("seed", 0), 2**32),
             overrides=_table(content.get("overrides", {})),
             reference_clip=_count(content.get("reference_clip", 0)),
+            follow_links=_flag(content.get("follow_links", False)),
         )
         if not (0.0 < settings.scale <= 1.0 and settings.clip_length >= 1):
             raise ValueError(f"scale {settings.scale:g} or clip_length {settings.clip_length} is out of range")
@@ -223,6 +226,12 @@ def _table(value: Any) -> dict[str, Any]:
 def _count(value: Any, below: int = _MAX_COUNT) -> int:
     if type(value) is not int or not 0 <= value < below:
         raise TypeError(f"{value!r:.60} is not a whole number from 0 to {below - 1}")
+    return value
+
+
+def _flag(value: Any) -> bool:
+    if type(value) is not bool:
+        raise TypeError(f"{value!r:.60} is neither true nor false")
     return value
 
 
