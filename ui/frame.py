@@ -136,7 +136,7 @@ class Frame:
         session = self.session
         has_news = session.poll()
         self.remembering.follow(session)
-        has_news |= session.timeline.tick(min(dt_s, MAX_TICK_S))
+        has_news |= session.timeline.tick(min(dt_s, MAX_TICK_S), is_shown=self.viewport.shows_playhead(session))
         self._has_news |= has_news or self.viewport.has_news(session)
         if not self._redraw.is_due and (self.backend.needs_follow_up or self._is_news_due()):
             self._redraw.request(1)
