@@ -10,8 +10,6 @@ from ui.region_tool import rig_radius
 
 FRUSTUM_SHARE = 0.09
 """Length of a camera's pyramid as a share of the rig's radius."""
-REACH_PX = 6.0
-"""A pyramid whose lines are this near to the pointer is the one that is meant."""
 
 
 def frustum_size(rig: CameraRig) -> float:
@@ -27,7 +25,7 @@ def camera_under(
     y: float,
     *,
     near: float,
-    reach_px: float = REACH_PX,
+    reach_px: float = 6.0,
 ) -> int | None:
     """The camera whose pyramid lies under a pixel; of several the one whose lines are nearest to it there.
 
@@ -35,6 +33,7 @@ def camera_under(
         world_to_camera: Of the view. [4, 4]
         K: Of the picture in which x and y are pixels. [3, 3]
         near: What is nearer than this is not drawn, scene units.
+        reach_px: How near to a line the pointer has to be.
     """
     corners = frusta_lines(rig, frustum_size(rig))[0].astype(np.float64)  # two per line
     points = corners @ world_to_camera[:3, :3].T + world_to_camera[:3, 3]

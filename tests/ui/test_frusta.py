@@ -26,6 +26,7 @@ def pixel_of(view: OrbitView, point: np.ndarray) -> tuple[float, float]:
 
 
 def under(view: OrbitView, x: float, y: float) -> int | None:
+    assert view.rig is not None
     return camera_under(view.rig, view.world_to_camera(), view.K(WIDTH, HEIGHT), x, y, near=0.01)
 
 
@@ -33,6 +34,7 @@ def under(view: OrbitView, x: float, y: float) -> int | None:
 def test_a_point_on_a_line_of_a_pyramid_is_that_camera(camera: int) -> None:
     view = view_from_outside()
     rig = view.rig
+    assert rig is not None
     lines = frusta_lines(rig, frustum_size(rig))[0].reshape(len(rig), -1, 2, 3)
     start, end = lines[camera, 5].astype(np.float64)  # an edge of its picture
     assert under(view, *pixel_of(view, 0.5 * (start + end))) == camera
