@@ -351,10 +351,10 @@ class ViewportPanel:
 
     def _point_at_camera(self, session: Any, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """The camera under the pointer stands out; one that was pressed is remembered for the click."""
-        is_free = imgui.is_item_hovered() and not ui.regions.is_active and not self.is_moving
+        is_free = imgui.is_item_hovered() and not ui.regions.is_active
         is_pressing = imgui.is_item_activated() and self._button == imgui.MouseButton_.left
         marks = self.scene.marks
-        if is_free and (self._drag is None or is_pressing):
+        if is_free and (is_pressing or (self._drag is None and not self.is_moving)):
             marks.pointed_camera = marks.camera_under(session, view, *_pixels(pane, density))
         elif self._pressed_camera is None:
             marks.pointed_camera = None
