@@ -25,7 +25,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from engine.model.clip_state import read_clip_header
+from app.project import read_metrics
 from tests.faults.trainings import FAST, SETTINGS, Command, Kept, kept_clips, leftovers, problems_of
 
 KINDS = ("group", "group", "main", "restart at once", "worker", "worker", "Ctrl+C", "SIGTERM")
@@ -213,9 +213,9 @@ def _progress(project: Path, started_s: float) -> tuple[str, float]:
         for path in project.glob(pattern):
             with suppress(OSError):
                 kept_s = max(kept_s, path.stat().st_mtime)
-    headers = [read_clip_header(path) for path in project.glob("live/*-r*.safetensors")]
-    steps = [header["step"] for header in headers if header]
-    state = "training" if any(steps) else "starting or preparing"
+    has_stepped = any(row["step"] > 0 for path in project.glob("metrics/*.jsonl") for row in read_metrics(path))
+    is_kept = any(project.glob("checkpoints/*.safetensors"))
+    state = "training" if is_kept or has_stepped else "starting or preparing"
     return state, time.time() - kept_s
 
 
