@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import unicodedata
+from typing import TextIO
 
 _KEPT = "\n\t\u200c\u200d"
 """What lays out our own text, and what joins letters or signs into one."""
@@ -28,3 +30,33 @@ def _is_obeyed(part: str) -> bool:
 
 def _written_out(part: str) -> str:
     return part.encode("unicode_escape").decode("ascii")
+
+
+class PrintableStream(io.TextIOBase):
+    """A text stream in front of another, for results: what goes through it is printable.
+
+    Args:
+        stream: As sys.stdout. Characters that its encoding lacks are written out too.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+    def write(self, text: str, /) -> int:
+        """Write text; returns its length."""
+        self._stream.write(printable(text))
+        return len(text)
+
+    def flush(self) -> None:
+        """Hand on what waits."""
+        self._stream.flush()
+
+    def isatty(self) -> bool:
+        """Whether a terminal shows it."""
+        return self._stream.isatty()
+
+    def writable(self) -> bool:
+        """It is."""
+        return True
