@@ -5,6 +5,7 @@ no torch, no clouds.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -173,7 +174,7 @@ def make_fake(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining
     """Builds a FakeTraining from a job as the real builder would. Overrides go unused but `joint_steps` sets n_steps
     and `static_steps` the step that fails."""
     project = open_project(job.project, is_writable=False)
-    capture = open_capture(job.capture, scale=job.scale)
+    capture = open_capture(job.capture, scale=job.scale, follow_links=job.follow_links)
     clip = project.clips(capture.n_frames)[job.clip_index]
     first = project.settings.reference_clip
     reference = None if job.clip_index == first else read_clip_state(project.clip_path(first))
@@ -197,9 +198,14 @@ def make_slow(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining
     return training
 
 
+def make_telling(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
+    """Like make_fake; the environment of its process goes to a file in the project."""
+    (Path(job.project) / "environment.json").write_text(json.dumps(dict(os.environ)))
+    return make_fake(job, report)
+
+
 def make_crashing(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
     """Ends its process without a word."""
-    import os
     import signal
 
     os.kill(os.getpid(), signal.SIGKILL)
