@@ -44,14 +44,14 @@ def list_folders(folder: Path) -> list[str]:
 
 def typed_path(text: str) -> Path | None:
     """The path that a text names; None where it is empty or cannot be one: too long, a home that nobody has."""
+    if not text.strip():
+        return None
     try:
         path = Path(text).expanduser()
-        path.stat()
-    except (FileNotFoundError, NotADirectoryError, PermissionError):
-        pass
+        path.is_dir()
     except (OSError, RuntimeError, ValueError):
         return None
-    return path if text.strip() else None
+    return path
 
 
 class OpenFolderDialog:
