@@ -1,4 +1,4 @@
-"""The user's preferences: recent folders. A small JSON file in the platform's configuration folder."""
+"""The user's preferences: one small JSON document in the platform's configuration folder, saved when it changes."""
 
 from __future__ import annotations
 
@@ -7,12 +7,13 @@ import logging
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
+from app.recents import RecentProject, read_recents, recents_document, with_entry
 from engine.files import atomic_path
+from engine.json_files import JsonError, read_json_object
 
 logger = logging.getLogger(__name__)
-
-MAX_RECENT = 12
 
 
 def config_dir() -> Path:
@@ -27,7 +28,10 @@ def config_dir() -> Path:
 
 
 class Settings:
-    """Preferences, saved at once when they change. A file that cannot be read counts as empty, never as a failure.
+    """Preferences. A file that cannot be read counts as empty, never as a failure; entries of others are kept.
+
+    Attributes:
+        recent: Projects that were opened lately, newest first.
 
     Args:
         path: The file; the platform's place when None.
@@ -35,25 +39,41 @@ class Settings:
 
     def __init__(self, path: Path | None = None) -> None:
         self.path = config_dir() / "settings.json" if path is None else path
-        self.recent: list[str] = _read_recent(self.path)
+        self._document = _read(self.path)
+        self.recent: list[RecentProject] = read_recents(self._document)
 
-    def add_recent(self, folder: Path) -> None:
-        """Put a folder first in the list of recent ones."""
-        text = str(Path(folder).resolve())
-        self.recent = [text, *(known for known in self.recent if known != text)][:MAX_RECENT]
+    def get(self, name: str, default: Any = None) -> Any:
+        """A preference as it was kept."""
+        return self._document.get(name, default)
+
+    def put(self, **entries: Any) -> None:
+        """Keep preferences; values are JSON."""
+        changed = {"schema": 1} | self._document | entries
+        if changed == self._document:
+            return
+        self._document = changed
         try:
             with atomic_path(self.path) as partial:
-                partial.write_text(json.dumps({"schema": 1, "recent": self.recent}, indent=2), encoding="utf-8")
+                partial.write_text(json.dumps(changed, indent=2), encoding="utf-8")
         except OSError as error:
             logger.warning("preferences could not be saved (%s) - %s", error.strerror, self.path)
 
+    def add_recent(self, entry: RecentProject) -> None:
+        """Put a project first in the list of recent ones."""
+        self.recent = with_entry(self.recent, entry)
+        self.put(**recents_document(self.recent))
 
-def _read_recent(path: Path) -> list[str]:
+    def forget_recent(self, folder: Path) -> None:
+        """Take a project or capture out of the list; its files stay."""
+        self.recent = [entry for entry in self.recent if entry.folder != folder]
+        self.put(**recents_document(self.recent))
+
+
+def _read(path: Path) -> dict[str, Any]:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        return [str(folder) for folder in content["recent"]][:MAX_RECENT]
+        return read_json_object(path)
     except FileNotFoundError:
-        return []
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        return {}
+    except (OSError, JsonError) as error:
         logger.warning("preferences could not be read (%s) - %s", error, path)
-        return []
+        return {}

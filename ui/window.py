@@ -60,6 +60,12 @@ def make_window(width: int, height: int, *, is_visible: bool = True) -> Any:
     return window
 
 
+def window_title(session: Any) -> str:
+    """The open project, how far it is trained and where it lies."""
+    opened = session.opened
+    return TITLE if opened is None else f"{opened.name} - {opened.trained_text} - {opened.folder} - {TITLE}"
+
+
 class StudioWindow:
     """One window on one session.
 
@@ -150,8 +156,7 @@ class StudioWindow:
             drawn += 1
 
     def _show_title(self) -> None:
-        capture = self.session.capture
-        title = TITLE if capture is None else f"{capture.path.name} - {TITLE}"
+        title = window_title(self.session)
         if title != self._title:
             self._title = title
             self.window.set_caption(title)
