@@ -106,7 +106,7 @@ def project_lines(found: dict[str, Any]) -> list[str]:
 
 
 def _covered(coverage: dict[str, Any]) -> str:
-    said = f"{100 * coverage['share']:.1f} % with {coverage['n_residual']:,} anchors of its own"
+    said = f"{100 * coverage['share']:.1f} % with {coverage['n_residual']:,} residual anchors"
     if coverage["n_left_out"]:
         said += f", {coverage['n_left_out']:,} points beyond the budget left to those beside them"
     return said

@@ -38,6 +38,8 @@ logger = logging.getLogger(__name__)
 SCHEMA = 1
 PROJECT_FILE = "project.json"
 GATE_FILE = "gate.json"
+LOCK_FILE = "lock"
+LOCK_FILES = (LOCK_FILE, f".{LOCK_FILE}")
 MIN_TRAINING_CAMERAS = 2
 DEFAULT_CLIP_LENGTH = 10
 
@@ -330,7 +332,7 @@ def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
     folder = Path(folder)
     if (folder / PROJECT_FILE).exists():
         raise ProjectError("There is a project already.", hint="Open it instead.", path=folder)
-    if folder.is_dir() and any(child.name != "lock" for child in folder.iterdir()):
+    if folder.is_dir() and any(child.name not in LOCK_FILES for child in folder.iterdir()):
         raise ProjectError(
             "The project folder holds other files.", hint="Choose an empty or a new folder.", path=folder
         )
@@ -340,9 +342,11 @@ def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
         raise ProjectError(
             f"The project folder cannot be made ({error.strerror}).", hint="Choose another place.", path=folder
         ) from error
-    lock = ProcessLock(folder / "lock")
+    lock = ProcessLock(folder / LOCK_FILE)
     lock.acquire()
     try:
+        if (folder / PROJECT_FILE).exists():  # made while this one looked
+            raise ProjectError("There is a project already.", hint="Open it instead.", path=folder)
         _write_json(folder / PROJECT_FILE, asdict(settings))
     except ProjectError:
         lock.release()
@@ -360,7 +364,7 @@ def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
     settings = read_settings(folder)
     lock = None
     if is_writable:
-        lock = ProcessLock(folder / "lock")
+        lock = ProcessLock(folder / LOCK_FILE)
         lock.acquire()
     project = Project(folder, settings, lock)
     if is_writable:

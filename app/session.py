@@ -130,7 +130,7 @@ class Session:
         self._marking = Marking()
         self.regions: RegionsStatus = self._marking.status([])
         self._unread: SnapshotWritten | None = None
-        self._anchor_counts: dict[int, tuple[int, int]] = {}
+        self._live_counts: tuple[int, int] | None = None  # anchors of the running clip, once a state was loaded
         self._is_closed = False
         self._is_preloading = is_preloading
         self._first_cloud: Job | None = None
@@ -384,7 +384,7 @@ class Session:
         self._marking.leave()
         if self._first_cloud is not None:
             self._first_cloud.context.cancel()
-        self._unread, self._anchor_counts = None, {}
+        self._unread = self._live_counts = None
         service, project, self._service = self._service, self.project, None
         if service is None or project is None:
             return
@@ -442,7 +442,7 @@ class Session:
         if isinstance(event, SnapshotWritten):
             self._unread = event
         elif isinstance(event, ENDINGS):
-            self._unread = None
+            self._unread = self._live_counts = None
             self._keep_recent()
 
     def _release_snapshot(self) -> None:
@@ -510,13 +510,11 @@ class Session:
             return
         clip = self.timeline.clip
         request = self._frame_request()
-        if clip is not None and request is not None:
-            anchors = self._playback.anchors(request)
-            if anchors is not None:
-                counts = (len(anchors.inherited_positions), len(anchors.own_positions))
-                self._anchor_counts[clip.clip_index] = counts
+        anchors = None if request is None or not request.is_live else self._playback.anchors(request)
+        if anchors is not None:
+            self._live_counts = (len(anchors.inherited_positions), len(anchors.own_positions))
         self.training = self._service.status(None if clip is None else clip.clip_index)
-        self.clip_states = self._service.clip_statuses(self._anchor_counts)
+        self.clip_states = self._service.clip_statuses(self._live_counts)
         self.regions = self._marking.status(self.clip_states)
         self.plan = None
         if self.project is not None and self.capture is not None:

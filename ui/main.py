@@ -13,6 +13,7 @@ from pathlib import Path
 
 from app.arguments import COMMANDS, PlainParser
 from engine.assets import asset_path
+from engine.kernels.cache import use_kernel_cache
 from ui.ui_scale import parse_scale
 
 DEMO = {"demo": "train the first two clips and leave figures, a picture of the window and a video"}
@@ -74,8 +75,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         return int(run_command(arguments) or 0)
     if arguments and arguments[0] == "demo":
+        use_kernel_cache()
         return _run_demo(build_demo_parser().parse_args(arguments[1:]))
     options = build_parser().parse_args(arguments)
+    use_kernel_cache()
     logging.basicConfig(level=logging.DEBUG if options.verbose else logging.INFO, format="%(levelname)s %(message)s")
     if not has_display():
         demo_arguments = [] if options.path is None else [str(options.path)]

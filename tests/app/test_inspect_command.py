@@ -51,7 +51,7 @@ def test_inspecting_a_project_says_how_much_of_what_moves_is_within_reach_of_an_
     write_clip_state(path, ClipState(state.arrays, state.header | {"coverage": coverage | {"reason": "at most 3500"}}))
     clips = json.loads(run("inspect", project, "--json")[1])["clips"]
     assert [clip["coverage"] and clip["coverage"]["share"] for clip in clips] == [None, 0.9876]
-    said = "clip 1 98.8 % with 3,000 anchors of its own, 500 points beyond the budget left to those beside them"
+    said = "clip 1 98.8 % with 3,000 residual anchors, 500 points beyond the budget left to those beside them"
     assert said in run("inspect", project)[1]
 
 

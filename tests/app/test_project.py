@@ -2,12 +2,9 @@
 
 import json
 import os
-import subprocess
-import sys
 
 import pytest
 
-from app.lock import ProcessLock, is_process_alive
 from app.project import (
     ProjectSettings,
     create_project,
@@ -85,38 +82,6 @@ def test_two_writers_are_one_too_many(tmp_path):
     assert open_project(tmp_path / "p", is_writable=False).is_writable is False
     project.close()
     open_project(tmp_path / "p").close()
-
-
-@pytest.fixture
-def dead_pid() -> int:
-    """A process id that was in use and is not any more."""
-    child = subprocess.Popen([sys.executable, "-c", "pass"])
-    child.wait()
-    assert not is_process_alive(child.pid)
-    return child.pid
-
-
-@pytest.mark.parametrize("text", ['{"pid": DEAD, "start": "5"}', '{"pid": OWN, "start": "1"}', "", "{"])
-def test_a_lock_without_a_living_holder_is_taken_over(tmp_path, text, dead_pid):
-    # the second one is a reused process id: it lives, but it started at another time
-    path = tmp_path / "lock"
-    path.write_text(text.replace("DEAD", str(dead_pid)).replace("OWN", str(os.getpid())))
-    if "OWN" in text and not os.path.exists("/proc/self/stat"):
-        pytest.skip("start times are known on Linux only")
-    lock = ProcessLock(path)
-    lock.acquire()
-    assert lock.is_held
-    assert json.loads(path.read_text())["pid"] == os.getpid()
-    lock.release()
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_releasing_leaves_somebody_elses_lock(tmp_path):
-    lock = ProcessLock(tmp_path / "lock")
-    lock.acquire()
-    (tmp_path / "lock").write_text('{"pid": 1}')
-    lock.release()
-    assert (tmp_path / "lock").read_text() == '{"pid": 1}'
 
 
 def test_opening_sweeps_leftovers_and_keeps_clips(tmp_path):

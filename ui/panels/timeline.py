@@ -9,6 +9,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app.commands import SetFrame, TogglePlay, TrainClip
 from ui import theme
+from ui.progress_words import band_words
 from ui.shortcuts import go_to_frame
 from ui.state import Dispatch, Rect, UiState
 from ui.theme import Icon
@@ -235,9 +236,7 @@ def _draw_band_text(draw: Any, band: Rect, session: Any, clip: Any, status: Any,
     state = status.state
     icon = theme.CLIP_ICONS.get(state, "")
     title = _clip_title(clip.clip_index, session)
-    words: str = STATE_WORDS.get(state, str(state))
-    if state in ("preparing", "training", "paused", "stopped"):
-        words = f"{words} {status.progress * 100:.0f} %"
+    words = band_words(status, session.training, clip.clip_index, STATE_WORDS.get(state, str(state)))
     if status.held_out_psnr is not None:
         words = f"{words}, {status.held_out_psnr:.1f} dB"
     x, y = band.x0 + 9, band.y0 + 6

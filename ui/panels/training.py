@@ -12,11 +12,15 @@ from app.commands import PauseTraining, ResumeTraining, StopTraining, TrainNextC
 from ui import theme
 from ui.panels.plan import draw_plan
 from ui.panels.timeline import STATE_WORDS, state_note
+from ui.progress_words import stage_words
 from ui.state import Dispatch, UiState
 from ui.theme import Icon
 from ui.widgets import format_count, primary_button, text_right, text_wrapped_dim
 
 MAX_PLOT_POINTS = 600
+ANCHORS_TOOLTIP = """All anchors of a clip, whichever frames they are alive in.
+Reference clip: reference anchors, which later clips inherit.
+Later clips: inherited + residual anchors."""
 
 
 def duration_text(seconds: float | None) -> str:
@@ -120,7 +124,7 @@ def _draw_progress(status: Any, ui: UiState) -> None:
     imgui.text(f"{words[status.state]} clip {status.clip_index}")
     if status.stage:
         imgui.same_line()
-        imgui.text_disabled(str(status.stage))
+        imgui.text_disabled(stage_words(status))
     bar_color = theme.YELLOW if status.state == "paused" else theme.SKY
     imgui.push_style_color(imgui.Col_.plot_histogram, ImVec4(*bar_color))
     imgui.progress_bar(min(max(share, 0.0), 1.0), ImVec2(-1, 8), "")
@@ -130,8 +134,9 @@ def _draw_progress(status: Any, ui: UiState) -> None:
         _pair(f"Step {format_count(status.step)} of {format_count(status.n_steps)}", f"{share * 100:.0f} %")
         rate = f"{status.steps_per_s:.1f} steps/s" if status.steps_per_s else "–"
         _pair(rate, f"{duration_text(status.eta_s)} left")
-    elif status.eta_s is not None:
-        _pair("", f"about {duration_text(status.eta_s)} left")
+    else:
+        left = "" if status.eta_s is None else f"about {duration_text(status.eta_s)} left"
+        _pair(left, f"{share * 100:.0f} % of this stage" if status.stage else "")
     if status.message:
         text_wrapped_dim(str(status.message))
 
@@ -183,17 +188,24 @@ def _draw_curve(
     implot.end_plot()
 
 
+def anchors_text(n_inherited: int, n_own: int) -> str:
+    """Anchors of a clip: of the reference clip a number, of a later one a sum; a dash where there are none yet."""
+    if not n_inherited and not n_own:
+        return "–"
+    return f"{format_count(n_inherited)} + {format_count(n_own)}" if n_inherited else format_count(n_own)
+
+
 def _draw_clips(session: Any) -> None:
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.borders_inner_h | imgui.TableFlags_.scroll_y
     flags |= imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.pad_outer_x
-    if not imgui.begin_table("clips", 4, flags, ImVec2(0, max(imgui.get_content_region_avail().y - 4, 90))):
+    if not imgui.begin_table("clips", 3, flags, ImVec2(0, max(imgui.get_content_region_avail().y - 4, 90))):
         return
     imgui.table_setup_scroll_freeze(0, 1)
     imgui.table_setup_column("Clip", imgui.TableColumnFlags_.width_stretch)
     imgui.table_setup_column("PSNR")
-    imgui.table_setup_column("Inherited")
-    imgui.table_setup_column("Own")
+    imgui.table_setup_column("Anchors")
     imgui.table_headers_row()
+    imgui.set_item_tooltip(ANCHORS_TOOLTIP)
     clipper = imgui.ListClipper()
     clipper.begin(min(len(session.clips), len(session.clip_states)))
     while clipper.step():
@@ -217,6 +229,5 @@ def _draw_clip_row(clip: Any, status: Any) -> None:
     imgui.table_next_column()
     imgui.text("–" if status.held_out_psnr is None else f"{status.held_out_psnr:.1f}")
     imgui.table_next_column()
-    imgui.text(format_count(status.n_inherited) if status.n_inherited else "–")
-    imgui.table_next_column()
-    imgui.text(format_count(status.n_own) if status.n_own else "–")
+    imgui.text(anchors_text(status.n_inherited, status.n_own))
+    imgui.set_item_tooltip(ANCHORS_TOOLTIP)
