@@ -19,6 +19,8 @@ class OpenCapture:
     """Share of the original picture size to work at; None picks one that suits the size."""
     is_new_project: bool = False
     """Start another project, whatever there is."""
+    follow_links: bool = False
+    """Whether the user allows the capture's files to lie outside of its folder; noted in its project."""
 
 
 @dataclass(frozen=True, slots=True)

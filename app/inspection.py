@@ -7,18 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from app.opening import open_capture_of
-from app.project import PROJECT_FILE
 from app.report.facts import ClipFacts, read_facts
 from app.report.storage import COMPONENT_NAMES
 from engine.errors import CaptureError, ProjectError
 
 SCHEMA = 1
 _MB = 1e6
-
-
-def is_project(folder: Path) -> bool:
-    """Whether the folder is a project rather than a capture."""
-    return (folder / PROJECT_FILE).is_file()
 
 
 def describe_project(folder: Path) -> dict[str, Any]:

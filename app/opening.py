@@ -15,6 +15,7 @@ from app.project import (
     create_project,
     default_project_dir,
     default_settings,
+    is_project,
     open_project,
     read_settings,
 )
@@ -35,6 +36,7 @@ class Opened:
         catalog: What lies on disk of its clips; None without a project.
         choices: The projects to choose from; empty where there is nothing to choose.
         note: Kind, title, detail and hint of something that the user has to know, or None.
+        follow_links: Of a choice: whether the user allows the capture's files to lie outside of its folder.
     """
 
     capture: Capture
@@ -42,6 +44,7 @@ class Opened:
     catalog: ClipCatalog | None = None
     choices: tuple[RecentProject, ...] = ()
     note: tuple[str, str, str, str] | None = None
+    follow_links: bool = False
 
 
 def open_for_window(
@@ -53,6 +56,7 @@ def open_for_window(
     context: JobContext,
     recent: Sequence[RecentProject] = (),
     is_new_project: bool = False,
+    follow_links: bool = False,
 ) -> Opened:
     """Open a capture folder or a project folder.
 
@@ -65,28 +69,29 @@ def open_for_window(
         context: Receives progress.
         recent: Projects opened lately; those of this capture may be opened.
         is_new_project: Start another project, whatever there is.
+        follow_links: Whether the user allows the capture's files to lie outside of its folder; noted in the project.
     Raises:
         CaptureError, ProjectError: It cannot be opened.
     """
     context.report(0.0, path.name)
-    if (path / PROJECT_FILE).is_file():
-        return _open_project(path, current, context)
-    capture = open_capture(path, scale=1.0 if scale is None else scale)
+    if is_project(path):
+        return _open_project(path, current, context, follow_links=follow_links)
+    capture = open_capture(path, scale=1.0 if scale is None else scale, follow_links=follow_links)
     widest = int(capture.rig.image_sizes[:, 0].max())
     if scale is None and widest > WINDOW_WIDTH_PX:
-        capture = open_capture(path, scale=WINDOW_WIDTH_PX / widest)
+        capture = open_capture(path, scale=WINDOW_WIDTH_PX / widest, follow_links=follow_links)
     context.report(0.3, f"{len(capture.rig)} cameras, {capture.n_frames} frames")
     there = capture if scale is None else None
     if project_dir is not None:
         if (project_dir / PROJECT_FILE).is_file():
-            return _open_project(project_dir, current, context, there)
+            return _open_project(project_dir, current, context, there, follow_links=follow_links)
         return _make_project(project_dir, capture)
     found = projects_of(capture, recent)
     if is_new_project or not found:
         return _make_project(new_project_dir(capture), capture)
     if len(found) > 1:
-        return Opened(capture, choices=tuple(found))
-    opened = _open_project(found[0].folder, current, context, there)
+        return Opened(capture, choices=tuple(found), follow_links=follow_links)
+    opened = _open_project(found[0].folder, current, context, there, follow_links=follow_links)
     if opened.project is None or opened.catalog is None or opened.note is not None:
         return opened
     told = f"{opened.catalog.n_trained} of {len(opened.catalog)} clips trained - {opened.project.folder}"
@@ -98,12 +103,24 @@ def _make_project(folder: Path, capture: Capture) -> Opened:
     return Opened(capture, project, ClipCatalog(project, len(project.clips(capture.n_frames))))
 
 
-def _open_project(folder: Path, current: Path | None, context: JobContext, capture: Capture | None = None) -> Opened:
-    settings = read_settings(folder)
+def _open_project(
+    folder: Path,
+    current: Path | None,
+    context: JobContext,
+    capture: Capture | None = None,
+    *,
+    follow_links: bool = False,
+) -> Opened:
+    stored = read_settings(folder)
+    settings = replace(stored, follow_links=stored.follow_links or follow_links)
     if capture is None:
         capture = open_capture_of(settings, folder)
     else:
-        capture = capture if capture.scale == settings.scale else open_capture(capture.path, scale=settings.scale)
+        capture = (
+            capture
+            if capture.scale == settings.scale
+            else open_capture(capture.path, scale=settings.scale, follow_links=settings.follow_links)
+        )
         check_capture(capture, settings, folder)
     if current is not None and current.resolve() == folder.resolve():
         return Opened(capture)
@@ -111,8 +128,9 @@ def _open_project(folder: Path, current: Path | None, context: JobContext, captu
     try:
         project = open_project(folder)
         place = str(Path(capture.path).resolve())
-        if settings.capture != place:  # it has moved since; workers open it where the project says
-            project.update(replace(settings, capture=place))
+        settings = replace(settings, capture=place)
+        if settings != stored:  # it has moved since, or may follow links; workers open it as the project says
+            project.update(settings)
     except ProjectError as error:  # most likely locked; looking at it does no harm
         note = ("warn", "The project is open for reading only", str(error), "Training is off until it is closed there.")
         project = open_project(folder, is_writable=False)
@@ -172,7 +190,7 @@ def open_capture_of(settings: ProjectSettings, folder: Path) -> Capture:
             hint=f"Put it back, or say where it is: clipgstream train NEW_PLACE --project {folder}",
             path=settings.capture,
         )
-    capture = open_capture(settings.capture, scale=settings.scale)
+    capture = open_capture(settings.capture, scale=settings.scale, follow_links=settings.follow_links)
     check_capture(capture, settings, folder)
     return capture
 

@@ -57,6 +57,7 @@ class ProjectSettings:
         seed: Fixes initial values and the order of pictures.
         overrides: Training settings that differ from the defaults.
         reference_clip: Index of the clip that the others inherit from.
+        follow_links: Whether the user allowed the capture's files to lie outside of its folder.
     """
 
     capture: str
@@ -67,6 +68,7 @@ class ProjectSettings:
     seed: int = 0
     overrides: dict[str, Any] = field(default_factory=dict)
     reference_clip: int = 0
+    follow_links: bool = False
     schema: int = SCHEMA
 
     def clips(self, n_frames: int) -> list[Clip]:
@@ -263,6 +265,14 @@ class Project:
 # ---------------------------------------------------------------- opening
 
 
+def is_project(folder: Path) -> bool:
+    """Whether the folder is a project rather than a capture; a path that cannot even be looked at is none."""
+    try:
+        return (folder / PROJECT_FILE).is_file()
+    except OSError:
+        return False
+
+
 def default_settings(
     capture: Capture,
     *,
@@ -287,6 +297,7 @@ def default_settings(
         seed=seed,
         overrides=dict(overrides or {}),
         reference_clip=reference_clip,
+        follow_links=capture.follow_links,
     )
     check_settings(settings, capture)
     return settings
@@ -425,6 +436,7 @@ def read_settings(folder: Path) -> ProjectSettings:
             seed=int(content.get("seed", 0)),
             overrides=dict(content.get("overrides", {})),
             reference_clip=int(content.get("reference_clip", 0)),
+            follow_links=content.get("follow_links", False) is True,
         )
         if not (0.0 < settings.scale <= 1.0 and settings.clip_length >= 1):
             raise ValueError(f"scale {settings.scale:g} or clip_length {settings.clip_length} is out of range")

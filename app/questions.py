@@ -43,10 +43,12 @@ class ProjectQuestion:
     Attributes:
         capture: Folder of the capture.
         choices: The projects there are, latest first.
+        follow_links: Whether the user allows the capture's files to lie outside of its folder.
     """
 
     capture: str
     choices: tuple[RecentProject, ...]
+    follow_links: bool = False
 
 
 Question = RetrainQuestion | ProjectQuestion

@@ -18,7 +18,7 @@ from app.jobs import Job, JobContext, Jobs
 from app.latest import LatestWorker
 from app.marking import Marking
 from app.next_plan import NextPlan
-from app.notices import Notices
+from app.notices import Notice, Notices
 from app.opening import Opened, open_for_window
 from app.pictures import CapturedPictures
 from app.playback import FrameRequest, Playback, ShownFrame, static_points
@@ -50,6 +50,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.capture.rig import CameraRig
 from engine.errors import EngineError
+from engine.text import printable
 from engine.training.presets import preset
 
 logger = logging.getLogger(__name__)
@@ -119,6 +120,7 @@ class Session:
         self.missing: frozenset[Path] = frozenset()
         self.holdout: tuple[int, ...] = ()
         self._project_dir, self._launch, self._opener = project_dir, launch, opener
+        self._refusals: list[Notice] = []
         self._service: TrainingService | None = None
         self._closing: list[tuple[TrainingService, Project]] = []
         self._jobs, self._looks = Jobs(self._take_fault), Jobs()
@@ -173,8 +175,8 @@ class Session:
 
     def _obey(self, command: commands.Command) -> None:
         match command:
-            case commands.OpenCapture(path=path, scale=scale, is_new_project=is_new_project):
-                self._open(Path(path), scale, is_new_project=is_new_project)
+            case commands.OpenCapture(path=path, scale=scale):
+                self._open(Path(path), scale, is_new_project=command.is_new_project, follow_links=command.follow_links)
             case commands.OpenProject(path=path):
                 self._open(Path(path), None)
             case commands.ForgetRecent(folder=folder):
@@ -278,7 +280,9 @@ class Session:
 
     # ---------------------------------------------------------------- opening
 
-    def _open(self, path: Path, scale: float | None, *, is_new_project: bool = False) -> None:
+    def _open(
+        self, path: Path, scale: float | None, *, is_new_project: bool = False, follow_links: bool = False
+    ) -> None:
         current = None if self.project is None else self.project.folder
         recent = tuple(self.settings.recent)
         self.question = None
@@ -292,19 +296,24 @@ class Session:
                 context=context,
                 recent=recent,
                 is_new_project=is_new_project,
+                follow_links=follow_links,
             )
 
         def failed(error: Exception) -> None:
+            name = printable(path.name or str(path))
             if isinstance(error, EngineError):
-                self.notices.add_error(f"{path.name or path} cannot be opened", error)
+                self._refusals.append(self.notices.add_error(f"{name} cannot be opened", error))
             else:
-                self._report_fault(f"{path.name or path} cannot be opened", error)
+                self._report_fault(f"{name} cannot be opened", error)
 
         self._jobs.start("Opening the capture", work, self._take_opened, failed)
 
     def _take_opened(self, opened: Opened) -> None:
+        for notice in self._refusals:  # something is open now; why something else was not is no news any more
+            self.notices.withdraw(notice)
+        self._refusals.clear()
         if opened.choices:
-            self.question = ProjectQuestion(str(opened.capture.path), opened.choices)
+            self.question = ProjectQuestion(str(opened.capture.path), opened.choices, opened.follow_links)
             return
         if opened.project is None:  # it is open already
             self.view.home()
@@ -327,10 +336,10 @@ class Session:
         path = project.first_cloud_path
         if path.is_file() or self._state_of(self.reference_index) is not None:
             return
-        capture_path, holdout = capture.path, self.holdout
+        capture_path, holdout, follow_links = capture.path, self.holdout, capture.follow_links
 
         def work(context: JobContext) -> Path:
-            return make_cloud(capture_path, holdout=holdout, path=path, context=context)
+            return make_cloud(capture_path, holdout=holdout, path=path, context=context, follow_links=follow_links)
 
         def failed(error: Exception) -> None:  # the hint stays; training will say what is wrong
             logger.warning("no first cloud: %s", error)

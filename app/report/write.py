@@ -25,6 +25,7 @@ from app.report.seam_parts import seams_section, shown_boundaries
 from engine.capture.inspect import describe
 from engine.errors import CaptureError, ProjectError
 from engine.files import atomic_path
+from engine.json_files import json_text
 from engine.metrics.flicker import flicker_figures
 
 if TYPE_CHECKING:
@@ -217,7 +218,7 @@ def _write(out: Path, compared: Sequence[Compared], sections: Sequence[Section])
     for section in sections:
         for table in section.tables():
             files[f"{TABLES}/{table.name}.csv"] = table.csv_text().encode("utf-8", "replace")
-    numbers = json.dumps(document, indent=1, allow_nan=False)
+    numbers = json_text(document, indent=1)
     files[NUMBERS_FILE] = numbers.encode()
     files[PAGE_FILE] = page_html(f"Report: {facts.name}", lead, sections).encode("utf-8", "replace")
     is_new_folder = not out.exists()

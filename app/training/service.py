@@ -243,6 +243,7 @@ class TrainingService:
             seed=settings.seed,
             overrides=dict(settings.overrides),
             is_window_open=self._is_window_open,
+            follow_links=settings.follow_links,
         )
         self._stage, self._step, self._ending = StageReported("", 0.0), None, None
         self._is_ready = self._is_paused = self._is_stopping = False

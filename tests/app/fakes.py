@@ -174,7 +174,7 @@ def make_fake(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining
     """Builds a FakeTraining from a job as the real builder would. Overrides go unused but `joint_steps` sets n_steps
     and `static_steps` the step that fails."""
     project = open_project(job.project, is_writable=False)
-    capture = open_capture(job.capture, scale=job.scale)
+    capture = open_capture(job.capture, scale=job.scale, follow_links=job.follow_links)
     clip = project.clips(capture.n_frames)[job.clip_index]
     first = project.settings.reference_clip
     reference = None if job.clip_index == first else read_clip_state(project.clip_path(first))

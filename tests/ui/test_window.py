@@ -227,6 +227,18 @@ def test_bracket_keys_walk_the_cameras_around(pilot: Pilot) -> None:
     assert pilot.session.view.look_through == 0
 
 
+def test_cameras_of_any_name_can_be_chosen_from_the_list(pilot: Pilot) -> None:
+    names = ("a##b", "c##b", "", "%s%n", *pilot.session.rig.names[4:])
+    pilot.session.rig = dataclasses.replace(pilot.session.rig, names=names)
+    for index in range(4):
+        pilot.click("viewport.camera")
+        pilot.draw(2)
+        pilot.click(f"viewport.camera{index}")
+        pilot.draw(2)
+        assert pilot.session.view.look_through == index
+    assert len(pilot.session.notices) == 0
+
+
 def test_tab_shows_all_marks_then_hides_them(pilot: Pilot) -> None:
     overlays = pilot.session.overlays
     pilot.key(key.TAB)

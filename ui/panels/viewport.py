@@ -157,7 +157,13 @@ class ViewportPanel:
             if imgui.selectable("Free", shown is None)[0]:
                 dispatch(LookThrough(None))
             for index, name in enumerate(names):
-                if imgui.selectable(name, shown == index)[0]:
+                imgui.push_id(index)  # names may be equal before a "##", which is all that ImGui would tell apart
+                is_chosen = imgui.selectable("##camera", shown == index)[0]
+                ui.mark(f"viewport.camera{index}")
+                imgui.same_line(0, 0)
+                imgui.text(name)
+                imgui.pop_id()
+                if is_chosen:
                     dispatch(LookThrough(index))
             imgui.end_combo()
         ui.mark("viewport.camera")
