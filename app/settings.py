@@ -1,19 +1,18 @@
-"""The user's preferences: one small JSON document in the platform's configuration folder, saved when it changes."""
+"""The user's preferences: projects opened lately. A small JSON file in the platform's configuration folder."""
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import sys
 from pathlib import Path
-from typing import Any
 
 from app.recents import RecentProject, read_recents, recents_document, with_entry
-from engine.files import atomic_path
-from engine.json_files import JsonError, read_json_object
+from engine.json_files import JsonError, read_checked_json, write_checked_json
 
 logger = logging.getLogger(__name__)
+
+MAX_BYTES = 1 << 20
 
 
 def config_dir() -> Path:
@@ -28,7 +27,7 @@ def config_dir() -> Path:
 
 
 class Settings:
-    """Preferences. A file that cannot be read counts as empty, never as a failure; entries of others are kept.
+    """Preferences, saved at once when they change. A file that cannot be read counts as empty, never as a failure.
 
     Attributes:
         recent: Projects that were opened lately, newest first.
@@ -39,41 +38,29 @@ class Settings:
 
     def __init__(self, path: Path | None = None) -> None:
         self.path = config_dir() / "settings.json" if path is None else path
-        self._document = _read(self.path)
-        self.recent: list[RecentProject] = read_recents(self._document)
-
-    def get(self, name: str, default: Any = None) -> Any:
-        """A preference as it was kept."""
-        return self._document.get(name, default)
-
-    def put(self, **entries: Any) -> None:
-        """Keep preferences; values are JSON."""
-        changed = {"schema": 1} | self._document | entries
-        if changed == self._document:
-            return
-        self._document = changed
-        try:
-            with atomic_path(self.path) as partial:
-                partial.write_text(json.dumps(changed, indent=2), encoding="utf-8")
-        except OSError as error:
-            logger.warning("preferences could not be saved (%s) - %s", error.strerror, self.path)
+        self.recent: list[RecentProject] = _read_recent(self.path)
 
     def add_recent(self, entry: RecentProject) -> None:
         """Put a project first in the list of recent ones."""
-        self.recent = with_entry(self.recent, entry)
-        self.put(**recents_document(self.recent))
+        self._set_recent(with_entry(self.recent, entry))
 
     def forget_recent(self, folder: Path) -> None:
         """Take a project or capture out of the list; its files stay."""
-        self.recent = [entry for entry in self.recent if entry.folder != folder]
-        self.put(**recents_document(self.recent))
+        self._set_recent([entry for entry in self.recent if entry.folder != folder])
+
+    def _set_recent(self, entries: list[RecentProject]) -> None:
+        self.recent = entries
+        try:
+            write_checked_json(self.path, {"schema": 1} | recents_document(entries))
+        except OSError as error:
+            logger.warning("preferences could not be saved (%s) - %s", error.strerror, self.path)
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read_recent(path: Path) -> list[RecentProject]:
     try:
-        return read_json_object(path)
+        return read_recents(read_checked_json(path, max_bytes=MAX_BYTES))
     except FileNotFoundError:
-        return {}
+        return []
     except (OSError, JsonError) as error:
         logger.warning("preferences could not be read (%s) - %s", error, path)
-        return {}
+        return []

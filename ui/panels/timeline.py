@@ -17,6 +17,7 @@ from ui.widgets import format_count, text_right
 
 RULER_HEIGHT = 22.0
 BAND_GAP = 6.0
+MIN_TRACK_HEIGHT = RULER_HEIGHT + 18.0
 MIN_TICK_SPACING_PX = 56.0
 NOTE_WIDTH = 380.0
 
@@ -72,7 +73,8 @@ def draw_timeline(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     if session.capture is None:
         imgui.text_disabled("Frames and clips appear here when a capture is open.")
         return
-    _draw_transport(session, dispatch, ui)
+    if imgui.get_content_region_avail().y >= MIN_TRACK_HEIGHT + imgui.get_frame_height_with_spacing():
+        _draw_transport(session, dispatch, ui)  # in a lower panel it gives way: time is worth more than buttons
     _draw_track(session, dispatch, ui)
 
 
@@ -115,7 +117,7 @@ def _draw_transport(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     if is_edited:
         go_to_frame(session, dispatch, typed)
     imgui.same_line()
-    imgui.text_disabled(f"of {timeline.n_frames - 1}")
+    imgui.text_disabled(f"of 0 to {format_count(timeline.last_frame)}")
     imgui.same_line(0, 18)
     fps = max(timeline.fps, 1e-6)
     imgui.text(f"{timeline.frame_index / fps:.2f} s")
@@ -135,8 +137,7 @@ def _draw_track(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     timeline = session.timeline
     origin = imgui.get_cursor_screen_pos()
     size = imgui.get_content_region_avail()
-    if size.x < 40 or size.y < RULER_HEIGHT + 18:
-        return
+    size.x, size.y = max(size.x, 1.0), max(size.y, MIN_TRACK_HEIGHT)
     imgui.invisible_button("track", size)
     track = Rect(origin.x, origin.y, origin.x + size.x, origin.y + size.y)
     ui.mark_rect("timeline.track", track)

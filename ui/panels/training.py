@@ -10,6 +10,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
 from app.commands import PauseTraining, ResumeTraining, StopTraining, TrainNextClip
 from ui import theme
+from ui.axis import ticks_that_fit, whole_ticks
 from ui.panels.plan import draw_plan
 from ui.panels.timeline import STATE_WORDS, state_note
 from ui.progress_words import stage_words
@@ -18,6 +19,9 @@ from ui.theme import Icon
 from ui.widgets import format_count, primary_button, text_right, text_wrapped_dim
 
 MAX_PLOT_POINTS = 600
+TICK_ROOM = 52.0
+"""What the numbers on the left and the margins take of a plot, units."""
+MIN_TICK_DISTANCE = 52.0
 ANCHORS_TOOLTIP = """All anchors of a clip, whichever frames they are alive in.
 Reference clip: reference anchors, which later clips inherit.
 Later clips: inherited + residual anchors."""
@@ -174,7 +178,7 @@ def _draw_curve(
         implot.setup_axes("", "", axis, axis)
         last = float(max(steps[-1], n_steps, 10))
         implot.setup_axes_limits(0.0, last, low - margin, high + margin, implot.Cond_.always)
-        implot.setup_axis_ticks(implot.ImAxis_.x1, 0.0, last, 5)
+        _set_step_ticks(last)
         spec = implot.Spec(line_color=ImVec4(*color), line_weight=2.0)
         if has_markers:
             spec.marker = implot.Marker_.circle
@@ -186,6 +190,15 @@ def _draw_curve(
         implot.setup_axes_limits(0.0, 1.0, 0.0, 1.0, implot.Cond_.always)
         implot.plot_text("appears while a clip trains", 0.5, 0.5)
     implot.end_plot()
+
+
+def _set_step_ticks(last: float) -> None:
+    """Whole steps along the lower edge."""
+    width = max(imgui.get_content_region_avail().x - TICK_ROOM, 40.0)
+    ticks = whole_ticks(last, max(int(width / MIN_TICK_DISTANCE), 2))
+    halves = {tick: imgui.calc_text_size(format_count(tick)).x / 2 for tick in ticks}
+    kept = ticks_that_fit(last, width, halves, ticks)
+    implot.setup_axis_ticks(implot.ImAxis_.x1, [float(tick) for tick in kept], [format_count(tick) for tick in kept])
 
 
 def anchors_text(n_inherited: int, n_own: int) -> str:
