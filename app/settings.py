@@ -58,7 +58,11 @@ class Settings:
 
 def _read_recent(path: Path) -> list[RecentProject]:
     try:
-        return read_recents(read_checked_json(path, max_bytes=MAX_BYTES))
+        document = read_checked_json(path, max_bytes=MAX_BYTES)
+        for name in ("projects", "recent"):
+            if not isinstance(document.get(name, []), list):
+                raise JsonError(f'its entry "{name}" is not a list')
+        return read_recents(document)
     except FileNotFoundError:
         return []
     except (OSError, JsonError) as error:
