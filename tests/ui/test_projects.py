@@ -25,7 +25,7 @@ PROJECTS = ProjectQuestion(
     "/captures/kitchen",
     (
         RecentProject("/projects/kitchen-toy", "/captures/kitchen", "kitchen-toy", 2, 3),
-        RecentProject("/home/u/.local/share/ClipGStream/projects/kitchen-12ab", "/captures/kitchen", "kitchen", 0, 3),
+        RecentProject("/data/ClipGStream/projects/kitchen-12ab", "/captures/kitchen", "kitchen", 0, 3),
     ),
 )
 
