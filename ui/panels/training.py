@@ -21,7 +21,7 @@ from ui.widgets import format_count, primary_button, text_right, text_wrapped_di
 MAX_PLOT_POINTS = 600
 TICK_ROOM = 52.0
 """What the numbers on the left and the margins take of a plot, units."""
-MIN_TICK_DISTANCE = 52.0
+MIN_TICK_DISTANCE = 46.0
 ANCHORS_TOOLTIP = """All anchors of a clip, whichever frames they are alive in.
 Reference clip: reference anchors, which later clips inherit.
 Later clips: inherited + residual anchors."""
