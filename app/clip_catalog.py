@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from app.header_cache import FoundHeader
-from app.project import Project, read_metrics
+from app.project import Project
+from app.project_files import read_metrics
 from engine.model.roles import REFERENCE_ROLES
 
 REPORT_EVERY = 32

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from app.evaluation import EVAL_SCHEMA, evaluate_project
 from app.headless import TrainedProject, open_trained
 from app.report.facts import ProjectFacts
-from engine.files import atomic_path
+from engine.json_files import JsonError, read_checked_json, write_checked_json
 
 if TYPE_CHECKING:
     from engine.metrics.colors import Precision
@@ -82,11 +82,10 @@ def evaluation_of(
         precision=precision,
         on_progress=on_progress,
     )
-    text = json.dumps({"schema": CACHE_SCHEMA, "key": key, "evaluation": document}, allow_nan=False)
+    kept = {"schema": CACHE_SCHEMA, "key": key, "evaluation": document}
     for path in _places(facts, _name(choice, precision), key, fallback_dir):
         try:
-            with atomic_path(path) as partial:
-                partial.write_text(text, encoding="utf-8")
+            write_checked_json(path, kept)
             break
         except OSError as error:  # a project may lie where nothing can be written
             logger.info("an evaluation was not kept (%s) - %s", error.strerror, path)
@@ -104,9 +103,9 @@ def _places(facts: ProjectFacts, name: str, key: str, fallback_dir: Path) -> tup
 
 def _read(path: Path, key: str) -> dict[str, Any] | None:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = read_checked_json(path)
+    except (OSError, JsonError):
         return None
-    if not isinstance(content, dict) or content.get("key") != key or not isinstance(content.get("evaluation"), dict):
+    if content.get("key") != key or not isinstance(content.get("evaluation"), dict):
         return None
     return content["evaluation"]

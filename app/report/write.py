@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -25,7 +24,7 @@ from app.report.seam_parts import seams_section, shown_boundaries
 from engine.capture.inspect import describe
 from engine.errors import CaptureError, ProjectError
 from engine.files import atomic_path
-from engine.json_files import json_text
+from engine.json_files import JsonError, json_text, read_json_object
 from engine.metrics.flicker import flicker_figures
 
 if TYPE_CHECKING:
@@ -244,9 +243,9 @@ def _write(out: Path, compared: Sequence[Compared], sections: Sequence[Section])
 
 def _files_of_last_report(out: Path) -> set[str]:
     try:
-        listed = json.loads((out / NUMBERS_FILE).read_text(encoding="utf-8"))["files"]
+        listed = read_json_object(out / NUMBERS_FILE)["files"]
         return {name for name in listed if isinstance(name, str) and _OWN_FILE.fullmatch(name)}
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, JsonError, KeyError, TypeError):
         return set()
 
 

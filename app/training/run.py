@@ -5,7 +5,6 @@ It knows neither processes nor pipes: `worker` drives it in a process, `inline` 
 
 from __future__ import annotations
 
-import json
 import logging
 import math
 import os
@@ -18,7 +17,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from app.memory import peak_bytes
-from app.project import Project, open_project, read_metrics
+from app.project import Project, open_project
+from app.project_files import read_metrics
 from app.training.keeping import FolderWatch, ProjectGone, Refusals, Retries
 from app.training.messages import (
     ClipTrained,
@@ -44,9 +44,11 @@ from app.training.rate import Rate
 from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
 from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch, stages_of
 from engine.errors import DiskError, EngineError, NonFiniteLoss, ProjectError
+from engine.json_files import checked_line
 from engine.model.clip_state import ClipState, read_clip_header
 from engine.model.compact import CompactClip
 from engine.training.report import Progress, ReportProgress, StepStats
+from engine.training.stages import remove_stages
 
 logger = logging.getLogger(__name__)
 
@@ -350,6 +352,7 @@ class TrainingRun:
             logger.warning("the curves could not be put in their place (%s)", error.strerror)
         with suppress(OSError):
             self._project.checkpoint_path(self._job.clip_index).unlink(missing_ok=True)
+        remove_stages(self._project.prep_dir, self._job.clip_index)
         self._snapshots.clear()
         logger.info("clip %d is trained: %d steps", self._job.clip_index, training.steps_done)
         if self._n_clipped:
@@ -491,7 +494,7 @@ class TrainingRun:
         try:
             path.parent.mkdir(exist_ok=True)  # not the project itself, which may be gone
             with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
+                file.write(checked_line(row))
         except OSError as error:
             logger.warning("a metrics row could not be written (%s) - %s", error.strerror, path)
 
@@ -502,6 +505,7 @@ class TrainingRun:
         checkpoint = self._project.checkpoint_path(self._job.clip_index)
         if self._stop is not None and not self._stop.keep:
             self._project.discard_progress(self._job.clip_index)
+            remove_stages(self._project.prep_dir, self._job.clip_index)
         elif can_write and self._training is not None:
             self._checkpoint_refusals.written()  # said again if it is refused now
             self._write_checkpoint(self._training)

@@ -212,10 +212,10 @@ def is_cache_warm() -> bool:
 
 def read_marker(folder: Path) -> CacheKey | None:
     """What the last completed warm-up in this folder compiled; None when there was none or it cannot be read."""
-    import json
+    from engine.json_files import read_json_object
 
     try:
-        values = json.loads((folder / MARKER).read_text("utf-8"))
+        values = read_json_object(folder / MARKER, max_bytes=1 << 20)
         return CacheKey(**{name: str(values[name]) for name in CacheKey._fields})
     except (OSError, ValueError, KeyError, TypeError):
         return None

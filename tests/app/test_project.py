@@ -2,6 +2,9 @@
 
 import json
 import os
+import subprocess
+import sys
+import time
 
 import pytest
 
@@ -10,9 +13,9 @@ from app.project import (
     create_project,
     default_settings,
     open_project,
-    read_metrics,
     read_settings,
 )
+from app.project_files import read_metrics
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError
 
@@ -55,7 +58,12 @@ def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch):
 def test_a_bad_project_file_is_named(tmp_path, change, expected):
     create_project(tmp_path / "p", SETTINGS).close()
     path = tmp_path / "p" / "project.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    edited = json.loads(path.read_text()) | change
+    path.write_text(json.dumps(edited))
+    with pytest.raises(ProjectError, match=r'edited by hand, take out its entry "checksum"'):
+        read_settings(tmp_path / "p")
+    del edited["checksum"]
+    path.write_text(json.dumps(edited))
     with pytest.raises(ProjectError, match=expected) as caught:
         read_settings(tmp_path / "p")
     assert str(caught.value).endswith(str(path))
@@ -84,17 +92,30 @@ def test_two_writers_are_one_too_many(tmp_path):
     open_project(tmp_path / "p").close()
 
 
-def test_opening_sweeps_leftovers_and_keeps_clips(tmp_path):
+@pytest.fixture
+def dead_pid() -> int:
+    """A process id that was in use and is not any more."""
+    child = subprocess.Popen([sys.executable, "-c", "pass"])
+    child.wait()
+    return child.pid
+
+
+def test_opening_sweeps_leftovers_and_keeps_clips(tmp_path, dead_pid):
     create_project(tmp_path / "p", SETTINGS).close()
     keep = tmp_path / "p" / "clips" / "0000.safetensors"
-    gone = [tmp_path / "p" / "live" / "clip-0001-r0003.safetensors", keep.with_name(".partial-12-0001.safetensors")]
-    for path in (keep, *gone):
+    stale = tmp_path / "p" / "reports" / f".partial-{os.getpid()}-old.html"
+    half = keep.with_name(f".partial-{dead_pid}-0001.safetensors")
+    gone = [tmp_path / "p" / "live" / "clip-0001-r0003.safetensors", half, stale]
+    others = tmp_path / "p" / "reports" / f".partial-{os.getppid()}-report.html"  # another process writes it just now
+    for path in (keep, others, *gone):
         path.parent.mkdir(exist_ok=True)
         path.write_text("x")
+    os.utime(stale, (0, time.time() - 2 * 24 * 3600))
     open_project(tmp_path / "p", is_writable=False)
     assert all(path.exists() for path in gone)  # a reader must not disturb a running training
     open_project(tmp_path / "p").close()
     assert keep.exists()
+    assert others.exists()
     assert not any(path.exists() for path in gone)
 
 

@@ -68,6 +68,9 @@ def journey(desk: Desk, pictures: Path) -> None:
     desk.key("f")
     desk.wait_for("the home view", lambda s: s["look_through"] is None)
 
+    label = desk.wait_for("the words over the picture", lambda s: s["hud"] is not None)["hud"]["label"]
+    assert label.startswith("clip 0   frame 0   0.00 s   free view   "), label
+
     desk.click("timeline.play")
     desk.wait_for("playing", lambda s: s["is_playing"] and s["frame_index"] > 0)
     desk.key("space")

@@ -118,6 +118,7 @@ class Hud:
                 at = ImVec2(plate.x0 + 9 + extra, plate.y0 + 4 + row * imgui.get_text_line_height())
                 draw.add_text(at, theme.u32(color), line)
             x, row_height = plate.x1 + GAP, max(row_height, height)
+        ui.mark_rect("viewport.free", Rect(area.x0, area.y0, area.x1, bottom - row_height))
 
     def _draw_legend(self, session: Any, ui: UiState, scene: Scene, area: Rect) -> None:
         draw = imgui.get_window_draw_list()
