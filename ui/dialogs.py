@@ -21,7 +21,7 @@ from ui.state import Dispatch, UiState
 from ui.widgets import text_wrapped_dim
 
 _LINUX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
-_POPUP = "Open a capture folder"
+_POPUP = "Open a capture or project folder"
 _MAX_LISTED = 500
 
 
@@ -108,7 +108,7 @@ class OpenFolderDialog:
             dispatch(OpenCapture(Path(answer)))
 
     def _draw_box(self, dispatch: Dispatch, ui: UiState) -> None:
-        imgui.text_disabled("Folder with the cameras and their videos or pictures")
+        imgui.text_disabled("Folder with the cameras and their videos or pictures, or of a project")
         if self._is_keyboard_wanted:
             self._is_keyboard_wanted = False
             imgui.set_keyboard_focus_here()

@@ -390,12 +390,6 @@ def test_dropped_folder_and_dropped_file_open_the_capture(open_pilot: Callable[.
     assert pilot.sent(OpenCapture) == [OpenCapture(tmp_path), OpenCapture(tmp_path)]
 
 
-def test_a_recent_capture_opens_with_a_click(open_pilot: Callable[..., Pilot]) -> None:
-    pilot = open_pilot(FakeSession(has_capture=False))
-    pilot.click("welcome.recent1")
-    assert [command.path.name for command in pilot.sent(OpenCapture)] == ["dance_floor"]
-
-
 def test_path_box_opens_a_typed_folder(
     open_pilot: Callable[..., Pilot], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
