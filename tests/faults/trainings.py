@@ -17,9 +17,9 @@ from app.cli import main
 from app.project import open_project
 from app.training import run
 from app.training.build import build_training
+from app.training.interface import Training
 from app.training.messages import TrainJob
 from app.training.process import ProcessWorker
-from app.training.run import Training
 from engine.assets import asset_path
 from engine.errors import EngineError
 from engine.model.clip_state import read_clip_state
