@@ -36,11 +36,12 @@ class ClipOutcome:
     """How the training of one clip ended.
 
     Attributes:
-        state: trained, skipped (it was trained before), stopped or failed.
+        state: trained, skipped (it was trained before), stopped, failed, or damaged (its file cannot be read, or that
+            of a clip which it needs; it is left as it is).
         step: Steps done.
         held_out_psnr: dB; None when not measured.
         seconds: Wall time of this run, preparation included.
-        message, hint, kind: Of a failure.
+        message, hint, kind: Of a failure or a damage.
     """
 
     clip_index: int
@@ -77,9 +78,11 @@ def train_clips(
     """
     outcomes: list[ClipOutcome] = []
     for clip_index in clip_indices:
-        known = service.progress[clip_index]
+        known = service.catalog[clip_index]
         if known.state == "trained":
             outcome = ClipOutcome(clip_index, "skipped", known.step, known.held_out_psnr)
+        elif known.state == "damaged" or known.blocked_by is not None:
+            outcome = _left_alone(service, clip_index)
         else:
             on_begin(clip_index)
             outcome = _train_clip(service, clip_index, on_status, on_event, sleep)
@@ -112,7 +115,7 @@ def _train_clip(
         service.close(timeout_s=STOP_TIMEOUT_S)
         raise
     seconds = time.monotonic() - started_s
-    known = service.progress[clip_index]
+    step = service.status().step
     match ending:
         case ClipTrained():
             return ClipOutcome(clip_index, "trained", ending.step, ending.held_out_psnr, seconds)
@@ -120,7 +123,7 @@ def _train_clip(
             return ClipOutcome(
                 clip_index,
                 "failed",
-                known.step,
+                step,
                 seconds=seconds,
                 message=ending.message,
                 hint=ending.hint,
@@ -129,9 +132,23 @@ def _train_clip(
         case WorkerDied():
             message = f"The training process ended with code {ending.exit_code}."
             hint = f"Train again; it goes on from what was kept. Its log is {service.project.log_path(clip_index)}."
-            return ClipOutcome(clip_index, "failed", known.step, seconds=seconds, message=message, hint=hint)
+            return ClipOutcome(clip_index, "failed", step, seconds=seconds, message=message, hint=hint)
         case _:
-            return ClipOutcome(clip_index, "stopped", known.step, seconds=seconds)
+            return ClipOutcome(clip_index, "stopped", step, seconds=seconds)
+
+
+def _left_alone(service: TrainingService, clip_index: int) -> ClipOutcome:
+    """A damaged clip is not trained again unless somebody says so: the file may be worth a rescue."""
+    record = service.catalog[clip_index]
+    damaged = clip_index if record.state == "damaged" else record.blocked_by
+    assert damaged is not None
+    message = f"Clip {clip_index} was left as it is: "
+    message += (
+        service.catalog[damaged].reason if damaged == clip_index else f"it needs clip {damaged}, which is damaged."
+    )
+    path = service.project.clip_path(damaged)
+    hint = f"Restore the file from a copy, or remove it to train clip {damaged} again - {path}"
+    return ClipOutcome(clip_index, "damaged", message=message, hint=hint, kind="ProjectError")
 
 
 # ---------------------------------------------------------------- trained clips

@@ -16,7 +16,7 @@ from engine.errors import EngineError, ProjectError
 
 logger = logging.getLogger(__name__)
 
-STARTED = ("preparing", "training", "paused", "trained")
+STARTED = ("preparing", "training", "paused", "stopped", "trained")
 """States of clips that have taken their regions already."""
 MAX_UNDO = 100
 SETTLE_S = 2.0

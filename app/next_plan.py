@@ -6,6 +6,7 @@ import logging
 from dataclasses import dataclass, field
 
 from app.bench.speed import known_machine_speed
+from app.clip_catalog import ClipCatalog
 from app.latest import LatestWorker
 from app.planning import plan_clip, plan_status
 from app.project import Project
@@ -25,15 +26,16 @@ class PlanRequest:
     """The next clip, to be planned.
 
     Attributes:
-        basis: What the plan depends on: settings, and which clips are trained.
+        basis: What the plan depends on: settings, and the revision of the catalog of clips.
         can_measure: Whether nothing else computes, so that the machine may be timed.
     """
 
     clip: Clip
-    basis: tuple[str, ...]
+    basis: tuple[str, int]
     can_measure: bool
     project: Project = field(compare=False)
     capture: Capture = field(compare=False)
+    catalog: ClipCatalog = field(compare=False)
 
 
 class NextPlan:
@@ -55,15 +57,14 @@ class NextPlan:
         if clip_index is None or service.worker is not None:
             return None
         clip = service.clips[clip_index]
-        trained = (f"{i}: {known.revision}" for i, known in enumerate(service.progress) if known.state == "trained")
-        basis = (repr(project.settings), *trained)
-        request = PlanRequest(clip, basis, can_measure, project, capture)
+        basis = (repr(project.settings), service.catalog.revision)
+        request = PlanRequest(clip, basis, can_measure, project, capture, service.catalog)
         newest, plan = self._plans.newest, None
         if newest is None or newest[0] != request:
             self._plans.request(request)
         if newest is not None and (newest[0].clip, newest[0].basis) == (clip, basis):  # until the machine is timed
             plan = newest[1]
-        can_edit = project.is_writable and not project.has_progress
+        can_edit = project.is_writable and not service.catalog.has_progress
         return plan_status(project, capture, clip, plan, can_edit=can_edit)
 
     def forget(self) -> None:
@@ -78,7 +79,9 @@ class NextPlan:
 def _compute(request: PlanRequest) -> TrainingPlan | None:
     measure = known_machine_speed if request.can_measure else lambda: UNKNOWN_MACHINE
     try:
-        return plan_clip(request.project, request.capture, request.clip, measure_machine=measure)
+        return plan_clip(
+            request.project, request.capture, request.clip, measure_machine=measure, catalog=request.catalog
+        )
     except EngineError as error:  # training will say the same
         logger.info("the next clip cannot be planned: %s", error)
         return None

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from typing import Any
 
+from app.clip_catalog import ClipCatalog
 from app.kernels import COMPILING
 from app.progress import duration_text
 from app.project import Project
@@ -13,14 +13,19 @@ from app.status import PlanStatus, SettingStatus
 from app.training.stage_watch import stages_of
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.model.clip_state import read_clip_header
 from engine.training.config import TrainConfig
 from engine.training.expected_sizes import footage_of
 from engine.training.forecasting import UNKNOWN_MACHINE, MachineSpeed, MeasuredClip, measured_clip
-from engine.training.plan import TrainingPlan, make_plan
+from engine.training.plan import TrainingPlan, make_plan, resumed_plan
 from engine.training.presets import PRESETS
 
 PLAN_SCHEMA = 1
+
+
+def clip_history(project: Project, n_clips: int) -> list[MeasuredClip]:
+    """What the finished clips of a project say about the next one."""
+    found = (_measured(project, clip_index) for clip_index in range(n_clips))
+    return [known for known in found if known is not None]
 
 
 def plan_clip(
@@ -29,6 +34,8 @@ def plan_clip(
     clip: Clip,
     *,
     measure_machine: Callable[[], MachineSpeed] = lambda: UNKNOWN_MACHINE,
+    history: Sequence[MeasuredClip] | None = None,
+    catalog: ClipCatalog | None = None,
 ) -> TrainingPlan:
     """The plan of one clip of a project.
 
@@ -37,6 +44,8 @@ def plan_clip(
         capture: At the project's scale.
         clip: One of its clips.
         measure_machine: Asked where no other clip of the project says how long training takes.
+        history: Of all its clips, for callers that plan many; read here when None.
+        catalog: Says whether the training was stopped and goes on; when None, the whole of it is planned.
     Raises:
         CaptureError, PreparationError: The capture does not fit the settings.
     """
@@ -44,22 +53,25 @@ def plan_clip(
     base = project.inherited_index(clip.clip_index)
     if base is None and config.start == "previous" and clip.clip_index != settings.reference_clip:
         base, config = project.previous_index(clip.clip_index), config.going_on()
-    history = [
-        known
-        for other in project.clips(capture.n_frames)
-        if other != clip and (known := _measured(project, other.clip_index)) is not None
-    ]
+    if history is None:
+        history = clip_history(project, len(project.clips(capture.n_frames)))
+    history = [known for known in history if known.clip_index != clip.clip_index]
     is_measured = any(known.training_s for known in history)
-    return make_plan(
+    found = None if base is None else project.headers.read(project.clip_path(base))
+    plan = make_plan(
         footage_of(capture, capture.camera_indices(settings.holdout)),
         clip,
         config,
         is_source=base is not None,
-        reference=None if base is None else read_clip_header(project.clip_path(base)),
+        reference=None if found is None or found.damage else found.header,
         history=history,
         machine=UNKNOWN_MACHINE if is_measured else measure_machine(),
         is_still=base is not None and _looks_still(project, capture, clip, config),
     )
+    record = None if catalog is None else catalog[clip.clip_index]
+    if record is None or record.resume_step is None:
+        return plan
+    return resumed_plan(plan, record.resume_step, record.resume_n_steps)
 
 
 def _looks_still(project: Project, capture: Capture, clip: Clip, config: TrainConfig) -> bool:
@@ -72,16 +84,12 @@ def _looks_still(project: Project, capture: Capture, clip: Clip, config: TrainCo
 
 
 def _measured(project: Project, clip_index: int) -> MeasuredClip | None:
-    path = project.clip_path(clip_index)
-    header = read_clip_header(path)
-    if header is None:
+    found = project.headers.read(project.clip_path(clip_index))
+    if found is None or found.damage:
         return None
-    disk_mb = None
-    with suppress(OSError):
-        disk_mb = path.stat().st_size / 1e6
-    metrics = header.get("metrics")
+    metrics = found.header.get("metrics")
     stages_s = stages_of(metrics) if isinstance(metrics, dict) else {}
-    return measured_clip(header, disk_mb=disk_mb, uncounted_s=stages_s.get(COMPILING, 0.0))
+    return measured_clip(found.header, disk_mb=found.n_bytes / 1e6, uncounted_s=stages_s.get(COMPILING, 0.0))
 
 
 # ---------------------------------------------------------------- for the window
@@ -141,10 +149,13 @@ def closest_preset(overrides: dict[str, Any]) -> str:
 def short_text(plan: TrainingPlan) -> str:
     """The forecast as one line."""
     steps = f"{plan.n_steps:,} steps" if plan.n_steps else "no steps"
-    return (
-        f"{steps}, about {duration_text(plan.seconds)} ({duration_text(plan.preparation_s.value)} preparation), "
-        f"{plan.memory_mb.value / 1e3:.1f} GB of memory, {plan.disk_mb.text} stored"
-    )
+    times = f"about {duration_text(plan.seconds)} ({duration_text(plan.preparation_s.value)} preparation)"
+    if plan.steps_done:
+        steps = (
+            f"goes on at step {plan.steps_done:,}, {plan.n_steps - plan.steps_done:,} of {plan.n_steps:,} steps left"
+        )
+        times = f"about {duration_text(plan.seconds)}"
+    return f"{steps}, {times}, {plan.memory_mb.value / 1e3:.1f} GB of memory, {plan.disk_mb.text} stored"
 
 
 def plan_text(plan: TrainingPlan) -> list[str]:
@@ -181,7 +192,11 @@ def compared_text(plan: TrainingPlan, project: Project) -> str:
 
 
 def plan_document(
-    project: Project, capture: Capture, plans: Sequence[TrainingPlan], trained: Sequence[int]
+    project: Project,
+    capture: Capture,
+    plans: Sequence[TrainingPlan],
+    trained: Sequence[int],
+    damaged: Sequence[int] = (),
 ) -> dict[str, Any]:
     """What `train --plan --json` prints.
 
@@ -189,9 +204,11 @@ def plan_document(
         project, capture: As planned.
         plans: Of the clips that are not trained yet.
         trained: Indices of chosen clips that are.
+        damaged: Indices of chosen clips that are not trained because they, or what they need, cannot be read.
     """
     rows = [plan.as_dict() | {"state": "planned"} for plan in plans]
     rows += [{"clip_index": clip_index, "state": "trained"} for clip_index in trained]
+    rows += [{"clip_index": clip_index, "state": "damaged"} for clip_index in damaged]
     return {
         "schema": PLAN_SCHEMA,
         "project": str(project.folder),

@@ -6,7 +6,8 @@ clips/0000.safetensors       finished clips
 checkpoints/0000.safetensors unfinished clips: everything needed to go on
 live/                        snapshots of the running training; swept when the project is opened for writing
 prep/                        what clips share, such as backgrounds
-metrics/0000.jsonl           curves, one JSON object per line
+metrics/0000.jsonl           curves of the finished clip, one JSON object per line
+metrics/0000.unfinished.jsonl  of its training that is not finished
 logs/                        one file per clip
 """
 
@@ -23,6 +24,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from app.header_cache import HeaderCache
 from app.lock import ProcessLock
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip, split_clips
@@ -78,11 +80,16 @@ class ProjectSettings:
 
 
 class Project:
-    """An opened project folder. Use `create_project` or `open_project`."""
+    """An opened project folder. Use `create_project` or `open_project`.
+
+    Attributes:
+        headers: Of its clips and checkpoints, read once for everybody who asks.
+    """
 
     def __init__(self, folder: Path, settings: ProjectSettings, lock: ProcessLock | None) -> None:
         self.folder = folder
         self.settings = settings
+        self.headers = HeaderCache()
         self._lock = lock
 
     @property
@@ -114,8 +121,19 @@ class Project:
         return self.folder / "checkpoints" / f"{clip_index:04d}.safetensors"
 
     def metrics_path(self, clip_index: int) -> Path:
-        """Curves of a clip."""
+        """Curves of a finished clip."""
         return self.folder / "metrics" / f"{clip_index:04d}.jsonl"
+
+    def unfinished_metrics_path(self, clip_index: int) -> Path:
+        """Curves of a training that is not finished. Beside the others, so that those of an earlier one stand."""
+        return self.folder / "metrics" / f"{clip_index:04d}.unfinished.jsonl"
+
+    def curve_path(self, clip_index: int, *, is_finished: bool) -> Path:
+        """Curves of the finished clip, or of its training that was stopped."""
+        path = self.unfinished_metrics_path(clip_index)
+        if is_finished or (not path.is_file() and not self.is_trained(clip_index)):  # as earlier versions kept them
+            return self.metrics_path(clip_index)
+        return path
 
     def log_path(self, clip_index: int) -> Path:
         """Log of a clip's worker."""
@@ -212,10 +230,20 @@ class Project:
         _write_json(self.folder / GATE_FILE, {"regions": [region.as_dict() for region in regions]})
 
     def discard_progress(self, clip_index: int) -> None:
-        """Forget the unfinished training of a clip; a finished clip stays."""
-        for path in (self.checkpoint_path(clip_index), self.metrics_path(clip_index)):
+        """Forget the unfinished training of a clip; a finished clip and its curves stay."""
+        for path in (self.checkpoint_path(clip_index), self.unfinished_metrics_path(clip_index)):
             with suppress(OSError):
                 path.unlink()
+
+    def keep_curves(self, clip_index: int) -> None:
+        """The training of a clip is finished: its curves take the place of those of an earlier one.
+
+        Raises:
+            OSError: The disk refused; the earlier ones stand.
+        """
+        path = self.unfinished_metrics_path(clip_index)
+        if path.is_file():
+            os.replace(path, self.metrics_path(clip_index))
 
     def close(self) -> None:
         """Release the lock. The object can still be read from."""
@@ -412,16 +440,16 @@ def _write_json(path: Path, content: dict[str, Any]) -> None:
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:
-    """Rows of a metrics file; an unfinished last line is left out."""
+    """Rows of a metrics file; lines that are unfinished or damaged are left out."""
     try:
-        lines = path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return []
     rows = []
     for line in lines:
-        with suppress(ValueError):
+        with suppress(ValueError, RecursionError):
             row = json.loads(line)
-            if isinstance(row, dict) and "step" in row:
+            if isinstance(row, dict) and isinstance(row.get("step"), int):
                 rows.append(row)
     return rows
 

@@ -39,7 +39,7 @@ from app.telling import tell
 from app.timeline import Timeline
 from app.training.messages import ENDINGS, Event, SnapshotWritten, TrainJob
 from app.training.process import ProcessWorker, Worker
-from app.training.service import ClipProgress, Launch, TrainingService
+from app.training.service import Launch, ShownState, TrainingService
 from app.view import OrbitView
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -288,9 +288,8 @@ class Session:
 
     def _build_first_cloud(self, capture: Capture, project: Project) -> None:
         """Something of the scene to look at until the first training has built the real cloud."""
-        reference = self._known(self.reference_index)
         path = project.first_cloud_path
-        if path.is_file() or (reference is not None and reference.file is not None):
+        if path.is_file() or self._state_of(self.reference_index) is not None:
             return
         capture_path, holdout = capture.path, self.holdout
 
@@ -328,6 +327,7 @@ class Session:
         if service is None or project is None:
             return
         if service.worker is None:
+            service.close()
             project.close()
             return
         self._closing.append((service, project))
@@ -363,6 +363,8 @@ class Session:
 
     def _finished_keys(self) -> tuple[object, ...]:
         workers = (self._playback.worker, self._renderer.worker, self._pictures.viewing, self._pictures.thumbnails)
+        if self._service is not None:
+            workers = (*workers, self._service.curves.worker)
         newest = [worker.newest for worker in (*workers, self._points, self._next_plan)]
         statuses = [(job.name, job.done, job.message) for job in self.jobs]
         return (*(None if found is None else found[0] for found in newest), *statuses, self.notices.revision)
@@ -465,8 +467,9 @@ class Session:
 
     # ---------------------------------------------------------------- pictures and arrays
 
-    def _known(self, clip_index: int) -> ClipProgress | None:
-        return None if self._service is None else self._service.progress[clip_index]
+    def _state_of(self, clip_index: int) -> ShownState | None:
+        """The state of a clip to look at."""
+        return None if self._service is None else self._service.shown_state(clip_index)
 
     def shown_gaussians(self) -> GaussianArrays | None:
         """Gaussians of the shown frame; the newest ones there are until those are decoded; None where nothing is
@@ -481,8 +484,8 @@ class Session:
     def _frame_request(self) -> FrameRequest | None:
         """What is to be decoded for the playhead; None where nothing is trained."""
         clip = self.timeline.clip
-        known = None if clip is None else self._known(clip.clip_index)
-        if clip is None or known is None or known.file is None or self.project is None:
+        known = None if clip is None else self._state_of(clip.clip_index)
+        if clip is None or known is None or self.project is None:
             return None
         return FrameRequest(
             clip_index=clip.clip_index,
@@ -491,7 +494,7 @@ class Session:
             path=known.file,
             reference_path=self._inherited_path(clip.clip_index),
             clip=clip,
-            is_live=self._is_live(known),
+            is_live=known.is_live,
         )
 
     def wanted_frame(self) -> WantedFrame | None:
@@ -513,10 +516,6 @@ class Session:
             is_loaded=self._playback.is_loaded(request),
             has_failed=self._playback.has_failed(request) or self._renderer.has_failed,
         )
-
-    def _is_live(self, known: ClipProgress) -> bool:
-        """Whether the state of a clip is a snapshot, which its worker replaces and removes as it goes on."""
-        return known.file is not None and self.project is not None and known.file.parent == self.project.live_dir
 
     @property
     def reference_index(self) -> int:
@@ -543,9 +542,9 @@ class Session:
         if self.capture is None:
             return None
         generation = self._points.generation
-        reference = self._known(self.reference_index)
-        if reference is not None and reference.file is not None:
-            is_live = self._is_live(reference)
+        reference = self._state_of(self.reference_index)
+        if reference is not None:
+            is_live = reference.is_live
             request = PointsRequest("cloud", reference.revision, generation, reference.file, is_live=is_live)
         elif self.project is not None and self.project.first_cloud_path.is_file():
             request = PointsRequest("first cloud", "", generation, self.project.first_cloud_path)

@@ -65,10 +65,12 @@ class TrainingStatus:
         steps_per_s: Smoothed rate; 0 when unknown.
         eta_s: Seconds until the clip is finished; None when unknown.
         curve_clip_index: Clip of the histories: the one that trains, else the one at the playhead; None without one.
+            While a clip is trained again they are those of its finished version until the first new figures come.
         gradient_norm: Largest norm over all gradients since the last report, before clipping; None when unknown.
         loss_history, psnr_history: (step, value) of that clip; PSNR is of held-out pictures, dB.
         can_train_next: Whether TrainNextClip would start something.
         next_clip_index: The clip that TrainNextClip would train; None when all are trained.
+        resume_step: The step that it would go on from; None when it would start from the beginning.
         queue: Clips that wait.
     """
 
@@ -87,6 +89,7 @@ class TrainingStatus:
     psnr_history: Sequence[tuple[int, float]] = ()
     can_train_next: bool = False
     next_clip_index: int | None = None
+    resume_step: int | None = None
     queue: tuple[int, ...] = ()
 
 
@@ -95,12 +98,15 @@ class ClipStatus:
     """One clip of the project.
 
     Attributes:
-        state: untrained, queued, preparing, training, paused, trained, failed, or stale (its reference was
-            trained again, or the clip that it goes on from). A clip that was stopped before its end is paused:
-            training it again goes on there.
+        state: untrained, queued, preparing, training, paused (its training holds and waits), stopped (its training
+            has ended before the last step and goes on there), trained, failed, stale (its reference was trained
+            again, or the clip that it goes on from), or damaged (finished, but its file cannot be read).
         progress: Share of its steps, 0..1.
         held_out_psnr: Newest figure, dB; None when not measured.
         n_inherited, n_own: Anchors of the shown model; 0 until it was loaded.
+        resume_step: The step that its training goes on from; None when there is nothing to go on from. A clip that
+            was being trained again when that was stopped is trained and has one.
+        reason: Why it is stale or damaged; empty otherwise.
     """
 
     state: str = "untrained"
@@ -108,6 +114,8 @@ class ClipStatus:
     held_out_psnr: float | None = None
     n_inherited: int = 0
     n_own: int = 0
+    resume_step: int | None = None
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)

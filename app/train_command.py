@@ -20,8 +20,9 @@ from app.arguments import (
     parse_range,
 )
 from app.bench.speed import known_machine_speed
+from app.clip_catalog import ClipCatalog
 from app.headless import train_clips, train_document
-from app.planning import plan_clip, plan_document, plan_text, totals
+from app.planning import clip_history, plan_clip, plan_document, plan_text, totals
 from app.progress import ProgressLine, duration_text
 from app.project import (
     PROJECT_FILE,
@@ -79,7 +80,14 @@ def train(options: argparse.Namespace, launch: Launch) -> int:
             f"clips {chosen.start} to {chosen.stop - 1} of {len(clips)}"
         )
         first = project.settings.reference_clip  # the others cannot begin before it
-        plans = PlanLines(line, project, capture, measure_machine=known_machine_speed, is_quiet=options.quiet)
+        plans = PlanLines(
+            line,
+            project,
+            capture,
+            catalog=service.catalog,
+            measure_machine=known_machine_speed,
+            is_quiet=options.quiet,
+        )
         outcomes = train_clips(
             service,
             sorted(chosen, key=lambda clip_index: clip_index != first),
@@ -88,7 +96,7 @@ def train(options: argparse.Namespace, launch: Launch) -> int:
             on_event=lambda event: show_event(line, event),
             on_outcome=lambda outcome: (show_outcome(line, outcome), plans.end(outcome)),
         )
-        is_refused = outcomes[-1].kind in BAD_INPUT_KINDS
+        is_refused = outcomes[-1].state == "failed" and outcomes[-1].kind in BAD_INPUT_KINDS
         line.finish()
         if options.json:
             print(json.dumps(train_document(project, capture, outcomes), indent=2))
@@ -110,6 +118,9 @@ def train(options: argparse.Namespace, launch: Launch) -> int:
     if last.state == "failed":
         code = EXIT_BAD_INPUT if last.kind in BAD_INPUT_KINDS else EXIT_FAILED
         return fail(code, " ".join(part for part in (last.message, last.hint) if part))
+    damaged = [outcome for outcome in outcomes if outcome.state == "damaged"]
+    if damaged:
+        return fail(EXIT_FAILED, "\n".join(f"{outcome.message} {outcome.hint}" for outcome in damaged))
     return EXIT_OK
 
 
@@ -117,18 +128,26 @@ def _plan(options: argparse.Namespace) -> int:
     project, capture = _project_to_plan(options)
     clips = project.clips(capture.n_frames)
     chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
-    order = [i for i in project.training_order(len(clips)) if i in chosen]
-    trained = [clip_index for clip_index in order if project.is_trained(clip_index)]
+    catalog = ClipCatalog(project, len(clips))
+    order = [i for i in catalog.order if i in chosen]
+    trained = [i for i in order if catalog[i].state == "trained"]
+    damaged = [i for i in order if catalog[i].state == "damaged" or catalog[i].blocked_by is not None]
+    history = clip_history(project, len(clips))
     plans = [
-        plan_clip(project, capture, clips[i], measure_machine=known_machine_speed) for i in order if i not in trained
+        plan_clip(project, capture, clips[i], measure_machine=known_machine_speed, history=history, catalog=catalog)
+        for i in order
+        if i not in trained and i not in damaged
     ]
     if options.json:
-        print(json.dumps(plan_document(project, capture, plans, trained), indent=2))
+        print(json.dumps(plan_document(project, capture, plans, trained, damaged), indent=2))
         return EXIT_OK
     for plan in plans:
         print("\n".join(plan_text(plan)))
     if trained:
         print(f"Trained already: clip {', '.join(str(clip_index) for clip_index in trained)}")
+    if damaged:
+        listed = ", ".join(str(clip_index) for clip_index in damaged)
+        print(f"Left alone, because they are damaged or need one that is: clip {listed}")
     if len(plans) > 1:
         sums = totals(plans)
         print(

@@ -56,9 +56,11 @@ CLIP_COLORS: dict[str, Color] = {
     "preparing": SKY,
     "training": SKY,
     "paused": YELLOW,
+    "stopped": YELLOW,
     "trained": GREEN,
     "failed": VERMILLION,
     "stale": ORANGE,
+    "damaged": VERMILLION,
 }
 
 
@@ -94,6 +96,8 @@ class Icon:
     REGION = "\uf05b"
     TRASH = "\uf1f8"
     UNDO = "\uf2ea"
+    CLOCK_BACK = "\uf1da"
+    BROKEN = "\uf127"
 
 
 CLIP_ICONS: dict[str, str] = {
@@ -102,9 +106,11 @@ CLIP_ICONS: dict[str, str] = {
     "preparing": Icon.GEAR,
     "training": Icon.TRAIN,
     "paused": Icon.PAUSE,
+    "stopped": Icon.STOP,
     "trained": Icon.CHECK,
     "failed": Icon.WARNING,
-    "stale": Icon.WARNING,
+    "stale": Icon.CLOCK_BACK,
+    "damaged": Icon.BROKEN,
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from app.clip_catalog import ClipCatalog
 from app.headless import ClipOutcome
 from app.planning import begin_text, compared_text, plan_clip
 from app.progress import ProgressLine, duration_text
@@ -62,6 +63,7 @@ class PlanLines:
     Args:
         line: Where to say it.
         project, capture: What is trained.
+        catalog: Says which trainings were stopped and go on.
         measure_machine: Asked where no clip of the project says how long training takes.
         is_quiet: Plan nothing.
     """
@@ -72,11 +74,12 @@ class PlanLines:
         project: Project,
         capture: Capture,
         *,
+        catalog: ClipCatalog,
         measure_machine: Callable[[], MachineSpeed],
         is_quiet: bool,
     ) -> None:
         self._line, self._project, self._capture, self._is_quiet = line, project, capture, is_quiet
-        self._measure_machine = measure_machine
+        self._catalog, self._measure_machine = catalog, measure_machine
         self._plan: TrainingPlan | None = None
 
     def begin(self, clip: Clip) -> None:
@@ -85,7 +88,13 @@ class PlanLines:
         if self._is_quiet:
             return
         try:
-            self._plan = plan_clip(self._project, self._capture, clip, measure_machine=self._measure_machine)
+            self._plan = plan_clip(
+                self._project,
+                self._capture,
+                clip,
+                measure_machine=self._measure_machine,
+                catalog=self._catalog,
+            )
         except EngineError:
             return
         for text in begin_text(self._plan):

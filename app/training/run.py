@@ -214,6 +214,7 @@ class TrainingRun:
             try:
                 training.restore_checkpoint(checkpoint)
                 is_restored = True
+                self._take_up_curves()
                 self._recall_times(training.steps_done)
                 logger.info("clip %d goes on at step %d", job.clip_index, training.steps_done)
             except ProjectError as error:
@@ -342,6 +343,10 @@ class TrainingRun:
         assert self._project is not None
         path = self._project.clip_path(self._job.clip_index)
         keep_clip(clip, path, self._project.live_dir)
+        try:
+            self._project.keep_curves(self._job.clip_index)
+        except OSError as error:
+            logger.warning("the curves could not be put in their place (%s)", error.strerror)
         with suppress(OSError):
             self._project.checkpoint_path(self._job.clip_index).unlink(missing_ok=True)
         self._snapshots.clear()
@@ -452,10 +457,17 @@ class TrainingRun:
         if self._folder is not None:
             self._folder.check()
 
+    def _take_up_curves(self) -> None:
+        """Curves of a training that an earlier version stopped lie where those of finished clips do now."""
+        assert self._project is not None
+        found = self._project.curve_path(self._job.clip_index, is_finished=False)
+        with suppress(OSError):
+            found.rename(self._project.unfinished_metrics_path(self._job.clip_index))
+
     def _recall_times(self, step: int) -> None:
         """Add what earlier runs took up to the checkpoint that this one goes on from."""
         assert self._project is not None
-        rows = read_metrics(self._project.metrics_path(self._job.clip_index))
+        rows = read_metrics(self._project.unfinished_metrics_path(self._job.clip_index))
         known = [stages_of(row) for row in rows if row["step"] <= step and "stages_s" in row]
         for stage, seconds in (known[-1] if known else {}).items():
             self._watch.seconds[stage] = self._watch.seconds.get(stage, 0.0) + seconds
@@ -473,7 +485,7 @@ class TrainingRun:
     def _note(self, row: dict[str, Any]) -> None:
         """Append one line to the metrics file, so that a restarted window has the whole curve."""
         assert self._project is not None
-        path = self._project.metrics_path(self._job.clip_index)
+        path = self._project.unfinished_metrics_path(self._job.clip_index)
         row = {key: round(value, 6) if isinstance(value, float) else value for key, value in row.items()}
         try:
             path.parent.mkdir(exist_ok=True)  # not the project itself, which may be gone

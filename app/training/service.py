@@ -1,6 +1,7 @@
 """TrainingService: which clip trains, which wait, and what the worker said last. Status is derived, never stored.
 
 Owned by one thread. It knows no window and raises no notices: `poll` returns the events for whoever tells the user.
+What lies on disk is app.clip_catalog's business; the training at hand stands beside it and never hides it.
 """
 
 from __future__ import annotations
@@ -12,10 +13,11 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from app.project import Project, read_metrics
+from app.clip_catalog import ClipCatalog
+from app.project import Project
 from app.status import ClipStatus, TrainingStatus
+from app.training.curves import CurveReader, Curves, append_thinned, read_curves
 from app.training.messages import (
     ENDINGS,
     ClipTrained,
@@ -39,7 +41,6 @@ from app.training.messages import (
 from app.training.process import ProcessWorker, Worker
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
-from engine.model.clip_state import read_clip_header
 
 logger = logging.getLogger(__name__)
 
@@ -49,24 +50,38 @@ STAGE_WORDS = {
     "joint": "Learning what moves",
     "source": "Learning what is new",
 }
-MAX_HISTORY = 4000
-"""Points of a curve; beyond that every second one goes."""
 CLOSE_TIMEOUT_S = 5.0
 
 
 @dataclass
-class ClipProgress:
-    """What is known of one clip; curves and files, no worker."""
+class Run:
+    """The training at hand, or the last one: what its worker said so far.
 
-    state: str = "untrained"
+    Attributes:
+        file, revision: Its newest snapshot; None and empty before the first.
+    """
+
+    clip_index: int
     step: int = 0
     n_steps: int = 0
     held_out_psnr: float | None = None
-    loss_history: list[tuple[int, float]] = field(default_factory=list)
-    psnr_history: list[tuple[int, float]] = field(default_factory=list)
+    curves: Curves = field(default_factory=Curves)
     file: Path | None = None
     revision: str = ""
-    """Names the state in `file`; empty when there is none to show."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShownState:
+    """A state of a clip as a file.
+
+    Attributes:
+        revision: Names the state.
+        is_live: Whether it is a snapshot, which its worker replaces and removes as it goes on.
+    """
+
+    file: Path
+    revision: str
+    is_live: bool = False
 
 
 class TrainingService:
@@ -78,6 +93,7 @@ class TrainingService:
         holdout: Camera indices never trained on.
         launch: Starts a worker; a process by default.
         is_window_open: Passed on to workers, which then leave room for it.
+        catalog: What lies on disk; read here, which takes a while in a long project, when None.
     """
 
     def __init__(
@@ -88,82 +104,51 @@ class TrainingService:
         holdout: Sequence[int],
         launch: Launch = ProcessWorker,
         is_window_open: bool = True,
+        catalog: ClipCatalog | None = None,
     ) -> None:
         self.project, self.clips, self.holdout = project, list(clips), tuple(holdout)
         self._launch, self._is_window_open = launch, is_window_open
+        self.catalog = ClipCatalog(project, len(self.clips)) if catalog is None else catalog
         self.queue: deque[int] = deque()
         self.worker: Worker | None = None
-        self.progress = [ClipProgress() for _ in self.clips]
+        self.curves = CurveReader()
+        self._failed: set[int] = set()
+        self._run: Run | None = None
         self._stage = StageReported("", 0.0)
         self._step: StepReported | None = None
         self._is_ready = False
         self._is_paused = False
         self._is_stopping = False
         self._ending: Event | None = None
-        self._shown_clip: int | None = None
         self._n_runs = 0  # in the names of live states: each worker counts its own from one
-        for clip in self.clips:
-            self.read_clip(clip.clip_index)
-
-    # ---------------------------------------------------------------- what lies on disk
-
-    def read_clip(self, clip_index: int) -> None:
-        """Look at the clip's files: trained, stale, stopped half way, or nothing."""
-        known = self.progress[clip_index]
-        trained, checkpoint = self.project.clip_path(clip_index), self.project.checkpoint_path(clip_index)
-        header = read_clip_header(trained)
-        known.state, known.file, known.revision = "untrained", None, ""
-        if header is not None:
-            known.state = "stale" if self._is_stale(clip_index, header) else "trained"
-            known.file, known.revision = trained, f"trained-{header.get('fingerprint', '')}"
-        unfinished = read_clip_header(checkpoint)
-        if unfinished is not None and (header is None or known.state == "stale"):
-            header = unfinished
-            known.state = "paused"
-            known.file, known.revision = checkpoint, f"stopped-{header.get('step', 0)}-{header.get('fingerprint', '')}"
-        known.step, known.n_steps = (int(header[key]) for key in ("step", "n_steps")) if header else (0, 0)
-        rows = read_metrics(self.project.metrics_path(clip_index))
-        known.loss_history = thinned([(row["step"], row["loss"]) for row in rows if _is_number(row.get("loss"))])
-        known.psnr_history = thinned(
-            [(row["step"], row["held_out_psnr"]) for row in rows if _is_number(row.get("held_out_psnr"))]
-        )
-        known.held_out_psnr = known.psnr_history[-1][1] if known.psnr_history else None
-        if known.state == "stale":
-            known.file, known.revision = None, ""  # it cannot be shown without the reference it was trained on
-
-    def _is_stale(self, clip_index: int, header: dict[str, Any]) -> bool:
-        """Whether what the clip was trained on is not there any more: its reference, or the clip that it goes on from.
-
-        Clips that go on from each other form a chain: one that is stale makes all after it stale.
-        """
-        if header.get("role") == "source":
-            reference = read_clip_header(self.project.reference_path)
-            if reference is None or reference.get("fingerprint") != header.get("reference_fingerprint"):
-                return True
-        if "previous_fingerprint" not in header:
-            return False
-        before = self.project.previous_index(clip_index)
-        previous = read_clip_header(self.project.clip_path(before))
-        if previous is None or previous.get("fingerprint") != header["previous_fingerprint"]:
-            return True
-        return self._is_stale(before, previous)
+        self._statuses: list[ClipStatus] = []
+        self._statuses_of: tuple[object, ...] = ()
 
     @property
-    def _goes_on(self) -> bool:
-        """Whether clips begin with what the clip before has learned."""
-        config = self.project.settings.config()
-        return config.field == "continue" or config.start == "previous"
+    def running_clip(self) -> int | None:
+        """The clip that trains; None while nothing does."""
+        return None if self.worker is None else self.worker.job.clip_index
+
+    def shown_state(self, clip_index: int) -> ShownState | None:
+        """The state of a clip to look at: the newest snapshot while it trains, else what is on disk, if anything."""
+        if clip_index == self.running_clip and self._run is not None and self._run.file is not None:
+            return ShownState(self._run.file, self._run.revision, is_live=True)
+        record = self.catalog[clip_index]
+        return None if record.file is None else ShownState(record.file, record.revision)
 
     # ---------------------------------------------------------------- commands
 
     @property
     def next_clip_index(self) -> int | None:
-        """The first clip that is neither finished nor on its way; None when there is none."""
-        taken = {*self.queue, *(() if self.worker is None else (self.worker.job.clip_index,))}
-        first = self.project.settings.reference_clip
-        for clip_index in (first, *(i for i in range(len(self.progress)) if i != first)):
-            known = self.progress[clip_index]
-            if known.state != "trained" and clip_index not in taken:
+        """The first clip that is neither finished nor on its way; None when there is none.
+
+        A damaged clip is not among them, nor one that cannot be trained without it: that is for the user to decide.
+        """
+        taken = {*self.queue, self.running_clip}
+        for clip_index in self.catalog.order:
+            record = self.catalog[clip_index]
+            is_due = record.state not in ("trained", "damaged") and record.blocked_by is None
+            if is_due and clip_index not in taken:
                 return clip_index
         return None
 
@@ -173,23 +158,30 @@ class TrainingService:
         return self.project.is_writable and self.next_clip_index is not None and not self._is_stopping
 
     def enqueue(self, clip_index: int) -> None:
-        """Train a clip when its turn comes; at once when nothing else does.
+        """Train a clip when its turn comes; at once when nothing else does. Who trains a finished one has asked.
 
         Raises:
-            ProjectError: The project is read-only, there is no such clip, or its reference is missing.
+            ProjectError: The project is read-only, there is no such clip, or its reference is missing or damaged.
         """
         self.project.check_writable()
         if not 0 <= clip_index < len(self.clips):
             raise ProjectError(f"There is no clip {clip_index}; clips are 0 to {len(self.clips) - 1}.")
-        coming = {*self.queue, *(() if self.worker is None else (self.worker.job.clip_index,))}
+        coming = {*self.queue, self.running_clip}
         if clip_index in coming:
             return
         base = self.project.inherited_index(clip_index)
-        if base is not None and not self.project.is_trained(base) and base not in coming:
-            raise ProjectError(
-                f"Clip {clip_index} needs the reference clip {base}, which is not trained.",
-                hint=f"Train clip {base} first.",
-            )
+        if base is not None and base not in coming:
+            if self.catalog[base].state == "damaged":
+                raise ProjectError(
+                    f"Clip {clip_index} needs the reference clip {base}, whose file is damaged.",
+                    hint=f"Restore it from a copy, or train clip {base} again.",
+                    path=self.project.clip_path(base),
+                )
+            if not self.project.is_trained(base):
+                raise ProjectError(
+                    f"Clip {clip_index} needs the reference clip {base}, which is not trained.",
+                    hint=f"Train clip {base} first.",
+                )
         self.queue.append(clip_index)
         self._start_next()
 
@@ -227,8 +219,9 @@ class TrainingService:
         self.queue.clear()
         if self.worker is not None:
             self.worker.close(timeout_s=timeout_s)
-            self.read_clip(self.worker.job.clip_index)
+            self.catalog.update(self.worker.job.clip_index)
             self.worker = None
+        self.curves.close()
 
     def _start_next(self) -> None:
         if self.worker is not None or not self.queue:
@@ -248,11 +241,13 @@ class TrainingService:
         )
         self._stage, self._step, self._ending = StageReported("", 0.0), None, None
         self._is_ready = self._is_paused = self._is_stopping = False
-        self._shown_clip = clip_index
-        known = self.progress[clip_index]
-        if not self.project.checkpoint_path(clip_index).is_file():
-            known.loss_history, known.psnr_history, known.held_out_psnr = [], [], None
-            known.step = 0
+        self._failed.discard(clip_index)
+        record = self.catalog[clip_index]
+        self._run = Run(clip_index)
+        if record.resume_step is not None:
+            curves = read_curves(self.project.curve_path(clip_index, is_finished=False))
+            self._run = Run(clip_index, record.resume_step, record.resume_n_steps, curves=curves)
+            self._run.held_out_psnr = curves.psnr[-1][1] if curves.psnr else None
         self._n_runs += 1
         self.worker = self._launch(job, self.project)
 
@@ -267,7 +262,7 @@ class TrainingService:
         while self.worker is not None:
             events = self.worker.poll()
             for event in events:
-                self._take(event, self.worker.job.clip_index)
+                self._take(event)
             taken += events
             if not events or time.monotonic() >= until_s or isinstance(events[-1], ENDINGS):
                 break
@@ -275,8 +270,9 @@ class TrainingService:
             self._end(taken[-1])
         return taken
 
-    def _take(self, event: Event, clip_index: int) -> None:
-        known = self.progress[clip_index]
+    def _take(self, event: Event) -> None:
+        run = self._run
+        assert run is not None
         match event:
             case WorkerReady():
                 self._is_ready = True
@@ -284,16 +280,16 @@ class TrainingService:
                 self._stage = event
             case StepReported():
                 self._step = event
-                known.step, known.n_steps = event.step, event.n_steps
+                run.step, run.n_steps = event.step, event.n_steps
                 if event.stage:  # takes the place of the preparation that went before
                     self._stage = StageReported(STAGE_WORDS.get(event.stage, event.stage), 1.0)
                 if math.isfinite(event.loss):
-                    append_thinned(known.loss_history, (event.step, event.loss))
+                    append_thinned(run.curves.loss, (event.step, event.loss))
             case HeldOutMeasured():
-                known.held_out_psnr = event.psnr
-                append_thinned(known.psnr_history, (event.step, event.psnr))
+                run.held_out_psnr = event.psnr
+                append_thinned(run.curves.psnr, (event.step, event.psnr))
             case SnapshotWritten():
-                known.file, known.revision = Path(event.path), f"live-{self._n_runs}-{event.revision}"
+                run.file, run.revision = Path(event.path), f"live-{self._n_runs}-{event.revision}"
             case TrainingPaused():
                 self._is_paused = True
             case TrainingResumed():
@@ -308,15 +304,11 @@ class TrainingService:
         self.worker = None
         self._ending = ending
         self._is_paused = self._is_stopping = False
-        is_reference = clip_index == self.project.settings.reference_clip
-        for index in range(len(self.clips)) if is_reference or self._goes_on else (clip_index,):
-            self.read_clip(index)  # a new reference makes the others stale, a new clip those that went on from it
+        self.catalog.update(clip_index)  # also sees what is out of date by it
         if isinstance(ending, TrainingFailed | WorkerDied):
-            self.progress[clip_index].state = "failed"
-            if is_reference and not self.project.is_trained(clip_index):
+            self._failed.add(clip_index)
+            if clip_index == self.project.settings.reference_clip and not self.project.is_trained(clip_index):
                 self.queue.clear()  # what waits needs the reference
-        if isinstance(ending, ClipTrained) and ending.held_out_psnr is not None:
-            self.progress[clip_index].held_out_psnr = ending.held_out_psnr
         self._start_next()
 
     # ---------------------------------------------------------------- status
@@ -340,18 +332,18 @@ class TrainingService:
         Args:
             viewed_clip: Whose curves to show while nothing trains.
         """
-        clip_index = self._shown_clip
+        run, state, step = self._run, self.state, self._step
+        clip_index = None if run is None else run.clip_index
         curve_clip = clip_index if self.worker is not None or viewed_clip is None else viewed_clip
-        curves = None if curve_clip is None else self.progress[curve_clip]
-        known = None if clip_index is None else self.progress[clip_index]
-        state, step = self.state, self._step
+        curves = None if curve_clip is None else self._curves(curve_clip)
         rate = step.steps_per_s if step is not None else 0.0
         left = 0 if step is None else step.n_steps - step.step
+        upcoming = self.next_clip_index
         return TrainingStatus(
             state=state,
             clip_index=clip_index,
-            step=0 if known is None else known.step,
-            n_steps=0 if known is None else known.n_steps,
+            step=0 if run is None else run.step,
+            n_steps=0 if run is None else run.n_steps,
             progress=self._stage.done if step is None else step.step / max(step.n_steps, 1),
             stage=self._stage.stage,
             message=self._message(state),
@@ -359,10 +351,11 @@ class TrainingService:
             eta_s=left / rate if rate > 0 and state == "running" else None,
             curve_clip_index=curve_clip,
             gradient_norm=step.gradient_norm if step is not None and math.isfinite(step.gradient_norm) else None,
-            loss_history=() if curves is None else curves.loss_history,
-            psnr_history=() if curves is None else curves.psnr_history,
-            can_train_next=self.can_train_next,
-            next_clip_index=self.next_clip_index,
+            loss_history=() if curves is None else curves.loss,
+            psnr_history=() if curves is None else curves.psnr,
+            can_train_next=self.project.is_writable and upcoming is not None and not self._is_stopping,
+            next_clip_index=upcoming,
+            resume_step=None if upcoming is None else self.catalog[upcoming].resume_step,
             queue=tuple(self.queue),
         )
 
@@ -373,44 +366,55 @@ class TrainingService:
             )
         return self._stage.message if self.worker is not None else ""
 
+    def _curves(self, clip_index: int) -> Curves | None:
+        """Of the training at hand once it has any; otherwise those on disk, None until they are read."""
+        run = self._run
+        if run is not None and clip_index == run.clip_index:
+            is_over = self.worker is None and not isinstance(self._ending, ClipTrained)
+            if not is_over and (run.curves.loss or run.curves.psnr):
+                return run.curves
+        state = self.catalog[clip_index].state
+        return self.curves.curves(
+            self.project.curve_path(clip_index, is_finished=state not in ("stopped", "untrained"))
+        )
+
     def clip_statuses(self, counts: dict[int, tuple[int, int]]) -> list[ClipStatus]:
-        """One status per clip. `counts` holds inherited and own anchors of the clips that were loaded."""
-        state = self.state
-        running = None if self.worker is None else self.worker.job.clip_index
-        statuses = []
-        for clip_index, known in enumerate(self.progress):
-            shown = known.state
-            if clip_index in self.queue:
-                shown = "queued"
-            if clip_index == running:
-                shown = {"starting": "preparing", "preparing": "preparing", "paused": "paused"}.get(state, "training")
-            share = known.step / known.n_steps if known.n_steps else 0.0
-            n_inherited, n_own = counts.get(clip_index, (0, 0))
-            statuses.append(
-                ClipStatus(
-                    state=shown,
-                    progress=1.0 if shown == "trained" else share,
-                    held_out_psnr=known.held_out_psnr,
-                    n_inherited=n_inherited,
-                    n_own=n_own,
-                )
-            )
-        return statuses
+        """One status per clip. `counts` holds inherited and own anchors of the clips that were loaded.
 
+        Only what has changed is remade: this is asked for at every change of the picture, and clips may be thousands.
+        """
+        queued = tuple(self.queue)
+        running = self.running_clip
+        if self._statuses_of != (self.catalog.revision, queued, running, len(self._failed)):
+            self._statuses = [self._clip_status(index, counts) for index in range(len(self.clips))]
+            self._statuses_of = (self.catalog.revision, queued, running, len(self._failed))
+        for index, (n_inherited, n_own) in counts.items():
+            known = self._statuses[index]
+            if (known.n_inherited, known.n_own) != (n_inherited, n_own):
+                self._statuses[index] = self._clip_status(index, counts)
+        if running is not None:
+            self._statuses[running] = self._clip_status(running, counts)
+        return list(self._statuses)
 
-def append_thinned(history: list[tuple[int, float]], point: tuple[int, float]) -> None:
-    """Append a point; a list that grew too long loses every second one."""
-    history.append(point)
-    if len(history) > MAX_HISTORY:
-        del history[1:-1:2]
-
-
-def thinned(history: list[tuple[int, float]]) -> list[tuple[int, float]]:
-    """At most MAX_HISTORY points, first and last kept."""
-    while len(history) > MAX_HISTORY:
-        del history[1:-1:2]
-    return history
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and math.isfinite(value)
+    def _clip_status(self, clip_index: int, counts: dict[int, tuple[int, int]]) -> ClipStatus:
+        record, run = self.catalog[clip_index], self._run
+        n_inherited, n_own = counts.get(clip_index, (0, 0))
+        shown, step, n_steps, psnr = record.state, record.step, record.n_steps, record.held_out_psnr
+        if clip_index == self.running_clip and run is not None:
+            words = {"starting": "preparing", "preparing": "preparing", "paused": "paused"}
+            shown, step, n_steps = words.get(self.state, "training"), run.step, run.n_steps
+            psnr = record.held_out_psnr if run.held_out_psnr is None else run.held_out_psnr
+        elif clip_index in self.queue:
+            shown = "queued"
+        elif clip_index in self._failed and shown in ("untrained", "stopped"):
+            shown = "failed"
+        share = step / n_steps if n_steps else 0.0
+        return ClipStatus(
+            state=shown,
+            progress=1.0 if shown == "trained" else min(share, 1.0),
+            held_out_psnr=psnr,
+            n_inherited=n_inherited,
+            n_own=n_own,
+            resume_step=record.resume_step,
+            reason=record.reason,
+        )

@@ -67,6 +67,7 @@ class TrainingPlan:
         preparation_s, training_s: Forecast; together the wall time, compiling of kernels left out.
         memory_mb: Most that the training process will hold, 10^6 bytes.
         disk_mb: The finished clip, 10^6 bytes.
+        steps_done: Of n_steps, where a training that was stopped goes on; the times are of what is left.
     """
 
     clip_index: int
@@ -79,6 +80,7 @@ class TrainingPlan:
     training_s: ForecastLine
     memory_mb: ForecastLine
     disk_mb: ForecastLine
+    steps_done: int = 0
 
     @property
     def forecast(self) -> tuple[ForecastLine, ...]:
@@ -103,9 +105,28 @@ class TrainingPlan:
             "n_frames": self.n_frames,
             "role": self.role,
             "n_steps": self.n_steps,
+            "steps_done": self.steps_done,
             "forecast": {name: line.value for name, line in zip(names, self.forecast, strict=True)},
             "lines": [asdict(line) for line in (*self.lines, *self.forecast)],
         }
+
+
+def resumed_plan(plan: TrainingPlan, steps_done: int, n_steps: int) -> TrainingPlan:
+    """The plan of a training that goes on after a stop.
+
+    Args:
+        plan: Of the whole training.
+        steps_done, n_steps: As the checkpoint says; steps of the whole are not forecast any more.
+    """
+    left = 1.0 - steps_done / n_steps if n_steps else 0.0
+    training_s, done = plan.training_s, f"{steps_done:,} of {n_steps:,} steps are done"
+    return replace(
+        plan,
+        n_steps=n_steps,
+        steps_done=steps_done,
+        preparation_s=replace(plan.preparation_s, value=0.0, reason="done before the training was stopped"),
+        training_s=replace(training_s, value=training_s.value * left, reason=f"{training_s.reason}; {done}"),
+    )
 
 
 def make_plan(

@@ -24,7 +24,8 @@ def live_session(make_session, monkeypatch):
 
 
 def revision_of(session) -> str:
-    return session._service.progress[0].revision
+    shown = session._service.shown_state(0)
+    return "" if shown is None else shown.revision
 
 
 def test_the_states_of_the_fake_training_are_those_of_a_clip(make_session):
@@ -82,9 +83,9 @@ def test_a_live_state_that_is_gone_costs_no_notice_and_the_next_one_is_shown(liv
     poll_until(session, lambda: revision_of(session) != "")
     poll_until(session, lambda: session.shown_gaussians() is not None, what="the first live state")
     session._playback.clear()  # so that the snapshot is read from its file again
-    snapshot = session._service.progress[0].file
+    snapshot = session._service.shown_state(0).file
     snapshot.unlink()
-    poll_until(session, lambda: session._service.progress[0].file != snapshot, what="the next snapshot")
+    poll_until(session, lambda: session._service.shown_state(0).file != snapshot, what="the next snapshot")
     poll_until(session, lambda: session.wanted_frame().is_loaded, what="a live state after that")
     assert len(session.notices) == 0
 

@@ -106,13 +106,15 @@ def test_stopping_keeps_what_was_learned_and_training_goes_on_there(make_session
     kept = session.project.checkpoint_path(0)
     step, value = read_clip_state(kept).header["step"], float(read_clip_state(kept).arrays["value"][0])
     assert step >= 3
-    assert session.clip_states[0].state == "paused"
-    assert session.training.next_clip_index == 0
+    assert (session.clip_states[0].state, session.clip_states[0].resume_step) == ("stopped", step)
+    assert (session.training.next_clip_index, session.training.resume_step) == (0, step)
+    n_left = 10_000_000 - step
+    assert planned(session).summary.startswith(f"goes on at step {step}, {n_left:,} of 10,000,000 steps left, about ")
 
     folder = session.project.folder
     session.close()
     again = make_session(make_training=partial(_until, n_steps=step + 2), name=folder.name)
-    assert again.clip_states[0].state == "paused"
+    assert again.clip_states[0].state == "stopped"
     train_next(again)
     trained = read_clip_state(again.project.clip_path(0))
     assert trained.header["step"] == step + 2
@@ -197,6 +199,47 @@ def test_training_a_clip_again_makes_those_stale_that_went_on_from_it(make_sessi
     poll_until(session, lambda: session.training.state == "idle")
     later = "stale" if goes_on else "trained"
     assert [state.state for state in session.clip_states] == ["trained", "trained"] + [later] * (n_clips - 2)
+
+
+@pytest.mark.parametrize("ends_by", ["stopping", "failing"])
+def test_training_again_leaves_the_finished_clip_and_its_curves_until_it_is_finished(make_session, ends_by):
+    session = make_session()
+    train_next(session)
+    kept = {path: path.read_bytes() for path in (session.project.clip_path(0), session.project.metrics_path(0))}
+    psnr, history = session.clip_states[0].held_out_psnr, list(session.training.psnr_history)
+    folder = session.project.folder
+    session.close()
+    slow = make_slow if ends_by == "stopping" else partial(_fails_at, step=3)
+    session = make_session(make_training=slow, name=folder.name)
+    poll_until(session, lambda: session.training.psnr_history == history, what="the curve on disk")
+    session.dispatch(c.TrainClip(0))
+    assert session.training.psnr_history == history  # the picture is that of the finished clip as well
+    assert session.clip_states[0].held_out_psnr == psnr
+    if ends_by == "stopping":
+        poll_until(session, lambda: session.training.step >= 3)
+        assert session.training.psnr_history != history
+        session.dispatch(c.StopTraining())
+    poll_until(session, lambda: session.training.state in ("idle", "failed"))
+    assert {path: path.read_bytes() for path in kept} == kept
+    status = session.clip_states[0]
+    assert (status.state, status.held_out_psnr) == ("trained", psnr)
+    assert status.resume_step is not None
+    poll_until(session, lambda: session.training.psnr_history == history, what="the curve of the finished clip")
+    session.close()
+    session = make_session(make_training=partial(_until, n_steps=status.resume_step + 2), name=folder.name)
+    session.dispatch(c.TrainClip(0))
+    poll_until(session, lambda: session.training.state == "idle")
+    assert session.clip_states[0].resume_step is None
+    steps = [step for step, _ in session.training.psnr_history]
+    assert steps == sorted(steps)
+    assert steps[-1] == status.resume_step + 2  # one curve, from before the stop to the end
+    assert not session.project.unfinished_metrics_path(0).exists()
+
+
+def _fails_at(job, report, *, step):
+    training = make_fake(job, report)
+    training.fails_at = step
+    return training
 
 
 def test_what_was_learned_fixes_clip_length_and_hold_out(make_session):

@@ -34,7 +34,17 @@ def test_a_plan_as_json(run, capture_folder, tmp_path):
         (1, "planned", "source"),
     ]
     first = document["clips"][0]
-    assert first.keys() == {"clip_index", "start", "n_frames", "role", "n_steps", "forecast", "lines", "state"}
+    assert first.keys() == {
+        "clip_index",
+        "start",
+        "n_frames",
+        "role",
+        "n_steps",
+        "steps_done",
+        "forecast",
+        "lines",
+        "state",
+    }
     assert first["n_steps"] == 300 + 36
     for name in ("preparation_s", "training_s"):
         together = sum(clip["forecast"][name] for clip in document["clips"])

@@ -24,9 +24,11 @@ STATE_WORDS: dict[str, str] = {
     "preparing": "preparing",
     "training": "training",
     "paused": "paused",
+    "stopped": "stopped",
     "trained": "trained",
     "failed": "failed",
     "stale": "out of date",
+    "damaged": "damaged",
 }
 
 
@@ -183,7 +185,7 @@ def _draw_band(draw: Any, band: Rect, session: Any, clip: Any, status: Any, ui: 
     draw.push_clip_rect(band.low, band.high, True)
     if state == "trained":
         draw.add_rect_filled(band.low, band.high, theme.u32(theme.faded(color, 0.38)), 3)
-    elif state in ("preparing", "training", "paused"):
+    elif state in ("preparing", "training", "paused", "stopped"):
         share = min(max(float(status.progress), 0.0), 1.0)
         filled = ImVec2(band.x0 + band.width * share, band.y1)
         draw.add_rect_filled(band.low, filled, theme.u32(theme.faded(color, 0.38)), 3)
@@ -191,6 +193,9 @@ def _draw_band(draw: Any, band: Rect, session: Any, clip: Any, status: Any, ui: 
     elif state in ("failed", "stale"):
         draw.add_rect_filled(band.low, band.high, theme.u32(theme.faded(color, 0.22)), 3)
         _hatch(draw, band, theme.faded(color, 0.55), 7.0)
+    elif state == "damaged":
+        draw.add_rect_filled(band.low, band.high, theme.u32(theme.faded(color, 0.22)), 3)
+        _hatch(draw, band, theme.faded(color, 0.55), 7.0, is_crossed=True)
     elif state == "queued":
         _hatch(draw, band, theme.faded(color, 0.28), 14.0)
     draw.add_rect_filled(ImVec2(band.x0, band.y1 - 3), band.high, theme.u32(color), 2)
@@ -203,7 +208,7 @@ def _draw_band_text(draw: Any, band: Rect, session: Any, clip: Any, status: Any,
     icon = theme.CLIP_ICONS.get(state, "")
     title = _clip_title(clip.clip_index, session)
     words: str = STATE_WORDS.get(state, str(state))
-    if state in ("preparing", "training", "paused"):
+    if state in ("preparing", "training", "paused", "stopped"):
         words = f"{words} {status.progress * 100:.0f} %"
     if status.held_out_psnr is not None:
         words = f"{words}, {status.held_out_psnr:.1f} dB"
@@ -221,8 +226,8 @@ def _draw_band_text(draw: Any, band: Rect, session: Any, clip: Any, status: Any,
         draw.add_text(ImVec2(x, y + 19), theme.u32(theme.TEXT if state != "untrained" else theme.TEXT_DIM), line_two)
 
 
-def _hatch(draw: Any, rect: Rect, color: theme.Color, spacing: float) -> None:
-    """Diagonal lines; the caller clips them."""
+def _hatch(draw: Any, rect: Rect, color: theme.Color, spacing: float, *, is_crossed: bool = False) -> None:
+    """Diagonal lines, one way or both; clipped to the rectangle."""
     if rect.width < 1:
         return
     packed = theme.u32(color)
@@ -230,6 +235,8 @@ def _hatch(draw: Any, rect: Rect, color: theme.Color, spacing: float) -> None:
     x = rect.x0 - rect.height
     while x < rect.x1:
         draw.add_line(ImVec2(x, rect.y1), ImVec2(x + rect.height, rect.y0), packed, 1.5)
+        if is_crossed:
+            draw.add_line(ImVec2(x, rect.y0), ImVec2(x + rect.height, rect.y1), packed, 1.5)
         x += spacing
     draw.pop_clip_rect()
 
