@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from app.headless import TrainedProject
-from app.kernels import use_threads
 from app.kept_figures import EVALUATIONS, KeptFigures
+from app.kernels import use_threads
 from engine.cloud.parallel import n_workers
 
 if TYPE_CHECKING:
@@ -185,9 +185,7 @@ def is_measured(opened: TrainedProject, scope: Scope) -> bool:
     return not any(_unknown(opened, scope, i, kept_figures(opened, scope, i, nothing)) for i in scope.clips)
 
 
-def measure_clip(
-    opened: TrainedProject, scope: Scope, clip_index: int, unknown: Frames
-) -> Iterator[EvalRow | PairRow]:
+def measure_clip(opened: TrainedProject, scope: Scope, clip_index: int, unknown: Frames) -> Iterator[EvalRow | PairRow]:
     """Measure what is not known of a clip, cameras side by side on all cores, one core each.
 
     Raises:

@@ -109,7 +109,7 @@ class KeptFigures:
     def _read(self) -> None:
         try:
             lines, n_damaged = read_checked_lines(self.path, max_bytes=MAX_BYTES)
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return
         except OSError as error:
             self._say(f"Kept figures cannot be read and are measured again ({error.strerror or error}) - {self.path}")

@@ -52,7 +52,7 @@ def side_by_side(
                     hand_over(item, None)
                     if stop.is_set():
                         return
-        except BaseException as error:
+        except BaseException as error:  # noqa: BLE001 - raised again by the caller's thread
             hand_over(None, error)
 
     threads = [threading.Thread(target=work, daemon=True) for _ in range(max(1, min(n_threads, len(waiting))))]

@@ -26,7 +26,7 @@ CAMERAS = ("0", "1", "2", "3")
 
 
 class Measure:
-    """Stands in for app.evaluation.measure_clip: made-up figures; says what it was asked for.
+    """Stands in for app.evaluation.ClipMeasuring: made-up figures; says what it was asked for.
 
     Attributes:
         asked: Project, choice of metrics and clip, in order.
