@@ -57,6 +57,7 @@ class AnchorArrays:
         inherited_roles, own_roles: What each anchor is, in engine.model.roles.ROLES; None where nobody says.
             [A0], [A] uint8
         inherited_reasons, own_reasons: Why the gate decided so, codes of engine.cloud.reasons. [A0], [A] uint8
+        clip_index, frame_index: What they are of; None for all anchors of the clip.
     """
 
     inherited_positions: np.ndarray
@@ -66,6 +67,8 @@ class AnchorArrays:
     own_roles: np.ndarray | None = None
     inherited_reasons: np.ndarray | None = None
     own_reasons: np.ndarray | None = None
+    clip_index: int | None = None
+    frame_index: int | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,8 +105,8 @@ class Picture:
         key: What it shows; equal keys mean equal pictures.
         is_stale: It is not what was asked for now, but the newest there is. What it is says the rest:
         duration_s: How long it took to make; 0 when unknown.
-        clip_index, frame_index, revision: The frame it shows, and the state of the clip; None and "" where that is
-            not known or, for a captured picture, without meaning.
+        clip_index, frame_index, revision, step: The frame it shows, and the state of the clip; None and "" where that
+            is not known or, for a captured picture, without meaning.
         camera_index: The capture camera that took it, or that a rendered one looks through; None for a free view.
         look: From where and through which lens it was rendered, whatever its size; see OrbitView.look_key.
     """
@@ -115,6 +118,7 @@ class Picture:
     clip_index: int | None = None
     frame_index: int | None = None
     revision: str = ""
+    step: int | None = None
     camera_index: int | None = None
     look: Hashable = None
 

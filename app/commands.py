@@ -80,7 +80,7 @@ class SetCompare:
 
 @dataclass(frozen=True, slots=True)
 class ToggleOverlay:
-    """Switch one of the overlays: show_frusta, show_inherited, show_residual, show_points, show_regions."""
+    """Switch one of the overlays: show_frusta, show_inherited, show_residual, show_points, show_cloud, show_regions."""
 
     name: str
 

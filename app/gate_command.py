@@ -15,6 +15,7 @@ from app.project import Project, open_project
 from app.training.service import Launch
 from engine.cloud.reasons import REASONS
 from engine.cloud.regions import parse_region
+from engine.errors import ProjectError
 from engine.model.clip_state import ClipState, read_clip_state
 
 SCHEMA = 1
@@ -73,28 +74,36 @@ def describe_gate(project: Project) -> dict[str, Any]:
     Returns:
         schema; path; gate (the setting); regions; clips, each with clip_index, role, sets (role of anchors to how
         many the clip stores), n_hidden (inherited static anchors it replaces), reasons (words to how many static
-        anchors; empty where the clip was trained without a decision from pictures or regions).
+        anchors; empty where the clip was trained without a decision from pictures or regions); damaged, files of
+        clips that cannot be read, each with path and reason.
     """
-    clips = []
+    clips, damaged = [], []
     for path in sorted((project.folder / "clips").glob("*.safetensors")):
-        state = read_clip_state(path)
-        sets = {name.split(".")[1] for name in state.arrays if name.startswith("sets.")}
-        is_hidden = state.arrays.get("inherited.static.is_hidden", np.zeros(0, dtype=bool))
-        clips.append(
-            {
-                "clip_index": state.header["clip_index"],
-                "role": state.header["role"],
-                "sets": {name: len(state.arrays[f"sets.{name}.positions"]) for name in sorted(sets)},
-                "n_hidden": int(is_hidden.sum()),
-                "reasons": _reasons(state),
-            }
-        )
+        try:
+            clips.append(_describe_clip(read_clip_state(path)))
+        except ProjectError as error:
+            damaged.append({"path": str(path), "reason": error.message})
+        except (KeyError, TypeError, ValueError, IndexError) as error:  # whole, but not as this version writes them
+            damaged.append({"path": str(path), "reason": f"The clip file holds unexpected arrays ({error})."})
     return {
         "schema": SCHEMA,
         "path": str(project.folder),
         "gate": project.settings.config().gate,
         "regions": [region.as_dict() for region in project.gate_regions()],
         "clips": clips,
+        "damaged": damaged,
+    }
+
+
+def _describe_clip(state: ClipState) -> dict[str, Any]:
+    sets = {name.split(".")[1] for name in state.arrays if name.startswith("sets.")}
+    is_hidden = state.arrays.get("inherited.static.is_hidden", np.zeros(0, dtype=bool))
+    return {
+        "clip_index": state.header["clip_index"],
+        "role": state.header["role"],
+        "sets": {name: len(state.arrays[f"sets.{name}.positions"]) for name in sorted(sets)},
+        "n_hidden": int(is_hidden.sum()),
+        "reasons": _reasons(state),
     }
 
 
@@ -115,4 +124,5 @@ def gate_lines(found: dict[str, Any]) -> list[str]:
         hidden = f"; {clip['n_hidden']} inherited static anchors are replaced" if clip["n_hidden"] else ""
         lines.append(f"{clip['role']} {clip['clip_index']}: {sets} anchors of its own{hidden}")
         lines += [f"  {n:>7}  {words}" for words, n in clip["reasons"].items()]
+    lines += [f"{clip['path']}: {clip['reason']}" for clip in found["damaged"]]
     return lines

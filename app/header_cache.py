@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from engine.model.clip_state import read_clip_header
+from engine.model.clip_state import look_at_clip
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +48,8 @@ class HeaderCache:
 
 
 def _read(path: Path, n_bytes: int) -> FoundHeader:
-    header = read_clip_header(path)
-    if header is None:
-        return FoundHeader({}, "The file is damaged: its header cannot be read.", n_bytes)
-    for key in ("step", "n_steps"):
-        if not isinstance(header.get(key), int) or isinstance(header[key], bool) or header[key] < 0:
-            return FoundHeader({}, f"The file is damaged: its header has no number of steps ({key}).", n_bytes)
-    return FoundHeader(header, "", n_bytes)
+    found = look_at_clip(path)
+    if isinstance(found, dict):
+        return FoundHeader(found, "", n_bytes)
+    reason = "it is not there any more" if found is None else found.reason
+    return FoundHeader({}, f"The file is damaged ({reason}).", n_bytes)

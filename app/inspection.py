@@ -27,15 +27,15 @@ def describe_project(folder: Path) -> dict[str, Any]:
     Returns:
         schema; kind "project"; path; capture; fps (None when the capture is not there); clips, each with clip_index,
         role, start, n_frames, components (name to bytes), n_bytes and coverage (what moves and how much of it has an
-        anchor near it, see engine.training.building.Coverage; None where not known); components and n_bytes of all
-        clips;
+        anchor near it, see engine.training.building.Coverage; None where not known); damaged, files of clips that
+        cannot be read, each with path and reason; components and n_bytes of all clips;
         reference_bytes and reference_share, of the clip that others inherit from; bytes_per_frame and mb_per_minute,
         of all others: what video costs once the reference is there. None where there are none, or where the frame
         rate is not known.
     Raises:
-        ProjectError: It is no project, a file is damaged, or nothing is trained yet.
+        ProjectError: It is no project, nothing is trained yet, or none of what is trained can be read.
     """
-    facts = read_facts(folder, folder.name)
+    facts = read_facts(folder, folder.name, leave_out_damaged=True)
     try:
         fps = float(open_capture_of(facts.settings, folder).fps)
     except (CaptureError, ProjectError):  # bytes can be counted without it
@@ -62,6 +62,7 @@ def describe_project(folder: Path) -> dict[str, Any]:
             }
             for clip in facts.clips
         ],
+        "damaged": [{"path": str(clip.path), "reason": clip.reason} for clip in facts.damaged],
         "components": {name: sum(clip.storage[name] for clip in facts.clips) for name in COMPONENT_NAMES},
         "n_bytes": facts.n_bytes,
         "reference_bytes": n_reference_bytes,
@@ -91,6 +92,7 @@ def project_lines(found: dict[str, Any]) -> list[str]:
     for row in (heads, *rows):
         cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
         lines.append("  " + "  ".join(cells))
+    lines += [f"Damaged, and not counted ({clip['reason']}): {clip['path']}" for clip in found["damaged"]]
     covered = [f"clip {clip['clip_index']} {_covered(clip['coverage'])}" for clip in clips if clip["coverage"]]
     if covered:
         lines.append(f"Of what moves, within reach of an anchor: {'; '.join(covered)}.")

@@ -198,6 +198,7 @@ class Playback:
         with torch.no_grad():
             gaussians = loaded.model.decode(clip_time)
         anchors = _anchor_arrays(loaded.model.anchors(clip_time), request.key)
+        anchors = replace(anchors, clip_index=request.clip_index, frame_index=request.frame_index)
         values = [np.ascontiguousarray(tensor.numpy(), np.float32) for tensor in gaussians.tensors()]
         arrays = GaussianArrays(
             *values,

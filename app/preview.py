@@ -11,16 +11,15 @@ import multiprocessing
 from pathlib import Path
 
 import numpy as np
-from safetensors import SafetensorError, safe_open
 
 from app.arrays import PointArrays
 from app.jobs import JobContext
 from app.pictures import downsized
 from app.playback import point_spacing
 from app.priority import lower_process
+from engine.array_files import ArraysError, read_arrays, write_arrays
 from engine.capture.capture import Capture, open_capture
 from engine.errors import EngineError, PreparationError, ProjectError
-from engine.files import write_arrays
 
 logger = logging.getLogger(__name__)
 
@@ -125,9 +124,13 @@ def read_cloud(path: Path) -> PointArrays:
         ProjectError: The file is missing or damaged.
     """
     try:
-        with safe_open(path, framework="numpy") as file:
-            points, colors = file.get_tensor("points"), file.get_tensor("colors")
-    except (OSError, SafetensorError) as error:
+        arrays, _ = read_arrays(path, ())
+        points, colors = arrays["points"], arrays["colors"]
+        if points.ndim != 2 or points.shape[1] != 3 or points.shape != colors.shape:
+            raise ArraysError(f"its points are {points.shape}, its colours {colors.shape}")
+        if {points.dtype, colors.dtype} != {np.dtype(np.float32)} or not np.isfinite([points, colors]).all():
+            raise ArraysError("its numbers are not finite floats")
+    except (OSError, ArraysError, KeyError) as error:
         raise ProjectError(f"The first cloud cannot be read ({error}).", path=path) from error
     key = ("first cloud", str(path), path.stat().st_mtime_ns)
     return PointArrays(points, colors, key, kind="moment", spacing=point_spacing(points))

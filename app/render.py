@@ -114,6 +114,7 @@ def render(request: RenderRequest) -> Picture:
         clip_index=arrays.clip_index,
         frame_index=arrays.frame_index,
         revision=arrays.revision,
+        step=arrays.step,
         camera_index=request.camera_index,
         look=request.look,
     )

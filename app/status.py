@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from engine.cloud.regions import GateRegion
 
-OVERLAY_NAMES = ("show_frusta", "show_inherited", "show_residual", "show_points", "show_regions")
+OVERLAY_NAMES = ("show_frusta", "show_inherited", "show_residual", "show_points", "show_cloud", "show_regions")
 COMPARE_MODES = ("off", "wipe", "side")
 
 
@@ -16,17 +16,24 @@ class Overlays:
     """What is drawn over or beside the scene.
 
     Attributes:
+        show_points: The point cloud where a clip is not trained.
+        show_cloud: The point cloud in place of the picture of a trained clip.
         compare: "off", "wipe" or "side": the captured picture over or beside the rendered one.
         wipe_position: Share of the width that shows the captured picture, 0..1.
+        mark_size: Of anchor marks, 1 as designed.
+        mark_opacity: Of anchor marks that nothing hides, 0..1.
     """
 
     show_frusta: bool = True
     show_inherited: bool = False
     show_residual: bool = False
     show_points: bool = True
+    show_cloud: bool = False
     show_regions: bool = True
     compare: str = "off"
     wipe_position: float = 0.5
+    mark_size: float = 1.0
+    mark_opacity: float = 0.9
 
 
 @dataclass(frozen=True, slots=True)

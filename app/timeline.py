@@ -16,6 +16,7 @@ class Timeline:
         n_frames: Frames of the capture.
         fps: Frames per second of the capture.
         is_playing, is_looping: Play state.
+        is_every_frame: Whether playing waits for each frame to be shown, instead of leaving some out.
     """
 
     def __init__(self, clips: Sequence[Clip] = (), *, fps: float = 30.0) -> None:
@@ -25,6 +26,7 @@ class Timeline:
         self.frame_index = 0
         self.is_playing = False
         self.is_looping = True
+        self.is_every_frame = False
         self._carried_s = 0.0
 
     @property
@@ -51,11 +53,12 @@ class Timeline:
         if self.is_playing and not self.is_looping and self.frame_index == self.last_frame:
             self.frame_index = 0
 
-    def tick(self, dt_s: float) -> bool:
+    def tick(self, dt_s: float, *, is_shown: bool = True) -> bool:
         """Let time pass while playing; time left over from whole frames is carried on.
 
         Args:
             dt_s: Seconds since the last tick; negative or non-finite values count as none.
+            is_shown: Whether the frame under the playhead is on screen. Playing every frame waits for that.
         Returns:
             Whether the playhead moved.
         """
@@ -64,6 +67,9 @@ class Timeline:
         self._carried_s += dt_s
         # the small addition keeps 3 ticks of 1/30 s at 10 fps from falling one ulp short of a frame
         n_frames = math.floor(self._carried_s * self.fps + 1e-9)
+        if self.is_every_frame:
+            n_frames = min(n_frames, 1 if is_shown else 0)
+            self._carried_s = min(self._carried_s, (1 + n_frames) / self.fps)  # time lost is not caught up with
         if n_frames == 0:
             return False
         self._carried_s = max(self._carried_s - n_frames / self.fps, 0.0)

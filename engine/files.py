@@ -3,24 +3,14 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-import numpy as np
-
 from engine.errors import DiskError
-
-_DTYPES = {
-    **{f"{kind}{bits}": f"{kind[0].upper()}{bits}" for kind in ("int", "uint") for bits in (8, 16, 32, 64)},
-    **{f"float{bits}": f"F{bits}" for bits in (16, 32, 64)},
-    "bool": "BOOL",
-}
-"""Names of number types in safetensors files."""
 
 PARTIAL_PREFIX = ".partial-"
 """Half-written files begin with this, then with the id of the process that writes them."""
@@ -154,36 +144,3 @@ def _check_regular(found: os.stat_result, path: Path | str) -> None:
         raise IsADirectoryError(errno.EISDIR, "it is a folder, not a file", str(path))
     if not stat.S_ISREG(found.st_mode):
         raise OSError(errno.EINVAL, "it is a pipe or a device, not a file", str(path))
-
-
-def write_arrays(path: Path | str, arrays: Mapping[str, np.ndarray], metadata: Mapping[str, str], *, what: str) -> None:
-    """Write named arrays as a safetensors file, atomically.
-
-    The package's own writer makes a temporary file under a name that nobody can predict, which a killed process leaves
-    behind, and wraps what the system says in an error of its own. Its reader is used to read.
-
-    Args:
-        path: As of `atomic_path`.
-        arrays: Any shapes; numbers or bool.
-        metadata: Texts beside them.
-        what: Names the file in the message, as "The clip".
-    Raises:
-        DiskError: The disk refused; nothing is left behind.
-    """
-    # widest numbers first keeps all of them aligned
-    names = sorted(arrays, key=lambda name: (-arrays[name].dtype.itemsize, name))
-    header: dict[str, object] = {"__metadata__": dict(metadata)}
-    end = 0
-    for name in names:
-        start, end = end, end + arrays[name].nbytes
-        header[name] = {
-            "dtype": _DTYPES[arrays[name].dtype.name],
-            "shape": list(arrays[name].shape),
-            "data_offsets": [start, end],
-        }
-    text = json.dumps(header, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 8)
-    with checked_path(path, what=what) as partial, partial.open("wb") as file:
-        file.write(len(text).to_bytes(8, "little") + text)
-        for name in names:
-            file.write(np.ascontiguousarray(arrays[name]).view(np.uint8).data if arrays[name].size else b"")

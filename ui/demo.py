@@ -123,7 +123,7 @@ def picture_of_window(capture_path: Path, project_dir: Path, path: Path, line: P
 def _draw_window(
     studio: StudioWindow, session: Session, capture_path: Path, path: Path, line: ProgressLine
 ) -> Path | None:
-    from ui.scene import RENDERED
+    from ui.hud_text import RENDERED
     from ui.screenshot import read_window, write_png
 
     if not _open(session, capture_path, line):
@@ -138,7 +138,7 @@ def _draw_window(
     def is_complete() -> bool:
         studio.settle(2)
         scene = studio.frame.viewport.scene
-        return scene.shows == RENDERED and not scene.is_stale and scene.counts.n_inherited > 0
+        return scene.shows == RENDERED and not scene.shown.is_on_its_way and scene.counts.n_inherited > 0
 
     if not _wait(session, is_complete, PICTURE_TIMEOUT_S):
         line.say("The trained picture was not ready in time; the window is shown as it is.")

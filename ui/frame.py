@@ -14,10 +14,12 @@ from typing import Any
 import moderngl
 from imgui_bundle import ImVec2, ImVec4, imgui
 
+from app.window_memory import WindowMemory
 from ui import theme
 from ui.dialogs import OpenFolderDialog, draw_help
 from ui.gl import ImageTexture, free_dropped, n_changes
 from ui.imgui_backend import ImGuiBackend
+from ui.layout import hold_sizes, is_laid_out, lay_out
 from ui.panels.capture import CapturePanel
 from ui.panels.menu_bar import draw_menu_bar
 from ui.panels.notices import NoticesPanel
@@ -28,6 +30,7 @@ from ui.panels.timeline import draw_timeline
 from ui.panels.training import draw_training
 from ui.panels.viewport import ViewportPanel
 from ui.redraw import FRAMES_AFTER_INPUT, RedrawPlan
+from ui.remembering import Remembering
 from ui.scene import Scene
 from ui.shortcuts import handle_shortcuts
 from ui.state import CAPTURE, REGIONS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
@@ -65,6 +68,7 @@ class Frame:
         session: The program's state; see app.session.Session.
         fixed_delta_s: Seconds per frame as told to ImGui; tests fix it.
         on_input: Called after each input that wants a frame, so that it need not wait for the next tick.
+        memory: What the window looked like before; None starts afresh and keeps nothing.
         scale: How large everything is drawn.
     """
 
@@ -76,6 +80,7 @@ class Frame:
         *,
         fixed_delta_s: float | None = None,
         on_input: Callable[[], None] = lambda: None,
+        memory: WindowMemory | None = None,
         scale: UiScale | None = None,
     ) -> None:
         self._window = window
@@ -96,9 +101,12 @@ class Frame:
         self._drawn_s = -1e9
         self._input_s = -1e9
         self._has_news = False
-        self._is_laid_out = False
+        self.remembering = Remembering(memory, self.ui)
+        self.remembering.restore_layout()
+        self.remembering.restore_marks(session)
         self._failed_panels: set[str] = set()
         self._floating_panels: set[str] = set()
+        self._dock_ids: dict[str, int] = {}
         self._panels: tuple[tuple[str, Callable[[Any, Dispatch, UiState], None], bool], ...] = (
             (VIEWPORT, self.viewport.draw, False),
             (CAPTURE, self.capture.draw, True),
@@ -127,7 +135,8 @@ class Frame:
         """Drain the session and move time on. True when a frame has to be drawn."""
         session = self.session
         has_news = session.poll()
-        has_news |= session.timeline.tick(min(dt_s, MAX_TICK_S))
+        self.remembering.follow(session)
+        has_news |= session.timeline.tick(min(dt_s, MAX_TICK_S), is_shown=self.viewport.shows_playhead(session))
         self._has_news |= has_news or self.viewport.has_news(session)
         if not self._redraw.is_due and (self.backend.needs_follow_up or self._is_news_due()):
             self._redraw.request(1)
@@ -178,10 +187,15 @@ class Frame:
         imgui.push_style_color(imgui.Col_.window_bg, NOTHING)  # the frame is cleared to the panels' colour
         dock_id = imgui.dock_space_over_viewport(0, imgui.get_main_viewport(), imgui.DockNodeFlags_.none)
         imgui.pop_style_color()
-        if not self._is_laid_out or ui.is_layout_reset_requested:
-            self._lay_out(dock_id)
+        if ui.is_layout_reset_requested or not is_laid_out(dock_id):
+            ui.is_layout_reset_requested = False
+            ui.wanted_panel = TRAINING  # of the two that lie over each other
+            lay_out(dock_id)
+            self._redraw.request(FIRST_FRAMES)
+        self._dock_ids.clear()
         for title, draw_panel, has_padding in self._panels:
             self._draw_panel(title, draw_panel, has_padding)
+        hold_sizes(self._dock_ids)
         if ui.is_open_requested:
             ui.is_open_requested = False
             self.dialog.open()
@@ -222,6 +236,8 @@ class Frame:
         if is_bare:
             imgui.pop_style_color()
         (self._floating_panels.discard if imgui.is_window_docked() else self._floating_panels.add)(title)
+        if imgui.is_window_docked():
+            self._dock_ids[title] = imgui.get_window_dock_id()
         if not has_padding:
             imgui.pop_style_var()
         if is_visible:
@@ -248,36 +264,6 @@ class Frame:
                 self.request_redraw()
         else:
             self._failed_panels.discard(title)
-
-    # ---- layout ----------------------------------------------------------------------------------------------
-
-    def _lay_out(self, dock_id: int) -> None:
-        """Capture left, training right, timeline below, viewport in the rest."""
-        self._is_laid_out = True
-        self.ui.is_layout_reset_requested = False
-        internal = imgui.internal
-        size = imgui.get_main_viewport().work_size
-        internal.dock_builder_remove_node(dock_id)
-        internal.dock_builder_add_node(dock_id, internal.DockNodeFlagsPrivate_.dock_space)
-        internal.dock_builder_set_node_size(dock_id, size)
-        bottom_share = min(max(176.0 / max(size.y, 1.0), 0.12), 0.4)
-        _, bottom, top = internal.dock_builder_split_node_py(dock_id, imgui.Dir.down, bottom_share)
-        left_share = min(max(236.0 / max(size.x, 1.0), 0.1), 0.3)
-        _, left, rest = internal.dock_builder_split_node_py(top, imgui.Dir.left, left_share)
-        right_share = min(max(312.0 / max(size.x - 236.0, 1.0), 0.12), 0.4)
-        _, right, middle = internal.dock_builder_split_node_py(rest, imgui.Dir.right, right_share)
-        for title, node in (
-            (VIEWPORT, middle),
-            (CAPTURE, left),
-            (TRAINING, right),
-            (REGIONS, right),
-            (TIMELINE, bottom),
-        ):
-            internal.dock_builder_dock_window(title, node)
-        self.ui.wanted_panel = TRAINING  # of the two that lie over each other
-        node = internal.dock_builder_get_node(middle)  # keeps its flags: the central node is the one that gives way
-        node.set_local_flags(node.local_flags | internal.DockNodeFlagsPrivate_.no_tab_bar)
-        internal.dock_builder_finish(dock_id)
 
     def close(self) -> None:
         """Release GL objects and ImGui. The GL context must still be current."""

@@ -19,6 +19,7 @@ from pyglet.window import key, mouse
 from ui.redraw import fingerprint
 from ui.ui_scale import UiScale
 
+FRAMES_BETWEEN_MENUS = 3
 _FAR = -3.4e38  # ImGui's "no pointer here"
 
 _NAMED_KEYS: dict[str, str] = {
@@ -147,7 +148,7 @@ class ImGuiBackend:
 
     Attributes:
         pixels_per_unit: Of the newest frame. Everything that ImGui is told and tells is in units (ui.ui_scale).
-        is_popup_open: Was a menu or another popup open when the newest frame began?
+        is_popup_open: Was a menu or another popup open when the newest frame began, or just before?
     """
 
     def __init__(
@@ -162,6 +163,7 @@ class ImGuiBackend:
         self.scale = scale or UiScale()
         self.pixels_per_unit = 1.0
         self.is_popup_open = False
+        self._menu_frames = 0
         self._held_modifiers: set[int] = set()
         self._is_alt_alone = False
         self._was_alt_tapped = False
@@ -232,7 +234,12 @@ class ImGuiBackend:
     def _offer_menu_keys(self) -> None:
         """Arrow keys, Enter and Escape belong to a menu or popup while one is open, and to the shortcuts otherwise."""
         io = imgui.get_io()
-        self.is_popup_open = len(self.context.open_popup_stack) > 0
+        context = self.context
+        is_in_bar = context.nav_layer == imgui.internal.NavLayer.menu and context.nav_cursor_visible
+        is_open = is_in_bar or len(context.open_popup_stack) > 0
+        # From one menu to the next by arrow key there are frames without any.
+        self._menu_frames = FRAMES_BETWEEN_MENUS if is_open else max(self._menu_frames - 1, 0)
+        self.is_popup_open = self._menu_frames > 0
         if self.is_popup_open:
             io.config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
         elif io.config_flags & imgui.ConfigFlags_.nav_enable_keyboard:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from app.arguments import COMMANDS, PlainParser
 from engine.assets import asset_path
+from ui.ui_scale import parse_scale
 
 DEMO = {"demo": "train the first two clips and leave figures, a picture of the window and a video"}
 SWITCH_INTERVAL_S = 0.0005
@@ -38,6 +39,13 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("path", nargs="?", type=Path, help="capture or project folder to open")
     parser.add_argument("--size", type=_parse_size, metavar="WxH", help="window size in pixels, for example 1440x900")
+    parser.add_argument(
+        "--ui-scale",
+        type=parse_scale,
+        default=argparse.SUPPRESS,  # then it is as it was chosen before
+        metavar="SCALE",
+        help="size of the interface: auto, or 75%% to 250%%",
+    )
     parser.add_argument("--verbose", action="store_true", help="log more")
     return parser
 
@@ -93,14 +101,19 @@ def _run_window(options: argparse.Namespace) -> int:
 
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     pyglet.options.shadow_window = False  # no hidden second context
-    pyglet.options.dpi_scaling = "stretch"
+    # Sizes are pixels of the screen, of which ui.ui_scale makes units; on macOS they are the system's points.
+    pyglet.options.dpi_scaling = "stretch" if sys.platform == "darwin" else "real"
     from app.commands import OpenCapture
     from app.session import Session
-    from ui.window import DEFAULT_SIZE, StudioWindow
+    from app.window_memory import read_window_memory
+    from ui.window import StudioWindow
 
-    width, height = options.size or DEFAULT_SIZE
+    width, height = options.size or (None, None)
+    memory = read_window_memory()
+    if "ui_scale" in options:
+        memory.ui_scale = options.ui_scale
     session = Session()
-    window = StudioWindow(session, width=width, height=height)
+    window = StudioWindow(session, width=width, height=height, memory=memory)
     try:
         if options.path is not None:
             session.dispatch(OpenCapture(options.path))

@@ -7,9 +7,8 @@ faster, so its picture is uploaded instead. Redrawn only when the key of what it
 
 from __future__ import annotations
 
-import math
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import moderngl
@@ -31,15 +30,11 @@ from ui.gl import (
     frusta_lines,
     is_software,
 )
+from ui.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
+from ui.picture_size import MAX_PICTURE_WIDTH, MOVING_SHARES, moving_share, picture_size
 from ui.region_layer import RegionLayer, ShownRegions
 from ui.region_tool import rig_radius
 
-MAX_PICTURE_WIDTH = 960
-"""The CPU rasterizer is not asked for more than this; the picture is stretched."""
-MOVING_SHARES = (0.25, 1.0)
-"""Smallest and largest share of the full size at which a picture is made while the view moves."""
-MOVING_MS = 40.0
-"""A picture while the view moves should take about this long; its size follows from the last one's time."""
 MAX_INHERITED_MARKS, MAX_RESIDUAL_MARKS = 2_500, 500
 """At most this many anchors of a kind are marked, evenly thinned: they should not drown the picture. Residual anchors
 crowd where something is new, and that is what one wants to see."""
@@ -49,14 +44,7 @@ FRUSTUM_SHARE = 0.09
 """Length of a camera's pyramid as a share of the rig's radius."""
 HINT_NEAR_SHARE = 0.4
 """Pictures in space nearer than this share of the way to the pivot are left out."""
-RENDERED, CLOUD, HINT, CAPTURED, MARKS = (
-    "Rendered",
-    "Point cloud",
-    "Captured pictures in space",
-    "Captured picture",
-    "Cameras only",
-)
-
+_CLOUD_KINDS = {"static": CLOUD, "moment": FIRST_CLOUD, "pictures": HINT}
 NO_REGIONS = ShownRegions()
 
 
@@ -90,9 +78,22 @@ class SceneView:
 
 @dataclass(frozen=True)
 class Composed:
-    """The finished picture, and whether something newer is under way."""
+    """The finished picture, and what it is of."""
 
     texture: moderngl.Texture
+    shown: ShownPicture
+
+
+@dataclass(frozen=True)
+class CapturedPicture:
+    """A captured picture on the GPU.
+
+    Attributes:
+        frame_index: The frame it was taken at, which need not be that of the playhead yet.
+    """
+
+    texture: moderngl.Texture
+    frame_index: int | None
     is_stale: bool
 
 
@@ -101,12 +102,15 @@ class AnchorCounts:
     """Anchors held for the overlays, by origin. Those of the reference clip itself count as inherited.
 
     Attributes:
+        clip_index, frame_index: What they are of; None where nobody says.
         inherited_roles, residual_roles: Likewise by what they are; empty where nobody says.
     """
 
     n_inherited: int = 0
     n_residual: int = 0
     is_reference: bool = False
+    clip_index: int | None = None
+    frame_index: int | None = None
     inherited_roles: dict[str, int] = field(default_factory=dict)
     residual_roles: dict[str, int] = field(default_factory=dict)
 
@@ -117,8 +121,7 @@ class Scene:
     def __init__(self, ctx: moderngl.Context) -> None:
         self.is_software = is_software(ctx)
         self.counts = AnchorCounts()
-        self.shows = MARKS
-        self.is_stale = False
+        self.shown = ShownPicture()
         self._target = Target(ctx, precision="f1" if self.is_software else "f2")
         self._picture = ImageTexture(ctx)
         self._captured = ImageTexture(ctx)
@@ -135,7 +138,7 @@ class Scene:
         self._asked_capture: tuple[int, int, int] | None = None
         self._near = NEAR
         self._moving_share = MOVING_SHARES[1]
-        self._is_hint = False
+        self._cloud_kind = CLOUD
         self._point_size = 0.0
         self._picture_key: Hashable = None
         self._captured_key: Hashable = None
@@ -156,6 +159,11 @@ class Scene:
         for thing in owned:
             thing.release()
 
+    @property
+    def shows(self) -> str:
+        """The kind of picture on screen; one of the words of ui.hud_text."""
+        return self.shown.kind
+
     # ---- what arrived ----------------------------------------------------------------------------------------
 
     def has_news(self, session: Any) -> bool:
@@ -175,81 +183,131 @@ class Scene:
     def compose(self, session: Any, view: SceneView, regions: ShownRegions = NO_REGIONS) -> Composed:
         """Draw what belongs to the session's frame from this view, unless it is drawn already."""
         self._target.resize(view.width, view.height)
-        if self.is_software:
-            base_key, is_stale = self._take_picture(session, view)
-        else:
-            base_key, is_stale = self._take_gaussians(session)
-        points_key = self._take_points(session) if base_key is None else None
+        is_cloud_chosen = bool(session.overlays.show_cloud)
+        points_key = self._take_points(session) if is_cloud_chosen else None
+        is_cloud_chosen = points_key is not None
+        self._asked_size = None
+        shown = ShownPicture(
+            camera_index=session.view.look_through,
+            look=session.view.look_key,
+            size=(view.width, view.height),
+            full_size=(view.width, view.height),
+            is_cloud_chosen=is_cloud_chosen,
+        )
+        base_key = None
+        if not is_cloud_chosen:
+            take = self._take_picture if self.is_software else self._take_gaussians
+            base_key, shown = take(session, view, shown)
+            points_key = self._take_points(session) if base_key is None and session.overlays.show_points else None
         needs_capture = base_key is None and points_key is None and session.view.look_through is not None
-        captured_key = self._take_captured(session, view.width) if needs_capture else None
+        captured = self.captured(session, view.width) if needs_capture else None
+        captured_key = None if captured is None else self._captured_key
+        if base_key is None:
+            shown = self._without_render(shown, points_key, captured)
         marks_key = self._take_marks(session)
         regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
+        self.shown = shown
         if self.is_software and base_key is not None and regions.is_empty and not self._has_marks(session):
             # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
-            self.shows, self.is_stale, self._drawn_key = RENDERED, is_stale, None
-            return Composed(self._picture.texture, is_stale)
+            self._drawn_key = None
+            return Composed(self._picture.texture, shown)
         key = (view.key, base_key, points_key, captured_key, marks_key, regions_key)
         if key != self._drawn_key or self._splats.is_order_stale:
             self._drawn_key = key
             self._draw(view, base_key, points_key, captured_key, session)
-        self.is_stale = is_stale or self._splats.is_order_stale
-        return Composed(self._target.texture, self.is_stale)
+        if self._splats.is_order_stale:
+            self.shown = shown = replace(shown, is_on_its_way=True)
+        return Composed(self._target.texture, shown)
 
-    def captured(self, session: Any, width_px: int) -> moderngl.Texture | None:
-        """The captured picture of the camera looked through, at the session's frame; None until it was decoded."""
-        self._take_captured(session, width_px)
-        return None if self._captured.is_empty else self._captured.texture
-
-    def _take_picture(self, session: Any, view: SceneView) -> tuple[Hashable, bool]:
-        full = min(MAX_PICTURE_WIDTH / view.width, 1.0)
-        share = full * (self._moving_share if view.is_moving else 1.0)
-        self._asked_size = (max(round(view.width * share), 16), max(round(view.height * share), 16))
-        picture = session.request_render(*self._asked_size)
-        if picture is None:
-            self._picture_key = None
-            return None, False
-        if self._picture.set(picture.image, key=picture.key) and picture.duration_s > 0:
-            drawn_share = picture.image.shape[1] / (view.width * full)
-            self._moving_share = moving_share(drawn_share, picture.duration_s * 1e3)
-        self._picture_key = picture.key
-        return picture.key, bool(picture.is_stale)
-
-    def _take_gaussians(self, session: Any) -> tuple[Hashable, bool]:
-        gaussians = session.shown_gaussians()
-        if gaussians is None:
-            return None, False
-        self._splats.upload(gaussians)
-        self._near = gaussians.near_plane
-        return gaussians.key, False
-
-    def _take_points(self, session: Any) -> Hashable:
-        cloud = session.shown_points() if session.overlays.show_points else None
-        if cloud is None:
-            return None
-        points, colors, key = cloud
-        if len(points) == 0:
-            return None
-        self._cloud.set(points, colors, key=key)
-        self._is_hint = cloud.is_hint
-        if self._is_hint and len(points) > 1:  # pictures as grids: as large as the gap between neighbours
-            self._point_size = 1.8 * float(np.linalg.norm(points[1] - points[0]))
-        else:
-            self._point_size = CLOUD_OVERLAP * cloud.spacing
-        return key
-
-    def _take_captured(self, session: Any, width_px: int) -> Hashable:
+    def captured(self, session: Any, width_px: int) -> CapturedPicture | None:
+        """What the camera looked through took at the playhead's frame, or at another one until that was decoded; None
+        until anything was."""
         camera_index = session.view.look_through
         if camera_index is None:
             self._asked_capture = None
             return None
         own_width = int(session.rig.image_sizes[camera_index, 0])
         self._asked_capture = (camera_index, session.timeline.frame_index, min(width_px, own_width))
-        captured = session.ground_truth(*self._asked_capture)
-        if captured is None:
+        picture = session.ground_truth(*self._asked_capture)
+        if picture is None:
             return None
-        self._captured.set(captured.image, key=captured.key)
-        self._captured_key = captured.key
-        return captured.key
+        self._captured.set(picture.image, key=picture.key)
+        self._captured_key = picture.key
+        return CapturedPicture(self._captured.texture, picture.frame_index, bool(picture.is_stale))
+
+    def _without_render(
+        self, shown: ShownPicture, points_key: Hashable, captured: CapturedPicture | None
+    ) -> ShownPicture:
+        if points_key is not None:
+            return replace(shown, kind=self._cloud_kind)
+        if captured is not None:
+            return replace(
+                shown,
+                kind=CAPTURED,
+                frame_index=captured.frame_index,
+                size=captured.texture.size,
+                full_size=captured.texture.size,
+                is_on_its_way=captured.is_stale,
+            )
+        return shown
+
+    def _take_picture(self, session: Any, view: SceneView, shown: ShownPicture) -> tuple[Hashable, ShownPicture]:
+        full = min(MAX_PICTURE_WIDTH / view.width, 1.0)
+        share = full * (self._moving_share if view.is_moving else 1.0)
+        self._asked_size = picture_size(view.width, view.height, share)
+        picture = session.request_render(*self._asked_size)
+        if picture is None:
+            self._picture_key = None
+            return None, shown
+        if self._picture.set(picture.image, key=picture.key) and picture.duration_s > 0:
+            drawn_share = picture.image.shape[1] / (view.width * full)
+            self._moving_share = moving_share(drawn_share, picture.duration_s * 1e3)
+        self._picture_key = picture.key
+        return picture.key, replace(
+            shown,
+            kind=RENDERED,
+            clip_index=picture.clip_index,
+            frame_index=picture.frame_index,
+            revision=picture.revision,
+            step=picture.step,
+            camera_index=picture.camera_index,
+            look=picture.look,
+            size=picture.size,
+            full_size=picture_size(view.width, view.height, full),
+            is_on_its_way=bool(picture.is_stale) or (view.is_moving and share < full),
+        )
+
+    def _take_gaussians(self, session: Any, view: SceneView, shown: ShownPicture) -> tuple[Hashable, ShownPicture]:
+        gaussians, wanted = session.shown_gaussians(), session.wanted_frame()
+        if gaussians is None:
+            return None, shown
+        self._splats.upload(gaussians)
+        self._near = gaussians.near_plane
+        shown = replace(
+            shown,
+            kind=RENDERED,
+            clip_index=gaussians.clip_index,
+            frame_index=gaussians.frame_index,
+            revision=gaussians.revision,
+            step=gaussians.step,
+        )
+        is_current = wanted is None or (shown.is_of(wanted) and shown.revision == wanted.revision)
+        return gaussians.key, replace(shown, is_on_its_way=not is_current)
+
+    def _take_points(self, session: Any) -> Hashable:
+        cloud = session.shown_points()
+        if cloud is None:
+            return None
+        points, colors, key = cloud
+        if len(points) == 0:
+            return None
+        self._cloud.set(points, colors, key=key)
+        self._cloud_kind = _CLOUD_KINDS[cloud.kind]
+        if cloud.is_hint and len(points) > 1:  # pictures as grids: as large as the gap between neighbours
+            self._point_size = 1.8 * float(np.linalg.norm(points[1] - points[0]))
+        else:
+            self._point_size = CLOUD_OVERLAP * cloud.spacing
+        return key
 
     def _take_marks(self, session: Any) -> Hashable:
         overlays = session.overlays
@@ -292,7 +350,15 @@ class Scene:
         first = anchor_marks(*inherited, most=MAX_INHERITED_MARKS, color=INHERITED_ANCHOR_COLOR)
         second = anchor_marks(*own, most=MAX_RESIDUAL_MARKS, color=RESIDUAL_ANCHOR_COLOR)
         self._marks, self._marks_key = (first, second), anchors.key
-        self.counts = AnchorCounts(len(inherited[0]), len(own[0]), is_reference, first.counts, second.counts)
+        self.counts = AnchorCounts(
+            len(inherited[0]),
+            len(own[0]),
+            is_reference,
+            anchors.clip_index,
+            anchors.frame_index,
+            first.counts,
+            second.counts,
+        )
 
     def anchor_text(self, session: Any, view: SceneView, x: float, y: float) -> str:
         """What the anchor under a pixel of the view is and why; empty where none is shown or nobody says."""
@@ -345,23 +411,18 @@ class Scene:
         target = self._target
         target.clear(BACKGROUND)
         if base_key is not None:
-            self.shows = RENDERED
             if self.is_software:
                 target.draw_image(self._picture)
             else:
                 self._splats.draw(target, *camera, self._near)
         elif points_key is not None:
-            self.shows = HINT if self._is_hint else CLOUD
             unit: Literal["px", "world"]
             size, unit = (self._point_size, "world") if self._point_size > 0 else (self._cloud_point_px(view), "px")
             # A picture that stands right before the eye would hide all the others.
-            near = HINT_NEAR_SHARE * session.view.distance if self._is_hint else NEAR
+            near = HINT_NEAR_SHARE * session.view.distance if self._cloud_kind == HINT else NEAR
             self._cloud.draw(target, *camera, near, shape="circle", size=size, unit=unit, is_depth_tested=True)
         elif captured_key is not None:
-            self.shows = CAPTURED
             target.draw_image(self._captured)
-        else:
-            self.shows = MARKS
         is_free = session.view.look_through is None
         if session.overlays.show_frusta and is_free:  # from inside a camera the others are only in the way
             self._frusta.draw(target, *camera, width_px=1.5, opacity=0.8)
@@ -376,12 +437,3 @@ class Scene:
         """Fewer points are drawn larger, so that a thin cloud still reads as surfaces."""
         per_point_px2 = view.width * view.height / max(len(self._cloud), 1)
         return float(np.clip(0.45 * np.sqrt(per_point_px2), 2.0, 5.0))
-
-
-def moving_share(drawn_share: float, took_ms: float) -> float:
-    """Share of the full size at which a picture takes about MOVING_MS, given what another one took.
-
-    In eighths, so that the size does not change with every picture.
-    """
-    share = drawn_share * math.sqrt(MOVING_MS / max(took_ms, 1e-3))
-    return float(np.clip(math.floor(share * 8) / 8, *MOVING_SHARES))

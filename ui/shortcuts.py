@@ -112,6 +112,10 @@ def _toggle_play(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(TogglePlay())
 
 
+def _toggle_every_frame(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    session.timeline.is_every_frame = not session.timeline.is_every_frame
+
+
 def _toggle_loop(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     session.timeline.is_looping = not session.timeline.is_looping
 
@@ -180,6 +184,20 @@ def _toggle_overlay(name: str) -> Action:
         dispatch(ToggleOverlay(name))
 
     return toggle
+
+
+def cloud_overlay(session: Any) -> str:
+    """The overlay that shows or hides the point cloud: in place of a trained picture, or where there is none."""
+    wanted = session.wanted_frame()
+    return "show_points" if wanted is None or not wanted.revision else "show_cloud"
+
+
+def _is_cloud_shown(session: Any) -> bool:
+    return bool(getattr(session.overlays, cloud_overlay(session)))
+
+
+def _toggle_cloud(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(ToggleOverlay(cloud_overlay(session)))
 
 
 def train_or_pause(session: Any, dispatch: Dispatch) -> None:
@@ -296,7 +314,15 @@ SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("end", "End", "Last frame", TIME, _last_frame),
     Shortcut("up_arrow", "Up", "Start of this or the previous clip", TIME, _previous_clip, repeats=True),
     Shortcut("down_arrow", "Down", "Start of the next clip", TIME, _next_clip, repeats=True),
-    Shortcut("l", "L", "Loop on or off", TIME, _toggle_loop),
+    Shortcut("l", "L", "Loop on or off", TIME, _toggle_loop, is_on=lambda session: session.timeline.is_looping),
+    Shortcut(
+        "e",
+        "E",
+        "Play every frame, or skip frames to keep the speed",
+        TIME,
+        _toggle_every_frame,
+        is_on=lambda session: session.timeline.is_every_frame,
+    ),
     Shortcut("f", "F", "Frame the whole scene", VIEW, _home),
     Shortcut("left_bracket", "[", "Look through the previous camera", VIEW, _camera_by(-1), repeats=True),
     Shortcut("right_bracket", "]", "Look through the next camera", VIEW, _camera_by(1), repeats=True),
@@ -322,12 +348,7 @@ SHORTCUTS: tuple[Shortcut, ...] = (
         is_on=_is_shown("show_residual"),
     ),
     Shortcut(
-        "_4",
-        "4",
-        "Show or hide the point cloud",
-        COMPARE,
-        _toggle_overlay("show_points"),
-        is_on=_is_shown("show_points"),
+        "_4", "4", "Point cloud, also in place of a trained picture", COMPARE, _toggle_cloud, is_on=_is_cloud_shown
     ),
     Shortcut(
         "_5",

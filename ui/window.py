@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 import signal
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -15,14 +16,18 @@ import moderngl
 import pyglet
 from pyglet.event import EVENT_HANDLED
 
+from app.window_memory import WindowMemory
 from ui.frame import Frame
 from ui.gl import free_dropped
+from ui.ui_scale import MIN_UNITS, UiScale
 
 logger = logging.getLogger(__name__)
 
 TICK_S = 1 / 60
 DEFAULT_SIZE = (1440, 900)
-MIN_SIZE = (880, 560)
+"""In units of the interface (ui.ui_scale)."""
+FRAME_PX, TASK_BAR_PX = 16, 120
+"""How much of the screen borders, title bar and task bars take from a maximised window."""
 TITLE = "ClipGStream Studio"
 
 
@@ -56,8 +61,19 @@ def make_window(width: int, height: int, *, is_visible: bool = True) -> Any:
         file_drops=not pyglet.options.headless,
     )
     if not pyglet.options.headless:
-        window.set_minimum_size(*MIN_SIZE)
+        window.set_minimum_size(*(int(side) for side in MIN_UNITS))
     return window
+
+
+def screen_scale() -> float:
+    """How many pixels the platform wants for what takes one on an ordinary screen: Xft.dpi / 96 on X11, the scale of
+    the first screen on Windows. On macOS 1: there a window has more pixels than its size says."""
+    if pyglet.options.headless or sys.platform == "darwin":
+        return 1.0
+    try:
+        return float(pyglet.display.get_display().get_default_screen().get_dpi()) / 96.0
+    except (NotImplementedError, ValueError, OSError):  # a platform, or a resource file, that does not say
+        return 1.0
 
 
 class StudioWindow:
@@ -65,23 +81,41 @@ class StudioWindow:
 
     Args:
         session: See app.session.Session; closed by `close`.
-        width, height: Logical pixels.
+        width, height: Pixels of the screen; None takes the size it had before, else the default one.
         fixed_delta_s: Seconds per frame as told to ImGui; tests fix it, None measures.
+        memory: What the window looked like before; None starts afresh and keeps nothing.
     """
 
     def __init__(
         self,
         session: Any,
         *,
-        width: int = DEFAULT_SIZE[0],
-        height: int = DEFAULT_SIZE[1],
+        width: int | None = None,
+        height: int | None = None,
         fixed_delta_s: float | None = None,
+        memory: WindowMemory | None = None,
     ) -> None:
         self.session = session
-        self.window = make_window(width, height)
+        self._memory = memory
+        scale = UiScale(None if memory is None else memory.ui_scale, of_screen=screen_scale())
+        kept_size = None if memory is None else memory.size
+        default = (round(DEFAULT_SIZE[0] * scale.wanted), round(DEFAULT_SIZE[1] * scale.wanted))
+        size = kept_size or default if width is None or height is None else (width, height)
+        self.window = make_window(*size)
+        scale.of_screen *= self.window.get_framebuffer_size()[0] / max(self.window.get_size()[0], 1)
+        if memory is not None and memory.is_maximized and width is None:
+            self.window.maximize()
         self.ctx = moderngl.create_context(require=330)
         self.ctx.gc_mode = "context_gc"  # dropped objects wait for free_dropped() on this thread
-        self.frame = Frame(self.window, self.ctx, session, fixed_delta_s=fixed_delta_s, on_input=self._answer_soon)
+        self.frame = Frame(
+            self.window,
+            self.ctx,
+            session,
+            fixed_delta_s=fixed_delta_s,
+            on_input=self._answer_soon,
+            memory=memory,
+            scale=scale,
+        )
         self._handlers = {
             "on_file_drop": self._file_dropped,
             "on_close": self._close_asked,
@@ -173,11 +207,28 @@ class StudioWindow:
     def _exposed(self) -> None:
         self.frame.forget_shown()
 
+    def _remember(self) -> None:
+        if self._memory is None:
+            return
+        self._memory.is_maximized = self._fills_screen()
+        if not self._memory.is_maximized:  # else the size to go back to is the one before
+            self._memory.size = self.window.get_size()
+        self.frame.remembering.save(self.session)
+
+    def _fills_screen(self) -> bool:
+        """Is the window maximised? pyglet does not say; one that leaves no more than a task bar is taken for it."""
+        if pyglet.options.headless:
+            return False
+        screen = pyglet.display.get_display().get_default_screen()
+        width, height = self.window.get_size()
+        return width >= screen.width - FRAME_PX and height >= screen.height - TASK_BAR_PX
+
     def close(self) -> None:
         """Stop the session, then release GL, ImGui and the window. Safe to call twice."""
         if self._is_closed:
             return
         self._is_closed = True
+        self._remember()
         self.session.close()
         self.window.switch_to()
         self.frame.close()

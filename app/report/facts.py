@@ -13,7 +13,7 @@ from app.project import PROJECT_FILE, Project, ProjectSettings, open_project
 from app.report.storage import storage_of
 from app.training.stage_watch import stages_of
 from engine.errors import ProjectError
-from engine.model.clip_state import read_clip_header
+from engine.model.clip_state import DamagedClip, look_at_clip
 
 SEARCH_DEPTH = 3
 """Levels of folders below a given one in which projects are looked for."""
@@ -57,11 +57,13 @@ class ClipFacts:
 
 @dataclass(frozen=True, slots=True)
 class ProjectFacts:
-    """One project. `name` tells it from the others on the page; `clips` are the trained ones, at least one."""
+    """One project. `name` tells it from the others on the page; `clips` are the trained ones, at least one; `damaged`
+    are files of trained clips that cannot be read."""
 
     name: str
     project: Project
     clips: list[ClipFacts]
+    damaged: tuple[DamagedClip, ...] = ()
 
     @property
     def settings(self) -> ProjectSettings:
@@ -80,45 +82,56 @@ class ProjectFacts:
         return sum(sum(clip.storage.values()) for clip in self.clips)
 
 
-def read_facts(folder: Path, name: str) -> ProjectFacts:
+def read_facts(folder: Path, name: str, *, leave_out_damaged: bool = False) -> ProjectFacts:
     """Look at a project's files.
 
+    Args:
+        name: Of the result.
+        leave_out_damaged: List files of clips that cannot be read beside the others, as long as there are others.
+
     Raises:
-        ProjectError: It is no project, a file is damaged, or nothing is trained yet.
+        ProjectError: It is not a project, nothing is trained yet, or a clip cannot be read.
     """
     project = open_project(folder, is_writable=False)
-    clips = [_read_clip(path) for path in sorted((folder / "clips").glob("[0-9]*.safetensors"))]
+    found = [_read_clip(path) for path in sorted((folder / "clips").glob("[0-9]*.safetensors"))]
+    clips = [clip for clip in found if isinstance(clip, ClipFacts)]
+    damaged = tuple(clip for clip in found if isinstance(clip, DamagedClip))
+    if damaged and not (clips and leave_out_damaged):
+        raise ProjectError(
+            f"The clip file is damaged or not a clip file ({damaged[0].reason}).",
+            hint="Restore it from a copy, or remove it and train the clip again.",
+            path=damaged[0].path,
+        )
     if not clips:
         raise ProjectError(
             "Nothing is trained in this project yet.", hint="Run `clipgstream train` first.", path=folder
         )
-    return ProjectFacts(name, project, sorted(clips, key=lambda clip: clip.clip_index))
+    return ProjectFacts(name, project, sorted(clips, key=lambda clip: clip.clip_index), damaged)
 
 
-def _read_clip(path: Path) -> ClipFacts:
-    storage = storage_of(path)
-    header = read_clip_header(path)
+def _read_clip(path: Path) -> ClipFacts | DamagedClip | None:
+    header = look_at_clip(path)
+    if not isinstance(header, dict):
+        return header
+    metrics = header.get("metrics") or {}
     try:
-        if header is None:
-            raise KeyError("header")
-        metrics = header.get("metrics") or {}
         return ClipFacts(
-            clip_index=int(header["clip_index"]),
-            start=int(header["start"]),
-            n_frames=int(header["n_frames"]),
-            role=str(header["role"]),
-            n_steps=int(header["step"]),
-            fingerprint=str(header.get("fingerprint", "")),
-            storage=storage,
+            clip_index=header["clip_index"],
+            start=header["start"],
+            n_frames=header["n_frames"],
+            role=header["role"],
+            n_steps=header["step"],
+            fingerprint=header.get("fingerprint", ""),
+            storage=storage_of(path),
             stages_s=stages_of(metrics),
             preparation_s=_seconds(metrics.get("preparation_s")),
             training_s=_seconds(metrics.get("training_s")),
             coverage=dict(header["coverage"]) if header.get("coverage") else None,
         )
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ProjectError(
-            f"The clip file has a missing or wrong entry ({error}).", hint="Train the clip again.", path=path
-        ) from error
+    except KeyError as error:
+        return DamagedClip(path, f"its header has no {error}")
+    except ProjectError as error:  # removed or replaced since
+        return DamagedClip(path, error.message)
 
 
 def _seconds(value: Any) -> float | None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
-from safetensors import SafetensorError, safe_open
-
+from engine.array_files import ArraysError
 from engine.errors import ProjectError
+from engine.model.clip_state import read_clip_metadata, reason_of
 
 COMPONENTS = (
     ("positions", "sets.", ".positions"),
@@ -28,7 +27,6 @@ OTHER = "other arrays"
 HEADER = "header"
 """Names, shapes, settings and figures: all that is no array."""
 COMPONENT_NAMES = (*dict.fromkeys(name for name, _, _ in COMPONENTS), OTHER, HEADER)
-_BYTES = {"F64": 8, "I64": 8, "U64": 8, "F32": 4, "I32": 4, "U32": 4, "F16": 2, "BF16": 2, "I16": 2, "U16": 2}
 
 
 def component_of(array_name: str) -> str:
@@ -47,13 +45,13 @@ def storage_of(path: Path) -> dict[str, int]:
     """
     found = dict.fromkeys(COMPONENT_NAMES, 0)
     try:
-        with safe_open(path, framework="numpy") as file:
-            for name in file.keys():  # noqa: SIM118 - not a mapping
-                part = file.get_slice(name)
-                found[component_of(name)] += math.prod(part.get_shape()) * _BYTES.get(part.get_dtype(), 1)
+        for name, n_bytes in read_clip_metadata(path)[1].items():
+            found[component_of(name)] += n_bytes
         found[HEADER] += path.stat().st_size - sum(found.values())
-    except (OSError, SafetensorError) as error:
+    except (OSError, ArraysError) as error:
         raise ProjectError(
-            f"The clip file is damaged or no clip file ({error}).", hint="Train the clip again.", path=path
+            f"The clip file is damaged or not a clip file ({reason_of(error)}).",
+            hint="Train the clip again.",
+            path=path,
         ) from error
     return found

@@ -218,7 +218,8 @@ class TrainingRun:
                 self._recall_times(training.steps_done)
                 logger.info("clip %d goes on at step %d", job.clip_index, training.steps_done)
             except ProjectError as error:
-                self._send(WarningRaised(f"Clip {job.clip_index} starts from the beginning", str(error)))
+                said = str(ProjectError(error.message, path=checkpoint))
+                self._send(WarningRaised(f"Clip {job.clip_index} starts from the beginning", said))
                 training = self._make(job, self._report)
         if not is_restored:
             self._project.discard_progress(job.clip_index)

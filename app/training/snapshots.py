@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import suppress
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from app.training.messages import SnapshotWritten
 from engine.errors import DiskError, ProjectError
-from engine.files import disk_error
+from engine.files import disk_error, replace_file
 from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.model.compact import CompactClip, write_compact_clip
 
@@ -106,7 +105,7 @@ def keep_clip(clip: CompactClip, path: Path, live_dir: Path) -> None:
                 path=path,
             )
         path.parent.mkdir(exist_ok=True)
-        os.replace(draft, path)
+        replace_file(draft, path, is_durable=True)
     except OSError as error:
         raise disk_error(error, what="The clip", path=path) from error
     finally:

@@ -7,22 +7,27 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import os
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
+from engine.capture.checks import raise_problems
 from engine.capture.formats import panoptic, sample
 from engine.capture.frames import FrameStore
 from engine.capture.layout import Layout
 from engine.capture.rig import CameraRig
+from engine.capture.rig_checks import check_rig, rig_warnings
+from engine.capture.seen import MAX_LOOKED_AT, folder_contents
 from engine.errors import CaptureError
 
 logger = logging.getLogger(__name__)
 
 FORMATS = (sample, panoptic)
-"""Readers in the order they are tried. Each has FORMAT, probe(folder) and read(folder)."""
+"""Readers in the order they are tried. Each has FORMAT, LAYOUT, probe(folder) and read(folder, follow_links=...)."""
 DEFAULT_CACHE_BYTES = 512 << 20
 """Decoded frames kept in memory."""
 
@@ -43,6 +48,7 @@ class Capture:
         warnings: Plain sentences about what was odd but usable.
         fingerprint: Short hash of format, cameras, sizes and length; the same wherever the folder lies and whatever
             the scale.
+        follow_links: Whether the user allowed its files to lie outside of the folder.
     """
 
     path: Path
@@ -56,6 +62,7 @@ class Capture:
     warnings: tuple[str, ...]
     fingerprint: str
     store: FrameStore = field(repr=False)
+    follow_links: bool = False
 
     def frame(self, camera_index: int, frame_index: int) -> np.ndarray:
         """One picture at the working size. Cached; safe to call from several threads.
@@ -116,7 +123,9 @@ class Capture:
                 raise IndexError(f"frame {frame_index} is outside 0..{self.n_frames - 1}")
 
 
-def open_capture(path: Path | str, *, scale: float = 1.0, cache_bytes: int = DEFAULT_CACHE_BYTES) -> Capture:
+def open_capture(
+    path: Path | str, *, scale: float = 1.0, cache_bytes: int = DEFAULT_CACHE_BYTES, follow_links: bool = False
+) -> Capture:
     """Open a capture folder of any known layout.
 
     Args:
@@ -124,19 +133,21 @@ def open_capture(path: Path | str, *, scale: float = 1.0, cache_bytes: int = DEF
         scale: Working size divided by stored size, in (0, 1]; frames are area-filtered, K scales by the actual
             ratio of the rounded sizes.
         cache_bytes: Bound on decoded frames kept in memory.
+        follow_links: Whether files that the capture names may lie outside of its folder. Only where the user said so.
     Raises:
-        CaptureError: The folder is no capture or cannot be used; lists every problem found.
+        CaptureError: The folder does not hold a capture, or one that cannot be used; lists every problem found.
     """
     folder = Path(path)
     try:
-        layout = _read_layout(folder)
+        layout = _read_layout(folder, follow_links=follow_links)
     except OSError as error:  # rights, a drive that went away, a path too long
         raise CaptureError(
             f"The capture cannot be read ({error.strerror or error}).",
-            hint="Check that you may read all its files.",
+            hint="Check the path, and that you may read all its files.",
             path=error.filename or folder,
         ) from error
     native_rig = layout.rig()
+    raise_problems(check_rig(native_rig, folder), folder)
     rig = native_rig.resized(working_sizes(native_rig.image_sizes, scale, folder))
     store = FrameStore(
         [camera.source for camera in layout.cameras],
@@ -154,9 +165,10 @@ def open_capture(path: Path | str, *, scale: float = 1.0, cache_bytes: int = DEF
         scale=scale,
         native_rig=native_rig,
         default_holdout=layout.default_holdout,
-        warnings=layout.warnings,
+        warnings=(*layout.warnings, *rig_warnings(native_rig)),
         fingerprint=fingerprint(layout),
         store=store,
+        follow_links=follow_links,
     )
 
 
@@ -185,23 +197,40 @@ def fingerprint(layout: Layout) -> str:
     return digest.hexdigest()[:16]
 
 
-def _read_layout(folder: Path) -> Layout:
+def _read_layout(folder: Path, *, follow_links: bool) -> Layout:
     if not folder.exists():
         raise CaptureError("There is no such folder.", hint="Check the path.", path=folder)
     if not folder.is_dir():
         raise CaptureError(
-            "This is a file, a capture is a folder.", hint=f"Open {folder.absolute().parent} instead.", path=folder
+            "This is a file; a capture is a folder.", hint=f"Open {folder.absolute().parent} instead.", path=folder
         )
     reasons = []
     for reader in FORMATS:
         reason = reader.probe(folder)
         if reason is None:
-            return reader.read(folder)
-        reasons.append(f"{reader.FORMAT} layout: {reason}")
-    inside = sorted(child.name for child in folder.iterdir() if child.is_dir() and _is_capture(child))
-    hint = f"Open {inside[0]} inside it." if inside else "Open the folder that holds one of these files."
-    raise CaptureError(f"This folder is no capture ({'; '.join(reasons)}).", hint=hint, path=folder)
+            return reader.read(folder, follow_links=follow_links)
+        reasons.append(reason)
+    raise _not_a_capture(folder, reasons)
 
 
-def _is_capture(folder: Path) -> bool:
-    return any(reader.probe(folder) is None for reader in FORMATS)
+def _not_a_capture(folder: Path, reasons: Sequence[str]) -> CaptureError:
+    """What was seen in the folder, what can be read, and what to do."""
+    with os.scandir(folder) as entries:
+        inside = sorted(entry.name for entry in islice(entries, MAX_LOOKED_AT) if _is_capture(entry))
+    if inside:
+        hint = f"Open {inside[0]} inside it, which is one."
+    else:
+        layouts = "; or ".join(reader.LAYOUT for reader in FORMATS)
+        hint = f"A capture is a folder with {layouts}. For other recordings write cameras.json, see the README."
+    return CaptureError(
+        f"This folder is not a capture ({'; '.join(reasons)}). In it: {folder_contents(folder)}.",
+        hint=hint,
+        path=folder,
+    )
+
+
+def _is_capture(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_dir() and any(reader.probe(Path(entry.path)) is None for reader in FORMATS)
+    except OSError:  # a link to itself, a folder that may not be looked into
+        return False

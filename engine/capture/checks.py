@@ -6,26 +6,33 @@ A problem says what was found, with numbers, what to do, and names the file. Not
 
 from __future__ import annotations
 
-import json
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import av
-import av.error
 import numpy as np
-from PIL import Image, UnidentifiedImageError
 
-from engine.capture.frames import shown_pts
+from engine.capture.limits import (
+    FOCAL_RANGE,
+    FPS_RANGE,
+    MAX_META_BYTES,
+    MAX_NAME_LENGTH,
+    MAX_PIXELS,
+    MAX_POSITION,
+    MAX_SIDE,
+)
+from engine.capture.media import ImageHeader
 from engine.errors import CaptureError
+from engine.files import read_bytes
+from engine.json_files import JsonError, parse_object
+from engine.text import shown
 
 ROTATION_TOLERANCE = 1e-3
 """Largest |R R^T - I| entry that counts as a rotation; calibrations printed with four digits reach 3e-4."""
 MAX_LISTED = 3
 """File names listed in one message before "and n more"."""
-END_BYTES = 64
-"""Bytes at the end of an image file searched for its end marker; some writers pad behind it."""
 
 
 def raise_problems(problems: Sequence[CaptureError], folder: Path) -> None:
@@ -46,61 +53,107 @@ def read_json_object(path: Path) -> dict[str, Any]:
     """Read a JSON file whose top level is an object.
 
     Raises:
-        CaptureError: The file is missing, not readable, not JSON, or something else than an object.
+        CaptureError: The file is missing, not readable, too large, not JSON, or something else than an object.
     """
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        # NaN is let through, so that the camera that has it can be named
+        return parse_object(read_bytes(path, max_bytes=MAX_META_BYTES), is_nan_allowed=True)
     except FileNotFoundError:
         raise CaptureError("The file is missing.", hint="Put it back or export the capture again.", path=path) from None
     except OSError as error:
         raise CaptureError(
-            f"The file cannot be read ({error.strerror}).", hint="Check its rights.", path=path
-        ) from error
-    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise CaptureError(
-            f"The file is no valid JSON ({error}).", hint="It may be cut off; export the capture again.", path=path
-        ) from error
-    if not isinstance(document, dict):
-        raise CaptureError(
-            f"The file holds a JSON {type(document).__name__}, expected an object.",
-            hint="Export the capture again.",
+            f"The file cannot be read ({error.strerror}).",
+            hint="Check that you may read it.",
             path=path,
-        )
-    return document
+        ) from error
+    except JsonError as error:
+        raise CaptureError(
+            f"The file is not valid JSON ({error}).", hint="It may be cut off; export the capture again.", path=path
+        ) from error
+
+
+def is_whole(value: object) -> bool:
+    """Whether a JSON value is a whole number; true and false are not."""
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def parse_matrix(value: object, shape: tuple[int, ...]) -> np.ndarray | None:
-    """Nested lists as a float64 array of this shape, or None when they are anything else."""
+    """Nested lists of numbers as a float64 array of this shape, or None when they are anything else."""
     try:
-        matrix = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+        matrix = np.asarray(value)
+    except (TypeError, ValueError, OverflowError):
         return None
-    return matrix if matrix.shape == shape else None
+    if matrix.dtype.kind not in "iuf" or matrix.shape != shape:  # texts and objects would become numbers
+        return None
+    return matrix.astype(np.float64)
 
 
 def check_names(names: Sequence[str], path: Path) -> list[CaptureError]:
-    """Zero cameras and names that occur twice."""
+    """Zero cameras, names that occur twice, and names that cannot be shown or typed."""
     if not names:
         return [CaptureError("The capture has no cameras.", hint="List at least one camera with its file.", path=path)]
-    return [
+    problems = [
         CaptureError(f'{count} cameras are called "{name}".', hint="Give each camera its own name.", path=path)
         for name, count in Counter(names).items()
-        if count > 1
+        if count > 1 and is_name(name)
+    ]
+    odd = [(row, name) for row, name in enumerate(names) if not is_name(name)]
+    hint = f"Give it a name of 1 to {MAX_NAME_LENGTH} characters that can be printed."
+    return problems + [
+        CaptureError(f"Camera number {row} is called {shown(name)}.", hint=hint, path=path) for row, name in odd
     ]
 
 
+def is_name(name: str) -> bool:
+    """Whether a camera may be called so: something that can be read on a screen and typed."""
+    return bool(name.strip()) and len(name) <= MAX_NAME_LENGTH and name.isprintable()
+
+
+def check_fps(fps: object, path: Path) -> list[CaptureError]:
+    """Something that is not a number of frames per second, or none that a camera has."""
+    low, high = FPS_RANGE
+    if isinstance(fps, int | float) and not isinstance(fps, bool) and math.isfinite(fps) and low <= fps <= high:
+        return []
+    hint = f"Give frames per second, a number from {low:g} to {high:,.0f}."
+    return [CaptureError(f"fps is {shown(fps)}.", hint=hint, path=path)]
+
+
+def parse_size(width: object, height: object) -> tuple[int, int] | None:
+    """Width and height as whole numbers of pixels, or None when they are anything else or more than is read."""
+    if not (isinstance(width, int) and isinstance(height, int) and is_whole(width) and is_whole(height)):
+        return None
+    is_in_range = 0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE and width * height <= MAX_PIXELS
+    return (width, height) if is_in_range else None
+
+
+def size_problem(text: str, width: object, height: object, path: Path) -> CaptureError:
+    """What to say where `parse_size` gives None. text: what has them, such as "w and h are"."""
+    return CaptureError(
+        f"{text} {shown(width)} and {shown(height)}.",
+        hint=f"Give whole numbers from 1 to {MAX_SIDE:,}, together at most {MAX_PIXELS:,} pixels.",
+        path=path,
+    )
+
+
 def check_pose(name: str, world_to_camera: np.ndarray, path: Path) -> list[CaptureError]:
-    """NaN, a rotation that is none, a last row other than 0 0 0 1. world_to_camera is [4, 4]."""
+    """NaN, absurd numbers, a rotation that is not one, a last row other than 0 0 0 1. world_to_camera is [4, 4]."""
     hint = "Export the calibration again as a rigid 4x4 world-to-camera map."
     if not np.isfinite(world_to_camera).all():
         return [CaptureError(f'Camera "{name}" has NaN or infinity in its pose.', hint=hint, path=path)]
     rotation = world_to_camera[:3, :3]
+    if np.abs(rotation).max() > 2.0:  # the entries of a rotation are at most 1; squares of 1e300 are infinite
+        largest = f"has {np.abs(rotation).max():.3g} in its rotation, whose entries are at most 1"
+        return [CaptureError(f'The pose of camera "{name}" {largest}.', hint=hint, path=path)]
+    distance = float(np.abs(world_to_camera[:3, 3]).max())
+    if distance > MAX_POSITION:
+        text = f'The pose of camera "{name}" moves it by {distance:.3g}, at most {MAX_POSITION:g} is read.'
+        return [CaptureError(text, hint="Export the calibration in other units or around another origin.", path=path)]
     error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     determinant = float(np.linalg.det(rotation))
     found = []
     if error > ROTATION_TOLERANCE or determinant < 0:
         found.append(
-            "is no rotation: R R^T differs from the identity by "
+            "is not a rotation: R R^T differs from the identity by "
             f"{error:.3g}, the determinant is {determinant:.3g} and must be 1"
         )
     if not np.array_equal(world_to_camera[3], [0.0, 0.0, 0.0, 1.0]):
@@ -110,22 +163,35 @@ def check_pose(name: str, world_to_camera: np.ndarray, path: Path) -> list[Captu
 
 
 def check_K(name: str, K: np.ndarray, image_size: tuple[int, int], path: Path) -> list[CaptureError]:
-    """NaN, a focal length that is not positive, skew, a principal point far outside the image. K is [3, 3]."""
+    """NaN, a focal length that no camera has, skew, a principal point far outside the image. K is [3, 3]."""
     hint = "Export K as [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels of the stated image size."
     if not np.isfinite(K).all():
         return [CaptureError(f'Camera "{name}" has NaN or infinity in K.', hint=hint, path=path)]
-    found = []
     if K[0, 0] <= 0 or K[1, 1] <= 0:
-        found.append(f"fx {K[0, 0]:g} and fy {K[1, 1]:g} must be positive")
-    elif max(abs(K[0, 1]), abs(K[1, 0])) > 1e-6 * K[0, 0]:
-        found.append(f"skew {K[0, 1]:g} is not supported")
+        found = [f"fx {K[0, 0]:g} and fy {K[1, 1]:g} must be positive"]
+    else:
+        found = _focal_faults(K, image_size)
     if not np.allclose(K[2], [0.0, 0.0, 1.0], rtol=0, atol=1e-9):
         found.append("the last row is not 0 0 1")
     centre = K[:2, 2] / np.array(image_size, dtype=np.float64)
     if (centre < -0.5).any() or (centre > 1.5).any():
         size = f"{image_size[0]}x{image_size[1]}"
-        found.append(f"the principal point {K[0, 2]:.1f}, {K[1, 2]:.1f} is far outside the {size} image")
+        found.append(f"the principal point {K[0, 2]:.6g}, {K[1, 2]:.6g} is far outside the {size} image")
     return [CaptureError(f'Camera "{name}" has a bad K: {text}.', hint=hint, path=path) for text in found]
+
+
+def _focal_faults(K: np.ndarray, image_size: tuple[int, int]) -> list[str]:
+    """Of a K with positive focal lengths."""
+    low, high = FOCAL_RANGE
+    shares = {"fx": K[0, 0] / image_size[0], "fy": K[1, 1] / image_size[1]}
+    absurd = [
+        f"{key} is {share:.3g} times the side of the image, {low:g} to {high:,.0f} times is read"
+        for key, share in shares.items()
+        if not low <= share <= high
+    ]
+    if not absurd and max(abs(K[0, 1]), abs(K[1, 0])) > 1e-6 * K[0, 0]:
+        return [f"skew {K[0, 1]:g} is not supported"]
+    return absurd
 
 
 def check_image_size(name: str, found: tuple[int, int], calibrated: tuple[int, int], path: Path) -> list[CaptureError]:
@@ -140,6 +206,16 @@ def check_image_size(name: str, found: tuple[int, int], calibrated: tuple[int, i
             path=path,
         )
     ]
+
+
+def check_image_header(name: str, header: ImageHeader, calibrated: tuple[int, int], path: Path) -> list[CaptureError]:
+    """As `check_image_size`; of a picture that EXIF lays on its side, this is said as the likely cause."""
+    problems = check_image_size(name, header.size, calibrated, path)
+    if problems and header.orientation > 4 and header.size[::-1] == calibrated:
+        text = f"{problems[0].message} An EXIF entry turns them for display; pictures are read as they are stored."
+        hint = "Save the images turned, without the EXIF entry, or calibrate them as they are stored."
+        return [CaptureError(text, hint=hint, path=path)]
+    return problems
 
 
 def check_equal_counts(counts: Mapping[str, int], paths: Mapping[str, Path]) -> list[CaptureError]:
@@ -166,88 +242,6 @@ def check_equal_counts(counts: Mapping[str, int], paths: Mapping[str, Path]) -> 
         if count != expected
     ]
     return problems
-
-
-def check_image_file(path: Path) -> str | None:
-    """What is wrong with an image file as far as its ends tell, without decoding it; None when nothing is.
-
-    Only JPEG and PNG carry an end marker; for other formats an empty file is all that shows here.
-    """
-    with path.open("rb") as file:
-        head = file.read(8)
-        n_bytes = file.seek(0, 2)
-        file.seek(max(n_bytes - END_BYTES, 0))
-        tail = file.read()
-    if n_bytes == 0:
-        return "is empty"
-    if path.suffix.lower() in (".jpg", ".jpeg"):
-        is_kind, is_complete, kind = head[:2] == b"\xff\xd8", b"\xff\xd9" in tail, "JPEG"
-    elif path.suffix.lower() == ".png":
-        is_kind, is_complete, kind = head == b"\x89PNG\r\n\x1a\n", b"IEND" in tail, "PNG"
-    else:
-        return None
-    if not is_kind:
-        return f"is no {kind}"
-    return None if is_complete else f"is truncated: the {kind} ends after {n_bytes} bytes without its end marker"
-
-
-def image_size_of(path: Path) -> tuple[int, int]:
-    """Width and height from the header of an image file.
-
-    Raises:
-        CaptureError: No image header.
-    """
-    try:
-        with Image.open(path) as image:
-            return image.size
-    except (OSError, UnidentifiedImageError, SyntaxError) as error:
-        raise CaptureError(
-            "The file is no readable image.", hint="Copy or export this file again.", path=path
-        ) from error
-
-
-def inspect_video(path: Path) -> tuple[int, tuple[int, int], float]:
-    """Number of frames, size and rate of a video from its container; no pixel is decoded.
-
-    Returns:
-        n_frames; width and height; frames per second (0 when the container does not say).
-    Raises:
-        CaptureError: The file is missing, no video, or ends before the frames that its index lists.
-    """
-    if not path.is_file():
-        raise CaptureError("The video is missing.", hint="Put the file back or take its camera out.", path=path)
-    n_bytes = path.stat().st_size
-    if n_bytes == 0:
-        raise CaptureError("The video is empty (0 bytes).", hint="Copy or export it again.", path=path)
-    try:
-        with av.open(str(path)) as container:
-            if not container.streams.video:
-                raise CaptureError(
-                    "The file has no video stream, so it is truncated or no video.",
-                    hint="Copy or export it again.",
-                    path=path,
-                )
-            stream = container.streams.video[0]
-            size = (stream.codec_context.width, stream.codec_context.height)
-            rate = float(stream.average_rate or 0)
-            entries = [entry for entry in stream.index_entries if not entry.is_discard]
-            if len(entries) != stream.frames or not entries:  # the index lists key frames only, or frames not shown
-                return sum(shown_pts(packet) is not None for packet in container.demux(stream)), size, rate
-            n_whole = sum(entry.pos + entry.size <= n_bytes for entry in entries)
-    except av.error.FFmpegError as error:
-        raise CaptureError(
-            f"The video cannot be opened ({error.strerror}), so it is truncated or of an unknown kind.",
-            hint="Copy or export it again, for example as H.264 in mp4.",
-            path=path,
-        ) from error
-    if n_whole < len(entries):
-        raise CaptureError(
-            f"The video is truncated: its index lists {len(entries)} frames, "
-            f"only {n_whole} lie within its {n_bytes} bytes.",
-            hint="Copy or export it again.",
-            path=path,
-        )
-    return len(entries), size, rate
 
 
 def shortened(items: Sequence[str]) -> str:

@@ -13,12 +13,21 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-import av
-import av.error
 import numpy as np
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
+from engine.capture.limits import MAX_PIXELS
+from engine.capture.media import (
+    IMAGE_FAULTS,
+    IMAGE_KINDS,
+    VIDEO_FAULTS,
+    open_video,
+    opened_video,
+    set_pixel_limit,
+    shown_pts,
+)
 from engine.errors import CaptureError
+from engine.files import open_regular
 
 MAX_FORWARD_DECODE = 64
 """Frames decoded forward before a seek is considered cheaper even inside one group of pictures."""
@@ -77,16 +86,17 @@ def read_image(path: Path) -> np.ndarray:
     Raises:
         CaptureError: The file is missing, truncated or no image.
     """
+    again = "Copy or export this file again."
     try:
-        with Image.open(path) as image:
+        with open_regular(path) as file, Image.open(file, formats=IMAGE_KINDS) as image:
+            if image.width * image.height > MAX_PIXELS:
+                raise CaptureError(f"The image is {image.width}x{image.height}.", hint=again, path=path)
             return np.asarray(image.convert("RGB"))
     except FileNotFoundError:
         raise CaptureError("The image is missing.", hint="Put the file back or export it again.", path=path) from None
-    except (OSError, UnidentifiedImageError, SyntaxError) as error:
+    except IMAGE_FAULTS as error:
         raise CaptureError(
-            f"The image cannot be decoded ({error}), so it is truncated or damaged.",
-            hint="Copy or export this file again.",
-            path=path,
+            f"The image cannot be decoded ({error}), so it is truncated or damaged.", hint=again, path=path
         ) from error
 
 
@@ -143,9 +153,9 @@ class VideoFrames:
                 if index > frame_index or frame.is_corrupt:
                     break
                 return frame.to_ndarray(format="rgb24")
-        except av.error.FFmpegError as error:
+        except (*VIDEO_FAULTS, OSError, ValueError) as error:  # ValueError: a pixel format that cannot be converted
             self._close()
-            raise self._damaged(frame_index, str(error.strerror)) from error
+            raise self._damaged(frame_index, getattr(error, "strerror", None) or "damaged") from error
         self._close()
         raise self._damaged(frame_index, "its data ends or is damaged there")
 
@@ -159,13 +169,15 @@ class VideoFrames:
     def _open(self) -> None:
         if not self._pts:
             self._read_index()
-        self._container = av.open(str(self.path))
-        self._decoder = self._container.decode(self._container.streams.video[0])
+        self._container = open_video(self.path)
+        stream = self._container.streams.video[0]
+        set_pixel_limit(stream)
+        self._decoder = self._container.decode(stream)
         self._next_index = 0
 
     def _read_index(self) -> None:
         """Collect frame times; packets are read, not decoded. Needed because frame times need not be even."""
-        with av.open(str(self.path)) as container:
+        with opened_video(self.path) as container:
             packets = [
                 (pts, packet.is_keyframe)
                 for packet in container.demux(container.streams.video[0])
@@ -192,11 +204,6 @@ class VideoFrames:
         stream = self._container.streams.video[0]
         self._container.seek(self._pts[frame_index], stream=stream, backward=True)
         self._decoder = self._container.decode(stream)
-
-
-def shown_pts(packet: Any) -> int | None:
-    """Presentation time of a demuxed packet; None for the flush packet and for what an edit list discards."""
-    return None if packet.size == 0 or packet.is_discard else packet.pts
 
 
 class FrameCache:

@@ -17,15 +17,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from safetensors import SafetensorError, safe_open
 
+from engine.array_files import ArraysError, read_arrays, read_metadata, write_arrays
 from engine.errors import ProjectError
-from engine.files import write_arrays
+from engine.json_files import JsonError, parse_object
+from engine.model.clip_header import READABLE, SCHEMA, HeaderError, check_header
 from engine.model.coding import CodedArray, CodingError, decode_array
 
-SCHEMA = 2
-_READABLE = (1, SCHEMA)
-"""Schema 1 knew no compact form; its files are read like any other that holds its arrays as they are."""
+_ENTRIES = ("header", "coding")
+"""Texts of a file beside its checksum."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,13 +57,15 @@ class ClipState:
         return digest.hexdigest()[:16]
 
 
-def write_clip_state(path: Path | str, state: ClipState) -> None:
+def write_clip_state(path: Path | str, state: ClipState, *, is_durable: bool = False) -> None:
     """Write atomically: a complete file appears under `path`, or none.
 
+    Args:
+        is_durable: Whether it must outlive a power cut, see engine.files.atomic_path.
     Raises:
         DiskError: The disk refused.
     """
-    write_arrays(path, state.arrays, {"header": json.dumps(state.header)}, what="The clip")
+    write_arrays(path, state.arrays, {"header": json.dumps(state.header)}, what="The clip", is_durable=is_durable)
 
 
 def write_coded_arrays(path: Path | str, coded: dict[str, CodedArray], header: dict[str, Any]) -> None:
@@ -81,30 +83,25 @@ def read_clip_state(path: Path | str) -> ClipState:
     """Read a state written by `write_clip_state` or `write_coded_arrays`.
 
     Raises:
-        ProjectError: The file is missing, damaged, or of a newer schema.
+        ProjectError: The file is missing, damaged, or of a newer schema; says which, and why.
     """
     path = Path(path)
     try:
-        with safe_open(path, framework="numpy") as file:
-            metadata = file.metadata() or {}
-            header = json.loads(metadata["header"])
-            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
+        arrays, metadata = read_arrays(path, _ENTRIES)
+        header = _header_of(metadata)
         if "coding" in metadata:
-            arrays = _decoded(arrays, json.loads(metadata["coding"]))
+            arrays = _decoded(arrays, parse_object(metadata["coding"]))
     except FileNotFoundError as error:
         raise ProjectError("The clip file does not exist.", hint="Train the clip first.", path=path) from error
-    except (OSError, SafetensorError, KeyError, ValueError) as error:
+    except _Unreadable as error:
+        hint = "Use the version that wrote it or train the clip again."
+        raise ProjectError(f"The clip file cannot be read: {error}.", hint=hint, path=path) from error
+    except _DAMAGE as error:
         raise ProjectError(
-            f"The clip file is damaged or no clip file ({error}).",
-            hint="Train the clip again.",
+            f"The clip file is damaged or not a clip file ({reason_of(error)}).",
+            hint="Restore it from a copy, or remove it and train the clip again.",
             path=path,
         ) from error
-    if header.get("schema") not in _READABLE:
-        raise ProjectError(
-            f"The clip file has schema {header.get('schema')}, this version reads 1 to {SCHEMA}.",
-            hint="Use the version that wrote it or train the clip again.",
-            path=path,
-        )
     return ClipState(arrays, header)
 
 
@@ -114,7 +111,7 @@ def _decoded(payloads: dict[str, np.ndarray], specs: dict[str, Any]) -> dict[str
     Raises:
         CodingError: An array is damaged, missing or not described; names it.
     """
-    if not isinstance(specs, dict) or specs.keys() != payloads.keys():
+    if specs.keys() != payloads.keys():
         raise CodingError("its arrays and their description differ")
     arrays = {}
     for name, payload in payloads.items():
@@ -125,11 +122,73 @@ def _decoded(payloads: dict[str, np.ndarray], specs: dict[str, Any]) -> dict[str
     return arrays
 
 
+@dataclass(frozen=True, slots=True)
+class DamagedClip:
+    """What stands in place of a header that cannot be read. A value.
+
+    Attributes:
+        path: The file.
+        reason: What is wrong with it, in words that fit into brackets.
+    """
+
+    path: Path
+    reason: str
+
+
+def look_at_clip(path: Path, *, with_arrays: bool = False) -> dict[str, Any] | DamagedClip | None:
+    """Header of a clip, checkpoint or snapshot; None when there is no such file, the reason when it cannot be read.
+
+    Args:
+        with_arrays: Compare the arrays with their checksums too, which reads the whole file.
+    """
+    try:
+        if with_arrays:
+            return read_clip_state(path).header
+        return _header_of(read_clip_metadata(path)[0])
+    except FileNotFoundError:
+        return None
+    except ProjectError as error:
+        return DamagedClip(path, reason_of(error.__cause__ or error)) if path.exists() else None
+    except _DAMAGE as error:
+        return DamagedClip(path, reason_of(error))
+
+
 def read_clip_header(path: Path) -> dict[str, Any] | None:
     """Header of a clip, checkpoint or snapshot without its arrays; None when there is none or it is damaged."""
-    try:
-        with safe_open(path, framework="numpy") as file:
-            header = json.loads((file.metadata() or {})["header"])
-    except (OSError, SafetensorError, KeyError, ValueError):
-        return None
-    return header if isinstance(header, dict) else None
+    found = look_at_clip(path)
+    return found if isinstance(found, dict) else None
+
+
+def reason_of(error: BaseException) -> str:
+    """Why a file cannot be used, in words that fit into brackets."""
+    return (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
+
+
+class _Unreadable(ValueError):
+    """A file of a newer version."""
+
+
+_DAMAGE = (OSError, ArraysError, JsonError, HeaderError, CodingError, _Unreadable)
+
+
+def read_clip_metadata(path: Path) -> tuple[dict[str, str], dict[str, int]]:
+    """Texts of a clip file, and the bytes that each of its arrays takes. Raises: see engine.array_files."""
+    return read_metadata(path, _ENTRIES)
+
+
+def _header_of(metadata: dict[str, str]) -> dict[str, Any]:
+    """The header among the texts of a file.
+
+    Raises:
+        HeaderError, JsonError: There is none, or not a clip's.
+        _Unreadable: It is of a newer schema.
+    """
+    if "header" not in metadata:
+        raise HeaderError("it has no header")
+    header = parse_object(metadata["header"], is_nan_allowed=True)
+    schema = header.get("schema")
+    if type(schema) is int and schema > SCHEMA:
+        raise _Unreadable(f"it has schema {schema}, this version reads 1 to {SCHEMA}")
+    if type(schema) is not int or schema not in READABLE:
+        raise HeaderError(f"its header has schema {schema!r:.60}")
+    return check_header(header)

@@ -26,7 +26,9 @@ MAX_BYTES = 1 << 29
 _FILTERS = [{"id": lzma.FILTER_LZMA2, "preset": 6, "dict_size": 1 << 20, "lc": 0, "lp": 0, "pb": 0}]
 _FLOAT_MAX = float(np.finfo(np.float32).max)
 _HALF_MAX = float(np.finfo(np.float16).max)
-_DTYPES = frozenset(map(np.dtype, ("?", "u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f2", "<f4", "<f8")))
+_KINDS = ("?", "u1", "i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f2", "<f4", "<f8")
+_DTYPES = {np.dtype(kind).str: np.dtype(kind) for kind in _KINDS}
+"""By the names that a specification gives them."""
 
 
 class CodingError(ValueError):
@@ -66,7 +68,7 @@ def encode_array(array: np.ndarray, codec: str, **options: Any) -> CodedArray:
     if np.issubdtype(array.dtype, np.floating) and not np.isfinite(array).all():
         raise CodingError("it holds numbers that are not finite")
     little = np.ascontiguousarray(array.astype(array.dtype.newbyteorder("<"), copy=False)).reshape(array.shape)
-    if little.dtype not in _DTYPES:
+    if little.dtype.str not in _DTYPES:
         raise CodingError(f"arrays of {array.dtype} cannot be stored")
     raw, extra, bounds = _CODECS[codec][0](little, **options)
     spec = {
@@ -89,12 +91,12 @@ def decode_array(payload: np.ndarray, spec: dict[str, Any]) -> np.ndarray:
             specification's sizes, and no more than MAX_BYTES, is ever allocated.
     """
     try:
-        dtype, shape = np.dtype(spec["dtype"]), tuple(int(n) for n in spec["shape"])
+        dtype, shape = _DTYPES[spec["dtype"]], tuple(int(n) for n in spec["shape"])
         n_bytes, unpack = int(spec["n_bytes"]), _CODECS[spec["codec"]][1]
         n_values = math.prod(shape)
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise CodingError(f"the description is incomplete ({error})") from error
-    if dtype not in _DTYPES or min((*shape, n_bytes)) < 0 or max(n_values * dtype.itemsize, n_bytes) > MAX_BYTES:
+    if min((*shape, n_bytes)) < 0 or max(n_values * dtype.itemsize, n_bytes) > MAX_BYTES:
         raise CodingError(f"shape {shape} of {dtype} in {n_bytes} bytes is no array of a clip")
     try:
         unpacker = lzma.LZMADecompressor(format=lzma.FORMAT_RAW, filters=_FILTERS)
@@ -106,7 +108,7 @@ def decode_array(payload: np.ndarray, spec: dict[str, Any]) -> np.ndarray:
         raise CodingError(f"{len(raw)} of {n_bytes} bytes are there, or others than were written")
     try:
         array = unpack(raw, dtype, shape, spec)
-    except (KeyError, TypeError, ValueError, IndexError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError, MemoryError) as error:
         raise CodingError(f"the bytes do not fit shape {shape} ({error})") from error
     if (array.shape, array.dtype) != (shape, dtype):
         raise CodingError(f"{spec['codec']} gives {array.dtype} {array.shape}, not {dtype} {shape}")
@@ -185,9 +187,12 @@ def _pack_steps(array: np.ndarray, *, bits: int = 8) -> Packed:
 def _unpack_steps(raw: bytes, dtype: np.dtype, shape: tuple[int, ...], spec: dict[str, Any]) -> np.ndarray:
     if dtype != np.float32:
         raise CodingError(f"{dtype} has no steps")
-    groups = np.zeros(_group_shape(shape), np.float32)
-    n_groups, n_rows, n_channels = groups.shape
+    n_groups, n_rows, n_channels = _group_shape(shape)
     code_dtype = _code_dtype(int(spec["bits"]))
+    n_least = (n_groups * n_rows + 7) // 8 if len(shape) == 3 else n_rows * n_channels * code_dtype.itemsize
+    if len(raw) < 16 * n_groups * n_channels + n_least:  # seen before memory for the values is taken
+        raise CodingError(f"{len(raw)} bytes are too few")
+    groups = np.zeros((n_groups, n_rows, n_channels), np.float32)
     at = 16 * n_groups * n_channels
     sizes = np.frombuffer(raw[:at], "<f8").reshape(n_groups, n_channels, 2)
     is_kept = np.ones((n_groups, n_rows), bool)

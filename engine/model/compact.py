@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from engine.errors import NonFiniteLoss, ProjectError
-from engine.model.clip_state import SCHEMA, ClipState, write_coded_arrays
+from engine.model.clip_header import SCHEMA
+from engine.model.clip_state import ClipState, write_coded_arrays
 from engine.model.coding import CodedArray, CodingError, decode_array, encode_array
 
 _BITS = {"features": 7, "color_logits": 7, "log_offset_scales": 6, "log_base_scales": 6}

@@ -281,6 +281,11 @@ class FusedAdam:
     def restore(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
         """See AdamState."""
         self._steps[name] = round(arrays["step"].item())  # a file gives a single number back as [1]
+        if (
+            arrays["exp_avg"].shape != self._means[name].shape
+            or arrays["exp_avg_sq"].shape != self._squares[name].shape
+        ):
+            raise ValueError(f"moments of {name} are {arrays['exp_avg'].shape}, not {self._means[name].shape}")
         self._means[name][...] = arrays["exp_avg"]
         self._squares[name][...] = arrays["exp_avg_sq"]
         is_moving = (self._means[name].ravel() != 0) | (self._squares[name].ravel() != 0)

@@ -21,13 +21,14 @@ from engine.cloud.range import near_plane
 from engine.cloud.regions import GateRegion
 from engine.errors import NonFiniteLoss, PreparationError
 from engine.metrics.psnr import psnr
+from engine.model.clip_header import SCHEMA
 from engine.model.clip_model import ClipModel, decoder_sizes, load_clip_model
-from engine.model.clip_state import SCHEMA, ClipState
+from engine.model.clip_state import ClipState
 from engine.model.compact import CompactClip, compact_clip
 from engine.model.view import REACH_SPACINGS, View, render_gaussians, render_model
 from engine.training.active_tiles import ActivePicture, ActiveTiles
 from engine.training.building import merged
-from engine.training.checkpoint import Checkpoint, Place, read_checkpoint, write_checkpoint
+from engine.training.checkpoint import Checkpoint, Place, damaged_checkpoint, read_checkpoint, write_checkpoint
 from engine.training.clip_field import n_alive
 from engine.training.clip_preparation import ClipParts, ClipPreparation
 from engine.training.config import TrainConfig
@@ -407,6 +408,24 @@ class ClipTraining:
         expected = {"clip_index": self.clip.clip_index, "camera_names": list(self.rig.names), "seed": self.seed}
         kept = read_checkpoint(path, expected)
         self.pictures = self._preparation.read_pictures()
+        try:
+            self._go_on(kept)
+        except (
+            ArithmeticError,
+            AssertionError,
+            AttributeError,
+            LookupError,
+            RuntimeError,
+            TypeError,
+            ValueError,
+        ) as error:
+            raise damaged_checkpoint(error, path) from error
+
+    def _go_on(self, kept: Checkpoint) -> None:
+        width, height = shared_image_size(self.capture)
+        if kept.backgrounds.images.shape != (len(self.rig), height, width, 3) or kept.gains.shape != (len(self.rig), 3):
+            found = f"{kept.backgrounds.images.shape} and {kept.gains.shape}"
+            raise ValueError(f"backgrounds and gains are {found}, not of {len(self.rig)} cameras of {width}x{height}")
         header, arrays, place = kept.state.header, kept.state.arrays, kept.place
         parts = ClipParts(
             load_clip_model(kept.state, self.reference, is_learning=True),

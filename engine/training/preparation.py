@@ -8,13 +8,14 @@ corrected backgrounds are reused, only the clip's own motion is looked at.
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from safetensors import SafetensorError, safe_open
 
+from engine.array_files import ArraysError, read_arrays, write_arrays
 from engine.capture.capture import Capture
 from engine.capture.rig import CameraRig
 from engine.cloud.background import estimate_background
@@ -23,10 +24,11 @@ from engine.cloud.moving_cloud import MovingCloud, build_moving_cloud, motion_bo
 from engine.cloud.recheck import recheck_background
 from engine.cloud.sparse import triangulate
 from engine.cloud.static_cloud import StaticCloud, build_static_cloud
-from engine.files import write_arrays
 from engine.training.config import TrainConfig
 from engine.training.pictures import TrainingPictures
 from engine.training.report import Progress, ReportProgress
+
+logger = logging.getLogger(__name__)
 
 BACKGROUNDS_FILE = "backgrounds.safetensors"
 
@@ -209,12 +211,21 @@ def write_backgrounds(prep_dir: Path, backgrounds: Backgrounds, key: dict) -> No
 
 
 def read_backgrounds(prep_dir: Path, key: dict) -> Backgrounds | None:
-    """Backgrounds kept earlier, or None when there are none for this key or the file is damaged."""
+    """Backgrounds kept earlier, or None when there are none for this key, or the file is damaged or does not fit it."""
+    path = prep_dir / BACKGROUNDS_FILE
     try:
-        with safe_open(prep_dir / BACKGROUNDS_FILE, framework="numpy") as file:
-            if (file.metadata() or {}).get("key") != json.dumps(key, sort_keys=True):
-                return None
-            images, packed = file.get_tensor("images"), file.get_tensor("is_stable")
-    except (OSError, SafetensorError, KeyError):
+        arrays, metadata = read_arrays(path, ("key",))
+        images, packed = arrays["images"], arrays["is_stable"]
+    except FileNotFoundError:
+        return None
+    except (OSError, ArraysError, KeyError) as error:
+        logger.warning("the kept backgrounds cannot be read (%s) and are made again - %s", error, path)
         return None  # a cache: estimated again by the caller
-    return Backgrounds(images, np.unpackbits(packed, axis=-1, count=images.shape[2]).astype(bool))
+    if metadata.get("key") != json.dumps(key, sort_keys=True):
+        return None
+    (width, height), n_cameras = key["size"], len(key["cameras"])
+    shapes = [(n_cameras, height, width, 3), (n_cameras, height, (width + 7) // 8)]
+    if [images.shape, packed.shape] != shapes or {images.dtype, packed.dtype} != {np.dtype(np.uint8)}:
+        logger.warning("the kept backgrounds do not fit the cameras and are made again - %s", path)
+        return None
+    return Backgrounds(images, np.unpackbits(packed, axis=-1, count=width).astype(bool))

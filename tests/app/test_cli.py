@@ -16,7 +16,7 @@ def test_a_folder_that_is_no_capture(run, tmp_path):
     for command in (["inspect", tmp_path / "holiday"], ["train", tmp_path / "holiday", "--project", tmp_path / "p"]):
         code, _, err = run(*command)
         assert code == 2
-        assert "no capture" in err
+        assert "not a capture" in err
         assert str(tmp_path / "holiday") in err
     assert not (tmp_path / "p").exists()
 

@@ -12,7 +12,7 @@ from app.clip_catalog import ClipCatalog
 from app.project import Project
 from app.training.service import TrainingService
 from engine.capture.clip import split_clips
-from engine.model.clip_state import read_clip_header
+from engine.model.clip_state import DamagedClip, look_at_clip, read_clip_header
 from tests.app.made_projects import clip_header, make_chain, make_project, write_header
 
 
@@ -86,11 +86,11 @@ def test_each_header_is_read_once_while_its_file_stays(tmp_path: Path, monkeypat
     project = make_chain(tmp_path, 20)
     read: list[str] = []
 
-    def counted(path: Path) -> dict | None:
+    def counted(path: Path) -> dict | DamagedClip | None:
         read.append(path.name)
-        return read_clip_header(path)
+        return look_at_clip(path)
 
-    monkeypatch.setattr("app.header_cache.read_clip_header", counted)
+    monkeypatch.setattr("app.header_cache.look_at_clip", counted)
     catalog = ClipCatalog(project, 20)
     assert sorted(read) == [f"{index:04d}.safetensors" for index in range(20)]
     ClipCatalog(project, 20)

@@ -72,7 +72,7 @@ def test_what_was_decided_is_counted_per_clip(folder, capsys):
         "inherited.static.is_hidden": np.array([True, False, True, False]),
         "gate.static": np.array([LIGHT, STILL, LIGHT, STILL], np.uint8),
     }
-    header = {"schema": 2, "role": "source", "clip_index": 1}
+    header = {"schema": 2, "role": "source", "clip_index": 1, "step": 1, "n_steps": 1}
     (folder / "clips").mkdir()
     write_clip_state(folder / "clips" / "0001.safetensors", ClipState(arrays, header))
     code, out, _ = run(capsys, folder)

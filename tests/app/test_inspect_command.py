@@ -55,14 +55,26 @@ def test_inspecting_a_project_says_how_much_of_what_moves_is_within_reach_of_an_
     assert said in run("inspect", project)[1]
 
 
-def test_inspecting_a_project_without_clips_or_with_a_damaged_one_is_bad_input(run, capture_folder, tmp_path):
+def test_a_damaged_clip_is_listed_beside_the_others(run, capture_folder, tmp_path):
     project = tmp_path / "p"
     assert run("train", capture_folder, "--project", project, "--clip-length", 3)[0] == 0
     clip = project / "clips" / "0001.safetensors"
     clip.write_bytes(clip.read_bytes()[:50])
     code, out, err = run("inspect", project)
+    assert (code, err) == (0, "")
+    assert "1 trained clips, 3 frames" in out
+    assert f"Damaged, and not counted (invalid header length): {clip}" in out
+    found = json.loads(run("inspect", project, "--json")[1])
+    assert [entry["path"] for entry in found["damaged"]] == [str(clip)]
+    (project / "clips" / "0000.safetensors").write_bytes(b"")
+    code, out, err = run("inspect", project)
     assert (code, out) == (2, "")
     assert "damaged" in err
+
+
+def test_inspecting_a_project_without_clips_is_bad_input(run, capture_folder, tmp_path):
+    project = tmp_path / "p"
+    assert run("train", capture_folder, "--project", project, "--clip-length", 3)[0] == 0
     for path in (project / "clips").iterdir():
         path.unlink()
     code, out, err = run("inspect", project)

@@ -255,9 +255,12 @@ def test_a_state_that_is_no_number_is_not_kept(bench):
     assert not it.checkpoint.exists()
 
 
+HEADER = {"schema": 1, "role": "reference", "clip_index": 0, "step": 1, "n_steps": 1}
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_a_clip_with_numbers_that_are_none_is_not_kept(tmp_path, bad):
-    state = ClipState({"value": np.array([1.0, bad], np.float32)}, {"schema": 1, "role": "reference"})
+    state = ClipState({"value": np.array([1.0, bad], np.float32)}, HEADER)
     with pytest.raises(NonFiniteLoss):
         keep_clip(compact_clip(state), tmp_path / "clips" / "0000.safetensors", tmp_path / "live")
     assert not list(tmp_path.rglob("*.safetensors"))
@@ -265,7 +268,7 @@ def test_a_clip_with_numbers_that_are_none_is_not_kept(tmp_path, bad):
 
 def test_a_clip_that_reads_back_differently_does_not_replace_the_old_one(tmp_path, monkeypatch):
     path = tmp_path / "clips" / "0000.safetensors"
-    good = ClipState({"value": np.ones(2, np.float32)}, {"schema": 1, "role": "reference"})
+    good = ClipState({"value": np.ones(2, np.float32)}, HEADER)
     keep_clip(compact_clip(good), path, tmp_path / "live")
     other = ClipState({"value": np.zeros(2, np.float32)}, good.header)
     monkeypatch.setattr("app.training.snapshots.read_clip_state", lambda _path: good)

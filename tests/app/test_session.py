@@ -60,7 +60,7 @@ def test_what_is_no_capture_becomes_a_notice_and_leaves_nothing(make_session, tm
     assert [job.name for job in session.jobs] == ["Opening the capture"]
     poll_until(session, lambda: len(session.notices) > 0)
     assert session.notices[0].kind == "error"
-    assert "no capture" in session.notices[0].detail
+    assert "not a capture" in session.notices[0].detail
     assert session.capture is None
     assert not (tmp_path / "p").exists()
     session.dispatch(c.DismissNotice(0))

@@ -71,3 +71,29 @@ def test_stepping_wraps_only_when_looping():
     timeline.is_looping = False
     timeline.step(3)
     assert timeline.frame_index == 4
+
+
+def test_playing_every_frame_waits_for_each_picture_and_does_not_catch_up():
+    timeline = Timeline(split_clips(10, 5), fps=10.0)
+    timeline.is_every_frame = True
+    timeline.toggle_play()
+    assert not timeline.tick(0.5, is_shown=False)
+    assert timeline.tick(0.01, is_shown=True)
+    assert timeline.frame_index == 1
+    visited = []
+    for _ in range(4):
+        timeline.tick(0.25, is_shown=True)  # slower than the capture: one frame each time, none left out
+        visited.append(timeline.frame_index)
+    assert visited == [2, 3, 4, 5]
+    timeline.tick(0.01, is_shown=True)
+    timeline.tick(0.01, is_shown=True)
+    assert timeline.frame_index <= 6  # what was lost is not made up for in a hurry
+
+
+def test_playing_every_frame_is_never_faster_than_the_capture():
+    timeline = Timeline(split_clips(20, 5), fps=10.0)
+    timeline.is_every_frame = True
+    timeline.toggle_play()
+    for _ in range(60):
+        timeline.tick(1 / 60, is_shown=True)
+    assert timeline.frame_index == 10

@@ -11,6 +11,7 @@ import pytest
 pyglet.options.headless = True  # before pyglet.window is imported anywhere in this process
 pyglet.options.shadow_window = False
 
+from app.window_memory import WindowMemory  # noqa: E402
 from tests.ui.fake_session import FakeSession  # noqa: E402
 from tests.ui.pilot import Pilot  # noqa: E402
 
@@ -42,13 +43,20 @@ def open_pilot(headless_gl: None) -> Iterator[Callable[..., Pilot]]:
 
     opened: list[Any] = []
 
-    def open_window(session: FakeSession | None = None) -> Pilot:
-        studio = StudioWindow(session or FakeSession(), width=1280, height=800, fixed_delta_s=1 / 60)
+    def open_window(
+        session: FakeSession | None = None,
+        *,
+        size: tuple[int, int] = (1280, 800),
+        memory: WindowMemory | None = None,
+        first_frames: int = 6,
+    ) -> Pilot:
+        width, height = size
+        studio = StudioWindow(session or FakeSession(), width=width, height=height, fixed_delta_s=1 / 60, memory=memory)
         opened.append(studio)
         # Synthetic events would wait for dispatch_events() otherwise.
         studio.window._enable_event_queue = False
         pilot = Pilot(studio)
-        pilot.draw(6)
+        pilot.draw(first_frames)
         return pilot
 
     yield open_window

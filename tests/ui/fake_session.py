@@ -24,6 +24,7 @@ from app.status import (
     RegionsStatus,
     SettingStatus,
     TrainingStatus,
+    WantedFrame,
 )
 from app.timeline import Timeline
 from app.view import OrbitView
@@ -164,6 +165,21 @@ class FakeSession:
         clip = self.timeline.clip_of(self.timeline.frame_index)
         return clip is not None and self.clip_states[clip.clip_index].state == "trained"
 
+    def wanted_frame(self) -> WantedFrame | None:
+        """What is under the playhead; trained clips are there at once."""
+        clip = self.timeline.clip
+        if clip is None:
+            return None
+        is_trained = self._is_trained()
+        return WantedFrame(
+            clip.clip_index,
+            self.timeline.frame_index,
+            revision="trained" if is_trained else "",
+            camera_index=self.view.look_through,
+            look=self.view.look_key,
+            is_loaded=is_trained,
+        )
+
     def request_render(self, width: int, height: int) -> Picture | None:
         """A gradient that depends on the frame, for trained clips."""
         if not self._is_trained():
@@ -174,7 +190,18 @@ class FakeSession:
         tint = np.array([1.0, 0.8, 0.6], dtype=np.float32)
         image = ((x * 0.5 + y * 0.5) * tint).astype(np.uint8)
         matrix = np.asarray(self.view.world_to_camera())
-        return Picture(image, key=(self.timeline.frame_index, width, height, matrix.tobytes()))
+        frame_index = self.timeline.frame_index
+        clip = self.timeline.clip_of(frame_index)
+        assert clip is not None
+        return Picture(
+            image,
+            key=(frame_index, width, height, matrix.tobytes()),
+            clip_index=clip.clip_index,
+            frame_index=frame_index,
+            revision="trained",
+            camera_index=self.view.look_through,
+            look=self.view.look_key,
+        )
 
     def shown_gaussians(self) -> None:
         """No Gaussians here."""
@@ -194,4 +221,5 @@ class FakeSession:
         x = np.arange(max_width)[None, :, None] * 255 // max_width
         image = np.broadcast_to(x, (height, max_width, 3)).astype(np.uint8).copy()
         image[:, :, camera_index % 3] = (camera_index * 37) % 255
-        return Picture(image, key=(camera_index, frame_index, max_width))
+        key = (camera_index, frame_index, max_width)
+        return Picture(image, key=key, camera_index=camera_index, frame_index=frame_index)

@@ -13,6 +13,7 @@ import json
 import os
 import sys
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,7 @@ def describe(studio: Any) -> dict[str, Any]:
         "sphere": None if studio.frame.ui.regions.sphere is None else studio.frame.ui.regions.sphere.as_dict(),
         "is_help_open": studio.frame.ui.is_help_open,
         "shows": studio.frame.viewport.scene.shows,
+        "hud": None if studio.frame.viewport.hud.text is None else asdict(studio.frame.viewport.hud.text),
     }
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from pyglet.window import key, mouse
 
+from ui.screenshot import read_window
 from ui.state import Rect
 
 
@@ -28,27 +30,53 @@ class Pilot:
             self.studio.frame.update(1 / 60)
             self.studio.draw()
 
+    def rest(self, turns: int = 120) -> None:
+        """Turn the window's loop as if nobody touched anything, until it stops drawing.
+
+        Raises:
+            AssertionError: It never does.
+        """
+        for _ in range(turns):
+            if not self.studio.frame.update(1 / 60):
+                return
+            self.studio.draw()
+        raise AssertionError(f"the window still draws after {turns} turns without any input")
+
+    def tap(self, x: float, y: float, button: int = mouse.LEFT) -> None:
+        """Move, press and release with no frame between, as a tap on a tablet does; then let the loop rest."""
+        self.x, self.y = x, y
+        self._send("on_mouse_motion", *self._at(), 1, 1)
+        self._send("on_mouse_press", *self._at(), button, 0)
+        self._send("on_mouse_release", *self._at(), button, 0)
+        self.rest()
+
+    def picture(self) -> np.ndarray:
+        """What stands in the window. [H, W, 3] uint8"""
+        return read_window(self.studio.ctx, *self.studio.window.get_framebuffer_size())
+
     def _send(self, name: str, *arguments: Any) -> None:
         self.studio.window.dispatch_event(name, *arguments)
 
-    def _up(self, y: float) -> float:
-        return self.studio.window.height - 1 - y  # pyglet counts rows upwards
+    def _at(self) -> tuple[float, float]:
+        """Where the pointer is, as pyglet counts: pixels, rows upwards."""
+        scale = self.studio.frame.backend.pixels_per_unit
+        return self.x * scale, self.studio.window.height - 1 - self.y * scale
 
     def move(self, x: float, y: float) -> None:
         """Pointer to window coordinates (y down), no button held."""
         dx, dy = x - self.x, self.y - y
         self.x, self.y = x, y
-        self._send("on_mouse_motion", x, self._up(y), dx, dy)
+        self._send("on_mouse_motion", *self._at(), dx, dy)
         self.draw()
 
     def press(self, button: int = mouse.LEFT) -> None:
         """Button down where the pointer is."""
-        self._send("on_mouse_press", self.x, self._up(self.y), button, 0)
+        self._send("on_mouse_press", *self._at(), button, 0)
         self.draw()
 
     def release(self, button: int = mouse.LEFT) -> None:
         """Button up where the pointer is."""
-        self._send("on_mouse_release", self.x, self._up(self.y), button, 0)
+        self._send("on_mouse_release", *self._at(), button, 0)
         self.draw()
 
     def drag(self, start: tuple[float, float], stop: tuple[float, float], *, button: int = mouse.LEFT, steps: int = 4):
@@ -60,7 +88,7 @@ class Pilot:
             y = start[1] + (stop[1] - start[1]) * i / steps
             dx, dy = x - self.x, self.y - y
             self.x, self.y = x, y
-            self._send("on_mouse_drag", x, self._up(y), dx, dy, button, 0)
+            self._send("on_mouse_drag", *self._at(), dx, dy, button, 0)
             self.draw()
         self.release(button)
 
@@ -73,7 +101,7 @@ class Pilot:
 
     def wheel(self, ticks: float) -> None:
         """Turn the wheel where the pointer is."""
-        self._send("on_mouse_scroll", self.x, self._up(self.y), 0.0, ticks)
+        self._send("on_mouse_scroll", *self._at(), 0.0, ticks)
         self.draw(2)
 
     def key(self, symbol: int, *, modifiers: tuple[int, ...] = ()) -> None:

@@ -1,27 +1,10 @@
-"""The viewport's choices that need no GL: how large a picture is while the view moves, which anchors are marked."""
+"""The viewport's choices that need no GL: which anchors are marked."""
 
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from ui.anchor_marks import thinned
-from ui.scene import MOVING_MS, MOVING_SHARES, moving_share
-
-
-@pytest.mark.parametrize(
-    ("drawn_share", "took_ms", "expected"),
-    [
-        (1.0, MOVING_MS, 1.0),
-        (1.0, 4 * MOVING_MS, 0.5),  # time goes with the pixels, so half the width
-        (0.5, MOVING_MS / 4, 1.0),
-        (1.0, 1e4, MOVING_SHARES[0]),
-        (1.0, 0.0, MOVING_SHARES[1]),
-        (1.0, 1.3 * MOVING_MS, 0.875),  # in eighths, rounded down
-    ],
-)
-def test_a_moving_picture_is_as_large_as_time_allows(drawn_share: float, took_ms: float, expected: float) -> None:
-    assert moving_share(drawn_share, took_ms) == expected
 
 
 def test_few_anchors_are_all_marked() -> None:

@@ -136,7 +136,7 @@ def test_a_folder_that_is_no_capture_becomes_a_notice(tmp_path: Path, monkeypatc
         kind, title, detail, hint = state["notices"][0]
         assert kind == "error"
         assert "holiday" in title
-        assert "no capture" in detail
+        assert "not a capture" in detail
         assert hint.endswith(str(empty))
         assert state["capture"] is None
     finally:

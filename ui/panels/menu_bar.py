@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from app.commands import OpenCapture
 from ui.panels.welcome import SAMPLE_PATH
-from ui.shortcuts import COMPARE, MARK, SHORTCUTS, VIEW, choose_scale, train_or_pause
+from ui.shortcuts import COMPARE, MARK, SHORTCUTS, TIME, VIEW, choose_scale, train_or_pause
 from ui.state import PANELS, Dispatch, UiState
 from ui.theme import Icon
 from ui.ui_scale import CHOICES, scale_text
@@ -22,6 +22,8 @@ def draw_menu_bar(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         return
     if ui.is_menu_wanted:
         ui.is_menu_wanted = False
+        bar = imgui.internal.get_current_window()
+        imgui.internal.set_focus_id(bar.get_id(FIRST_MENU), bar)  # from there the arrow keys go to the other menus
         imgui.open_popup(FIRST_MENU)
     has_capture = session.capture is not None
     if _begin_menu(FIRST_MENU, ui):
@@ -36,6 +38,8 @@ def draw_menu_bar(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     if _begin_menu("View", ui):
         imgui.begin_disabled(not has_capture)
         _draw_rows((VIEW, COMPARE), session, dispatch, ui)
+        imgui.separator()
+        _draw_rows((TIME,), session, dispatch, ui, is_on_only=True)
         imgui.end_disabled()
         imgui.separator()
         _draw_scale_menu(ui)
@@ -57,6 +61,9 @@ def draw_menu_bar(session: Any, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _begin_menu(title: str, ui: UiState, *, is_enabled: bool = True) -> bool:
+    menu_id = imgui.internal.get_current_window().get_id(title)
+    if is_enabled and imgui.get_current_context().nav_just_moved_to_id == menu_id:
+        imgui.open_popup(title)  # an arrow key went on to this menu: it opens as under the pointer
     is_open = imgui.begin_menu(title, is_enabled)
     if not is_open:
         ui.mark(f"menu.{title}")
@@ -69,8 +76,13 @@ def _item(ui: UiState, label: str, key_label: str = "", *, is_on: bool = False) 
     return is_chosen
 
 
-def _draw_rows(groups: tuple[str, ...], session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_rows(
+    groups: tuple[str, ...], session: Any, dispatch: Dispatch, ui: UiState, *, is_on_only: bool = False
+) -> None:
+    """Rows of the table of keys. is_on_only: Those only that can be on or off."""
     for shortcut in SHORTCUTS:
+        if is_on_only and shortcut.is_on is None:
+            continue
         if shortcut.group not in groups or (shortcut.needs_choosing and not ui.regions.is_active):
             continue
         is_on = shortcut.is_on is not None and session.capture is not None and shortcut.is_on(session)

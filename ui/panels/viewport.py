@@ -15,15 +15,17 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from app.commands import LookThrough, ToggleOverlay
 from app.status import COMPARE_MODES
 from ui import theme
-from ui.panels.regions import begin_choosing, draw_chosen_sphere, draw_region_mark
+from ui.hud_text import pane_text
+from ui.panels.hud import Hud
+from ui.panels.regions import begin_choosing, draw_chosen_sphere
 from ui.panels.welcome import draw_welcome
 from ui.region_layer import ShownRegions
-from ui.region_tool import GROWTH, REGION_WORDS
+from ui.region_tool import GROWTH
 from ui.scene import Scene, SceneView
-from ui.shortcuts import set_compare, shown_compare
+from ui.shortcuts import cloud_overlay, set_compare, shown_compare
 from ui.state import Dispatch, Rect, UiState
 from ui.theme import Icon
-from ui.widgets import chip, format_count
+from ui.widgets import chip
 
 MOVING_S = 0.22
 """The view counts as moving for this long after the last change of it."""
@@ -31,7 +33,8 @@ WIPE_GRAB_PX = 9.0
 CLICK_PX = 4.0
 """A press that moves less than this before its release is a click, where clicks mean something."""
 TOOLBAR_HEIGHT = 38.0
-STALE_AFTER_S = 0.15
+TOOLBAR_WIDTH = 610.0
+"""With less room, words give way to symbols."""
 COMPARE_WORDS = {"off": "Off", "wipe": "Wipe", "side": "Side by side"}
 
 
@@ -74,8 +77,8 @@ class ViewportPanel:
         self._is_click = False
         self._aimed_at = (0.0, 0.0)
         self._moved_s = -1e9
-        self._stale_since_s: float | None = None
-        self._fps = 0.0
+        self.hud = Hud()
+        self._captured_frame: int | None = None
 
     def release(self) -> None:
         """Free GL objects. GL thread only."""
@@ -93,6 +96,11 @@ class ViewportPanel:
     def has_news(self, session: Any) -> bool:
         """Did a picture arrive that the window does not show yet? Cheap; asked at every tick."""
         return session.capture is not None and self.scene.has_news(session)
+
+    def shows_playhead(self, session: Any) -> bool:
+        """Is the frame under the playhead on screen, in every picture that is compared?"""
+        wanted = session.wanted_frame()
+        return wanted is None or (self.scene.shown.is_of(wanted) and self._captured_frame in (None, wanted.frame_index))
 
     def draw(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
         """Toolbar, picture, HUD."""
@@ -126,7 +134,11 @@ class ViewportPanel:
         self._navigate(session, dispatch, ui, panes)
         # Looking through a camera may just have ended; the picture then fills the area from the next frame on.
         self._draw_picture(session, dispatch, ui, area, panes)
-        self._draw_hud(session, ui, area, panes)
+        self.hud.draw(session, ui, area, self.scene)
+        if ui.regions.is_active:
+            below_label = 44 if panes.captured is not None else 12
+            free = Rect(area.x0 + 12, area.y0 + below_label, area.x1, area.y1)
+            draw_chosen_sphere(ui, imgui.get_window_draw_list(), free, self.scene.regions.counts)
 
     # ---- toolbar ---------------------------------------------------------------------------------------------
 
@@ -134,10 +146,13 @@ class ViewportPanel:
         imgui.set_cursor_pos(ImVec2(imgui.get_cursor_pos_x() + 8, imgui.get_cursor_pos_y() + 6))
         shown = session.view.look_through
         names = session.rig.names
+        room = imgui.get_content_region_avail().x
+        is_roomy = room > TOOLBAR_WIDTH
         imgui.align_text_to_frame_padding()
-        imgui.text_disabled("View")
-        imgui.same_line()
-        imgui.set_next_item_width(150)
+        if is_roomy:
+            imgui.text_disabled("View")
+            imgui.same_line()
+        imgui.set_next_item_width(150 if is_roomy else min(120, max(room - 230, 40)))
         if imgui.begin_combo("##camera", "Free" if shown is None else names[shown]):
             if imgui.selectable("Free", shown is None)[0]:
                 dispatch(LookThrough(None))
@@ -147,22 +162,25 @@ class ViewportPanel:
             imgui.end_combo()
         ui.mark("viewport.camera")
         imgui.set_item_tooltip("Look through a capture camera ([ and ])")
-        imgui.same_line(0, 18)
-        imgui.text_disabled("Compare")
-        for mode in COMPARE_MODES:
-            imgui.same_line(0, 8 if mode == "off" else 2)
-            if _segment(COMPARE_WORDS[mode], shown_compare(session) == mode):
-                set_compare(session, dispatch, mode)
-            ui.mark(f"viewport.compare.{mode}")
-            imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")
-        imgui.same_line(0, 18)
-        if imgui.button(f"{Icon.EYE}  Show"):
+        imgui.same_line(0, 18 if is_roomy else 8)
+        if is_roomy:
+            imgui.text_disabled("Compare")
+            for mode in COMPARE_MODES:
+                imgui.same_line(0, 8 if mode == "off" else 2)
+                if _segment(COMPARE_WORDS[mode], shown_compare(session) == mode):
+                    set_compare(session, dispatch, mode)
+                ui.mark(f"viewport.compare.{mode}")
+                imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")
+        else:
+            self._draw_compare_box(session, dispatch, ui)
+        imgui.same_line(0, 18 if is_roomy else 8)
+        if imgui.button(f"{Icon.EYE}  Show" if is_roomy else f"{Icon.EYE}##show"):
             imgui.open_popup("overlays")
         ui.mark("viewport.overlays")
         self._draw_overlay_menu(session, dispatch, ui)
         imgui.same_line(0, 8)
         imgui.begin_disabled(not session.regions.can_mark)
-        if _segment(f"{Icon.REGION}  Mark", ui.regions.is_active):
+        if _segment(f"{Icon.REGION}  Mark" if is_roomy else Icon.REGION, ui.regions.is_active):
             if ui.regions.is_active:
                 ui.regions.leave()
             else:
@@ -173,6 +191,19 @@ class ViewportPanel:
         if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
             imgui.set_tooltip(words)
 
+    def _draw_compare_box(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        """All ways to compare in one place, where there is no room for buttons."""
+        shown = shown_compare(session)
+        imgui.set_next_item_width(118)
+        if imgui.begin_combo("##compare", "Compare" if shown == "off" else COMPARE_WORDS[shown]):
+            for mode in COMPARE_MODES:
+                if imgui.selectable(COMPARE_WORDS[mode], shown == mode)[0]:
+                    set_compare(session, dispatch, mode)
+                ui.mark(f"viewport.compare.{mode}")
+            imgui.end_combo()
+        ui.mark("viewport.compare")
+        imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")
+
     def _draw_overlay_menu(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
         if not imgui.begin_popup("overlays"):
             return
@@ -180,12 +211,13 @@ class ViewportPanel:
             ("show_frusta", "Cameras", "1"),
             ("show_inherited", "Inherited anchors (circles)", "2"),
             ("show_residual", "Residual anchors (diamonds)", "3"),
-            ("show_points", "Point cloud", "4"),
+            (cloud_overlay(session), "Point cloud", "4"),
             ("show_regions", "Marked regions", "5"),
         )
         for name, label, key_label in rows:
             if imgui.menu_item(label, key_label, bool(getattr(session.overlays, name)), True)[0]:
                 dispatch(ToggleOverlay(name))
+            ui.mark(f"show.{name}")
         imgui.separator()
         imgui.text_disabled("Tab hides or shows cameras and anchors")
         imgui.end_popup()
@@ -284,7 +316,7 @@ class ViewportPanel:
             text = self.scene.anchor_text(session, view, *pixels)
             if text:
                 imgui.set_tooltip(text)
-        self._note_stale(composed.is_stale, ui)
+        self._captured_frame = None
         if panes.captured is not None:
             self._draw_captured(session, draw, panes)
         draw.pop_clip_rect()
@@ -308,121 +340,39 @@ class ViewportPanel:
         tool.place(self.scene.point_under(session, view, *pixels, depth), eye=view.eye)
         tool.is_placed |= is_click
 
-    def _note_stale(self, is_stale: bool, ui: UiState) -> None:
-        if not is_stale:
-            self._stale_since_s = None
-            return
-        if self._stale_since_s is None:
-            self._stale_since_s = time.perf_counter()
-        ui.redraw_within(STALE_AFTER_S)
-
     def _draw_captured(self, session: Any, draw: Any, panes: Panes) -> None:
-        captured = panes.captured
-        assert captured is not None
-        texture = self.scene.captured(session, round(captured.width))
+        area = panes.captured
+        assert area is not None
+        captured = self.scene.captured(session, round(area.width))
+        shown = self.scene.shown
+        self._captured_frame = None if captured is None else captured.frame_index
+        frames = (None if captured is None else captured.frame_index, shown.frame_index)
+        words = "Captured picture is being read" if captured is None else pane_text("Captured", *frames)
+        rendered_words = pane_text(shown.kind, *frames[::-1])
+        color = theme.YELLOW if None not in frames and frames[0] != frames[1] else theme.TEXT
         if session.overlays.compare == "side":
-            if texture is not None:
-                draw.add_image(imgui.ImTextureRef(texture.glo), captured.low, captured.high)
-            chip(draw, captured.x0 + 10, captured.y0 + 10, "Captured")
-            chip(draw, panes.rendered.x0 + 10, panes.rendered.y0 + 10, self.scene.shows)
+            if captured is not None:
+                draw.add_image(imgui.ImTextureRef(captured.texture.glo), area.low, area.high)
+            chip(draw, area.x0 + 10, area.y0 + 10, words, color=color)
+            chip(draw, panes.rendered.x0 + 10, panes.rendered.y0 + 10, rendered_words, color=color)
             return
         share = session.overlays.wipe_position
-        x = captured.x0 + captured.width * share
-        if texture is not None:
+        x = area.x0 + area.width * share
+        if captured is not None:
             draw.add_image(
-                imgui.ImTextureRef(texture.glo), captured.low, ImVec2(x, captured.y1), ImVec2(0, 0), ImVec2(share, 1)
+                imgui.ImTextureRef(captured.texture.glo), area.low, ImVec2(x, area.y1), ImVec2(0, 0), ImVec2(share, 1)
             )
         white = theme.u32(theme.PLAYHEAD)
-        draw.add_line_v(x, captured.y0, captured.y1, white, 2)
-        middle = captured.center[1]
+        draw.add_line_v(x, area.y0, area.y1, white, 2)
+        middle = area.center[1]
         draw.add_circle_filled(ImVec2(x, middle), 9, white)
         dark = theme.u32(theme.VOID)
         draw.add_triangle_filled(ImVec2(x - 6, middle), ImVec2(x - 2, middle - 4), ImVec2(x - 2, middle + 4), dark)
         draw.add_triangle_filled(ImVec2(x + 6, middle), ImVec2(x + 2, middle + 4), ImVec2(x + 2, middle - 4), dark)
         if share > 0.15:
-            chip(draw, captured.x0 + 10, captured.y0 + 10, "Captured")
+            chip(draw, area.x0 + 10, area.y0 + 10, words, color=color)
         if share < 0.85:
-            chip(draw, captured.x1 - 10, captured.y0 + 10, self.scene.shows, is_right=True)
-
-    # ---- HUD -------------------------------------------------------------------------------------------------
-
-    def _draw_hud(self, session: Any, ui: UiState, area: Rect, panes: Panes) -> None:
-        draw = imgui.get_window_draw_list()
-        timeline, shown = session.timeline, session.view.look_through
-        delta_s = imgui.get_io().delta_time
-        if delta_s < 0.5:
-            self._fps = 0.9 * self._fps + 0.1 / max(delta_s, 1e-3)
-        camera = "free view" if shown is None else session.rig.names[shown]
-        if shown is not None and shown in (getattr(session, "holdout", ()) or ()):
-            camera += " (held out)"
-        parts = [f"frame {timeline.frame_index}", f"{timeline.frame_index / max(timeline.fps, 1e-6):.2f} s", camera]
-        if timeline.is_playing or self.is_moving:
-            parts.append(f"{self._fps:.0f} fps")
-        x = chip(draw, area.x0 + 12, area.y1 - 34, "   ".join(parts)) + 8
-        note = self._note(session)
-        if note:
-            x = chip(draw, x, area.y1 - 34, note[0], color=note[1]) + 8
-        stale_s = 0.0 if self._stale_since_s is None else time.perf_counter() - self._stale_since_s
-        if stale_s >= STALE_AFTER_S:
-            chip(draw, x, area.y1 - 34, f"{Icon.CLOCK}  stale", color=theme.YELLOW)
-        self._draw_legend(session, draw, area)
-        if ui.regions.is_active:
-            below_label = 44 if panes.captured is not None else 12
-            free = Rect(area.x0 + 12, area.y0 + below_label, area.x1, area.y1)
-            draw_chosen_sphere(ui, draw, free, self.scene.regions.counts)
-
-    def _note(self, session: Any) -> tuple[str, theme.Color] | None:
-        clip = session.timeline.clip_of(session.timeline.frame_index)
-        if clip is None:
-            return None
-        clip_index = clip.clip_index
-        status = session.clip_states[clip_index]
-        if status.state in ("preparing", "training", "paused"):
-            return f"{theme.CLIP_ICONS[status.state]}  clip {clip_index} {status.state}", theme.SKY
-        if status.state == "trained":
-            return None
-        return f"{self.scene.shows}, clip {clip_index} is not trained", theme.TEXT_DIM
-
-    def _draw_legend(self, session: Any, draw: Any, area: Rect) -> None:
-        counts = self.scene.counts
-        rows = []
-        if session.overlays.show_inherited and counts.n_inherited:
-            kind = "reference" if counts.is_reference else "inherited"
-            rows.append(("circle", theme.INHERITED, f"{format_count(counts.n_inherited)} {kind} anchors"))
-            rows += _role_rows("circle", counts.inherited_roles)
-        if session.overlays.show_residual and counts.n_residual:
-            kind = "residual" if len(counts.residual_roles) < 2 else "own"
-            rows.append(("diamond", theme.RESIDUAL, f"{format_count(counts.n_residual)} {kind} anchors"))
-            rows += _role_rows("diamond", counts.residual_roles)
-        if session.overlays.show_regions:
-            for treat, words in REGION_WORDS.items():
-                n = sum(region.treat == treat for region in session.regions.regions)
-                text = f"{n} {words} region{'s' if n > 1 else ''}"
-                rows += [(treat, theme.REGION_COLORS[treat], text)] if n else []
-        is_labelled = session.overlays.compare == "wipe" and session.view.look_through is not None
-        y = area.y0 + (44 if is_labelled else 12)
-        for shape, color, text in rows:
-            width = imgui.calc_text_size(text).x
-            x = area.x1 - width - 46
-            draw.add_rect_filled(
-                ImVec2(x, y), ImVec2(area.x1 - 12, y + 24), theme.u32(theme.faded(theme.VOID, 0.78)), 4
-            )
-            middle = ImVec2(x + 14, y + 12)
-            if shape in REGION_WORDS:
-                draw_region_mark(draw, middle, shape)
-            elif shape == "circle":
-                draw.add_circle(middle, 5, theme.u32(color), 0, 2)
-            else:
-                draw.add_ngon_filled(middle, 6, theme.u32(color), 4)
-            draw.add_text(ImVec2(x + 26, y + 3), theme.u32(theme.TEXT), text)
-            y += 28
-
-
-def _role_rows(shape: str, counts: dict[str, int]) -> list[tuple[str, theme.Color, str]]:
-    """Legend of anchors by what they are; nothing where they are all the same."""
-    if len(counts) < 2:
-        return []
-    return [(shape, theme.ROLE_COLORS[role], f"{format_count(n)} {role}") for role, n in counts.items()]
+            chip(draw, area.x1 - 10, area.y0 + 10, rendered_words, color=color, is_right=True)
 
 
 def _segment(label: str, is_on: bool) -> bool:

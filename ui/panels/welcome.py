@@ -21,10 +21,12 @@ MAX_RECENT = 3
 def draw_welcome(session: Any, dispatch: Dispatch, ui: UiState, area: Rect) -> None:
     """A card in the middle of the area."""
     x, y = area.center
-    imgui.set_cursor_screen_pos(ImVec2(x - CARD_SIZE[0] / 2, y - CARD_SIZE[1] / 2))
+    width, height = min(CARD_SIZE[0], area.width - 24), min(CARD_SIZE[1], area.height - 24)
+    imgui.set_cursor_screen_pos(ImVec2(x - width / 2, y - height / 2))
     imgui.push_style_color(imgui.Col_.child_bg, ImVec4(*theme.PANEL))
-    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(36, 30))
-    imgui.begin_child("welcome", ImVec2(*CARD_SIZE), imgui.ChildFlags_.always_use_window_padding)
+    padding = (36, 30) if height == CARD_SIZE[1] else (20, 14)
+    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(*padding))
+    imgui.begin_child("welcome", ImVec2(width, height), imgui.ChildFlags_.always_use_window_padding)
     imgui.pop_style_var()
     push_bold(ui, ui.fonts.title_size)
     imgui.text("ClipGStream Studio")

@@ -7,6 +7,7 @@ the default hold-out. Cameras must not move. The dome records at 30 frames per s
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,22 +16,28 @@ import numpy as np
 
 from engine.capture.checks import (
     check_equal_counts,
-    check_image_file,
-    check_image_size,
+    check_image_header,
     check_K,
     check_names,
     check_pose,
-    image_size_of,
     parse_matrix,
+    parse_size,
     raise_problems,
     read_json_object,
     shortened,
+    size_problem,
 )
+from engine.capture.duplicates import CameraFiles, check_duplicates
 from engine.capture.frames import ImageFrames
 from engine.capture.layout import CameraEntry, Layout
+from engine.capture.limits import MAX_CAMERA_ID
+from engine.capture.media import ImageHeader, read_image_header
+from engine.capture.places import place_in
 from engine.errors import CaptureError
 
 FORMAT = "panoptic"
+LAYOUT = "train_meta.json and test_meta.json with images below ims/ (CMU Panoptic, as for Dynamic 3D Gaussians)"
+"""The layout in words."""
 FPS = 30.0
 META_FILES = ("train_meta.json", "test_meta.json")
 KEYS = ("w", "h", "k", "w2c", "fn", "cam_id")
@@ -56,16 +63,18 @@ def probe(folder: Path) -> str | None:
     return "no train_meta.json or test_meta.json"
 
 
-def read(folder: Path) -> Layout:
+def read(folder: Path, *, follow_links: bool = False) -> Layout:
     """Read cameras and the frame index; no pixels.
 
+    Args:
+        follow_links: Whether images may lie outside of the folder.
     Raises:
         CaptureError: Listing every problem found.
     """
     problems: list[CaptureError] = []
     cameras: list[_MetaCamera] = []
     for name in META_FILES:
-        if name == META_FILES[1] and not (folder / name).is_file():
+        if name == META_FILES[1] and not (folder / name).exists():
             continue  # a capture may come without its own hold-out
         try:
             cameras += _read_meta(folder / name, problems)
@@ -75,7 +84,7 @@ def read(folder: Path) -> Layout:
     if cameras or not problems:
         problems += check_names([str(camera.camera_id) for camera in cameras], folder / META_FILES[0])
 
-    entries, warnings = _read_frames(folder, cameras, problems)
+    entries, warnings = _read_frames(folder, cameras, problems, follow_links=follow_links)
     raise_problems(problems, folder)
     return Layout(
         format=FORMAT,
@@ -105,10 +114,15 @@ def _read_meta(path: Path, problems: list[CaptureError]) -> list[_MetaCamera]:
         key, shape = ("k", "3x3") if Ks is None else ("w2c", "4x4") if poses is None else ("cam_id", "number")
         found = f"{key} must hold one {shape} for each of {n_frames} frames and {n_cameras} cameras, as fn does."
         raise CaptureError(found, hint=hint, path=path)
-    is_whole = np.isfinite(camera_ids).all() and (camera_ids == np.round(camera_ids)).all()
-    if not is_whole or (camera_ids != camera_ids[0]).any():
+    if (
+        not (np.isfinite(camera_ids) & (camera_ids == np.round(camera_ids))).all()
+        or (camera_ids != camera_ids[0]).any()
+    ):
         found = "cam_id must list the same whole numbers in the same order in each frame."
         raise CaptureError(found, hint=hint, path=path)
+    if camera_ids.min() < 0 or camera_ids.max() > MAX_CAMERA_ID:
+        found = f"cam_id goes from {camera_ids.min():.0f} to {camera_ids.max():.3g}, expected 0 to {MAX_CAMERA_ID:,}."
+        raise CaptureError(found, hint="Number the cameras from 0.", path=path)
 
     cameras = []
     for i in range(n_cameras):
@@ -129,13 +143,9 @@ def _read_meta(path: Path, problems: list[CaptureError]) -> list[_MetaCamera]:
 
 
 def _image_size(meta: dict[str, Any], path: Path) -> tuple[int, int]:
-    size = (meta["w"], meta["h"])
-    if not all(isinstance(value, int) and value > 0 for value in size):
-        raise CaptureError(
-            f"w and h are {size[0]!r} and {size[1]!r}, expected positive whole numbers.",
-            hint="Export the capture again.",
-            path=path,
-        )
+    size = parse_size(meta["w"], meta["h"])
+    if size is None:
+        raise size_problem("w and h are", meta["w"], meta["h"], path)
     return size
 
 
@@ -172,11 +182,11 @@ def _check_motionless(name: str, Ks: np.ndarray, poses: np.ndarray, path: Path) 
 
 
 def _read_frames(
-    folder: Path, cameras: list[_MetaCamera], problems: list[CaptureError]
+    folder: Path, cameras: list[_MetaCamera], problems: list[CaptureError], *, follow_links: bool
 ) -> tuple[list[CameraEntry], list[str]]:
     """Match the meta files against what lies in ims/. Adds problems; returns entries and warnings."""
     n_listed = max((len(camera.files) for camera in cameras), default=0)
-    present = _present_files(folder, cameras)
+    present = _present_files(folder, cameras, problems, follow_links=follow_links)
     found = [[name in present for name in camera.files] for camera in cameras]
     n_common = min((_leading(row) for row in found), default=0)
     is_cut_alike = n_common > 0 and all(sum(row) == n_common for row in found)
@@ -186,27 +196,56 @@ def _read_frames(
         cameras_files = [camera.files for camera in cameras]
         problems += _missing_frames(folder, cameras, found)
 
-    entries = []
+    entries, turned = [], []
+    headers: dict[str, dict[Path, ImageHeader]] = {}
     for camera, files in zip(cameras, cameras_files, strict=True):
-        paths = [folder / "ims" / name for name in files]
-        directory = paths[0].parent
-        problems += _check_images(camera, [path for path, name in zip(paths, files, strict=True) if name in present])
-        source = ImageFrames(directory, paths)
-        entries.append(CameraEntry(str(camera.camera_id), camera.K, camera.world_to_camera, camera.image_size, source))
+        name = str(camera.camera_id)
+        paths = [folder / "ims" / file for file in files]
+        read = _read_headers(
+            camera, [path for path, file in zip(paths, files, strict=True) if file in present], problems
+        )
+        headers[name] = read
+        turned += [path for path, header in read.items() if header.orientation != 1][:1]
+        source = ImageFrames(paths[0].parent, paths)
+        entries.append(CameraEntry(name, camera.K, camera.world_to_camera, camera.image_size, source))
+    if not problems:
+        problems += check_duplicates(
+            {
+                name: CameraFiles(list(read), [header.n_bytes for header in read.values()])
+                for name, read in headers.items()
+            }
+        )
     warnings = []
     if is_cut_alike and n_common < n_listed:
         warnings.append(f"The calibration lists {n_listed} frames, the first {n_common} are there and are used.")
+    if turned:
+        warnings.append(
+            f"Images of {len(turned)} cameras have an EXIF entry that turns them for display, such as "
+            f"{turned[0].relative_to(folder)}. They are used as they are stored; if the calibration was made on turned "
+            "ones, save them turned without that entry."
+        )
     return entries, warnings
 
 
-def _present_files(folder: Path, cameras: list[_MetaCamera]) -> set[str]:
-    """Names below ims/ that exist, by one directory listing per camera."""
-    directories = {name.rpartition("/")[0] for camera in cameras for name in camera.files}
-    present = set()
-    for directory in directories:
-        full = folder / "ims" / directory
-        if full.is_dir():
-            present.update(f"{directory}/{file.name}" if directory else file.name for file in full.iterdir())
+def _present_files(
+    folder: Path, cameras: list[_MetaCamera], problems: list[CaptureError], *, follow_links: bool
+) -> set[str]:
+    """Names below ims/ that exist, by one listing of each folder. Adds a problem for each name that leads outside."""
+    named_in = {name.rpartition("/")[0]: camera.meta_path for camera in cameras for name in camera.files}
+    present: set[str] = set()
+    for directory, meta_path in named_in.items():
+        below = f"ims/{directory}" if directory else "ims"
+        try:
+            full = place_in(folder, below, follow_links=follow_links, named_in=meta_path)
+            if not full.is_dir():
+                continue
+            with os.scandir(full) as listed:
+                for entry in listed:
+                    if entry.is_symlink():
+                        place_in(folder, f"{below}/{entry.name}", follow_links=follow_links, named_in=meta_path)
+                    present.add(f"{directory}/{entry.name}" if directory else entry.name)
+        except CaptureError as error:
+            problems.append(error)
     return present
 
 
@@ -233,21 +272,18 @@ def _missing_frames(folder: Path, cameras: list[_MetaCamera], found: list[list[b
     return problems
 
 
-def _check_images(camera: _MetaCamera, paths: list[Path]) -> list[CaptureError]:
-    """Ends and sizes of all files, by their headers; one problem per size that is not the calibrated one."""
-    hint = "Copy or export this file again."
-    damaged = [(path, reason) for path in paths if (reason := check_image_file(path)) is not None]
-    problems = [
-        CaptureError(f'An image of camera "{camera.camera_id}" {reason}.', hint=hint, path=path)
-        for path, reason in damaged
-    ]
-    whole = [path for path in paths if path not in {path for path, _ in damaged}]
-    first_of_size: dict[tuple[int, int], Path] = {}
-    for path in whole:
+def _read_headers(camera: _MetaCamera, paths: list[Path], problems: list[CaptureError]) -> dict[Path, ImageHeader]:
+    """Headers of all images of a camera. Adds what is wrong with one, and one problem per size not calibrated for."""
+    headers: dict[Path, ImageHeader] = {}
+    for path in paths:
         try:
-            first_of_size.setdefault(image_size_of(path), path)
+            headers[path] = read_image_header(path)
         except CaptureError as error:
-            problems.append(error)
-    for size, path in first_of_size.items():
-        problems += check_image_size(str(camera.camera_id), size, camera.image_size, path)
-    return problems
+            text = f'Camera "{camera.camera_id}": {error.message}'
+            problems.append(CaptureError(text, hint=error.hint, path=error.path))
+    first_of_size: dict[tuple[int, int], Path] = {}
+    for path, header in headers.items():
+        first_of_size.setdefault(header.size, path)
+    for path in first_of_size.values():
+        problems += check_image_header(str(camera.camera_id), headers[path], camera.image_size, path)
+    return headers

@@ -6,46 +6,81 @@ cameras.json: {"schema": 1, "fps", "n_frames", "default_holdout": [names], "came
 
 from __future__ import annotations
 
-import math
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from engine.capture.checks import (
     check_equal_counts,
+    check_fps,
     check_image_size,
     check_K,
     check_names,
     check_pose,
-    inspect_video,
+    is_name,
+    is_whole,
     parse_matrix,
+    parse_size,
     raise_problems,
     read_json_object,
+    shortened,
+    size_problem,
 )
+from engine.capture.duplicates import CameraFiles, check_duplicates
 from engine.capture.frames import VideoFrames
 from engine.capture.layout import CameraEntry, Layout
+from engine.capture.media import VideoHeader, read_video_header
+from engine.capture.places import place_in
 from engine.errors import CaptureError
+from engine.text import shown
 
 FORMAT = "sample"
+LAYOUT = "cameras.json with one video per camera"
+"""The layout in words."""
 SCHEMA = 1
 CAMERAS_FILE = "cameras.json"
 
 
+RATE_TOLERANCE = 0.01
+"""Share by which the rate of a video may differ from fps, as 29.97 does from 30."""
+
+
+@dataclass(slots=True)
+class _Reading:
+    """What reading has found so far.
+
+    Attributes:
+        headers: Of the videos that could be opened, by camera.
+    """
+
+    folder: Path
+    follow_links: bool
+    problems: list[CaptureError] = field(default_factory=list)
+    headers: dict[str, VideoHeader] = field(default_factory=dict)
+
+
 def probe(folder: Path) -> str | None:
     """None when the folder looks like this layout, otherwise why not."""
-    return None if (folder / CAMERAS_FILE).is_file() else f"no {CAMERAS_FILE}"
+    path = folder / CAMERAS_FILE
+    if path.is_file():
+        return None
+    return f"{CAMERAS_FILE} is not a file" if path.exists() else f"no {CAMERAS_FILE}"
 
 
-def read(folder: Path) -> Layout:
+def read(folder: Path, *, follow_links: bool = False) -> Layout:
     """Read cameras and the containers of their videos; no pixels.
 
+    Args:
+        follow_links: Whether videos may lie outside of the folder.
     Raises:
         CaptureError: Listing every problem found.
     """
     path = folder / CAMERAS_FILE
     document = read_json_object(path)
-    if document.get("schema") != SCHEMA:
+    schema = document.get("schema")
+    if not is_whole(schema) or schema != SCHEMA:
         raise CaptureError(
-            f"The file has schema {document.get('schema')!r}, this program reads {SCHEMA}.",
+            f"The file has schema {shown(schema)}, this program reads {SCHEMA}.",
             hint="Export the capture with a matching version.",
             path=path,
         )
@@ -53,91 +88,116 @@ def read(folder: Path) -> Layout:
     if not isinstance(rows, list):
         raise CaptureError('The file has no list "cameras".', hint="Export the capture again.", path=path)
 
-    problems: list[CaptureError] = []
-    cameras = [camera for i, row in enumerate(rows) if (camera := _read_camera(i, row, folder, problems)) is not None]
+    reading = _Reading(folder, follow_links)
+    problems = reading.problems
+    cameras = [camera for i, row in enumerate(rows) if (camera := _read_camera(i, row, reading)) is not None]
     if cameras or not problems:
-        names = [str(row.get("name")) for row in rows if isinstance(row, dict)]
+        names = [row["name"] for row in rows if isinstance(row, dict) and isinstance(row.get("name"), str)]
         problems += check_names(names, path)
-    fps = _read_fps(document, path, problems)
+    fps = document.get("fps")
+    problems += check_fps(fps, path)
     problems += _check_counts(cameras, document.get("n_frames"), path)
-    holdout = _read_holdout(document, [camera.name for camera in cameras], path, problems)
+    if not problems:  # names are unique from here on
+        problems += check_duplicates(
+            {
+                camera.name: CameraFiles([camera.source.path], [reading.headers[camera.name].n_bytes])
+                for camera in cameras
+            }
+        )
+    holdout = _read_holdout(document, {camera.name for camera in cameras}, path, problems)
     raise_problems(problems, folder)
     return Layout(
         format=FORMAT,
         cameras=tuple(cameras),
         n_frames=cameras[0].source.n_frames,
-        fps=fps,
+        fps=float(document["fps"]),
         default_holdout=holdout,
+        warnings=tuple(_warnings(document, reading.headers)),
     )
 
 
-def _read_camera(index: int, row: Any, folder: Path, problems: list[CaptureError]) -> CameraEntry | None:
+def _warnings(document: dict[str, Any], headers: dict[str, VideoHeader]) -> list[str]:
+    """Odd but usable: a length that is not stated, rates of videos that are missing or others."""
+    fps, warnings = document["fps"], []
+    if document.get("n_frames") is None:
+        n_frames = next(iter(headers.values())).n_frames
+        warnings.append(
+            f"{CAMERAS_FILE} does not say n_frames; the {n_frames} frames of the videos are taken. Add it, so that "
+            "videos cut short alike are noticed."
+        )
+    unstated = [name for name, header in headers.items() if header.rate <= 0]
+    if unstated:
+        warnings.append(f"Videos that state no frame rate: {shortened(unstated)}. The {fps:g} per second of fps holds.")
+    others = {name: header.rate for name, header in headers.items() if abs(header.rate - fps) > RATE_TOLERANCE * fps}
+    others = {name: rate for name, rate in others.items() if rate > 0}
+    if others:
+        listed = shortened([f"{name} {rate:g}" for name, rate in others.items()])
+        warnings.append(
+            f"fps is {fps:g}, but these videos state another rate: {listed}. Frames are taken one by one and shown at "
+            f"{fps:g} per second; correct fps if that is wrong."
+        )
+    return warnings
+
+
+def _read_camera(index: int, row: Any, reading: _Reading) -> CameraEntry | None:
     """One entry of "cameras". Adds its problems; None when there is too little to go on."""
-    path = folder / CAMERAS_FILE
+    path = reading.folder / CAMERAS_FILE
     hint = "Export the capture again."
     if not isinstance(row, dict) or not isinstance(row.get("name"), str) or not isinstance(row.get("file"), str):
-        problems.append(CaptureError(f"Camera number {index} has no name or no file.", hint=hint, path=path))
+        reading.problems.append(CaptureError(f"Camera number {index} has no name or no file.", hint=hint, path=path))
         return None
-    name, found = row["name"], []
-    width, height = row.get("width"), row.get("height")
-    size = (width, height) if isinstance(width, int) and isinstance(height, int) else (0, 0)
-    if min(size) < 1:
-        text = f'Camera "{name}" has width {width!r} and height {height!r}, expected positive whole numbers.'
-        problems.append(CaptureError(text, hint=hint, path=path))
+    name = row["name"] if is_name(row["name"]) else shown(row["name"])
+    size = parse_size(row.get("width"), row.get("height"))
+    if size is None:
+        text = f'Camera "{name}" has width and height'
+        reading.problems.append(size_problem(text, row.get("width"), row.get("height"), path))
         return None
+    found: list[CaptureError] = []
     K, world_to_camera = parse_matrix(row.get("K"), (3, 3)), parse_matrix(row.get("world_to_camera"), (4, 4))
     if K is None:
-        found.append(CaptureError(f'Camera "{name}" has no 3x3 matrix K.', hint=hint, path=path))
+        found.append(CaptureError(f'Camera "{name}" has no 3x3 matrix K of numbers.', hint=hint, path=path))
     else:
         found += check_K(name, K, size, path)
     if world_to_camera is None:
-        found.append(CaptureError(f'Camera "{name}" has no 4x4 matrix world_to_camera.', hint=hint, path=path))
+        found.append(
+            CaptureError(f'Camera "{name}" has no 4x4 matrix world_to_camera of numbers.', hint=hint, path=path)
+        )
     else:
         found += check_pose(name, world_to_camera, path)
-    n_frames = _check_video(name, folder / row["file"], size, found)
-    problems += found
-    if K is None or world_to_camera is None or n_frames is None:
-        return None
-    return CameraEntry(name, K, world_to_camera, size, VideoFrames(folder / row["file"], n_frames))
-
-
-def _check_video(name: str, path: Path, size: tuple[int, int], found: list[CaptureError]) -> int | None:
-    """Frames in the container, or None when it cannot be used. Adds problems."""
+    header, place = None, reading.folder
     try:
-        n_frames, video_size, _ = inspect_video(path)
+        place = place_in(reading.folder, row["file"], follow_links=reading.follow_links, named_in=path)
+        header = read_video_header(place)
+        found += check_image_size(name, header.size, size, place)
     except CaptureError as error:
         found.append(CaptureError(f'Camera "{name}": {error.message}', hint=error.hint, path=error.path))
+    reading.problems += found
+    if K is None or world_to_camera is None or header is None:
         return None
-    found += check_image_size(name, video_size, size, path)
-    return n_frames
-
-
-def _read_fps(document: dict[str, Any], path: Path, problems: list[CaptureError]) -> float:
-    fps = document.get("fps")
-    if isinstance(fps, (int, float)) and math.isfinite(fps) and fps > 0:
-        return float(fps)
-    problems.append(CaptureError(f"fps is {fps!r}.", hint="Give frames per second, above 0.", path=path))
-    return 0.0
+    reading.headers[name] = header
+    return CameraEntry(name, K, world_to_camera, size, VideoFrames(place, header.n_frames))
 
 
 def _check_counts(cameras: list[CameraEntry], n_listed: Any, path: Path) -> list[CaptureError]:
     counts = {camera.name: camera.source.n_frames for camera in cameras}
     problems = check_equal_counts(counts, {camera.name: camera.source.path for camera in cameras})
-    if not problems and counts and n_listed is not None and n_listed != cameras[0].source.n_frames:
-        text = f"n_frames is {n_listed!r}, every video has {cameras[0].source.n_frames} frames."
+    n_frames = next(iter(counts.values()), None)
+    if not problems and counts and n_listed is not None and (not is_whole(n_listed) or n_listed != n_frames):
+        text = f"n_frames is {shown(n_listed)}, every video has {n_frames} frames."
         problems.append(CaptureError(text, hint="Correct the number or export the videos again.", path=path))
     return problems
 
 
 def _read_holdout(
-    document: dict[str, Any], names: list[str], path: Path, problems: list[CaptureError]
+    document: dict[str, Any], names: set[str], path: Path, problems: list[CaptureError]
 ) -> tuple[str, ...]:
     holdout = document.get("default_holdout", [])
     if not isinstance(holdout, list) or not all(isinstance(name, str) for name in holdout):
-        problems.append(CaptureError("default_holdout is no list of names.", hint="Correct it.", path=path))
+        problems.append(CaptureError("default_holdout is not a list of names.", hint="Correct it.", path=path))
         return ()
     unknown = [name for name in holdout if name not in names]
     if unknown and not problems:
-        text = f"default_holdout names {', '.join(unknown)}, which the capture does not have."
+        listed = shortened([shown(name)[1:-1] for name in unknown])
+        text = f"default_holdout names {listed}, which the capture does not have."
         problems.append(CaptureError(text, hint="Use names of its cameras.", path=path))
-    return tuple(holdout)
+    return tuple(dict.fromkeys(holdout))

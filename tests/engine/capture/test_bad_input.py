@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import pickle
 from collections.abc import Callable
 from pathlib import Path
@@ -32,9 +33,10 @@ def camera(document: dict[str, Any], row: int) -> dict[str, Any]:
     return document["cameras"][row]
 
 
-def test_a_folder_that_is_no_capture_says_what_was_looked_for(tmp_path: Path) -> None:
+def test_a_folder_that_is_not_a_capture_says_what_was_looked_for(tmp_path: Path) -> None:
     message = str(problem_of(tmp_path))
-    assert "no capture" in message
+    assert "not a capture (no cameras.json; no train_meta.json or test_meta.json)" in message
+    assert "In it: nothing." in message
     assert "cameras.json" in message
     assert "train_meta.json" in message
     assert list(tmp_path.iterdir()) == []
@@ -53,10 +55,10 @@ def test_a_missing_folder_and_a_file_are_named(make_sample: MakeCapture) -> None
 @pytest.mark.parametrize(
     ("text", "found"),
     [
-        ("", "no valid JSON"),
-        ('{"schema": 1, "cam', "no valid JSON"),
-        ("\x00\x01", "no valid JSON"),
-        ("[1]", "JSON list"),
+        ("", "not valid JSON"),
+        ('{"schema": 1, "cam', "not valid JSON"),
+        ("\x00\x01", "not valid JSON"),
+        ("[1]", "holds a list, not an object"),
         ('{"schema": 7}', "schema 7"),
         ('{"schema": 1, "fps": 30}', 'no list "cameras"'),
         ('{"schema": 1, "fps": 30, "cameras": []}', "no cameras"),
@@ -75,18 +77,18 @@ def test_a_damaged_cameras_file(make_sample: MakeCapture, text: str, found: str)
     [
         (lambda d: camera(d, 1).update(name="cam00"), '2 cameras are called "cam00"'),
         (lambda d: camera(d, 1).pop("file"), "number 1 has no name or no file"),
-        (lambda d: camera(d, 1).update(width=0), 'camera "cam01" has width 0'),
+        (lambda d: camera(d, 1).update(width=0), 'camera "cam01" has width and height 0 and 32'),
         (lambda d: camera(d, 1).update(width=50), "48x32 frames, its calibration is for 50x32"),
         (lambda d: camera(d, 1).update(K=[1, 2]), "no 3x3 matrix K"),
         (lambda d: camera(d, 1)["K"][0].__setitem__(0, -5.0), "fx -5"),
         (lambda d: camera(d, 1)["K"][0].__setitem__(0, float("nan")), "NaN or infinity in K"),
         (lambda d: camera(d, 1)["K"][0].__setitem__(1, 3.0), "skew 3"),
         (lambda d: camera(d, 1)["K"][2].__setitem__(2, 2.0), "last row is not 0 0 1"),
-        (lambda d: camera(d, 1)["K"][0].__setitem__(2, 400.0), "principal point 400.0"),
+        (lambda d: camera(d, 1)["K"][0].__setitem__(2, 400.0), "principal point 400"),
         (lambda d: camera(d, 1).update(world_to_camera="x"), "no 4x4 matrix world_to_camera"),
         (lambda d: camera(d, 1)["world_to_camera"][1].__setitem__(3, float("nan")), "NaN or infinity in its pose"),
-        (lambda d: camera(d, 1)["world_to_camera"][0].__setitem__(0, 2.0), "is no rotation"),
-        (lambda d: camera(d, 1)["world_to_camera"].__setitem__(0, [-1, 0, 0, 0]), "is no rotation"),
+        (lambda d: camera(d, 1)["world_to_camera"][0].__setitem__(0, 2.0), "is not a rotation"),
+        (lambda d: camera(d, 1)["world_to_camera"].__setitem__(0, [-1, 0, 0, 0]), "is not a rotation"),
         (lambda d: camera(d, 1)["world_to_camera"].__setitem__(3, [0, 0, 0, 2]), "0 0 0 2 as its last row"),
         (lambda d: d.update(fps=0), "fps is 0"),
         (lambda d: d.update(fps="fast"), "fps is 'fast'"),
@@ -100,7 +102,7 @@ def test_one_wrong_value_gives_one_message(make_sample: MakeCapture, edit: Calla
     assert error.problems == ()
 
 
-def test_a_mirrored_pose_is_no_rotation(make_sample: MakeCapture) -> None:
+def test_a_mirrored_pose_is_not_a_rotation(make_sample: MakeCapture) -> None:
     def mirror(document: dict[str, Any]) -> None:
         row = camera(document, 0)["world_to_camera"][0]
         row[:3] = [-value for value in row[:3]]
@@ -237,7 +239,7 @@ def test_panoptic_one_later_image_of_another_size_is_named(make_panoptic: MakeCa
             lambda d: d["test_meta.json"]["w2c"][2][0][0].__setitem__(3, float("nan")),
             '"0" has NaN or infinity in its calibration of frame 2',
         ),
-        (lambda d: d["test_meta.json"]["w2c"][0][0].__setitem__(0, [1, 1, 0, 0]), "is no rotation"),
+        (lambda d: d["test_meta.json"]["w2c"][0][0].__setitem__(0, [1, 1, 0, 0]), "is not a rotation"),
     ],
 )
 def test_panoptic_wrong_values(make_panoptic: MakeCapture, edit: Callable[..., None], found: str) -> None:
@@ -264,14 +266,14 @@ def test_panoptic_frames_listed_differently_in_the_two_files(make_panoptic: Make
 def test_a_file_that_may_not_be_read(make_panoptic: MakeCapture, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = make_panoptic()  # a mode of 000 would not stop root, so the refusal is played
     secret = folder / "ims" / "2" / "000001.jpg"
-    real_open = Path.open
+    real_open = os.open
 
-    def refuse(path: Path, *args: Any, **kwargs: Any) -> Any:
+    def refuse(path: Any, *args: Any, **kwargs: Any) -> int:
         if path == secret:
             raise PermissionError(13, "Permission denied", str(path))
         return real_open(path, *args, **kwargs)
 
-    monkeypatch.setattr(Path, "open", refuse)
+    monkeypatch.setattr(os, "open", refuse)
     error = problem_of(folder)
     assert "cannot be read (Permission denied)" in str(error)
     assert error.path == secret

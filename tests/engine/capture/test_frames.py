@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.capture.checks import inspect_video
 from engine.capture.frames import FrameCache, VideoFrames, resize_area
+from engine.capture.media import read_video_header
 
 
 def write_stream(path: Path, *, options: dict[str, str], n_frames: int, pts: list[int] | None = None) -> None:
@@ -45,8 +45,9 @@ def levels(source: VideoFrames, order: list[int]) -> list[int]:
 def test_any_order_finds_the_right_frames(tmp_path: Path, suffix: str, options: dict[str, str]) -> None:
     path = tmp_path / f"video{suffix}"
     write_stream(path, n_frames=40, options=options)
-    n_frames, size, rate = inspect_video(path)
-    assert (n_frames, size, rate) == (40, (32, 32), 30.0)
+    header = read_video_header(path)
+    n_frames = header.n_frames
+    assert (n_frames, header.size, header.rate) == (40, (32, 32), 30.0)
     source = VideoFrames(path, n_frames)
     forward = list(range(40))
     random = np.random.default_rng(1).integers(0, 40, 40).tolist()
@@ -63,14 +64,14 @@ def test_uneven_frame_times_keep_their_index(tmp_path: Path) -> None:
 
 
 def test_a_file_without_pictures_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "sound.wav"
+    path = tmp_path / "sound.mov"
     with av.open(str(path), "w") as container:
         stream = container.add_stream("pcm_s16le", rate=8000)
         sound = av.AudioFrame.from_ndarray(np.zeros((1, 800), np.int16), format="s16", layout="mono")
         sound.sample_rate = 8000
         container.mux(stream.encode(sound))
     with pytest.raises(Exception, match="no video stream"):
-        inspect_video(path)
+        read_video_header(path)
 
 
 @given(

@@ -7,8 +7,9 @@ import torch
 from engine.cloud.reasons import LIGHT, NO_REASON, STILL
 from engine.errors import ProjectError
 from engine.model.anchors import AnchorSet
+from engine.model.clip_header import SCHEMA
 from engine.model.clip_model import ClipModel, decoder_sizes, inherit, load_clip_model
-from engine.model.clip_state import SCHEMA, ClipState
+from engine.model.clip_state import ClipState
 from engine.model.decoder import HEADS, Decoder
 from engine.model.field import FieldShape, SpatioTemporalField
 from engine.model.roles import ROLES
@@ -62,6 +63,8 @@ def state_of(model: ClipModel, *, role: str, clip_index: int = 0, reference: Cli
         "schema": SCHEMA,
         "role": role,
         "clip_index": clip_index,
+        "step": 1,
+        "n_steps": 1,
         "clip_length": N_FRAMES,
         "n_frames": N_FRAMES,
         "decoder": decoder_sizes(model.decoder),

@@ -145,6 +145,7 @@ def test_damaged_arrays_and_descriptions_are_named_as_damaged(reference, tmp_pat
     with safe_open(path, framework="numpy") as file:
         metadata = dict(file.metadata())
         arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
+    del metadata["checksum"]  # as files of earlier versions, which rest on the checksum in each description
     specs = json.loads(metadata["coding"])
     if damage == "bytes":
         arrays["sets.static.features"][20] ^= 0xFF

@@ -1,0 +1,170 @@
+"""What is drawn over the viewport's picture: what it is of, what is on its way, and a legend of the marks."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from imgui_bundle import ImVec2, imgui
+
+from ui import theme
+from ui.hud_text import HudText, count_text, hud_text
+from ui.panels.regions import draw_region_mark
+from ui.panels.timeline import STATE_WORDS
+from ui.picture_rate import PictureRate
+from ui.region_tool import REGION_WORDS
+from ui.scene import Scene
+from ui.state import Rect, UiState
+from ui.theme import Icon
+from ui.widgets import format_count
+
+BUSY_REDRAW_S = 0.25
+"""The mark of something on its way turns this often."""
+LINE_HEIGHT, GAP, MARGIN = 24.0, 8.0, 12.0
+BUSY_WIDTH = 20.0
+
+
+def wrapped(text: str, width: float, measure: Callable[[str], float]) -> list[str]:
+    """Text in lines that fit a width, broken between words; a word that is too long stands alone."""
+    lines: list[str] = []
+    for word in text.split(" "):
+        longer = f"{lines[-1]} {word}" if lines else word
+        if lines and measure(longer) <= width:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return lines
+
+
+class Hud:
+    """Plates at the lower left of the picture, the legend at its upper right."""
+
+    def __init__(self) -> None:
+        self._rate = PictureRate()
+        self.text: HudText | None = None
+        """What the newest frame says."""
+
+    def draw(self, session: Any, ui: UiState, area: Rect, scene: Scene) -> None:
+        """Everything that stands over the picture."""
+        self.text = self._text(session, scene)
+        if self.text is not None:
+            self._draw_plates(self.text, ui, area)
+            if self.text.pending or scene.shown.is_on_its_way:
+                ui.redraw_within(BUSY_REDRAW_S)
+        self._draw_legend(session, scene, area)
+
+    def _text(self, session: Any, scene: Scene) -> HudText | None:
+        wanted, timeline, shown = session.wanted_frame(), session.timeline, scene.shown
+        if wanted is None:
+            return None
+        rate, now_s = None, time.perf_counter()
+        if timeline.is_playing:
+            self._rate.note(
+                timeline.frame_index if shown.frame_index is None else shown.frame_index, timeline.n_frames, now_s
+            )
+            rate = self._rate.rate(now_s, is_every_frame=timeline.is_every_frame)
+        else:
+            self._rate.stop()
+        state = session.clip_states[wanted.clip_index].state
+
+        def camera_name(index: int | None) -> str:
+            if index is None:
+                return "free view"
+            return session.rig.names[index] + (" (held out)" if index in session.holdout else "")
+
+        return hud_text(
+            shown,
+            wanted,
+            fps=timeline.fps,
+            state=state,
+            state_words=str(STATE_WORDS.get(state, state)),
+            camera_name=camera_name,
+            rate=rate,
+        )
+
+    def _draw_plates(self, text: HudText, ui: UiState, area: Rect) -> None:
+        """In rows from below, as many side by side as fit; the label comes first, lowest and leftmost."""
+        draw = imgui.get_window_draw_list()
+        plates = [
+            (text.label, theme.TEXT, False),
+            (text.rate, theme.TEXT, False),
+            (text.pending, theme.YELLOW, True),
+            (f"{Icon.WARNING}  {text.failure}" if text.failure else "", theme.VERMILLION, False),
+            (text.note, theme.TEXT_DIM if not text.pending else theme.TEXT, False),
+        ]
+        widest = area.width - 2 * MARGIN - 18
+        x, bottom = area.x0 + MARGIN, area.y1 - 10
+        row_height = 0.0
+        for words, color, is_busy in plates:
+            if not words:
+                continue
+            extra = BUSY_WIDTH if is_busy else 0.0
+            lines = wrapped(words, widest - extra, lambda line: imgui.calc_text_size(line).x)
+            width = max(imgui.calc_text_size(line).x for line in lines) + 18 + extra
+            height = LINE_HEIGHT + (len(lines) - 1) * imgui.get_text_line_height()
+            if x > area.x0 + MARGIN and (x + width > area.x1 - MARGIN or len(lines) > 1):
+                x, bottom, row_height = area.x0 + MARGIN, bottom - row_height - 4, 0.0
+            plate = Rect(x, bottom - height, x + width, bottom)
+            draw.add_rect_filled(plate.low, plate.high, theme.u32(theme.faded(theme.VOID, 0.82)), 4)
+            if is_busy:
+                _draw_busy(draw, ImVec2(plate.x0 + 15, plate.y0 + LINE_HEIGHT / 2), color)
+                ui.mark_rect("viewport.busy", plate)
+            for row, line in enumerate(lines):
+                at = ImVec2(plate.x0 + 9 + extra, plate.y0 + 4 + row * imgui.get_text_line_height())
+                draw.add_text(at, theme.u32(color), line)
+            x, row_height = plate.x1 + GAP, max(row_height, height)
+
+    def _draw_legend(self, session: Any, scene: Scene, area: Rect) -> None:
+        draw = imgui.get_window_draw_list()
+        is_labelled = session.overlays.compare == "wipe" and session.view.look_through is not None
+        y = area.y0 + (44 if is_labelled else 12)
+        for shape, color, text in _legend_rows(session, scene):
+            width = imgui.calc_text_size(text).x
+            x = area.x1 - width - 46
+            plate = theme.u32(theme.faded(theme.VOID, 0.78))
+            draw.add_rect_filled(ImVec2(x, y), ImVec2(area.x1 - 12, y + 24), plate, 4)
+            middle = ImVec2(x + 14, y + 12)
+            if shape in REGION_WORDS:
+                draw_region_mark(draw, middle, shape)
+            elif shape == "circle":
+                draw.add_circle(middle, 5, theme.u32(color), 0, 2)
+            else:
+                draw.add_ngon_filled(middle, 6, theme.u32(color), 4)
+            draw.add_text(ImVec2(x + 26, y + 3), theme.u32(theme.TEXT), text)
+            y += 28
+
+
+def _draw_busy(draw: Any, middle: ImVec2, color: theme.Color) -> None:
+    """Three quarters of a circle that turns in eighths."""
+    turn = math.tau * int(time.perf_counter() / BUSY_REDRAW_S) / 8
+    draw.path_arc_to(middle, 5.5, turn, turn + 0.75 * math.tau, 16)
+    draw.path_stroke(theme.u32(color), 2.0)
+
+
+def _legend_rows(session: Any, scene: Scene) -> list[tuple[str, theme.Color, str]]:
+    """Shape, colour and words of what is marked."""
+    counts, rows = scene.counts, []
+    status = None if counts.clip_index is None else session.clip_states[counts.clip_index]
+    n_inherited, n_own = (0, 0) if status is None else (status.n_inherited, status.n_own)
+    if session.overlays.show_inherited and counts.n_inherited:
+        words, n_all = ("reference anchors", n_own) if counts.is_reference else ("inherited anchors", n_inherited)
+        text = count_text(counts.n_inherited, n_all, words, counts.frame_index)
+        rows += [("circle", theme.INHERITED, text), *_role_rows("circle", counts.inherited_roles)]
+    if session.overlays.show_residual and counts.n_residual:
+        text = count_text(counts.n_residual, n_own, "residual anchors", counts.frame_index)
+        rows += [("diamond", theme.RESIDUAL, text), *_role_rows("diamond", counts.residual_roles)]
+    if session.overlays.show_regions:
+        for treat, words in REGION_WORDS.items():
+            n = sum(region.treat == treat for region in session.regions.regions)
+            text = f"{n} {words} region{'s' if n > 1 else ''}"
+            rows += [(treat, theme.REGION_COLORS[treat], text)] if n else []
+    return rows
+
+
+def _role_rows(shape: str, counts: dict[str, int]) -> Sequence[tuple[str, theme.Color, str]]:
+    """Legend of anchors by what they are; nothing where they are all the same."""
+    if len(counts) < 2:
+        return []
+    return [(shape, theme.ROLE_COLORS[role], f"of them {format_count(n)} {role}") for role, n in counts.items()]
