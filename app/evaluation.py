@@ -53,7 +53,7 @@ Frames = dict[int, tuple[list[int], list[int]]]
 
 
 class Measuring(Protocol):
-    """Measures what is not known of a clip, in any order; `measure_clip`, or what a test brings."""
+    """Measures what is not known of a clip, in any order; ClipMeasuring, or what a test brings."""
 
     def __call__(
         self, opened: TrainedProject, scope: Scope, clip_index: int, unknown: Frames
@@ -79,7 +79,7 @@ def evaluate_project(
         metrics, precision: See engine.metrics.picture.measure_picture.
         on_progress: Gets rows done, rows in all, and the newest row; at first what was known before, with None.
         say: Told of kept figures that are damaged, or that cannot be kept.
-        measuring: Measures a clip; `measure_clip` when None.
+        measuring: Measures what is not known of a clip; ClipMeasuring when None.
     Returns:
         JSON-able: schema, project, capture, scale, holdout (names), clips, metrics and precision (as chosen), columns
         (engine.metrics.summary.columns_of), rows (EvalRow.as_dict: one per clip, frame and camera), means with keys
@@ -101,7 +101,7 @@ def evaluate_project(
     kept = {i: kept_figures(opened, scope, i, say) for i in scope.clips}
     unknown = {i: _unknown(opened, scope, i, kept[i]) for i in scope.clips}
     if measuring is None:
-        measuring = measure_clip
+        measuring = ClipMeasuring()
         for clip_index in [i for i in scope.clips if unknown[i]]:  # damaged ones are found before the work
             opened.load(clip_index)
     n_rows = sum(opened.clips[i].n_frames for i in scope.clips) * len(scope.cameras)
@@ -185,23 +185,39 @@ def is_measured(opened: TrainedProject, scope: Scope) -> bool:
     return not any(_unknown(opened, scope, i, kept_figures(opened, scope, i, nothing)) for i in scope.clips)
 
 
-def measure_clip(opened: TrainedProject, scope: Scope, clip_index: int, unknown: Frames) -> Iterator[EvalRow | PairRow]:
-    """Measure what is not known of a clip, cameras side by side on all cores, one core each.
+class ClipMeasuring:
+    """Measures clips of one project and scope, cameras side by side on all cores; keeps their backgrounds in between.
 
-    Raises:
-        ProjectError: A clip is not trained or damaged.
+    Each camera is measured with one thread, so that its figures do not depend on how many cores there are.
+
+    Args:
+        n_threads: How many cameras at a time; as many as cores when None.
     """
-    use_threads(None)
-    from engine.metrics.side_by_side import side_by_side
 
-    trained, before_index = opened.load(clip_index), scope.before(clip_index)
-    before = None if before_index is None else opened.load(before_index)
-    evaluation = _evaluation(opened, metrics=scope.metrics, precision=scope.precision)
-    cameras = [
-        evaluation.of_camera(trained, camera, before=before, frames=frames, pairs=pairs)
-        for camera, (frames, pairs) in unknown.items()
-    ]
-    yield from side_by_side(cameras, n_threads=n_workers(), prepare=lambda: use_threads(1))
+    def __init__(self, n_threads: int | None = None) -> None:
+        self._n_threads = n_workers() if n_threads is None else n_threads
+        self._evaluation: Evaluation | None = None
+
+    def __call__(
+        self, opened: TrainedProject, scope: Scope, clip_index: int, unknown: Frames
+    ) -> Iterator[EvalRow | PairRow]:
+        """Rows and pairs that are not known.
+
+        Raises:
+            ProjectError: A clip is not trained or damaged.
+        """
+        use_threads(None)
+        from engine.metrics.side_by_side import side_by_side
+
+        if self._evaluation is None:
+            self._evaluation = _evaluation(opened, metrics=scope.metrics, precision=scope.precision)
+        trained, before_index = opened.load(clip_index), scope.before(clip_index)
+        before = None if before_index is None else opened.load(before_index)
+        cameras = [
+            self._evaluation.of_camera(trained, camera, before=before, frames=frames, pairs=pairs)
+            for camera, (frames, pairs) in unknown.items()
+        ]
+        yield from side_by_side(cameras, n_threads=self._n_threads, prepare=lambda: use_threads(1))
 
 
 def _fingerprint(opened: TrainedProject, clip_index: int) -> str:
