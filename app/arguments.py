@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import argparse
 import logging
+import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
 from engine.capture.capture import Capture
 from engine.errors import ProjectError
+from engine.text import shown
 
 logger = logging.getLogger(__name__)
 
@@ -26,6 +29,10 @@ COMMANDS = {
     "ablate": "train variants of the method and baselines, and compare them",
 }
 """Subcommands that app.cli serves without a window, and what each does."""
+
+
+_LONGEST_INSIDE = 200
+"""Bytes of the longest name that the program adds to a folder it was given."""
 
 
 def fail(code: int, message: str) -> int:
@@ -72,6 +79,29 @@ def add_figure_choices(command: argparse.ArgumentParser, *, default: str | None,
         choices=("float", "8bit"),
         default="float",
         help="compare pictures as rendered, or rounded as in a PNG file (default: float)",
+    )
+
+
+def path_argument(text: str) -> Path:
+    """A path of the command line; what cannot be one is said at once, with exit code 2, whatever it is for."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("it is empty; name a folder")
+    try:
+        os.lstat(os.path.join(text, "x" * _LONGEST_INSIDE))
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        pass  # told better by whoever uses it
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise argparse.ArgumentTypeError(f"{shown(text)} cannot be used as a path ({reason})") from error
+    return Path(text)
+
+
+def add_follow_links(command: argparse.ArgumentParser) -> None:
+    """The argument of every subcommand that opens a capture by its name."""
+    command.add_argument(
+        "--follow-links",
+        action="store_true",
+        help="read files outside of the capture folder if it names some",
     )
 
 

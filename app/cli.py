@@ -28,6 +28,7 @@ from app.train_command import add_train_arguments, train
 from app.training.process import ProcessWorker
 from app.training.service import Launch
 from engine.errors import CaptureError, DiskError, EngineError, ProjectError
+from engine.kernels.cache import use_kernel_cache
 
 logger = logging.getLogger(__name__)
 
@@ -61,6 +62,7 @@ def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -
     Returns:
         The exit code.
     """
+    use_kernel_cache()  # before a command imports kernels
     try:
         options = parse(build_parser(), argv)
     except SystemExit as error:  # argparse has said what is wrong

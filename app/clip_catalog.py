@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from app.header_cache import FoundHeader
-from app.project import Project, read_metrics
+from app.project import Project
+from app.project_files import read_metrics
+from engine.model.roles import REFERENCE_ROLES
 
 REPORT_EVERY = 32
 """Clips read between two reports of progress."""
@@ -34,6 +36,7 @@ class ClipRecord:
         reason: Why it is stale or damaged, or what became of its checkpoint; empty otherwise.
         blocked_by: A damaged clip without which this one cannot be trained.
         seconds: What it took when it was trained; None where not recorded.
+        n_anchors: Inherited ones, and those of the clip itself; zeros where the file does not say.
     """
 
     state: str = "untrained"
@@ -47,6 +50,7 @@ class ClipRecord:
     reason: str = ""
     blocked_by: int | None = None
     seconds: float | None = None
+    n_anchors: tuple[int, int] = (0, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,6 +230,7 @@ class ClipCatalog:
                 self._curve_psnr.get(index),
                 self._project.checkpoint_path(index),
                 f"stopped-{resume_step}-{kept.header.get('fingerprint', '')}",
+                n_anchors=anchor_counts(kept.header),
                 **resume,
             )
         if found is None:
@@ -233,7 +238,7 @@ class ClipCatalog:
         if header is None:
             return ClipRecord("damaged", reason=found.damage, **resume)
         psnr = _psnr(header) if _psnr(header) is not None or kept is not None else self._curve_psnr.get(index)
-        figures = {"held_out_psnr": psnr, "seconds": _seconds(header)}
+        figures = {"held_out_psnr": psnr, "seconds": _seconds(header), "n_anchors": anchor_counts(header)}
         if basis.reason:  # it cannot be shown without what it was trained on
             return ClipRecord("stale", header["step"], header["n_steps"], reason=basis.reason, **figures, **resume)
         revision = f"trained-{header.get('fingerprint', '')}"
@@ -258,6 +263,18 @@ class ClipCatalog:
         if known is not None and (reference is None or reference.get("fingerprint") != known):
             return "The reference was trained again after the stop; training starts from the beginning."
         return ""
+
+
+def anchor_counts(header: dict[str, Any]) -> tuple[int, int]:
+    """Anchors of a clip by its header: those it inherits, and those it holds itself. Zeros where it does not say."""
+    sets = header.get("n_anchors")
+    numbers = {role: n for role, n in sets.items() if isinstance(n, int)} if isinstance(sets, dict) else {}
+    config = header.get("config")
+    is_shared = isinstance(config, dict) and config.get("inherit") in ("trainable", "off")
+    if header.get("role") != "source" or is_shared:
+        return 0, sum(numbers.values())
+    n_inherited = sum(n for role, n in numbers.items() if role in REFERENCE_ROLES)
+    return n_inherited, sum(numbers.values()) - n_inherited
 
 
 def _psnr(header: dict[str, Any]) -> float | None:

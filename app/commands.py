@@ -16,6 +16,8 @@ class OpenCapture:
     path: Path
     scale: float | None = None
     """Share of the original picture size to work at; None picks one that suits the size."""
+    follow_links: bool = False
+    """Whether the user allows the capture's files to lie outside of its folder; noted in its project."""
 
 
 @dataclass(frozen=True, slots=True)

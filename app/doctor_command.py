@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import json
 
 from app.arguments import EXIT_OK
 from app.training.service import Launch
+from engine.json_files import json_text
 
 
 def add_doctor_arguments(command: argparse.ArgumentParser) -> None:
@@ -21,7 +21,7 @@ def doctor(options: argparse.Namespace, launch: Launch) -> int:
     findings = examine()
     if options.json:
         rows = [{"subject": f.subject, "text": f.text, "is_fine": f.is_fine} for f in findings]
-        print(json.dumps({"schema": 1, "findings": rows}, indent=2))
+        print(json_text({"schema": 1, "findings": rows}, indent=2))
     else:
         for finding in findings:
             print(f"{'ok ' if finding.is_fine else '!! '} {finding.subject:<9} {finding.text}")

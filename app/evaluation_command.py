@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
-from app.arguments import EXIT_OK, add_figure_choices, parse_range
+from app.arguments import EXIT_OK, add_figure_choices, parse_range, path_argument
 from app.evaluation import evaluate_project
 from app.headless import open_trained
 from app.progress import ProgressLine, row_progress
 from app.project import open_project
 from app.results import check_writable, write_text
 from app.training.service import Launch
+from engine.json_files import json_text
 
 
 def add_eval_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream eval`."""
-    command.add_argument("project", type=Path, help="project folder")
+    command.add_argument("project", type=path_argument, help="project folder")
     command.add_argument("--json", required=True, metavar="OUT", help="file for all rows and means; - prints them")
     command.add_argument("--clips", default=":", metavar="A:B", help="clips to measure (default: all trained)")
     add_figure_choices(command, default="all", said="all")
@@ -44,7 +44,7 @@ def evaluate(options: argparse.Namespace, launch: Launch) -> int:
         say=line.say,
     )
     line.finish()
-    text = json.dumps(document, indent=1, allow_nan=False)
+    text = json_text(document, indent=1)
     if options.json == "-":
         print(text)
         return EXIT_OK

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from app.arguments import EXIT_OK
+from app.arguments import EXIT_OK, path_argument
 from app.marking import after_marking, effect_text, region_text
 from app.project import Project, open_project
 from app.training.service import Launch
 from engine.cloud.reasons import REASONS
 from engine.cloud.regions import parse_region
 from engine.errors import ProjectError
+from engine.json_files import json_text
 from engine.model.clip_state import ClipState, read_clip_state
 
 SCHEMA = 1
@@ -24,7 +23,7 @@ _SHAPES = {"box": (("X0", "Y0", "Z0", "X1", "Y1", "Z1"), "two corners"), "sphere
 
 def add_gate_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream gate`."""
-    command.add_argument("project", type=Path, help="project folder")
+    command.add_argument("project", type=path_argument, help="project folder")
     for treat, meaning in (("static", "nothing moves here"), ("dynamic", "everything may change here")):
         for shape, (names, what) in _SHAPES.items():
             command.add_argument(
@@ -64,7 +63,7 @@ def gate(options: argparse.Namespace, launch: Launch) -> int:
         found = describe_gate(project)
     finally:
         project.close()
-    print(json.dumps(found, indent=2) if options.json else "\n".join(gate_lines(found)))
+    print(json_text(found, indent=2) if options.json else "\n".join(gate_lines(found)))
     return EXIT_OK
 
 

@@ -7,18 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from app.opening import open_capture_of
-from app.project import PROJECT_FILE
 from app.report.facts import ClipFacts, read_facts
 from app.report.storage import COMPONENT_NAMES
 from engine.errors import CaptureError, ProjectError
 
 SCHEMA = 1
 _MB = 1e6
-
-
-def is_project(folder: Path) -> bool:
-    """Whether the folder is a project rather than a capture."""
-    return (folder / PROJECT_FILE).is_file()
 
 
 def describe_project(folder: Path) -> dict[str, Any]:
@@ -106,7 +100,7 @@ def project_lines(found: dict[str, Any]) -> list[str]:
 
 
 def _covered(coverage: dict[str, Any]) -> str:
-    said = f"{100 * coverage['share']:.1f} % with {coverage['n_residual']:,} anchors of its own"
+    said = f"{100 * coverage['share']:.1f} % with {coverage['n_residual']:,} residual anchors"
     if coverage["n_left_out"]:
         said += f", {coverage['n_left_out']:,} points beyond the budget left to those beside them"
     return said

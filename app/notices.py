@@ -61,6 +61,13 @@ class Notices:
         """A failure the user can act on; every problem of a capture is listed."""
         return self.add("error", title, *error.told_apart())
 
+    def withdraw(self, notice: Notice) -> None:
+        """Remove a notice that does not hold any more; one that is gone already is ignored."""
+        for index, found in enumerate(self._notices):
+            if found is notice:
+                self.dismiss(index)
+                return
+
     def dismiss(self, index: int) -> None:
         """Remove one notice; an index that is gone already is ignored."""
         if 0 <= index < len(self._notices):

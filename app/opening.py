@@ -13,6 +13,7 @@ from app.project import (
     create_project,
     default_project_dir,
     default_settings,
+    is_project,
     open_project,
     read_settings,
 )
@@ -37,7 +38,13 @@ class Opened:
 
 
 def open_for_window(
-    path: Path, *, scale: float | None, project_dir: Path | None, current: Path | None, context: JobContext
+    path: Path,
+    *,
+    scale: float | None,
+    project_dir: Path | None,
+    current: Path | None,
+    context: JobContext,
+    follow_links: bool = False,
 ) -> Opened:
     """Open a capture folder or a project folder.
 
@@ -47,37 +54,46 @@ def open_for_window(
         project_dir: Where the capture's project goes; None for the user's data folder.
         current: Project folder that this program has open already.
         context: Receives progress.
+        follow_links: Whether the user allows the capture's files to lie outside of its folder; noted in the project.
     Raises:
         CaptureError, ProjectError: It cannot be opened.
     """
     context.report(0.0, path.name)
-    if (path / PROJECT_FILE).is_file():
-        return _open_project(path, current)
-    capture = open_capture(path, scale=1.0 if scale is None else scale)
+    if is_project(path):
+        return _open_project(path, current, follow_links=follow_links)
+    capture = open_capture(path, scale=1.0 if scale is None else scale, follow_links=follow_links)
     widest = int(capture.rig.image_sizes[:, 0].max())
     if scale is None and widest > WINDOW_WIDTH_PX:
-        capture = open_capture(path, scale=WINDOW_WIDTH_PX / widest)
+        capture = open_capture(path, scale=WINDOW_WIDTH_PX / widest, follow_links=follow_links)
     context.report(0.7, f"{len(capture.rig)} cameras, {capture.n_frames} frames")
     folder = default_project_dir(capture) if project_dir is None else project_dir
     if (folder / PROJECT_FILE).is_file():
-        return _open_project(folder, current, capture if scale is None else None)
+        return _open_project(folder, current, capture if scale is None else None, follow_links=follow_links)
     return Opened(capture, create_project(folder, default_settings(capture)))
 
 
-def _open_project(folder: Path, current: Path | None, capture: Capture | None = None) -> Opened:
-    settings = read_settings(folder)
+def _open_project(
+    folder: Path, current: Path | None, capture: Capture | None = None, *, follow_links: bool = False
+) -> Opened:
+    stored = read_settings(folder)
+    settings = replace(stored, follow_links=stored.follow_links or follow_links)
     if capture is None:
         capture = open_capture_of(settings, folder)
     else:
-        capture = capture if capture.scale == settings.scale else open_capture(capture.path, scale=settings.scale)
+        capture = (
+            capture
+            if capture.scale == settings.scale
+            else open_capture(capture.path, scale=settings.scale, follow_links=settings.follow_links)
+        )
         check_capture(capture, settings, folder)
     if current is not None and current.resolve() == folder.resolve():
         return Opened(capture, None)
     try:
         project = open_project(folder)
         place = str(Path(capture.path).resolve())
-        if settings.capture != place:  # it has moved since; workers open it where the project says
-            project.update(replace(settings, capture=place))
+        settings = replace(settings, capture=place)
+        if settings != stored:  # it has moved since, or may follow links; workers open it as the project says
+            project.update(settings)
         return Opened(capture, project)
     except ProjectError as error:  # most likely locked; looking at it does no harm
         note = ("The project is open for reading only", str(error), "Training is off until it is closed there.")
@@ -97,7 +113,7 @@ def open_capture_of(settings: ProjectSettings, folder: Path) -> Capture:
             hint=f"Put it back, or say where it is: clipgstream train NEW_PLACE --project {folder}",
             path=settings.capture,
         )
-    capture = open_capture(settings.capture, scale=settings.scale)
+    capture = open_capture(settings.capture, scale=settings.scale, follow_links=settings.follow_links)
     check_capture(capture, settings, folder)
     return capture
 

@@ -60,7 +60,9 @@ def picture_hint(capture: Capture, frame_index: int) -> PointArrays:
     )
 
 
-def make_cloud(capture_path: Path, *, holdout: tuple[int, ...], path: Path, context: JobContext) -> Path:
+def make_cloud(
+    capture_path: Path, *, holdout: tuple[int, ...], path: Path, context: JobContext, follow_links: bool = False
+) -> Path:
     """Build the first cloud in a process and wait for it. To be run on a job's thread.
 
     Args:
@@ -68,11 +70,12 @@ def make_cloud(capture_path: Path, *, holdout: tuple[int, ...], path: Path, cont
         holdout: Cameras to leave out, as training does.
         path: File for the cloud.
         context: Receives signs of life; cancelling it ends the process.
+        follow_links: As of the capture, see engine.capture.capture.
     Raises:
         PreparationError: There is no cloud; the log says why.
     """
     process = multiprocessing.get_context("spawn").Process(
-        target=write_cloud, args=(str(capture_path), holdout, str(path)), name="first cloud", daemon=True
+        target=write_cloud, args=(str(capture_path), holdout, str(path), follow_links), name="first cloud", daemon=True
     )
     process.start()
     try:
@@ -88,16 +91,16 @@ def make_cloud(capture_path: Path, *, holdout: tuple[int, ...], path: Path, cont
     return path
 
 
-def write_cloud(capture_path: str, holdout: tuple[int, ...], path: str) -> None:
+def write_cloud(capture_path: str, holdout: tuple[int, ...], path: str, follow_links: bool) -> None:
     """Build and write the first cloud. Runs in the child; its exit code is 1 when there is none."""
     lower_process()
     from engine.cloud.static_cloud import build_static_cloud
 
     try:
-        capture = open_capture(capture_path)
+        capture = open_capture(capture_path, follow_links=follow_links)
         widest = int(capture.rig.image_sizes[:, 0].max())
         if widest > CLOUD_WIDTH_PX:
-            capture = open_capture(capture_path, scale=CLOUD_WIDTH_PX / widest)
+            capture = open_capture(capture_path, scale=CLOUD_WIDTH_PX / widest, follow_links=follow_links)
         cameras = capture.training_cameras(holdout)
         pictures = np.stack([capture.frame(camera, 0) for camera in cameras])
         cloud = build_static_cloud(

@@ -13,70 +13,38 @@ logs/                        one file per clip
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import shutil
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 from app.header_cache import HeaderCache
-from app.lock import ProcessLock
+from app.lock import ProcessLock, is_process_alive
+from app.project_files import (
+    GATE_FILE,
+    PROJECT_FILE,
+    ProjectSettings,
+    read_regions,
+    read_settings,
+    write_regions,
+    write_settings,
+)
 from engine.capture.capture import Capture
-from engine.capture.clip import Clip, split_clips
-from engine.cloud.regions import GateRegion, parse_region
+from engine.capture.clip import Clip
+from engine.cloud.regions import GateRegion
 from engine.errors import ProjectError
-from engine.files import checked_path
-from engine.training.config import TrainConfig
+from engine.files import PARTIAL_PREFIX, is_left_over
 
 logger = logging.getLogger(__name__)
 
-SCHEMA = 1
-PROJECT_FILE = "project.json"
-GATE_FILE = "gate.json"
+LOCK_FILE = "lock"
+LOCK_FILES = (LOCK_FILE, f".{LOCK_FILE}")
 MIN_TRAINING_CAMERAS = 2
 DEFAULT_CLIP_LENGTH = 10
-
-
-@dataclass(frozen=True, slots=True)
-class ProjectSettings:
-    """What every clip of a project has in common. A value; saved as project.json.
-
-    Attributes:
-        capture: Folder of the capture.
-        fingerprint: Of the capture, to notice another one in its place.
-        scale: Share of the original picture size, in (0, 1].
-        clip_length: M, frames per clip.
-        holdout: Names of the cameras that training never sees.
-        seed: Fixes initial values and the order of pictures.
-        overrides: Training settings that differ from the defaults.
-        reference_clip: Index of the clip that the others inherit from.
-    """
-
-    capture: str
-    fingerprint: str
-    scale: float = 1.0
-    clip_length: int = 10
-    holdout: tuple[str, ...] = ()
-    seed: int = 0
-    overrides: dict[str, Any] = field(default_factory=dict)
-    reference_clip: int = 0
-    schema: int = SCHEMA
-
-    def clips(self, n_frames: int) -> list[Clip]:
-        """The clips of a capture of that many frames."""
-        return split_clips(n_frames, n_frames if self.config().field == "joint" else self.clip_length)
-
-    def config(self) -> TrainConfig:
-        """The training settings. Raises ProjectError for an unknown one or a value outside its range."""
-        unknown = sorted(set(self.overrides) - {item.name for item in fields(TrainConfig)})
-        if unknown:
-            raise ProjectError(f"There is no training setting called {', '.join(unknown)}.", hint="Take it out.")
-        return TrainConfig(**self.overrides)
 
 
 class Project:
@@ -198,7 +166,7 @@ class Project:
             ProjectError: The project is read-only, or the disk refused.
         """
         self.check_writable()
-        _write_json(self.folder / PROJECT_FILE, asdict(settings))
+        write_settings(self.folder, settings)
         self.settings = settings
 
     def gate_regions(self) -> tuple[GateRegion, ...]:
@@ -207,18 +175,7 @@ class Project:
         Raises:
             ProjectError: The file is damaged or holds something that is no region.
         """
-        path = self.folder / GATE_FILE
-        try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
-            return ()
-        except (OSError, ValueError) as error:
-            raise ProjectError(
-                f"The regions of the gate cannot be read ({error}).", hint="Correct or remove the file.", path=path
-            ) from error
-        if not isinstance(content, dict) or not isinstance(content.get("regions"), list):
-            raise ProjectError('The file has no list "regions".', hint="Correct or remove the file.", path=path)
-        return tuple(parse_region(values) for values in content["regions"])
+        return read_regions(self.folder / GATE_FILE)
 
     def set_gate_regions(self, regions: Sequence[GateRegion]) -> None:
         """Replace the regions, on disk.
@@ -227,7 +184,7 @@ class Project:
             ProjectError: The project is read-only, or the disk refused.
         """
         self.check_writable()
-        _write_json(self.folder / GATE_FILE, {"regions": [region.as_dict() for region in regions]})
+        write_regions(self.folder / GATE_FILE, regions)
 
     def discard_progress(self, clip_index: int) -> None:
         """Forget the unfinished training of a clip; a finished clip and its curves stay."""
@@ -261,6 +218,14 @@ class Project:
 # ---------------------------------------------------------------- opening
 
 
+def is_project(folder: Path) -> bool:
+    """Whether the folder is a project rather than a capture; a path that cannot even be looked at is none."""
+    try:
+        return (folder / PROJECT_FILE).is_file()
+    except OSError:
+        return False
+
+
 def default_settings(
     capture: Capture,
     *,
@@ -285,6 +250,7 @@ def default_settings(
         seed=seed,
         overrides=dict(overrides or {}),
         reference_clip=reference_clip,
+        follow_links=capture.follow_links,
     )
     check_settings(settings, capture)
     return settings
@@ -330,7 +296,7 @@ def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
     folder = Path(folder)
     if (folder / PROJECT_FILE).exists():
         raise ProjectError("There is a project already.", hint="Open it instead.", path=folder)
-    if folder.is_dir() and any(child.name != "lock" for child in folder.iterdir()):
+    if folder.is_dir() and any(child.name not in LOCK_FILES for child in folder.iterdir()):
         raise ProjectError(
             "The project folder holds other files.", hint="Choose an empty or a new folder.", path=folder
         )
@@ -340,10 +306,12 @@ def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
         raise ProjectError(
             f"The project folder cannot be made ({error.strerror}).", hint="Choose another place.", path=folder
         ) from error
-    lock = ProcessLock(folder / "lock")
+    lock = ProcessLock(folder / LOCK_FILE)
     lock.acquire()
     try:
-        _write_json(folder / PROJECT_FILE, asdict(settings))
+        if (folder / PROJECT_FILE).exists():  # made while this one looked
+            raise ProjectError("There is a project already.", hint="Open it instead.", path=folder)
+        write_settings(folder, settings)
     except ProjectError:
         lock.release()
         raise
@@ -360,7 +328,7 @@ def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
     settings = read_settings(folder)
     lock = None
     if is_writable:
-        lock = ProcessLock(folder / "lock")
+        lock = ProcessLock(folder / LOCK_FILE)
         lock.acquire()
     project = Project(folder, settings, lock)
     if is_writable:
@@ -369,89 +337,17 @@ def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
 
 
 def sweep(project: Project) -> None:
-    """Remove what a killed program left behind: snapshots and half-written files. Finished files stay."""
-    leftovers = [*project.live_dir.glob("*"), *project.folder.rglob(".partial-*")]
+    """Remove what a killed program left behind: snapshots and half-written files. Finished files stay.
+
+    What another process is writing stays too, such as the report of a project that trains.
+    """
+    partials = [path for path in project.folder.rglob(f"{PARTIAL_PREFIX}*") if is_left_over(path, is_process_alive)]
+    leftovers = [*project.live_dir.glob("*"), *partials]
     for path in leftovers:
         with suppress(OSError):
             path.unlink()
     if leftovers:
         logger.info("removed %d left-over files from %s", len(leftovers), project.folder)
-
-
-def read_settings(folder: Path) -> ProjectSettings:
-    """Read project.json.
-
-    Raises:
-        ProjectError: It is missing, damaged, of a newer schema, or holds unknown or ill-typed values.
-    """
-    path = folder / PROJECT_FILE
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        if not folder.exists():
-            raise ProjectError("There is no such folder.", hint="Check the path.", path=folder) from error
-        raise ProjectError(
-            f"This folder is no project: it has no {PROJECT_FILE}.",
-            hint="Train a capture first, or open the folder that holds that file.",
-            path=folder,
-        ) from error
-    except (OSError, ValueError) as error:
-        raise ProjectError(
-            f"The project file cannot be read ({error}).", hint="Restore it from a copy.", path=path
-        ) from error
-    if not isinstance(content, dict) or "schema" not in content:
-        raise ProjectError("The project file is no project.", hint="Restore it from a copy.", path=path)
-    if content["schema"] != SCHEMA:
-        raise ProjectError(
-            f"The project has schema {content['schema']}, this version reads {SCHEMA}.",
-            hint="Use the version that wrote it.",
-            path=path,
-        )
-    known = {item.name for item in fields(ProjectSettings)}
-    unknown = sorted(set(content) - known)
-    if unknown:
-        raise ProjectError(f"The project file has unknown entries: {', '.join(unknown)}.", path=path)
-    try:
-        settings = ProjectSettings(
-            capture=str(content["capture"]),
-            fingerprint=str(content["fingerprint"]),
-            scale=float(content.get("scale", 1.0)),
-            clip_length=int(content.get("clip_length", 10)),
-            holdout=tuple(str(name) for name in content.get("holdout", ())),
-            seed=int(content.get("seed", 0)),
-            overrides=dict(content.get("overrides", {})),
-            reference_clip=int(content.get("reference_clip", 0)),
-        )
-        if not (0.0 < settings.scale <= 1.0 and settings.clip_length >= 1):
-            raise ValueError(f"scale {settings.scale:g} or clip_length {settings.clip_length} is out of range")
-        settings.config()
-    except ProjectError as error:
-        raise ProjectError(error.message, hint="Correct it or restore the file from a copy.", path=path) from error
-    except (KeyError, TypeError, ValueError) as error:
-        raise ProjectError(
-            f"The project file has a missing or wrong entry ({error}).", hint="Restore it from a copy.", path=path
-        ) from error
-    return settings
-
-
-def _write_json(path: Path, content: dict[str, Any]) -> None:
-    with checked_path(path, what="The project") as partial:
-        partial.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-
-
-def read_metrics(path: Path) -> list[dict[str, Any]]:
-    """Rows of a metrics file; lines that are unfinished or damaged are left out."""
-    try:
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        return []
-    rows = []
-    for line in lines:
-        with suppress(ValueError, RecursionError):
-            row = json.loads(line)
-            if isinstance(row, dict) and isinstance(row.get("step"), int):
-                rows.append(row)
-    return rows
 
 
 # ---------------------------------------------------------------- where projects lie

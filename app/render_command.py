@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from app.arguments import EXIT_OK, parse_cameras, parse_range
+from app.arguments import EXIT_OK, parse_cameras, parse_range, path_argument
 from app.headless import open_trained, render_frames
 from app.progress import ProgressLine, row_progress
 from app.project import open_project
@@ -20,10 +20,12 @@ VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov")
 
 def add_render_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream render`."""
-    command.add_argument("project", type=Path, help="project folder")
+    command.add_argument("project", type=path_argument, help="project folder")
     command.add_argument("--camera", required=True, metavar="NAME", help="camera of the capture")
     command.add_argument("--frames", default=":", metavar="A:B", help="frames A up to B, B not included (default: all)")
-    command.add_argument("--out", type=Path, required=True, metavar="FILE.mp4|DIR", help="video, or folder for PNGs")
+    command.add_argument(
+        "--out", type=path_argument, required=True, metavar="FILE.mp4|DIR", help="video, or folder for PNGs"
+    )
     command.add_argument(
         "--features",
         choices=("both", "static", "dynamic"),

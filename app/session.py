@@ -16,7 +16,7 @@ from app.jobs import Job, JobContext, Jobs
 from app.latest import LatestWorker
 from app.marking import Marking
 from app.next_plan import NextPlan
-from app.notices import Notices
+from app.notices import Notice, Notices
 from app.opening import Opened, open_for_window
 from app.pictures import CapturedPictures
 from app.playback import FrameRequest, Playback, ShownFrame, static_points
@@ -45,6 +45,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.capture.rig import CameraRig
 from engine.errors import EngineError
+from engine.text import printable
 from engine.training.presets import preset
 
 logger = logging.getLogger(__name__)
@@ -108,6 +109,7 @@ class Session:
         self.plan: PlanStatus | None = None
         self.holdout: tuple[int, ...] = ()
         self._project_dir, self._launch, self._opener = project_dir, launch, opener
+        self._refusals: list[Notice] = []
         self._service: TrainingService | None = None
         self._closing: list[tuple[TrainingService, Project]] = []
         self._jobs = Jobs()
@@ -119,7 +121,7 @@ class Session:
         self._marking = Marking()
         self.regions: RegionsStatus = self._marking.status([])
         self._unread: SnapshotWritten | None = None
-        self._anchor_counts: dict[int, tuple[int, int]] = {}
+        self._live_counts: tuple[int, int] | None = None  # anchors of the running clip, once a state was loaded
         self._is_closed = False
         self._is_preloading = is_preloading
         self._first_cloud: Job | None = None
@@ -161,8 +163,8 @@ class Session:
 
     def _obey(self, command: commands.Command) -> None:
         match command:
-            case commands.OpenCapture(path=path, scale=scale):
-                self._open(Path(path), scale)
+            case commands.OpenCapture(path=path, scale=scale, follow_links=follow_links):
+                self._open(Path(path), scale, follow_links=follow_links)
             case commands.OpenProject(path=path):
                 self._open(Path(path), None)
             case commands.TrainNextClip():
@@ -255,21 +257,32 @@ class Session:
 
     # ---------------------------------------------------------------- opening
 
-    def _open(self, path: Path, scale: float | None) -> None:
+    def _open(self, path: Path, scale: float | None, *, follow_links: bool = False) -> None:
         current = None if self.project is None else self.project.folder
 
         def work(context: JobContext) -> Opened:
-            return self._opener(path, scale=scale, project_dir=self._project_dir, current=current, context=context)
+            return self._opener(
+                path,
+                scale=scale,
+                project_dir=self._project_dir,
+                current=current,
+                context=context,
+                follow_links=follow_links,
+            )
 
         def failed(error: Exception) -> None:
+            name = printable(path.name or str(path))
             if isinstance(error, EngineError):
-                self.notices.add_error(f"{path.name or path} cannot be opened", error)
+                self._refusals.append(self.notices.add_error(f"{name} cannot be opened", error))
             else:
-                self._report_fault(f"{path.name or path} cannot be opened", error)
+                self._report_fault(f"{name} cannot be opened", error)
 
         self._jobs.start("Opening the capture", work, self._take_opened, failed)
 
     def _take_opened(self, opened: Opened) -> None:
+        for notice in self._refusals:  # something is open now; why something else was not is no news any more
+            self.notices.withdraw(notice)
+        self._refusals.clear()
         if opened.project is None:  # it is open already
             self.view.home()
             return
@@ -291,10 +304,10 @@ class Session:
         path = project.first_cloud_path
         if path.is_file() or self._state_of(self.reference_index) is not None:
             return
-        capture_path, holdout = capture.path, self.holdout
+        capture_path, holdout, follow_links = capture.path, self.holdout, capture.follow_links
 
         def work(context: JobContext) -> Path:
-            return make_cloud(capture_path, holdout=holdout, path=path, context=context)
+            return make_cloud(capture_path, holdout=holdout, path=path, context=context, follow_links=follow_links)
 
         def failed(error: Exception) -> None:  # the hint stays; training will say what is wrong
             logger.warning("no first cloud: %s", error)
@@ -322,7 +335,7 @@ class Session:
         self._marking.leave()
         if self._first_cloud is not None:
             self._first_cloud.context.cancel()
-        self._unread, self._anchor_counts = None, {}
+        self._unread = self._live_counts = None
         service, project, self._service = self._service, self.project, None
         if service is None or project is None:
             return
@@ -374,7 +387,7 @@ class Session:
         if isinstance(event, SnapshotWritten):
             self._unread = event
         elif isinstance(event, ENDINGS):
-            self._unread = None
+            self._unread = self._live_counts = None
 
     def _release_snapshot(self) -> None:
         """Tell the worker that its snapshot was read, or that nobody looks at that clip."""
@@ -435,13 +448,11 @@ class Session:
             return
         clip = self.timeline.clip
         request = self._frame_request()
-        if clip is not None and request is not None:
-            anchors = self._playback.anchors(request)
-            if anchors is not None:
-                counts = (len(anchors.inherited_positions), len(anchors.own_positions))
-                self._anchor_counts[clip.clip_index] = counts
+        anchors = None if request is None or not request.is_live else self._playback.anchors(request)
+        if anchors is not None:
+            self._live_counts = (len(anchors.inherited_positions), len(anchors.own_positions))
         self.training = self._service.status(None if clip is None else clip.clip_index)
-        self.clip_states = self._service.clip_statuses(self._anchor_counts)
+        self.clip_states = self._service.clip_statuses(self._live_counts)
         self.regions = self._marking.status(self.clip_states)
         self.plan = None
         if self.project is not None and self.capture is not None:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import sys
 from pathlib import Path
 
-from engine.files import atomic_path
+from engine.json_files import JsonError, read_checked_json, write_checked_json
 
 logger = logging.getLogger(__name__)
 
 MAX_RECENT = 12
+MAX_BYTES = 1 << 20
 
 
 def config_dir() -> Path:
@@ -42,18 +42,19 @@ class Settings:
         text = str(Path(folder).resolve())
         self.recent = [text, *(known for known in self.recent if known != text)][:MAX_RECENT]
         try:
-            with atomic_path(self.path) as partial:
-                partial.write_text(json.dumps({"schema": 1, "recent": self.recent}, indent=2), encoding="utf-8")
+            write_checked_json(self.path, {"schema": 1, "recent": self.recent})
         except OSError as error:
             logger.warning("preferences could not be saved (%s) - %s", error.strerror, self.path)
 
 
 def _read_recent(path: Path) -> list[str]:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        return [str(folder) for folder in content["recent"]][:MAX_RECENT]
+        recent = read_checked_json(path, max_bytes=MAX_BYTES).get("recent")
+        if not isinstance(recent, list) or not all(isinstance(folder, str) for folder in recent):
+            raise JsonError("it has no list of recent folders")
+        return recent[:MAX_RECENT]
     except FileNotFoundError:
         return []
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, JsonError) as error:
         logger.warning("preferences could not be read (%s) - %s", error, path)
         return []

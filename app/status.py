@@ -68,6 +68,7 @@ class TrainingStatus:
         step, n_steps: Optimiser steps of that clip.
         progress: Share of the current stage while preparing, of all steps later. 0..1
         stage: What is done at the moment, as shown to the user.
+        stage_number, n_stages: Which stage of the preparation that is, from 1; 0 where they are not counted.
         message: One line with counts and reasons.
         steps_per_s: Smoothed rate; 0 when unknown.
         eta_s: Seconds until the clip is finished; None when unknown.
@@ -87,6 +88,8 @@ class TrainingStatus:
     n_steps: int = 0
     progress: float = 0.0
     stage: str = ""
+    stage_number: int = 0
+    n_stages: int = 0
     message: str = ""
     steps_per_s: float = 0.0
     eta_s: float | None = None
@@ -110,7 +113,9 @@ class ClipStatus:
             again, or the clip that it goes on from), or damaged (finished, but its file cannot be read).
         progress: Share of its steps, 0..1.
         held_out_psnr: Newest figure, dB; None when not measured.
-        n_inherited, n_own: Anchors of the shown model; 0 until it was loaded.
+        n_inherited, n_own: All anchors of the clip, whatever frames they are alive in: those it inherits from the
+            reference clip, and those it holds itself (all of the reference clip, residual ones of another). 0 where
+            there are none yet.
         resume_step: The step that its training goes on from; None when there is nothing to go on from. A clip that
             was being trained again when that was stopped is trained and has one.
         reason: Why it is stale or damaged; empty otherwise.

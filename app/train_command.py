@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,11 +12,13 @@ from app.arguments import (
     EXIT_BAD_INPUT,
     EXIT_FAILED,
     EXIT_OK,
+    add_follow_links,
     add_training_settings,
     fail,
     overrides_of,
     parse_cameras,
     parse_range,
+    path_argument,
 )
 from app.bench.speed import known_machine_speed
 from app.clip_catalog import ClipCatalog
@@ -38,6 +39,7 @@ from app.training.lines import PlanLines, show_event, show_outcome, show_status
 from app.training.service import Launch, TrainingService
 from engine.capture.capture import Capture, open_capture
 from engine.errors import CaptureError, DiskError, ProjectError
+from engine.json_files import json_text
 
 BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
 """Failures of a worker that are the input's and not the program's."""
@@ -45,9 +47,12 @@ BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
 
 def add_train_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream train`."""
-    command.add_argument("capture", type=Path, help="capture folder")
-    command.add_argument("--project", type=Path, required=True, help="project folder; made when it is not there")
+    command.add_argument("capture", type=path_argument, help="capture folder")
+    command.add_argument(
+        "--project", type=path_argument, required=True, help="project folder; made when it is not there"
+    )
     command.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
+    add_follow_links(command)
     add_training_settings(command)
     command.add_argument("--seed", type=int, help="fixes initial values and order of pictures (default: 0)")
     command.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
@@ -79,6 +84,8 @@ def train(options: argparse.Namespace, launch: Launch) -> int:
             f"{capture.path}: {len(capture.rig)} cameras (held out: {names}), {capture.n_frames} frames, "
             f"clips {chosen.start} to {chosen.stop - 1} of {len(clips)}"
         )
+        for sentence in capture.warnings:
+            line.say(f"Note: {sentence}")
         first = project.settings.reference_clip  # the others cannot begin before it
         plans = PlanLines(
             line,
@@ -99,7 +106,7 @@ def train(options: argparse.Namespace, launch: Launch) -> int:
         is_refused = outcomes[-1].state == "failed" and outcomes[-1].kind in BAD_INPUT_KINDS
         line.finish()
         if options.json:
-            print(json.dumps(train_document(project, capture, outcomes), indent=2))
+            print(json_text(train_document(project, capture, outcomes), indent=2))
     except (CaptureError, ProjectError) as error:
         is_refused = not isinstance(error, DiskError)
         raise
@@ -139,7 +146,7 @@ def _plan(options: argparse.Namespace) -> int:
         if i not in trained and i not in damaged
     ]
     if options.json:
-        print(json.dumps(plan_document(project, capture, plans, trained, damaged), indent=2))
+        print(json_text(plan_document(project, capture, plans, trained, damaged), indent=2))
         return EXIT_OK
     for plan in plans:
         print("\n".join(plan_text(plan)))
@@ -188,7 +195,8 @@ def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, Proj
     exists = (options.project / PROJECT_FILE).is_file()
     stored = read_settings(options.project) if exists else None
     scale = options.scale if options.scale is not None else 1.0 if stored is None else stored.scale
-    capture = open_capture(options.capture, scale=scale)
+    follow_links = options.follow_links or (stored is not None and stored.follow_links)
+    capture = open_capture(options.capture, scale=scale, follow_links=follow_links)
     holdout = None if options.holdout is None else parse_cameras(options.holdout, capture)
     if stored is None:
         settings = default_settings(
@@ -215,7 +223,8 @@ def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, Proj
             "The project was made for another capture.", hint="Choose another --project folder.", path=options.project
         )
     place = str(Path(capture.path).resolve())  # the capture may have moved
-    settings = replace(stored, **changes, overrides=stored.overrides | overrides, capture=place)
+    changes |= {"overrides": stored.overrides | overrides, "capture": place, "follow_links": follow_links}
+    settings = replace(stored, **changes)
     check_settings(settings, capture)
     return settings, stored, capture
 

@@ -1,5 +1,5 @@
-"""Numbers and files of ClipGStream Studio; see ARCHITECTURE.md. Kernels are kept where `engine.kernels.cache` says."""
+"""Numbers and files of ClipGStream Studio; see ARCHITECTURE.md. Importing it changes nothing in the process.
 
-from engine.kernels.cache import use_kernel_cache
-
-use_kernel_cache()  # numba asks for the folder when the decorator of a kernel runs
+A program that uses kernels calls `engine.kernels.cache.use_kernel_cache()` first, and
+`engine.kernels.threads.configure_threads()`; without them numba keeps machine code beside the sources.
+"""

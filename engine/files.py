@@ -5,7 +5,8 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
@@ -14,6 +15,7 @@ from engine.errors import DiskError
 
 PARTIAL_PREFIX = ".partial-"
 """Half-written files begin with this, then with the id of the process that writes them."""
+_MAX_PID_DIGITS = 9
 STALE_AFTER_S = 24 * 3600.0
 """A half-written file this old belongs to nobody, whoever may have its process id by now."""
 
@@ -38,6 +40,22 @@ def atomic_path(path: Path | str, *, makes_parents: bool = True, is_durable: boo
     finally:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
+
+
+def is_left_over(path: Path, is_alive: Callable[[int], bool]) -> bool:
+    """Whether nobody goes on writing a file that `atomic_path` yielded once: its process is dead, or it is a day old.
+
+    Args:
+        path: Has PARTIAL_PREFIX.
+        is_alive: Tells of the id of a process whether there is one.
+    """
+    number = path.name.removeprefix(PARTIAL_PREFIX).partition("-")[0]
+    if not number.isdecimal() or len(number) > _MAX_PID_DIGITS or not is_alive(int(number)):
+        return True
+    try:
+        return time.time() - path.stat().st_mtime > STALE_AFTER_S
+    except OSError:  # it is complete by now, or gone
+        return False
 
 
 def replace_file(source: Path, target: Path, *, is_durable: bool = False) -> None:

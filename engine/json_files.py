@@ -32,6 +32,10 @@ class JsonError(ValueError):
     """Not JSON as this program reads it. The text is a reason that fits into brackets behind a sentence."""
 
 
+class ChecksumError(JsonError):
+    """JSON, but not with the values that its checksum was made for: damaged, or edited by hand."""
+
+
 def parse_json(data: bytes | str, *, is_nan_allowed: bool = False) -> Any:
     """Parse a JSON document.
 
@@ -145,15 +149,20 @@ def _without_nan(value: Any) -> Any:
             return value
 
 
-def write_checked_json(path: Path | str, document: dict[str, Any], *, is_durable: bool = False) -> None:
+def write_checked_json(
+    path: Path | str, document: dict[str, Any], *, makes_parents: bool = True, is_durable: bool = False
+) -> None:
     """Write a document with its checksum, atomically.
+
+    Args:
+        path, makes_parents, is_durable: As of engine.files.atomic_path.
 
     Raises:
         OSError: The disk refused.
         ValueError: The document holds NaN.
     """
     text = json.dumps(document | {CHECKSUM: _checksum(document)}, indent=2, allow_nan=False) + "\n"
-    with atomic_path(path, is_durable=is_durable) as partial:
+    with atomic_path(path, makes_parents=makes_parents, is_durable=is_durable) as partial:
         partial.write_text(text, encoding="utf-8")
 
 
@@ -162,12 +171,12 @@ def read_checked_json(path: Path | str, *, max_bytes: int = MAX_JSON_BYTES) -> d
 
     Raises:
         OSError: See `read_json_object`.
-        JsonError: See there; or the content is not that which the checksum was made for.
+        JsonError: See there. ChecksumError: The content is not that which the checksum was made for.
     """
     document = read_json_object(path, max_bytes=max_bytes)
     stated = document.pop(CHECKSUM, None)
     if stated is not None and stated != _checksum(document):
-        raise JsonError("its content does not fit its checksum")
+        raise ChecksumError("its content does not fit its checksum")
     return document
 
 

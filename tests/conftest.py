@@ -13,6 +13,9 @@ TORCH_THREADS = 2  # what the smallest machine has; more would make sums, and so
 
 
 def pytest_configure() -> None:
+    from engine.kernels.cache import use_kernel_cache
+
+    use_kernel_cache()  # as the program's main functions do; before any test imports kernels
     os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the layer the program uses; set before numba is imported
 
 

@@ -11,7 +11,7 @@ from imgui_bundle import ImVec2, imgui
 
 from ui.state import CAPTURE, REGIONS, TIMELINE, TRAINING, VIEWPORT
 
-SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: (236.0, 0.0), REGIONS: (236.0, 0.0), TIMELINE: (0.0, 132.0)}
+SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: (236.0, 0.0), REGIONS: (236.0, 0.0), TIMELINE: (0.0, 140.0)}
 """Width and height of docked panels, units. The timeline has its buttons, ruler and bands at this height."""
 SMALLEST_PICTURE = (300.0, 150.0)
 WIDE_UNITS = 1240.0

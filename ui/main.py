@@ -11,8 +11,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.arguments import COMMANDS, PlainParser
+from app.arguments import COMMANDS, PlainParser, add_follow_links, path_argument
 from engine.assets import asset_path
+from engine.kernels.cache import use_kernel_cache
 from ui.ui_scale import parse_scale
 
 DEMO = {"demo": "train the first two clips and leave figures, a picture of the window and a video"}
@@ -37,7 +38,8 @@ def build_parser() -> argparse.ArgumentParser:
         + "\n".join(f"  clipgstream {name:<8} {words}" for name, words in (COMMANDS | DEMO).items()),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("path", nargs="?", type=Path, help="capture or project folder to open")
+    parser.add_argument("path", nargs="?", type=path_argument, help="capture or project folder to open")
+    add_follow_links(parser)
     parser.add_argument("--size", type=_parse_size, metavar="WxH", help="window size in pixels, for example 1440x900")
     parser.add_argument(
         "--ui-scale",
@@ -56,8 +58,10 @@ def build_demo_parser() -> argparse.ArgumentParser:
         prog="clipgstream demo",
         description="Train the first two clips without a window, then write a picture of the window and a video.",
     )
-    parser.add_argument("path", nargs="?", type=Path, default=None, help="capture folder (default: the sample)")
-    parser.add_argument("--out", type=Path, default=Path("demo_output"), help="folder for the results")
+    parser.add_argument(
+        "path", nargs="?", type=path_argument, default=None, help="capture folder (default: the sample)"
+    )
+    parser.add_argument("--out", type=path_argument, default=Path("demo_output"), help="folder for the results")
     parser.add_argument("--quick", action="store_true", help="a few steps only; shows that every part works")
     return parser
 
@@ -74,8 +78,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         return int(run_command(arguments) or 0)
     if arguments and arguments[0] == "demo":
+        use_kernel_cache()
         return _run_demo(build_demo_parser().parse_args(arguments[1:]))
     options = build_parser().parse_args(arguments)
+    use_kernel_cache()
     logging.basicConfig(level=logging.DEBUG if options.verbose else logging.INFO, format="%(levelname)s %(message)s")
     if not has_display():
         demo_arguments = [] if options.path is None else [str(options.path)]
@@ -116,7 +122,7 @@ def _run_window(options: argparse.Namespace) -> int:
     window = StudioWindow(session, width=width, height=height, memory=memory)
     try:
         if options.path is not None:
-            session.dispatch(OpenCapture(options.path))
+            session.dispatch(OpenCapture(options.path, follow_links=options.follow_links))
         window.run()
     finally:
         window.close()

@@ -8,40 +8,30 @@ faster, so its picture is uploaded instead. Redrawn only when the key of what it
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import moderngl
 import numpy as np
 
-from app.arrays import AnchorArrays
 from app.pointing import pixel_ray, seen_point
 from app.render import BACKGROUND
-from ui.anchor_marks import AnchorMarks, anchor_marks, nearest_under
+from ui.anchor_marks import nearest_under
 from ui.gl import (
-    INHERITED_ANCHOR_COLOR,
     NEAR,
-    RESIDUAL_ANCHOR_COLOR,
     ImageTexture,
-    LineRenderer,
     PointRenderer,
     SplatRenderer,
     Target,
-    frusta_lines,
     is_software,
 )
 from ui.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
+from ui.mark_layer import AnchorCounts, MarkLayer
 from ui.picture_size import MAX_PICTURE_WIDTH, MOVING_SHARES, moving_share, picture_size
 from ui.region_layer import RegionLayer, ShownRegions
-from ui.region_tool import rig_radius
 
-MAX_INHERITED_MARKS, MAX_RESIDUAL_MARKS = 2_500, 500
-"""At most this many anchors of a kind are marked, evenly thinned: they should not drown the picture. Residual anchors
-crowd where something is new, and that is what one wants to see."""
 CLOUD_OVERLAP = 1.5
 """Diameter of a cloud's points, in distances between neighbours."""
-FRUSTUM_SHARE = 0.09
-"""Length of a camera's pyramid as a share of the rig's radius."""
 HINT_NEAR_SHARE = 0.4
 """Pictures in space nearer than this share of the way to the pivot are left out."""
 _CLOUD_KINDS = {"static": CLOUD, "moment": FIRST_CLOUD, "pictures": HINT}
@@ -97,41 +87,18 @@ class CapturedPicture:
     is_stale: bool
 
 
-@dataclass(frozen=True)
-class AnchorCounts:
-    """Anchors held for the overlays, by origin. Those of the reference clip itself count as inherited.
-
-    Attributes:
-        clip_index, frame_index: What they are of; None where nobody says.
-        inherited_roles, residual_roles: Likewise by what they are; empty where nobody says.
-    """
-
-    n_inherited: int = 0
-    n_residual: int = 0
-    is_reference: bool = False
-    clip_index: int | None = None
-    frame_index: int | None = None
-    inherited_roles: dict[str, int] = field(default_factory=dict)
-    residual_roles: dict[str, int] = field(default_factory=dict)
-
-
 class Scene:
     """Owns the target, the renderers and the captured picture's texture. GL thread only."""
 
     def __init__(self, ctx: moderngl.Context) -> None:
         self.is_software = is_software(ctx)
-        self.counts = AnchorCounts()
         self.shown = ShownPicture()
         self._target = Target(ctx, precision="f1" if self.is_software else "f2")
         self._picture = ImageTexture(ctx)
         self._captured = ImageTexture(ctx)
         self._splats = SplatRenderer(ctx)
         self._cloud = PointRenderer(ctx)
-        self._inherited = PointRenderer(ctx)
-        self._residual = PointRenderer(ctx)
-        self._marks: tuple[AnchorMarks, AnchorMarks] | None = None
-        self._marks_key: Hashable = None
-        self._frusta = LineRenderer(ctx)
+        self.marks = MarkLayer(ctx)
         self.regions = RegionLayer(ctx)
         self._drawn_key: Hashable = None
         self._asked_size: tuple[int, int] | None = None
@@ -151,13 +118,16 @@ class Scene:
             self._captured,
             self._splats,
             self._cloud,
-            self._inherited,
-            self._residual,
-            self._frusta,
+            self.marks,
             self.regions,
         )
         for thing in owned:
             thing.release()
+
+    @property
+    def counts(self) -> AnchorCounts:
+        """Anchors of the shown frame."""
+        return self.marks.counts
 
     @property
     def shows(self) -> str:
@@ -204,10 +174,11 @@ class Scene:
         captured_key = None if captured is None else self._captured_key
         if base_key is None:
             shown = self._without_render(shown, points_key, captured)
-        marks_key = self._take_marks(session)
+        is_rendered = base_key is not None
+        marks_key = self.marks.take(session, view, session.shown_gaussians() if is_rendered else None)
         regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
         self.shown = shown
-        if self.is_software and base_key is not None and regions.is_empty and not self._has_marks(session):
+        if self.is_software and base_key is not None and regions.is_empty and self.marks.is_empty(session):
             # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
             self._drawn_key = None
             return Composed(self._picture.texture, shown)
@@ -309,71 +280,13 @@ class Scene:
             self._point_size = CLOUD_OVERLAP * cloud.spacing
         return key
 
-    def _take_marks(self, session: Any) -> Hashable:
-        overlays = session.overlays
-        frusta_key = None
-        if overlays.show_frusta:
-            held_out = tuple(session.holdout)
-            frusta_key = (id(session.rig), held_out)
-            size = FRUSTUM_SHARE * rig_radius(session.rig)
-            self._frusta.set(*frusta_lines(session.rig, size, held_out), key=frusta_key)
-        anchors = session.shown_anchors()
-        if anchors is None:
-            self.counts, self._marks, self._marks_key = AnchorCounts(), None, None
-            return (frusta_key, session.view.look_through)
-        if self._marks is None or anchors.key != self._marks_key:
-            self._sort_anchors(anchors)
-        assert self._marks is not None
-        for is_shown, marks, renderer in zip(
-            (overlays.show_inherited, overlays.show_residual),
-            self._marks,
-            (self._inherited, self._residual),
-            strict=True,
-        ):
-            if is_shown:
-                renderer.set(marks.positions, marks.colors, key=anchors.key)
-        return (
-            frusta_key,
-            session.view.look_through,
-            anchors.key,
-            overlays.show_inherited,
-            overlays.show_residual,
-        )
-
-    def _sort_anchors(self, anchors: AnchorArrays) -> None:
-        """Marks and counts of what is inherited and of what is the clip's own."""
-        inherited = (anchors.inherited_positions, anchors.inherited_roles, anchors.inherited_reasons)
-        own = (anchors.own_positions, anchors.own_roles, anchors.own_reasons)
-        is_reference = len(inherited[0]) == 0
-        if is_reference:  # what the reference clip learns is what the others inherit
-            inherited, own = own, inherited
-        first = anchor_marks(*inherited, most=MAX_INHERITED_MARKS, color=INHERITED_ANCHOR_COLOR)
-        second = anchor_marks(*own, most=MAX_RESIDUAL_MARKS, color=RESIDUAL_ANCHOR_COLOR)
-        self._marks, self._marks_key = (first, second), anchors.key
-        self.counts = AnchorCounts(
-            len(inherited[0]),
-            len(own[0]),
-            is_reference,
-            anchors.clip_index,
-            anchors.frame_index,
-            first.counts,
-            second.counts,
-        )
-
     def anchor_text(self, session: Any, view: SceneView, x: float, y: float) -> str:
-        """What the anchor under a pixel of the view is and why; empty where none is shown or nobody says."""
-        found = self._mark_under(session, view, x, y)
-        return "" if found is None else found[0].text(found[1], session.regions.regions)
-
-    def _mark_under(self, session: Any, view: SceneView, x: float, y: float) -> tuple[AnchorMarks, int] | None:
-        if self._marks is None:
-            return None
-        overlays = session.overlays
-        for is_shown, marks in zip((overlays.show_residual, overlays.show_inherited), self._marks[::-1], strict=True):
-            row = marks.at(view.world_to_camera, view.K, x, y, near=self._near) if is_shown else None
-            if row is not None:
-                return marks, row
-        return None
+        """What the anchor under a pixel of the view is and why; empty where none is shown or nobody says. It stands
+        out from the next frame on."""
+        found = self.marks.anchor_under(session, view, x, y, self._near)
+        text = "" if found is None else found[0].text(found[1], session.regions.regions)
+        self.marks.pointed_anchor = found[0].positions[found[1]] if found is not None and text else None
+        return text
 
     def point_under(self, session: Any, view: SceneView, x: float, y: float, depth: float) -> np.ndarray:
         """The place under a pixel of the view: of the anchor there if anchors are shown, else of what one sees there.
@@ -383,7 +296,7 @@ class Scene:
         Returns:
             Scene units. [3]
         """
-        found = self._mark_under(session, view, x, y)
+        found = self.marks.anchor_under(session, view, x, y, self._near)
         if found is not None:
             return found[0].positions[found[1]].astype(np.float64)
         origin, direction = pixel_ray(view.world_to_camera, view.K, x, y)
@@ -397,12 +310,6 @@ class Scene:
             if row is not None:
                 return cloud.points[row].astype(np.float64)
         return origin + depth * direction
-
-    def _has_marks(self, session: Any) -> bool:
-        overlays = session.overlays
-        has_frusta = overlays.show_frusta and session.view.look_through is None
-        has_inherited = overlays.show_inherited and self.counts.n_inherited > 0
-        return has_frusta or has_inherited or (overlays.show_residual and self.counts.n_residual > 0)
 
     def _draw(
         self, view: SceneView, base_key: Hashable, points_key: Hashable, captured_key: Hashable, session: Any
@@ -423,13 +330,7 @@ class Scene:
             self._cloud.draw(target, *camera, near, shape="circle", size=size, unit=unit, is_depth_tested=True)
         elif captured_key is not None:
             target.draw_image(self._captured)
-        is_free = session.view.look_through is None
-        if session.overlays.show_frusta and is_free:  # from inside a camera the others are only in the way
-            self._frusta.draw(target, *camera, width_px=1.5, opacity=0.8)
-        if self.counts.n_inherited and session.overlays.show_inherited:
-            self._inherited.draw(target, *camera, shape="ring", size=5.0, opacity=0.55)
-        if self.counts.n_residual and session.overlays.show_residual:
-            self._residual.draw(target, *camera, shape="diamond", size=6.5, outline_px=0.8, opacity=0.85)
+        self.marks.draw(target, view, session)
         self.regions.draw(target, camera)
         target.resolve(BACKGROUND)
 

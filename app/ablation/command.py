@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import replace
-from pathlib import Path
 
-from app.arguments import EXIT_OK, add_figure_choices, add_training_settings, overrides_of, parse_cameras
+from app.arguments import (
+    EXIT_OK,
+    add_figure_choices,
+    add_follow_links,
+    add_training_settings,
+    overrides_of,
+    parse_cameras,
+    path_argument,
+)
 from app.progress import ProgressLine, row_progress
 from app.project import check_settings, default_settings
 from app.results import check_writable
@@ -15,12 +21,13 @@ from app.training.lines import show_outcome, show_status
 from app.training.service import Launch
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError
+from engine.json_files import json_text
 
 
 def add_ablate_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream ablate`."""
-    command.add_argument("capture", type=Path, nargs="?", help="capture folder")
-    command.add_argument("--project", type=Path, help="folder for one project per variant and the table")
+    command.add_argument("capture", type=path_argument, nargs="?", help="capture folder")
+    command.add_argument("--project", type=path_argument, help="folder for one project per variant and the table")
     command.add_argument("--variants", metavar="NAMES", help="separated by commas (default: all; --list names them)")
     command.add_argument("--list", action="store_true", help="say what the variants are and end")
     command.add_argument("--n-clips", type=int, metavar="N", help="clips from the first (default: up to 4)")
@@ -34,6 +41,7 @@ def add_ablate_arguments(command: argparse.ArgumentParser) -> None:
         "--reference-clip", type=int, default=0, metavar="K", help="clip that others inherit from (default: 0)"
     )
     add_figure_choices(command, default="quick", said="quick")
+    add_follow_links(command)
     add_training_settings(command)
     command.add_argument("--json", action="store_true", help="print the table as JSON on standard output")
     command.add_argument("--quiet", action="store_true", help="no progress")
@@ -69,7 +77,8 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
         if lengths[0] < 1:
             raise ProjectError(f"--source-steps is '{options.source_steps}'; a clip needs at least one step.")
         variants = [with_source_steps(variant, n_steps) for variant in variants for n_steps in lengths]
-    capture = open_capture(options.capture, scale=options.scale if options.scale is not None else 1.0)
+    scale = options.scale if options.scale is not None else 1.0
+    capture = open_capture(options.capture, scale=scale, follow_links=options.follow_links)
     settings = default_settings(
         capture,
         clip_length=options.clip_length,
@@ -118,7 +127,7 @@ def ablate(options: argparse.Namespace, launch: Launch) -> int:
     finally:
         line.finish()
     if options.json:
-        print(json.dumps(document, indent=1, allow_nan=False))
+        print(json_text(document, indent=1))
     else:
         compared = "".join(f"\n{sentence}" for sentence in curve_lines(document["curves"]))
         print(f"{as_text(document['lines'])}\n{compared}\n{document['definition']}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -13,8 +12,9 @@ from app.headless import open_trained
 from app.later_clips import later_figures
 from app.project import Project, ProjectSettings, open_project
 from app.report.facts import read_facts
-from app.results import write_text
+from app.results import named_failure
 from engine.errors import ProjectError
+from engine.json_files import JsonError, read_checked_json, write_checked_json
 from engine.metrics.flicker import flicker_figures
 from engine.model.clip_state import read_clip_header
 
@@ -85,7 +85,8 @@ def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None]) 
     figures |= later_figures(document["means"]["clips"], group, source_s)
     figures["megabytes"] = sum(project.clip_path(i).stat().st_size for i in scope.clips) / 1e6
     measured = Measured(figures, sum(opened.clips[i].n_frames for i in scope.clips))
-    write_text(place / MEASURED_FILE, json.dumps({"key": key, **asdict(measured)}, indent=1, allow_nan=False) + "\n")
+    with named_failure(place / MEASURED_FILE):
+        write_checked_json(place / MEASURED_FILE, {"key": key, **asdict(measured)})
     return measured
 
 
@@ -114,10 +115,10 @@ def _key(project: Project, scope: Scope) -> dict[str, Any]:
 
 def _read(path: Path, key: dict[str, Any]) -> Measured | None:
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = read_checked_json(path)
+    except (OSError, JsonError):
         return None
-    if not isinstance(content, dict) or content.get("key") != key:
+    if content.get("key") != key:
         return None
     figures, n_frames = content.get("figures"), content.get("n_frames")
     return Measured(figures, n_frames) if isinstance(figures, dict) and isinstance(n_frames, int) else None

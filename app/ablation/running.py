@@ -6,7 +6,6 @@ only change source clips take over the reference clip of "full" instead of train
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +26,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import ProjectError, TrainingError
 from engine.files import atomic_path
+from engine.json_files import json_text
 
 if TYPE_CHECKING:
     from engine.metrics.colors import Precision
@@ -118,7 +118,7 @@ def run_ablation(
             "curves": curves_of(lines),
             "results": [{"variant": r.variant, "seed": r.seed, "n_frames": r.n_frames, **r.figures} for r in results],
         }
-        write_text(folder / RESULT_FILE, json.dumps(document, indent=1, allow_nan=False) + "\n")
+        write_text(folder / RESULT_FILE, json_text(document, indent=1) + "\n")
         write_text(folder / TABLE_FILE, as_csv(document["lines"]))
     return document
 

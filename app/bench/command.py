@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
-from app.arguments import EXIT_OK
+from app.arguments import EXIT_OK, path_argument
 from app.progress import ProgressLine
 from app.results import check_writable, named_failure, write_text
 from app.training.service import Launch
 from engine.errors import ProjectError
 from engine.files import atomic_path
+from engine.json_files import json_text
 
 CHART_FILE = "speed_error.png"
 DEFAULT_OUT = Path("bench_output")
@@ -22,7 +22,7 @@ def add_bench_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream bench`."""
     command.add_argument(
         "--out",
-        type=Path,
+        type=path_argument,
         default=DEFAULT_OUT,
         metavar="DIR",
         help=f"folder for the picture {CHART_FILE} (default: {DEFAULT_OUT})",
@@ -54,7 +54,7 @@ def bench(options: argparse.Namespace, launch: Launch) -> int:
         )
     finally:
         line.finish()
-    text = json.dumps(document(report), indent=1, allow_nan=False)
+    text = json_text(document(report), indent=1)
     print(text if options.json == "-" else report_text(report))
     if table_file is not None:
         write_text(table_file, text + "\n")

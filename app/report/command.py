@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
-from app.arguments import EXIT_OK, add_figure_choices
+from app.arguments import EXIT_OK, add_figure_choices, path_argument
 from app.progress import ProgressLine, row_progress
 from app.project import read_settings
 from app.results import check_writable
@@ -16,17 +15,19 @@ from app.training.service import Launch
 
 def add_report_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream report`."""
-    command.add_argument("project", type=Path, help="project folder")
+    command.add_argument("project", type=path_argument, help="project folder")
     command.add_argument(
         "--compare",
-        type=Path,
+        type=path_argument,
         nargs="+",
         action="extend",
         default=[],
         metavar="OTHER",
         help="project folders, or folders of projects, to set beside it",
     )
-    command.add_argument("--out", type=Path, metavar="DIR", help="folder for the page (default: PROJECT/reports)")
+    command.add_argument(
+        "--out", type=path_argument, metavar="DIR", help="folder for the page (default: PROJECT/reports)"
+    )
     add_figure_choices(command, default=None, said="all for the project, quick for the others")
     command.add_argument("--quiet", action="store_true", help="no progress")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import re
 from collections.abc import Callable, Sequence
@@ -26,6 +25,7 @@ from app.report.seam_parts import seams_section, shown_boundaries
 from engine.capture.inspect import describe
 from engine.errors import CaptureError, ProjectError
 from engine.files import atomic_path
+from engine.json_files import JsonError, json_text, read_json_object
 from engine.metrics.flicker import flicker_figures
 
 if TYPE_CHECKING:
@@ -223,7 +223,7 @@ def _write(out: Path, compared: Sequence[Compared], sections: Sequence[Section])
     for section in sections:
         for table in section.tables():
             files[f"{TABLES}/{table.name}.csv"] = table.csv_text().encode("utf-8", "replace")
-    numbers = json.dumps(document, indent=1, allow_nan=False)
+    numbers = json_text(document, indent=1)
     files[NUMBERS_FILE] = numbers.encode()
     files[PAGE_FILE] = page_html(f"Report: {facts.name}", lead, sections).encode("utf-8", "replace")
     is_new_folder = not out.exists()
@@ -249,9 +249,9 @@ def _write(out: Path, compared: Sequence[Compared], sections: Sequence[Section])
 
 def _files_of_last_report(out: Path) -> set[str]:
     try:
-        listed = json.loads((out / NUMBERS_FILE).read_text(encoding="utf-8"))["files"]
+        listed = read_json_object(out / NUMBERS_FILE)["files"]
         return {name for name in listed if isinstance(name, str) and _OWN_FILE.fullmatch(name)}
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, JsonError, KeyError, TypeError):
         return set()
 
 

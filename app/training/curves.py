@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.latest import LatestWorker
-from app.project import read_metrics
+from app.project_files import read_metrics
 
 Points = list[tuple[int, float]]
 """(step, value)."""

@@ -24,6 +24,7 @@ class TrainJob:
         scale, clip_length, seed, overrides: As in the project.
         clip_index: The clip to train.
         holdout: Camera indices never trained on.
+        follow_links: Whether files of the capture may lie outside of its folder.
         is_window_open: Leave a core, or at least right of way, to a window.
     """
 
@@ -36,6 +37,7 @@ class TrainJob:
     seed: int = 0
     overrides: dict[str, Any] = field(default_factory=dict)
     is_window_open: bool = True
+    follow_links: bool = False
 
 
 # ---------------------------------------------------------------- commands

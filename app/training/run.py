@@ -5,7 +5,6 @@ It knows neither processes nor pipes: `worker` drives it in a process, `inline` 
 
 from __future__ import annotations
 
-import json
 import logging
 import math
 import os
@@ -18,7 +17,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from app.memory import peak_bytes
-from app.project import Project, open_project, read_metrics
+from app.project import Project, open_project
+from app.project_files import read_metrics
 from app.training.keeping import FolderWatch, ProjectGone, Refusals, Retries
 from app.training.messages import (
     ClipTrained,
@@ -44,6 +44,7 @@ from app.training.rate import Rate
 from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
 from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch, stages_of
 from engine.errors import DiskError, EngineError, NonFiniteLoss, ProjectError
+from engine.json_files import checked_line
 from engine.model.clip_state import ClipState, read_clip_header
 from engine.model.compact import CompactClip
 from engine.training.report import Progress, ReportProgress, StepStats
@@ -491,7 +492,7 @@ class TrainingRun:
         try:
             path.parent.mkdir(exist_ok=True)  # not the project itself, which may be gone
             with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
+                file.write(checked_line(row))
         except OSError as error:
             logger.warning("a metrics row could not be written (%s) - %s", error.strerror, path)
 

@@ -39,6 +39,7 @@ from app.training.messages import (
     WorkerReady,
 )
 from app.training.process import ProcessWorker, Worker
+from app.training.stage_order import stage_number
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
 
@@ -238,6 +239,7 @@ class TrainingService:
             seed=settings.seed,
             overrides=dict(settings.overrides),
             is_window_open=self._is_window_open,
+            follow_links=settings.follow_links,
         )
         self._stage, self._step, self._ending = StageReported("", 0.0), None, None
         self._is_ready = self._is_paused = self._is_stopping = False
@@ -339,6 +341,9 @@ class TrainingService:
         rate = step.steps_per_s if step is not None else 0.0
         left = 0 if step is None else step.n_steps - step.step
         upcoming = self.next_clip_index
+        settings = self.project.settings
+        is_reference = clip_index == settings.reference_clip or settings.config().independent
+        number, n_stages = stage_number(self._stage.stage, is_reference=is_reference) if step is None else (0, 0)
         return TrainingStatus(
             state=state,
             clip_index=clip_index,
@@ -346,6 +351,8 @@ class TrainingService:
             n_steps=0 if run is None else run.n_steps,
             progress=self._stage.done if step is None else step.step / max(step.n_steps, 1),
             stage=self._stage.stage,
+            stage_number=number,
+            n_stages=n_stages,
             message=self._message(state),
             steps_per_s=rate if state == "running" else 0.0,
             eta_s=left / rate if rate > 0 and state == "running" else None,
@@ -378,27 +385,26 @@ class TrainingService:
             self.project.curve_path(clip_index, is_finished=state not in ("stopped", "untrained"))
         )
 
-    def clip_statuses(self, counts: dict[int, tuple[int, int]]) -> list[ClipStatus]:
-        """One status per clip. `counts` holds inherited and own anchors of the clips that were loaded.
+    def clip_statuses(self, live_counts: tuple[int, int] | None) -> list[ClipStatus]:
+        """One status per clip.
 
         Only what has changed is remade: this is asked for at every change of the picture, and clips may be thousands.
+
+        Args:
+            live_counts: Inherited and own anchors of the running clip, if a state of it was loaded.
         """
         queued = tuple(self.queue)
         running = self.running_clip
         if self._statuses_of != (self.catalog.revision, queued, running, len(self._failed)):
-            self._statuses = [self._clip_status(index, counts) for index in range(len(self.clips))]
+            self._statuses = [self._clip_status(index, None) for index in range(len(self.clips))]
             self._statuses_of = (self.catalog.revision, queued, running, len(self._failed))
-        for index, (n_inherited, n_own) in counts.items():
-            known = self._statuses[index]
-            if (known.n_inherited, known.n_own) != (n_inherited, n_own):
-                self._statuses[index] = self._clip_status(index, counts)
         if running is not None:
-            self._statuses[running] = self._clip_status(running, counts)
+            self._statuses[running] = self._clip_status(running, live_counts)
         return list(self._statuses)
 
-    def _clip_status(self, clip_index: int, counts: dict[int, tuple[int, int]]) -> ClipStatus:
+    def _clip_status(self, clip_index: int, live_counts: tuple[int, int] | None) -> ClipStatus:
         record, run = self.catalog[clip_index], self._run
-        n_inherited, n_own = counts.get(clip_index, (0, 0))
+        n_inherited, n_own = record.n_anchors if live_counts is None else live_counts
         shown, step, n_steps, psnr = record.state, record.step, record.n_steps, record.held_out_psnr
         if clip_index == self.running_clip and run is not None:
             words = {"starting": "preparing", "preparing": "preparing", "paused": "paused"}

@@ -19,6 +19,7 @@ from app.logs import FORMAT
 from app.priority import lower_process
 from app.training.messages import Command, Event, TrainJob, decode, encode
 from app.training.run import MakeTraining, TrainingRun
+from engine.kernels.cache import use_kernel_cache
 
 logger = logging.getLogger(__name__)
 
@@ -38,6 +39,7 @@ def n_training_threads(cores: int, *, is_window_open: bool) -> int:
 def main(job_bytes: bytes, commands: Connection, events: Connection, log_path: str, make: MakeTraining) -> None:
     """Runs in the child until the clip is finished, stopped or failed."""
     _redirect_output(Path(log_path))
+    use_kernel_cache()  # before the training imports kernels
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C reaches the whole group; the parent decides what it means
     job = decode(job_bytes)
     assert isinstance(job, TrainJob)

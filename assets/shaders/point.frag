@@ -21,7 +21,7 @@ void main() {
     float radius = 0.5 * mark_px;
     float outside = shape == DIAMOND ? (p.x + p.y - radius) * 0.70710678 : length(p) - radius; // px, negative inside
     if (shape == RING) {
-        float thickness = max(RING_SHARE * radius, 1.0);
+        float thickness = max(RING_SHARE * radius, 1.0) + 2.0 * outline_px; // a rim on both sides
         outside = abs(outside + 0.5 * thickness) - 0.5 * thickness;
     }
     float coverage = clamp(0.5 - outside, 0.0, 1.0);

@@ -135,7 +135,8 @@ def open_video(path: Path) -> Any:
 
 def set_pixel_limit(stream: Any) -> None:
     """Keep a damaged stream from claiming gigabytes for one frame; before its first frame is decoded."""
-    stream.codec_context.options = {"max_pixels": str(MAX_PIXELS)}
+    if stream.codec_context is not None:
+        stream.codec_context.options = {"max_pixels": str(MAX_PIXELS)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +173,8 @@ def read_video_header(path: Path) -> VideoHeader:
                     "The file has no video stream, so it is truncated or not a video.", hint=again, path=path
                 )
             stream = container.streams.video[0]
+            if stream.codec_context is None:
+                raise CaptureError("The video is of a kind that is not known.", hint=again, path=path)
             size = (stream.codec_context.width, stream.codec_context.height)
             rate = float(stream.average_rate or 0)
             entries = [entry for entry in stream.index_entries if not entry.is_discard]

@@ -61,7 +61,7 @@ def parse_region(values: Any) -> GateRegion:
     hint = 'Write {"treat": "static" or "dynamic", "box": [corner, corner]}, or "sphere": [centre, radius].'
     shapes = set(values) - {"treat"} if isinstance(values, dict) else set()
     if not isinstance(values, dict) or values.get("treat") not in TREATMENTS or shapes not in ({"box"}, {"sphere"}):
-        raise ProjectError(f"{values!r} is no region of the gate.", hint=hint)
+        raise ProjectError(f"{values!r:.200} is not a region of the gate.", hint=hint)
     try:
         if "box" in values:
             corners = np.array(values["box"], dtype=np.float64).reshape(2, 3)
@@ -71,10 +71,10 @@ def parse_region(values: Any) -> GateRegion:
             if not (len(values["sphere"]) == 2 and radius > 0.0):
                 raise ValueError(f"radius {radius}")
             low, high = center - radius, center + radius
-    except (TypeError, ValueError, IndexError) as error:
-        raise ProjectError(f"{values!r} is no region of the gate ({error}).", hint=hint) from error
+    except (TypeError, ValueError, LookupError, OverflowError) as error:
+        raise ProjectError(f"{values!r:.200} is not a region of the gate ({error}).", hint=hint) from error
     if not (np.isfinite(low).all() and np.isfinite(high).all() and math.isfinite(radius)):
-        raise ProjectError(f"{values!r} holds numbers that are not finite.", hint=hint)
+        raise ProjectError(f"{values!r:.200} holds numbers that are not finite.", hint=hint)
     x0, y0, z0 = low.tolist()
     x1, y1, z1 = high.tolist()
     return GateRegion(values["treat"], (x0, y0, z0), (x1, y1, z1), radius)

@@ -5,9 +5,10 @@ folder's name is a hash of every source that ends up in a kernel, of the version
 the processor. Machine code itself is still checked by numba against the exact processor, so a folder can never hold
 code that does not run. A completed warm-up leaves a marker that says what was compiled (`engine.kernels.warm`).
 
-Importing `engine` calls `use_kernel_cache`, before any decorator of a kernel can run. It imports neither numba nor
-torch, takes a few milliseconds (what only a warm-up needs is imported there), and never fails. NUMBA_CACHE_DIR wins
-when the user has set it.
+Who owns a process calls `use_kernel_cache` once, before any decorator of a kernel runs: the command line, the window
+and the worker do so first of all. Importing `engine` changes nothing, so kernels of other programs stay where those
+want them. The call imports neither numba nor torch, takes some 25 ms for the hash, and never fails. NUMBA_CACHE_DIR
+wins when the user has set it.
 """
 
 from __future__ import annotations
@@ -120,17 +121,25 @@ def fallback_root() -> Path:
     return folder if _is_private(folder) else Path(tempfile.mkdtemp(prefix=f"{_ROOT_NAME}-"))
 
 
-def use_kernel_cache() -> Path:
-    """Tell numba where to keep compiled kernels, in this process and those it starts. Returns the folder.
+def kernel_folder() -> Path:
+    """Where compiled kernels of these sources, libraries and this processor belong; need not exist.
 
-    Must run before the module of a kernel is imported. A folder of our own that came from a parent process is worked
-    out again, so that sources changed in between are noticed. Creates nothing on disk, except for
-    the folder of the fall-back.
+    A folder of our own that came from a parent process is worked out again, so that sources changed in between are
+    noticed. Creates nothing on disk, except for the folder of the fall-back.
     """
     given = os.environ.get(VARIABLE)
     if given and not _is_ours(Path(given)):
         return Path(given)
-    folder = _chosen_root()[0] / current_key().folder_name
+    return _chosen_root()[0] / current_key().folder_name
+
+
+def use_kernel_cache() -> Path:
+    """Tell numba where to keep compiled kernels, in this process and those it starts. Returns the folder.
+
+    Must run before the module of a kernel is imported. For the main function of a process: a library that is imported
+    leaves the environment alone.
+    """
+    folder = kernel_folder()
     os.environ[VARIABLE] = str(folder)
     config = sys.modules.get("numba.core.config")
     if config is not None:  # numba has read its environment already
@@ -178,7 +187,7 @@ def sources_hash(package: Path) -> str:
 
 def cache_state() -> CacheState:
     """Look at the cache: where, how large, warm or why not. Reads, never writes."""
-    folder = use_kernel_cache()
+    folder = kernel_folder()
     key, marked = current_key(), read_marker(folder)
     root, is_fallback = _chosen_root()
     is_fallback = is_fallback and folder.parent == root
@@ -198,15 +207,15 @@ def cache_state() -> CacheState:
 
 def is_cache_warm() -> bool:
     """Whether a warm-up was completed for exactly these sources, libraries and this processor."""
-    return read_marker(use_kernel_cache()) == current_key()
+    return read_marker(kernel_folder()) == current_key()
 
 
 def read_marker(folder: Path) -> CacheKey | None:
     """What the last completed warm-up in this folder compiled; None when there was none or it cannot be read."""
-    import json
+    from engine.json_files import read_json_object
 
     try:
-        values = json.loads((folder / MARKER).read_text("utf-8"))
+        values = read_json_object(folder / MARKER, max_bytes=1 << 20)
         return CacheKey(**{name: str(values[name]) for name in CacheKey._fields})
     except (OSError, ValueError, KeyError, TypeError):
         return None

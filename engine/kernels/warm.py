@@ -15,8 +15,12 @@ from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from engine.kernels.cache import is_cache_warm, use_kernel_cache, write_marker
+from engine.kernels.cache import VARIABLE, current_key, kernel_folder, read_marker, write_marker
+
+if TYPE_CHECKING:
+    from filelock import BaseFileLock
 
 logger = logging.getLogger(__name__)
 
@@ -37,8 +41,6 @@ MAX_PROCESSES = 4
 TIME_LIMIT_S = 180.0
 POLL_S = 0.05
 LOCK = "compiling.lock"
-LOCK_STALE_S = 10.0
-"""A lock that was not renewed for so long belongs to a process that has died."""
 
 ReportGroups = Callable[[int, int, str], None]
 """Groups done, groups in all, and what is compiled now. Called often; may raise to cancel."""
@@ -66,25 +68,25 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
         report: See `warm_up_all`.
         n_processes: How many at a time; as many as cores when None, MAX_PROCESSES at most.
     """
-    if is_cache_warm():
+    folder = kernel_folder()
+    if read_marker(folder) == current_key():
         return True
     report = report or (lambda done, n, what: None)
-    folder = use_kernel_cache()
     n = len(GROUPS)
-    lock = folder / LOCK
-    while not _take(lock):
+    lock = _take(folder / LOCK)
+    while lock is not None and not lock.is_locked:
         report(0, n, "another program compiles")
         time.sleep(POLL_S)
+        lock = _take(folder / LOCK)
     running: list[tuple[_Bundle, subprocess.Popen[bytes], float]] = []
     n_done, is_fine = 0, True
     try:
-        if is_cache_warm():  # the program we waited for has done it
+        if read_marker(folder) == current_key():  # the program we waited for has done it
             return True
         for bundle in _bundles(min(n_processes or _n_cores(), MAX_PROCESSES)):
-            running.append((bundle, _start(bundle), time.monotonic()))
+            running.append((bundle, _start(bundle, folder), time.monotonic()))
         while running:
             report(n_done, n, " and ".join(_names(bundle) for bundle, _, _ in running))
-            _renew(lock)
             time.sleep(POLL_S)
             for item in list(running):
                 bundle, process, started_s = item
@@ -102,8 +104,9 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
         for _, process, _ in running:
             process.kill()
             process.communicate()
-        with suppress(OSError):
-            lock.unlink(missing_ok=True)
+        if lock is not None:
+            with suppress(OSError):
+                lock.release()
 
 
 _Bundle = tuple[tuple[str, str, float], ...]
@@ -123,14 +126,14 @@ def _names(bundle: _Bundle) -> str:
     return ", ".join(name for name, _, _ in bundle)
 
 
-def _start(bundle: _Bundle) -> subprocess.Popen[bytes]:
+def _start(bundle: _Bundle, folder: Path) -> subprocess.Popen[bytes]:
     root = str(Path(__file__).resolve().parents[2])
     path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
     calls = "; ".join(f"import_module({module!r}).warm_up()" for _, module, _ in bundle)
     return subprocess.Popen(
         # a compiler makes millions of objects that live on: looking for garbage among them takes a fifth of the time
         [sys.executable, "-c", f"import gc; gc.disable(); from importlib import import_module; {calls}"],
-        env={**os.environ, "PYTHONPATH": path},
+        env={**os.environ, "PYTHONPATH": path, VARIABLE: str(folder)},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -150,24 +153,22 @@ def _end(name: str, process: subprocess.Popen[bytes], seconds: float) -> bool:
     return False
 
 
-def _take(lock: Path) -> bool:
-    """Whether the lock is ours now. True as well where no lock can be made: better twice than never."""
+def _take(path: Path) -> BaseFileLock | None:
+    """The system's lock on a file, which ends with this process; `is_locked` says whether it is ours now.
+
+    None where no lock can be made: compiling twice is better than never.
+    """
+    from filelock import FileLock, Timeout  # only where there is something to compile
+
+    lock = FileLock(path)
     try:
-        lock.parent.mkdir(parents=True, exist_ok=True)
-        os.close(os.open(lock, os.O_CREAT | os.O_EXCL | os.O_WRONLY))
-    except FileExistsError:
-        with suppress(OSError):
-            if time.time() - lock.stat().st_mtime > LOCK_STALE_S:
-                lock.unlink(missing_ok=True)
-        return False
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock.acquire(blocking=False)
+    except Timeout:
+        return lock
     except OSError:
-        return True
-    return True
-
-
-def _renew(lock: Path) -> None:
-    with suppress(OSError):
-        os.utime(lock)
+        return None
+    return lock
 
 
 def _n_cores() -> int:

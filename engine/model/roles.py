@@ -6,3 +6,6 @@ ROLES = ("static", "moving", "promoted", "residual", "adapted", "replacing")
 """static: no dynamic feature. moving: on the hulls of the reference clip. promoted: static in space, changing in the
 reference clip, as under a lamp. residual: what a source clip adds. adapted: moving ones that go on
 learning in a source clip. replacing: promoted in a source clip, in place of static ones."""
+
+REFERENCE_ROLES = ("static", "moving", "promoted")
+"""Those that a source clip inherits from its reference clip."""

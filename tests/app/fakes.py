@@ -5,9 +5,11 @@ no torch, no clouds.
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -124,7 +126,7 @@ class FakeTraining:
         )
 
     def state(self) -> ClipState:
-        header = {
+        header: dict[str, Any] = {
             "schema": 1,
             "role": "reference" if self.reference is None else "source",
             "clip_index": self.clip.clip_index,
@@ -137,7 +139,9 @@ class FakeTraining:
             "spacing": 0.1,
             "metrics": {},
         }
+        header["n_anchors"] = {"static": N_ANCHORS}
         if self.reference is not None:
+            header["n_anchors"]["residual"] = N_ANCHORS
             header["reference_fingerprint"] = self.reference.header["fingerprint"]
         if self.previous is not None:
             header["previous_fingerprint"] = self.previous.header["fingerprint"]
@@ -170,7 +174,7 @@ def make_fake(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining
     """Builds a FakeTraining from a job as the real builder would. Overrides go unused but `joint_steps` sets n_steps
     and `static_steps` the step that fails."""
     project = open_project(job.project, is_writable=False)
-    capture = open_capture(job.capture, scale=job.scale)
+    capture = open_capture(job.capture, scale=job.scale, follow_links=job.follow_links)
     clip = project.clips(capture.n_frames)[job.clip_index]
     first = project.settings.reference_clip
     reference = None if job.clip_index == first else read_clip_state(project.clip_path(first))
@@ -194,9 +198,14 @@ def make_slow(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining
     return training
 
 
+def make_telling(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
+    """Like make_fake; the environment of its process goes to a file in the project."""
+    (Path(job.project) / "environment.json").write_text(json.dumps(dict(os.environ)))
+    return make_fake(job, report)
+
+
 def make_crashing(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
     """Ends its process without a word."""
-    import os
     import signal
 
     os.kill(os.getpid(), signal.SIGKILL)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.clip_catalog import ClipCatalog
+from app.clip_catalog import ClipCatalog, anchor_counts
 from app.project import Project
 from app.training.service import TrainingService
 from engine.capture.clip import split_clips
@@ -170,3 +170,24 @@ def test_figures_of_a_stopped_training_come_from_its_curves(tmp_path: Path) -> N
         path.write_bytes(b'{"step": 2, "held_out_psnr": 11.5}\n\xff\xfe{"step": 3\n')
     catalog = ClipCatalog(project, 2)
     assert [catalog[index].held_out_psnr for index in range(2)] == [11.5, 11.5]
+
+
+def test_anchors_of_clips_that_nobody_looked_at_are_known_from_their_headers(tmp_path: Path) -> None:
+    project = make_project(tmp_path)
+    reference = {"static": 300, "moving": 40}
+    source = {"role": "source", "reference_fingerprint": "clip-0"}
+    write_header(project.clip_path(0), clip_header(0, n_anchors=reference))
+    write_header(project.clip_path(1), clip_header(1, n_anchors=reference | {"residual": 7}, **source))
+    write_header(project.checkpoint_path(2), clip_header(2, n_anchors=reference | {"residual": 9}, **source))
+    write_header(project.clip_path(3), clip_header(3, n_anchors="no numbers", **source))
+    service = TrainingService(project, split_clips(5, 1), holdout=())
+    counts = [(status.n_inherited, status.n_own) for status in service.clip_statuses(None)]
+    assert counts == [(0, 340), (340, 7), (340, 9), (0, 0), (0, 0)]
+
+
+def test_anchors_that_a_clip_learns_on_are_its_own_as_in_the_picture(tmp_path: Path) -> None:
+    """With inherit=trainable the file holds them, and the window draws them as the clip's own."""
+    header = clip_header(1, role="source", n_anchors={"static": 300, "residual": 7}, config={"inherit": "trainable"})
+    assert anchor_counts(header) == (0, 307)
+    header["config"] = {"inherit": "moving"}
+    assert anchor_counts(header) == (300, 7)

@@ -1,6 +1,7 @@
 """clipgstream inspect: a capture, and the clips of a project."""
 
 import json
+import os
 import re
 import shutil
 
@@ -51,7 +52,7 @@ def test_inspecting_a_project_says_how_much_of_what_moves_is_within_reach_of_an_
     write_clip_state(path, ClipState(state.arrays, state.header | {"coverage": coverage | {"reason": "at most 3500"}}))
     clips = json.loads(run("inspect", project, "--json")[1])["clips"]
     assert [clip["coverage"] and clip["coverage"]["share"] for clip in clips] == [None, 0.9876]
-    said = "clip 1 98.8 % with 3,000 anchors of its own, 500 points beyond the budget left to those beside them"
+    said = "clip 1 98.8 % with 3,000 residual anchors, 500 points beyond the budget left to those beside them"
     assert said in run("inspect", project)[1]
 
 
@@ -80,3 +81,57 @@ def test_inspecting_a_project_without_clips_is_bad_input(run, capture_folder, tm
     code, out, err = run("inspect", project)
     assert (code, out) == (2, "")
     assert "Nothing is trained" in err
+
+
+@pytest.mark.parametrize("path", ["", " ", "x" * 5000, "y/" * 2040, "a\0b"])
+def test_what_cannot_be_a_path_is_one_message(run, path):
+    for command in (["inspect", path], ["train", path, "--project", "p"], ["eval", path, "--json", "out.json"]):
+        code, out, err = run(*command)
+        assert code == 2
+        assert (out, err.count("\n"), "Traceback" in err) == ("", 1, False)
+        assert len(err) < 300
+
+
+def test_names_cannot_command_the_terminal_nor_stop_the_program(run, capture_folder, tmp_path):
+    folder = tmp_path / os.fsdecode(b"caf\xe9 \x1b[2J")  # no UTF-8, as unpacked from an old archive
+    shutil.copytree(capture_folder, folder)
+    code, out, _ = run("inspect", folder)
+    assert code == 0
+    out.encode("utf-8")
+    assert "\x1b" not in out
+    code, out, _ = run("inspect", folder, "--json")
+    assert code == 0
+    assert out.isascii()
+    assert json.loads(out)["path"] == str(folder)
+    (folder / "train_meta.json").write_text("{")
+    code, out, err = run("inspect", folder)
+    assert (code, out, err.count("clipgstream: ")) == (2, "", 1)
+    err.encode("utf-8")
+    assert "\x1b" not in err
+
+
+def test_links_outside_are_allowed_once_for_a_project(run, capture_folder, tmp_path):
+    capture, project = tmp_path / "capture", tmp_path / "p"
+    shutil.copytree(capture_folder, capture)
+    (capture / "ims").rename(tmp_path / "another disk")
+    (capture / "ims").symlink_to(tmp_path / "another disk")
+    for command in (["inspect", capture], ["train", capture, "--project", project]):
+        code, _, err = run(*command)
+        assert code == 2
+        assert "'ims' is a link that leads out of the capture folder" in err
+        assert err.count("\n") == 1
+        assert "--follow-links" in err
+    assert run("inspect", capture, "--follow-links")[0] == 0
+    assert run("train", capture, "--project", project, "--clip-length", 3, "--follow-links")[0] == 0
+    assert json.loads(run("inspect", project, "--json")[1])["fps"] == 30.0  # opens the capture as the project allows
+    assert run("train", capture, "--project", project)[0] == 0
+
+
+def test_training_repeats_what_is_odd_about_the_capture(run, capture_folder, tmp_path):
+    capture = tmp_path / "capture"
+    shutil.copytree(capture_folder, capture)
+    for folder in (capture / "ims").iterdir():
+        sorted(folder.iterdir())[-1].unlink()
+    code, _, err = run("train", capture, "--project", tmp_path / "p", "--clip-length", 3)
+    assert code == 0
+    assert "Note: The calibration lists 6 frames, the first 5 are there and are used." in err

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from app import doctor, kernels
 from app.doctor import vector_width
-from engine.kernels.cache import UNWRITABLE, CacheState
+from engine.kernels.cache import UNWRITABLE, CacheState, kernel_folder
 from engine.training.report import Progress
 
+ROOT = Path(__file__).resolve().parents[2]
 FOLDER = Path("somewhere") / "kernels-0"
 
 
@@ -81,3 +85,29 @@ def test_failing_to_start_processes_is_no_failure(monkeypatch, caplog):
     monkeypatch.setattr(kernels, "compile_all", refuse)
     kernels.warm_cache()
     assert "no more processes" in caplog.text
+
+
+WINDOW = """
+from ui import main
+main.has_display = lambda: {display}
+main._run_window = main._run_demo = tell
+main.main({arguments})
+"""
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        "from app import cli; cli.main(['inspect', 'nowhere']); tell()",
+        WINDOW.format(display=True, arguments=[]),
+        WINDOW.format(display=False, arguments=[]),
+        WINDOW.format(display=True, arguments=["demo"]),
+    ],
+)
+def test_whoever_owns_the_process_chooses_the_folder_of_kernels_before_numba_is_there(start):
+    tell = "import os, sys; tell = lambda *_: print(os.environ['NUMBA_CACHE_DIR'], 'numba' in sys.modules) or 0\n"
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA")}
+    done = subprocess.run(
+        [sys.executable, "-c", tell + start], cwd=ROOT, capture_output=True, text=True, check=False, env=environment
+    )
+    assert done.stdout.split() == [str(kernel_folder()), "False"], done.stderr

@@ -1,6 +1,5 @@
 """Regions marked by commands: kept in the project, handed to the next training, and what is said of them."""
 
-import json
 import threading
 from functools import partial
 
@@ -10,6 +9,7 @@ from app import commands as c
 from app.cli import main
 from app.marking import effect_text, region_text
 from app.project import Project, open_project
+from app.project_files import read_regions
 from app.training.build import build_training
 from engine.cloud.regions import GateRegion, sphere_region
 from engine.errors import ProjectError
@@ -54,7 +54,7 @@ def test_a_mark_reaches_the_file_and_the_next_training(make_session, monkeypatch
     assert session.regions.regions == (BALL,)  # at once, not when the disk is done
     train_next(session)
     assert seen == [(), (BALL,)]
-    assert json.loads((session.project.folder / "gate.json").read_text()) == {"regions": [BALL.as_dict()]}
+    assert read_regions(session.project.folder / "gate.json") == (BALL,)
     assert list(session.notices) == [n for n in session.notices if n.kind == "info"]
 
 
@@ -176,7 +176,7 @@ def test_a_damaged_file_is_told_and_not_written_over(make_session):
     poll_until(session, lambda: len(session.notices) > 0, what="a notice")
     assert session.notices[0].kind == "error"
     assert not session.regions.can_mark
-    assert "is no region" in session.regions.why_not
+    assert "is not a region" in session.regions.why_not
     session.dispatch(MARK_BALL)
     session._marking.settle()
     assert path.read_text() == '{"regions": [{"treat": "static"}]}'

@@ -4,18 +4,18 @@ import json
 import os
 import subprocess
 import sys
+import time
 
 import pytest
 
-from app.lock import ProcessLock, is_process_alive
 from app.project import (
     ProjectSettings,
     create_project,
     default_settings,
     open_project,
-    read_metrics,
     read_settings,
 )
+from app.project_files import read_metrics
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError
 
@@ -58,7 +58,12 @@ def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch):
 def test_a_bad_project_file_is_named(tmp_path, change, expected):
     create_project(tmp_path / "p", SETTINGS).close()
     path = tmp_path / "p" / "project.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    edited = json.loads(path.read_text()) | change
+    path.write_text(json.dumps(edited))
+    with pytest.raises(ProjectError, match=r'edited by hand, take out its entry "checksum"'):
+        read_settings(tmp_path / "p")
+    del edited["checksum"]
+    path.write_text(json.dumps(edited))
     with pytest.raises(ProjectError, match=expected) as caught:
         read_settings(tmp_path / "p")
     assert str(caught.value).endswith(str(path))
@@ -92,44 +97,25 @@ def dead_pid() -> int:
     """A process id that was in use and is not any more."""
     child = subprocess.Popen([sys.executable, "-c", "pass"])
     child.wait()
-    assert not is_process_alive(child.pid)
     return child.pid
 
 
-@pytest.mark.parametrize("text", ['{"pid": DEAD, "start": "5"}', '{"pid": OWN, "start": "1"}', "", "{"])
-def test_a_lock_without_a_living_holder_is_taken_over(tmp_path, text, dead_pid):
-    # the second one is a reused process id: it lives, but it started at another time
-    path = tmp_path / "lock"
-    path.write_text(text.replace("DEAD", str(dead_pid)).replace("OWN", str(os.getpid())))
-    if "OWN" in text and not os.path.exists("/proc/self/stat"):
-        pytest.skip("start times are known on Linux only")
-    lock = ProcessLock(path)
-    lock.acquire()
-    assert lock.is_held
-    assert json.loads(path.read_text())["pid"] == os.getpid()
-    lock.release()
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_releasing_leaves_somebody_elses_lock(tmp_path):
-    lock = ProcessLock(tmp_path / "lock")
-    lock.acquire()
-    (tmp_path / "lock").write_text('{"pid": 1}')
-    lock.release()
-    assert (tmp_path / "lock").read_text() == '{"pid": 1}'
-
-
-def test_opening_sweeps_leftovers_and_keeps_clips(tmp_path):
+def test_opening_sweeps_leftovers_and_keeps_clips(tmp_path, dead_pid):
     create_project(tmp_path / "p", SETTINGS).close()
     keep = tmp_path / "p" / "clips" / "0000.safetensors"
-    gone = [tmp_path / "p" / "live" / "clip-0001-r0003.safetensors", keep.with_name(".partial-12-0001.safetensors")]
-    for path in (keep, *gone):
+    stale = tmp_path / "p" / "reports" / f".partial-{os.getpid()}-old.html"
+    half = keep.with_name(f".partial-{dead_pid}-0001.safetensors")
+    gone = [tmp_path / "p" / "live" / "clip-0001-r0003.safetensors", half, stale]
+    others = tmp_path / "p" / "reports" / f".partial-{os.getppid()}-report.html"  # another process writes it just now
+    for path in (keep, others, *gone):
         path.parent.mkdir(exist_ok=True)
         path.write_text("x")
+    os.utime(stale, (0, time.time() - 2 * 24 * 3600))
     open_project(tmp_path / "p", is_writable=False)
     assert all(path.exists() for path in gone)  # a reader must not disturb a running training
     open_project(tmp_path / "p").close()
     assert keep.exists()
+    assert others.exists()
     assert not any(path.exists() for path in gone)
 
 

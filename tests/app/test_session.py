@@ -1,5 +1,6 @@
 """The Session driven by commands, with training inline: no process, no wait, no window."""
 
+import contextlib
 from dataclasses import replace
 from functools import partial
 
@@ -53,7 +54,7 @@ def test_opening_makes_a_project_and_frames_the_rig(make_session, tmp_path):
     assert str(session.capture.path.resolve()) in session.settings.recent
 
 
-def test_what_is_no_capture_becomes_a_notice_and_leaves_nothing(make_session, tmp_path):
+def test_what_is_not_a_capture_becomes_a_notice_and_leaves_nothing(make_session, tmp_path):
     session = make_session(is_open=False)
     (tmp_path / "empty").mkdir()
     session.dispatch(c.OpenCapture(tmp_path / "empty"))
@@ -64,6 +65,21 @@ def test_what_is_no_capture_becomes_a_notice_and_leaves_nothing(make_session, tm
     assert session.capture is None
     assert not (tmp_path / "p").exists()
     session.dispatch(c.DismissNotice(0))
+    assert len(session.notices) == 0
+
+
+def test_why_something_could_not_be_opened_goes_when_a_capture_opens(make_session, capture_folder, tmp_path):
+    session = make_session(is_open=False)
+    for name in ("empty", "x" * 5000):  # the second cannot even be looked for
+        with contextlib.suppress(OSError):
+            (tmp_path / name).mkdir()
+        n_before = len(session.notices)
+        session.dispatch(c.OpenCapture(tmp_path / name))
+        poll_until(session, lambda n_before=n_before: len(session.notices) > n_before)
+    assert ["cannot be opened" in notice.title for notice in session.notices] == [True, True]
+    assert "File name too long" in session.notices[1].detail
+    session.dispatch(c.OpenCapture(capture_folder))
+    poll_until(session, lambda: session.capture is not None)
     assert len(session.notices) == 0
 
 

@@ -12,9 +12,11 @@ import pytest
 from app import commands as c
 from app.training.process import ProcessWorker
 from app.training.worker import n_training_threads
+from engine.conventions import SPIN_COUNT
+from engine.kernels.cache import kernel_folder
 from engine.model.clip_state import read_clip_state
 from tests.app.conftest import poll_until
-from tests.app.fakes import N_STEPS, make_crashing, make_fake, make_slow
+from tests.app.fakes import N_STEPS, make_crashing, make_fake, make_slow, make_telling
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -35,6 +37,17 @@ def test_a_process_trains_a_clip(make_session):
     assert session.clip_states[0].state == "trained", list(session.notices)
     assert read_clip_state(session.project.clip_path(0)).header["step"] == N_STEPS
     assert "trains clip 0" in session.project.log_path(0).read_text()
+
+
+def test_a_worker_chooses_the_folder_of_kernels_and_how_long_threads_spin(make_session, monkeypatch):
+    for name in ("NUMBA_CACHE_DIR", "GOMP_SPINCOUNT"):
+        monkeypatch.delenv(name, raising=False)
+    session = make_session(launch=launch(make_telling))
+    session.dispatch(c.TrainNextClip())
+    poll_until(session, lambda: session.training.state in ("idle", "failed"))
+    found = json.loads((session.project.folder / "environment.json").read_text())
+    assert found["NUMBA_CACHE_DIR"] == str(kernel_folder())
+    assert found["GOMP_SPINCOUNT"] == str(SPIN_COUNT)
 
 
 def test_a_killed_worker_is_told_and_training_goes_on_from_what_was_kept(make_session):

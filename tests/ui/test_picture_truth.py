@@ -19,13 +19,14 @@ from app.session import Session
 from app.settings import Settings
 from app.training.inline import InlineWorker
 from engine.model.clip_state import ClipState
-from tests.app.fakes import make_fake, write_capture
+from tests.app.fakes import N_ANCHORS, make_fake, write_capture
 from tests.ui.pilot import Pilot
 from ui.hud_text import CLOUD, RENDERED, HudText
+from ui.panels.hud import legend_rows
 from ui.screenshot import read_window
 
 pytestmark = pytest.mark.gl
-WAIT_S = 120.0
+WAIT_S = 300.0
 """Only a hang takes longer, or the first start, which compiles the kernels."""
 
 
@@ -185,6 +186,20 @@ def test_compared_pictures_of_different_frames_say_so(
     draw_until(window, lambda: labels[-2:] == warned, "the warning")
     reader.may_go_on.set()
     draw_until(window, lambda: labels[-2:] == ["Captured, frame 3", "Rendered, frame 3"], "both of the next")
+
+
+def test_table_legend_and_arrays_count_the_same_anchors(window: Pilot) -> None:
+    session = window.session
+    counts = [(status.n_inherited, status.n_own) for status in session.clip_states]
+    assert counts == [(0, N_ANCHORS), (N_ANCHORS, N_ANCHORS)], "of the header, as nothing was looked at yet"
+    window.key(key._2)
+    window.key(key._3)
+    for frame_index, expected in ((0, ["12 reference anchors"]), (3, ["12 inherited anchors", "12 residual anchors"])):
+        show_frame(window, frame_index)
+        scene = window.studio.frame.viewport.scene
+        assert [text for _, _, text in legend_rows(session, scene)] == expected
+        anchors = session.shown_anchors()
+        assert (len(anchors.inherited_positions), len(anchors.own_positions)) == counts[frame_index // 3]
 
 
 def test_playing_every_frame_shows_each_one(window: Pilot) -> None:

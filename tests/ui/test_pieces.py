@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from app.arguments import COMMANDS
 from ui.main import main
 from ui.panels.timeline import MIN_TICK_SPACING_PX, cell_left, frame_at, tick_step
-from ui.panels.training import MAX_PLOT_POINTS, duration_text, plot_arrays
+from ui.panels.training import MAX_PLOT_POINTS, anchors_text, duration_text, plot_arrays
 from ui.panels.viewport import arrange, fit
 from ui.shortcuts import SHORTCUTS
 from ui.state import Rect
@@ -155,3 +155,9 @@ def test_nonsense_arguments_end_with_2_and_one_line(capsys: pytest.CaptureFixtur
         assert ended.value.code == 2
         assert expected in message
         assert message.count("\n") == 1
+
+
+def test_anchors_of_a_clip_are_a_number_or_a_sum() -> None:
+    assert anchors_text(0, 0) == "–"
+    assert anchors_text(0, 24291) == "24,291"
+    assert anchors_text(24291, 6646) == "24,291 + 6,646"

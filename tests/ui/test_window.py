@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 from pyglet.window import key, mouse
 
 from app.arrays import AnchorArrays
@@ -35,6 +36,8 @@ from engine.cloud.reasons import LIGHT
 from engine.model.roles import ROLES
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
+from ui.frusta import frustum_size
+from ui.gl import frusta_lines
 from ui.screenshot import read_window, write_png
 
 pytestmark = pytest.mark.gl
@@ -227,6 +230,18 @@ def test_bracket_keys_walk_the_cameras_around(pilot: Pilot) -> None:
     assert pilot.session.view.look_through == 0
 
 
+def test_cameras_of_any_name_can_be_chosen_from_the_list(pilot: Pilot) -> None:
+    names = ("a##b", "c##b", "", "%s%n", *pilot.session.rig.names[4:])
+    pilot.session.rig = dataclasses.replace(pilot.session.rig, names=names)
+    for index in range(4):
+        pilot.click("viewport.camera")
+        pilot.draw(2)
+        pilot.click(f"viewport.camera{index}")
+        pilot.draw(2)
+        assert pilot.session.view.look_through == index
+    assert len(pilot.session.notices) == 0
+
+
 def test_tab_shows_all_marks_then_hides_them(pilot: Pilot) -> None:
     overlays = pilot.session.overlays
     pilot.key(key.TAB)
@@ -236,9 +251,21 @@ def test_tab_shows_all_marks_then_hides_them(pilot: Pilot) -> None:
     assert {command.name for command in pilot.sent(ToggleOverlay)} == {"show_frusta", "show_inherited", "show_residual"}
 
 
-def test_the_pointer_asks_an_anchor_what_it_is_and_why(pilot: Pilot, monkeypatch: pytest.MonkeyPatch) -> None:
+def listen_to_tooltips(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What tooltips say from here on."""
     said: list[str] = []
-    monkeypatch.setattr("ui.panels.viewport.imgui.set_tooltip", said.append)
+    show = imgui.set_tooltip
+
+    def listen(text: str) -> None:
+        said.append(text)
+        show(text)
+
+    monkeypatch.setattr("ui.panels.viewport.imgui.set_tooltip", listen)
+    return said
+
+
+def test_the_pointer_asks_an_anchor_what_it_is_and_why(pilot: Pilot, monkeypatch: pytest.MonkeyPatch) -> None:
+    said = listen_to_tooltips(monkeypatch)
     pilot.session.clip_states[0] = ClipStatus("trained", 1.0)
     area, view = pilot.rects["viewport.rendered"], pilot.session.view
     K, pose = view.K(round(area.width), round(area.height)), view.world_to_camera()
@@ -259,6 +286,64 @@ def test_the_pointer_asks_an_anchor_what_it_is_and_why(pilot: Pilot, monkeypatch
     pilot.key(key.TAB)
     pilot.draw(2)
     assert any("promoted" in text and "lamp or shadow" in text for text in said)
+
+
+def test_a_camera_s_pyramid_says_its_name_and_a_click_looks_through_it(
+    pilot: Pilot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = listen_to_tooltips(monkeypatch)
+    session, view = pilot.session, pilot.session.view
+    view.dolly(3.0)
+    pilot.rest()
+    area = pilot.rects["viewport.rendered"]
+    K, pose = view.K(round(area.width), round(area.height)), view.world_to_camera()
+    lines = frusta_lines(session.rig, frustum_size(session.rig))[0].reshape(8, -1, 2, 3)
+    x, y, z = K @ (pose[:3, :3] @ lines[5, 5].mean(axis=0) + pose[:3, 3])
+    at = (area.x0 + x / z, area.y0 + y / z)
+    pilot.move(*at)
+    pilot.draw(2)
+    assert "cam05" in said[-1]
+    assert pilot.studio.frame.viewport.scene.marks.pointed_camera == 5
+    yaw = view.yaw
+    pilot.drag(at, (at[0] + 60, at[1]))
+    assert view.yaw - yaw == pytest.approx(0.36, abs=1e-6), "a drag that begins there orbits, in full"
+    assert pilot.sent(LookThrough) == []
+    pilot.drag((at[0] + 60, at[1]), at)
+    pilot.tap(*at)
+    assert pilot.sent(LookThrough) == [LookThrough(5)]
+    assert view.look_through == 5
+
+
+def test_marks_grow_and_fade_as_the_show_popup_says_and_hidden_ones_are_faint(pilot: Pilot) -> None:
+    session = pilot.session
+    session.clip_states[0] = ClipStatus("trained", 1.0)
+    session.overlays.show_frusta, session.overlays.show_inherited = False, True
+    pilot.rest()
+    plain = _changed_by_marks(pilot)
+    session.overlays.mark_size = 2.0
+    pilot.studio.frame.request_redraw()
+    larger = _changed_by_marks(pilot)
+    assert larger.astype(bool).sum() > 2 * plain.astype(bool).sum()
+    session.overlays.mark_size, session.overlays.mark_opacity = 1.0, 0.3
+    assert 0 < _changed_by_marks(pilot).max() < 0.6 * plain.max()
+    pilot.tap(*pilot.rects["viewport.overlays"].center)
+    rect = pilot.rects["show.mark_opacity"]
+    pilot.drag(rect.center, (rect.x1 + 40, rect.center[1]))
+    assert session.overlays.mark_opacity == 1.0
+
+
+def _changed_by_marks(pilot: Pilot) -> np.ndarray:
+    """How much each pixel of the picture differs from the same without marks. [H, W]"""
+    pictures = []
+    for is_shown in (True, False):
+        pilot.session.overlays.show_inherited = is_shown
+        pilot.studio.frame.request_redraw()
+        pilot.rest()
+        area = pilot.rects["viewport.rendered"]
+        x0, y0, x1, y1 = (round(v) for v in (area.x0, area.y0 + 200, area.x1, area.y1 - 60))
+        pictures.append(pilot.picture()[y0:y1, x0:x1].astype(int))
+    pilot.session.overlays.show_inherited = True
+    return np.abs(pictures[0] - pictures[1]).max(axis=2)
 
 
 def test_escape_closes_neither_the_window_nor_the_loop(pilot: Pilot) -> None:
@@ -329,8 +414,6 @@ def test_a_panel_that_raises_becomes_one_notice_and_the_others_go_on(
     pilot: Pilot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_: object) -> None:
-        from imgui_bundle import imgui
-
         imgui.begin_child("left open by the failure")
         raise RuntimeError("broken on purpose")
 
@@ -395,7 +478,7 @@ def test_closing_closes_the_session_once(open_pilot: Callable[..., Pilot]) -> No
 
 def _without_cameras(folder: Path) -> str:
     (folder / "cameras.json").unlink()
-    return "no capture"
+    return "not a capture"
 
 
 def _with_half_a_video(folder: Path) -> str:

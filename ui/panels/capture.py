@@ -10,11 +10,13 @@ from app.commands import LookThrough
 from ui import theme
 from ui.state import Dispatch, Rect, UiState
 from ui.theme import Icon
-from ui.widgets import pop_bold, push_bold, text_wrapped_dim
+from ui.widgets import elided, format_count, pop_bold, push_bold, text_wrapped_dim
 
 THUMBNAIL_WIDTH_PX = 160
 ROW_HEIGHT = 50.0
 PICTURE_SIZE = (64.0, 40.0)
+HELD_OUT_WORDS = ("held out", "test")
+"""The longest that there is room for."""
 
 
 class CapturePanel:
@@ -61,16 +63,15 @@ class CapturePanel:
     def _draw_summary(self, session: Any, ui: UiState) -> None:
         capture = session.capture
         push_bold(ui, ui.fonts.body_size + 1)
-        imgui.text(capture.path.name)
+        imgui.text(elided(capture.path.name, imgui.get_content_region_avail().x))
         pop_bold(ui)
         imgui.set_item_tooltip(str(capture.path))
         seconds = capture.n_frames / max(capture.fps, 1e-6)
-        imgui.text_disabled(f"{len(capture.rig)} cameras, {capture.n_frames} frames, {seconds:.1f} s")
+        n_cameras, n_frames = format_count(len(capture.rig)), format_count(capture.n_frames)
+        text_wrapped_dim(f"{n_cameras} cameras, {n_frames} frames, {seconds:.1f} s")
         held_out = held_out_cameras(session)
-        imgui.text_disabled(f"{len(session.clips)} clips")
-        if held_out:
-            imgui.same_line(0, 4)
-            imgui.text_disabled(f"- {len(held_out)} held out for measuring")
+        measured = f" - {len(held_out)} held out for measuring" if held_out else ""
+        text_wrapped_dim(f"{format_count(len(session.clips))} clips{measured}")
         imgui.spacing()
 
     def _draw_cameras(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
@@ -94,7 +95,9 @@ class CapturePanel:
                 self._shown_camera = shown
             if is_visible:
                 has_asked = self._ask_thumbnail(session, index, has_asked, ui)
-                self._draw_row(Rect(top_left.x, low.y, high.x, high.y), index, name, rig, index in held_out)
+                row = Rect(top_left.x, low.y, high.x, high.y)
+                if self._draw_row(ui, row, index, rig, index in held_out, is_shown=shown == index):
+                    imgui.set_item_tooltip(name)
             imgui.pop_id()
         if shown is None:
             self._shown_camera = None
@@ -112,8 +115,11 @@ class CapturePanel:
         ui.redraw_within(0.1)
         return True
 
-    def _draw_row(self, row: Rect, index: int, name: str, rig: Any, is_held_out: bool) -> None:
+    def _draw_row(self, ui: UiState, row: Rect, index: int, rig: Any, is_held_out: bool, *, is_shown: bool) -> bool:
+        """Picture, name and size of a camera. Whether its name had to be cut."""
         draw = imgui.get_window_draw_list()
+        if is_shown:
+            draw.add_rect_filled(row.low, ImVec2(row.x0 + 3, row.y1), theme.u32(theme.SKY))
         box = Rect(row.x0 + 4, row.y0 + 5, row.x0 + 4 + PICTURE_SIZE[0], row.y0 + 5 + PICTURE_SIZE[1])
         texture = self._thumbnails.get(index)
         if texture is None:
@@ -130,16 +136,26 @@ class CapturePanel:
                 theme.u32(theme.rgb(255, 255, 255)),
                 3,
             )
-        x = box.x1 + 10
+        x, room = box.x1 + 10, row.x1 - box.x1 - 14
+        if is_shown:
+            push_bold(ui, ui.fonts.body_size)
+        name = elided(rig.names[index], room)
         draw.add_text(ImVec2(x, row.y0 + 6), theme.u32(theme.TEXT), name)
+        if is_shown:
+            pop_bold(ui)
         width, height = (int(v) for v in rig.image_sizes[index])
-        draw.add_text(ImVec2(x, row.y0 + 26), theme.u32(theme.TEXT_DIM), f"{width} x {height}")
-        if is_held_out:
-            label = "held out"
-            text_width = imgui.calc_text_size(label).x
-            tag = Rect(row.x1 - text_width - 18, row.y0 + 6, row.x1 - 4, row.y0 + 25)
+        size = f"{width} x {height}"
+        size_width = imgui.calc_text_size(size).x
+        label = next((word for word in HELD_OUT_WORDS if imgui.calc_text_size(word).x + 14 <= room), "")
+        is_size_shown = not (is_held_out and size_width + imgui.calc_text_size(label).x + 22 > room)
+        if is_size_shown:
+            draw.add_text(ImVec2(x, row.y0 + 26), theme.u32(theme.TEXT_DIM), size)
+        if is_held_out and label:
+            left = row.x1 - 18 - imgui.calc_text_size(label).x if is_size_shown else x
+            tag = Rect(left, row.y0 + 25, left + imgui.calc_text_size(label).x + 14, row.y0 + 44)
             draw.add_rect(tag.low, tag.high, theme.u32(theme.HELD_OUT), 4)
             draw.add_text(ImVec2(tag.x0 + 7, tag.y0 + 1), theme.u32(theme.HELD_OUT), label)
+        return name != rig.names[index]
 
 
 def crop_to(image_aspect: float, box_aspect: float) -> tuple[ImVec2, ImVec2]:

@@ -120,7 +120,7 @@ class Hud:
         draw = imgui.get_window_draw_list()
         is_labelled = session.overlays.compare == "wipe" and session.view.look_through is not None
         y = area.y0 + (44 if is_labelled else 12)
-        for shape, color, text in _legend_rows(session, scene):
+        for shape, color, text in legend_rows(session, scene):
             width = imgui.calc_text_size(text).x
             x = area.x1 - width - 46
             plate = theme.u32(theme.faded(theme.VOID, 0.78))
@@ -143,7 +143,7 @@ def _draw_busy(draw: Any, middle: ImVec2, color: theme.Color) -> None:
     draw.path_stroke(theme.u32(color), 2.0)
 
 
-def _legend_rows(session: Any, scene: Scene) -> list[tuple[str, theme.Color, str]]:
+def legend_rows(session: Any, scene: Scene) -> list[tuple[str, theme.Color, str]]:
     """Shape, colour and words of what is marked."""
     counts, rows = scene.counts, []
     status = None if counts.clip_index is None else session.clip_states[counts.clip_index]

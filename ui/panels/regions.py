@@ -12,7 +12,7 @@ from ui import theme
 from ui.region_tool import REGION_WORDS
 from ui.state import REGIONS, Dispatch, Rect, UiState
 from ui.theme import Icon
-from ui.widgets import chip, format_count, primary_button, text_wrapped_dim
+from ui.widgets import chip, format_count, primary_button, text_right, text_wrapped_dim
 
 MEANINGS = {"static": "Nothing moves or changes in here.", "dynamic": "Everything in here may move or change."}
 ROW_HEIGHT = 44.0
@@ -85,14 +85,16 @@ def _draw_choice(ui: UiState) -> None:
             draw.add_rect(low, high, theme.u32(theme.REGION_COLORS[treat]), 4, thickness=2)
         imgui.set_item_tooltip(f"{MEANINGS[treat]} M switches.")
     text_wrapped_dim(MEANINGS[tool.treat])
-    imgui.set_next_item_width(-80)
+    imgui.text_disabled("Radius")
+    text_right(f"{tool.radius:.3g} scene units", theme.TEXT)
+    imgui.set_next_item_width(-1)
     low_radius, high_radius = tool.radius_limits
     flags = imgui.SliderFlags_.logarithmic | imgui.SliderFlags_.always_clamp
-    is_moved, radius = imgui.slider_float("radius", tool.radius, low_radius, high_radius, "%.4g", flags)
+    is_moved, radius = imgui.slider_float("##radius", tool.radius, low_radius, high_radius, "", flags)
     ui.mark("regions.radius")
     if is_moved:
         tool.set_radius(radius)
-    imgui.set_item_tooltip("Scene units. The wheel over the picture does the same, and so do - and +.")
+    imgui.set_item_tooltip("The wheel over the picture does the same, and so do - and +.")
     imgui.begin_disabled(tool.sphere is None)
     if primary_button(f"{Icon.CHECK}  Mark it", ImVec2(half, 32), ui):
         tool.is_accepted = True

@@ -8,6 +8,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from ui import theme
 from ui.panels.training import duration_text
+from ui.progress_words import stage_words
 from ui.state import UiState
 from ui.theme import Icon
 from ui.widgets import elided, format_count
@@ -46,7 +47,7 @@ def status_text(session: Any) -> str:
         return f"Training clip {status.clip_index}: {steps}, {duration_text(status.eta_s)} left"
     if status.state in ("starting", "preparing", "stopping", "paused"):
         words = {"starting": "Starting", "preparing": "Preparing", "stopping": "Stopping", "paused": "Paused:"}
-        return f"{words[status.state]} clip {status.clip_index}  {status.message or ''}"
+        return f"{words[status.state]} clip {status.clip_index}  {stage_words(status)}  {status.message or ''}"
     if session.capture is None:
         return "Open a capture folder to begin"
     trained = sum(state.state == "trained" for state in session.clip_states)

@@ -9,13 +9,15 @@ from imgui_bundle import ImVec2, imgui
 
 from app.commands import SetFrame, TogglePlay, TrainClip
 from ui import theme
+from ui.progress_words import band_words
 from ui.shortcuts import go_to_frame
 from ui.state import Dispatch, Rect, UiState
 from ui.theme import Icon
-from ui.widgets import text_right
+from ui.widgets import format_count, text_right
 
 RULER_HEIGHT = 22.0
 BAND_GAP = 6.0
+MIN_TRACK_HEIGHT = RULER_HEIGHT + 18.0
 MIN_TICK_SPACING_PX = 56.0
 
 STATE_WORDS: dict[str, str] = {
@@ -60,7 +62,8 @@ def draw_timeline(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     if session.capture is None:
         imgui.text_disabled("Frames and clips appear here when a capture is open.")
         return
-    _draw_transport(session, dispatch, ui)
+    if imgui.get_content_region_avail().y >= MIN_TRACK_HEIGHT + imgui.get_frame_height_with_spacing():
+        _draw_transport(session, dispatch, ui)  # in a lower panel it gives way: time is worth more than buttons
     _draw_track(session, dispatch, ui)
 
 
@@ -103,7 +106,7 @@ def _draw_transport(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     if is_edited:
         go_to_frame(session, dispatch, typed)
     imgui.same_line()
-    imgui.text_disabled(f"of {timeline.n_frames - 1}")
+    imgui.text_disabled(f"of 0 to {format_count(timeline.last_frame)}")
     imgui.same_line(0, 18)
     fps = max(timeline.fps, 1e-6)
     imgui.text(f"{timeline.frame_index / fps:.2f} s")
@@ -123,8 +126,7 @@ def _draw_track(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     timeline = session.timeline
     origin = imgui.get_cursor_screen_pos()
     size = imgui.get_content_region_avail()
-    if size.x < 40 or size.y < RULER_HEIGHT + 18:
-        return
+    size.x, size.y = max(size.x, 1.0), max(size.y, MIN_TRACK_HEIGHT)
     imgui.invisible_button("track", size)
     track = Rect(origin.x, origin.y, origin.x + size.x, origin.y + size.y)
     ui.mark_rect("timeline.track", track)
@@ -207,9 +209,7 @@ def _draw_band_text(draw: Any, band: Rect, session: Any, clip: Any, status: Any,
     state = status.state
     icon = theme.CLIP_ICONS.get(state, "")
     title = _clip_title(clip.clip_index, session)
-    words: str = STATE_WORDS.get(state, str(state))
-    if state in ("preparing", "training", "paused", "stopped"):
-        words = f"{words} {status.progress * 100:.0f} %"
+    words = band_words(status, session.training, clip.clip_index, STATE_WORDS.get(state, str(state)))
     if status.held_out_psnr is not None:
         words = f"{words}, {status.held_out_psnr:.1f} dB"
     x, y = band.x0 + 9, band.y0 + 6

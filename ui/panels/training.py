@@ -10,13 +10,21 @@ from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
 from app.commands import PauseTraining, ResumeTraining, StopTraining, TrainNextClip
 from ui import theme
+from ui.axis import ticks_that_fit, whole_ticks
 from ui.panels.plan import draw_plan
 from ui.panels.timeline import STATE_WORDS
+from ui.progress_words import stage_words
 from ui.state import Dispatch, UiState
 from ui.theme import Icon
 from ui.widgets import format_count, primary_button, text_right, text_wrapped_dim
 
 MAX_PLOT_POINTS = 600
+TICK_ROOM = 52.0
+"""What the numbers on the left and the margins take of a plot, units."""
+MIN_TICK_DISTANCE = 52.0
+ANCHORS_TOOLTIP = """All anchors of a clip, whichever frames they are alive in.
+Reference clip: reference anchors, which later clips inherit.
+Later clips: inherited + residual anchors."""
 
 
 def duration_text(seconds: float | None) -> str:
@@ -108,7 +116,7 @@ def _draw_progress(status: Any, ui: UiState) -> None:
     imgui.text(f"{words[status.state]} clip {status.clip_index}")
     if status.stage:
         imgui.same_line()
-        imgui.text_disabled(str(status.stage))
+        imgui.text_disabled(stage_words(status))
     bar_color = theme.YELLOW if status.state == "paused" else theme.SKY
     imgui.push_style_color(imgui.Col_.plot_histogram, ImVec4(*bar_color))
     imgui.progress_bar(min(max(share, 0.0), 1.0), ImVec2(-1, 8), "")
@@ -118,8 +126,9 @@ def _draw_progress(status: Any, ui: UiState) -> None:
         _pair(f"Step {format_count(status.step)} of {format_count(status.n_steps)}", f"{share * 100:.0f} %")
         rate = f"{status.steps_per_s:.1f} steps/s" if status.steps_per_s else "–"
         _pair(rate, f"{duration_text(status.eta_s)} left")
-    elif status.eta_s is not None:
-        _pair("", f"about {duration_text(status.eta_s)} left")
+    else:
+        left = "" if status.eta_s is None else f"about {duration_text(status.eta_s)} left"
+        _pair(left, f"{share * 100:.0f} % of this stage" if status.stage else "")
     if status.message:
         text_wrapped_dim(str(status.message))
 
@@ -157,7 +166,7 @@ def _draw_curve(
         implot.setup_axes("", "", axis, axis)
         last = float(max(steps[-1], n_steps, 10))
         implot.setup_axes_limits(0.0, last, low - margin, high + margin, implot.Cond_.always)
-        implot.setup_axis_ticks(implot.ImAxis_.x1, 0.0, last, 5)
+        _set_step_ticks(last)
         spec = implot.Spec(line_color=ImVec4(*color), line_weight=2.0)
         if has_markers:
             spec.marker = implot.Marker_.circle
@@ -171,17 +180,33 @@ def _draw_curve(
     implot.end_plot()
 
 
+def _set_step_ticks(last: float) -> None:
+    """Whole steps along the lower edge."""
+    width = max(imgui.get_content_region_avail().x - TICK_ROOM, 40.0)
+    ticks = whole_ticks(last, max(int(width / MIN_TICK_DISTANCE), 2))
+    halves = {tick: imgui.calc_text_size(format_count(tick)).x / 2 for tick in ticks}
+    kept = ticks_that_fit(last, width, halves, ticks)
+    implot.setup_axis_ticks(implot.ImAxis_.x1, [float(tick) for tick in kept], [format_count(tick) for tick in kept])
+
+
+def anchors_text(n_inherited: int, n_own: int) -> str:
+    """Anchors of a clip: of the reference clip a number, of a later one a sum; a dash where there are none yet."""
+    if not n_inherited and not n_own:
+        return "–"
+    return f"{format_count(n_inherited)} + {format_count(n_own)}" if n_inherited else format_count(n_own)
+
+
 def _draw_clips(session: Any) -> None:
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.borders_inner_h | imgui.TableFlags_.scroll_y
     flags |= imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.pad_outer_x
-    if not imgui.begin_table("clips", 4, flags, ImVec2(0, max(imgui.get_content_region_avail().y - 4, 90))):
+    if not imgui.begin_table("clips", 3, flags, ImVec2(0, max(imgui.get_content_region_avail().y - 4, 90))):
         return
     imgui.table_setup_scroll_freeze(0, 1)
     imgui.table_setup_column("Clip", imgui.TableColumnFlags_.width_stretch)
     imgui.table_setup_column("PSNR")
-    imgui.table_setup_column("Inherited")
-    imgui.table_setup_column("Own")
+    imgui.table_setup_column("Anchors")
     imgui.table_headers_row()
+    imgui.set_item_tooltip(ANCHORS_TOOLTIP)
     for clip, status in zip(session.clips, session.clip_states, strict=False):
         imgui.table_next_row()
         imgui.table_next_column()
@@ -193,7 +218,6 @@ def _draw_clips(session: Any) -> None:
         imgui.table_next_column()
         imgui.text("–" if status.held_out_psnr is None else f"{status.held_out_psnr:.1f}")
         imgui.table_next_column()
-        imgui.text(format_count(status.n_inherited) if status.n_inherited else "–")
-        imgui.table_next_column()
-        imgui.text(format_count(status.n_own) if status.n_own else "–")
+        imgui.text(anchors_text(status.n_inherited, status.n_own))
+        imgui.set_item_tooltip(ANCHORS_TOOLTIP)
     imgui.end_table()

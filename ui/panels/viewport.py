@@ -33,8 +33,10 @@ WIPE_GRAB_PX = 9.0
 CLICK_PX = 4.0
 """A press that moves less than this before its release is a click, where clicks mean something."""
 TOOLBAR_HEIGHT = 38.0
+TOOLTIP_AWAY = 22.0
 TOOLBAR_WIDTH = 610.0
 """With less room, words give way to symbols."""
+MARK_SLIDER = imgui.SliderFlags_.always_clamp
 COMPARE_WORDS = {"off": "Off", "wipe": "Wipe", "side": "Side by side"}
 
 
@@ -75,6 +77,7 @@ class ViewportPanel:
         self._button: int = 0
         self._pressed_at = (0.0, 0.0)
         self._is_click = False
+        self._pressed_camera: int | None = None
         self._aimed_at = (0.0, 0.0)
         self._moved_s = -1e9
         self.hud = Hud()
@@ -157,7 +160,13 @@ class ViewportPanel:
             if imgui.selectable("Free", shown is None)[0]:
                 dispatch(LookThrough(None))
             for index, name in enumerate(names):
-                if imgui.selectable(name, shown == index)[0]:
+                imgui.push_id(index)  # names may be equal before a "##", which is all that ImGui would tell apart
+                is_chosen = imgui.selectable("##camera", shown == index)[0]
+                ui.mark(f"viewport.camera{index}")
+                imgui.same_line(0, 0)
+                imgui.text(name)
+                imgui.pop_id()
+                if is_chosen:
                     dispatch(LookThrough(index))
             imgui.end_combo()
         ui.mark("viewport.camera")
@@ -219,6 +228,17 @@ class ViewportPanel:
                 dispatch(ToggleOverlay(name))
             ui.mark(f"show.{name}")
         imgui.separator()
+        overlays = session.overlays
+        imgui.text_disabled("Anchor marks")
+        imgui.set_next_item_width(150)
+        size = imgui.slider_float("Size", overlays.mark_size * 100.0, 50.0, 300.0, "%.0f %%", MARK_SLIDER)
+        overlays.mark_size = size[1] / 100.0
+        ui.mark("show.mark_size")
+        imgui.set_next_item_width(150)
+        opacity = imgui.slider_float("Opacity", overlays.mark_opacity * 100.0, 10.0, 100.0, "%.0f %%", MARK_SLIDER)
+        overlays.mark_opacity = opacity[1] / 100.0
+        ui.mark("show.mark_opacity")
+        imgui.separator()
         imgui.text_disabled("Tab hides or shows cameras and anchors")
         imgui.end_popup()
 
@@ -252,6 +272,13 @@ class ViewportPanel:
             session.overlays.wipe_position = min(max(share, 0.0), 1.0)
             imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
             return
+        if self._pressed_camera is not None:
+            x, y = self._pressed_at
+            if max(abs(io.mouse_pos.x - x), abs(io.mouse_pos.y - y)) < CLICK_PX:
+                if imgui.is_item_deactivated():
+                    dispatch(LookThrough(self._pressed_camera))
+                return
+            self._pressed_camera = None  # it became a drag
         if tool.is_active and self._button == imgui.MouseButton_.left and self._drag == "view":
             x, y = self._pressed_at
             if max(abs(io.mouse_pos.x - x), abs(io.mouse_pos.y - y)) < CLICK_PX:
@@ -299,6 +326,8 @@ class ViewportPanel:
             height=size[1],
             is_moving=self.is_moving,
         )
+        self.scene.marks.pixels_per_unit = density
+        self._point_at_camera(session, ui, view, pane, density)
         self._aim(session, ui, view, pane, density)
         command = ui.regions.take_accepted()
         if command is not None:
@@ -311,15 +340,35 @@ class ViewportPanel:
         if self.is_moving:
             ui.redraw_within(MOVING_S)
         elif imgui.is_item_hovered() and self._drag is None and not tool.is_active:
-            pointer = imgui.get_io().mouse_pos
-            pixels = ((pointer.x - pane.x0) * density, (pointer.y - pane.y0) * density)
-            text = self.scene.anchor_text(session, view, *pixels)
-            if text:
-                imgui.set_tooltip(text)
+            camera = self.scene.marks.pointed_camera
+            if camera is not None:
+                is_held_out = " (held out)" if camera in session.holdout else ""
+                _tooltip_beside(f"Camera {session.rig.names[camera]}{is_held_out}\nClick to look through it", area)
+            else:
+                text = self.scene.anchor_text(session, view, *_pixels(pane, density))
+                if text:
+                    _tooltip_beside(text, area)
+        else:
+            self.scene.marks.pointed_anchor = None
         self._captured_frame = None
         if panes.captured is not None:
             self._draw_captured(session, draw, panes)
         draw.pop_clip_rect()
+
+    def _point_at_camera(self, session: Any, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
+        """The camera under the pointer stands out; one that was pressed is remembered for the click."""
+        is_free = imgui.is_item_hovered() and not ui.regions.is_active
+        is_pressing = imgui.is_item_activated() and self._button == imgui.MouseButton_.left
+        marks = self.scene.marks
+        if is_free and (is_pressing or (self._drag is None and not self.is_moving)):
+            marks.pointed_camera = marks.camera_under(session, view, *_pixels(pane, density))
+        elif self._pressed_camera is None:
+            marks.pointed_camera = None
+        if imgui.is_item_activated():
+            self._pressed_camera = marks.pointed_camera if is_pressing and self._drag == "view" else None
+        if marks.pointed_camera is not None:
+            marks.pointed_anchor = None
+            imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
 
     def _aim(self, session: Any, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """Lead the sphere that is being chosen: to the middle at first, then by the pointer, until a click fixes it."""
@@ -373,6 +422,24 @@ class ViewportPanel:
             chip(draw, area.x0 + 10, area.y0 + 10, words, color=color)
         if share < 0.85:
             chip(draw, area.x1 - 10, area.y0 + 10, rendered_words, color=color, is_right=True)
+
+
+def _pixels(pane: Rect, density: float) -> tuple[float, float]:
+    """Where the pointer is, in pixels of the picture in a pane."""
+    pointer = imgui.get_io().mouse_pos
+    return (pointer.x - pane.x0) * density, (pointer.y - pane.y0) * density
+
+
+def _tooltip_beside(text: str, area: Rect) -> None:
+    """A tooltip that does not cover what is pointed at: away from the pointer, on the side where there is room."""
+    pointer = imgui.get_io().mouse_pos
+    is_left, is_above = pointer.x > area.center[0], pointer.y > area.center[1]
+    x = pointer.x + (-TOOLTIP_AWAY if is_left else TOOLTIP_AWAY)
+    y = pointer.y + (-TOOLTIP_AWAY if is_above else TOOLTIP_AWAY)
+    imgui.set_next_window_pos(
+        ImVec2(x, y), imgui.Cond_.always, ImVec2(1.0 if is_left else 0.0, 1.0 if is_above else 0.0)
+    )
+    imgui.set_tooltip(text)
 
 
 def _segment(label: str, is_on: bool) -> bool:

@@ -71,6 +71,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
     Raises:
         CaptureError: Listing every problem found.
     """
+    place_in(folder, "ims", follow_links=follow_links, named_in=folder)  # often a link to another disk: said once
     problems: list[CaptureError] = []
     cameras: list[_MetaCamera] = []
     for name in META_FILES:

@@ -102,6 +102,13 @@ def test_a_name_that_is_a_protocol_to_the_decoder_is_a_file_name_here(
     assert open_capture(".").frame(1, 0).shape == (32, 48, 3)
 
 
+def test_a_video_of_an_unknown_kind(make_sample: MakeCapture) -> None:
+    folder = make_sample()
+    path = folder / "cam01.mp4"
+    path.write_bytes(path.read_bytes().replace(b"avc1", b"zzzz"))
+    assert "of a kind that is not known" in refusal(folder)
+
+
 def test_postscript_is_not_run_as_an_image(make_panoptic: MakeCapture) -> None:
     folder = make_panoptic(edit=lambda d: d["train_meta.json"]["fn"][0].__setitem__(0, "1/a.eps"))
     (folder / "ims/1/a.eps").write_text("%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 48 32\nshowpage\n")

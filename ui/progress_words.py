@@ -1,0 +1,25 @@
+"""Progress in words, the same in the training panel, the timeline and the status bar. Percent are always of the steps;
+a preparation, which has none yet, is counted in stages.
+"""
+
+from __future__ import annotations
+
+from app.status import ClipStatus, TrainingStatus
+
+COUNTED_IN_STEPS = ("training", "paused", "stopped")
+
+
+def stage_words(training: TrainingStatus) -> str:
+    """What is done at the moment: "stage 2 of 3, Looking for what stands still"."""
+    if not training.n_stages:
+        return training.stage
+    return f"stage {training.stage_number} of {training.n_stages}, {training.stage}"
+
+
+def band_words(status: ClipStatus, training: TrainingStatus, clip_index: int, state_words: str) -> str:
+    """The state of a clip on the timeline. state_words: Of the state alone."""
+    if status.state == "preparing" and training.clip_index == clip_index and training.n_stages:
+        return f"{state_words}, stage {training.stage_number} of {training.n_stages}"
+    if status.state in COUNTED_IN_STEPS and status.progress > 0:
+        return f"{state_words} {status.progress * 100:.0f} %"
+    return state_words
