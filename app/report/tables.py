@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from app.csv_text import csv_text
 from app.report.markup import Markup, tag
 
 MISSING = "–"
@@ -74,11 +73,7 @@ class Table:
 
     def csv_text(self) -> str:
         """Comma-separated, keys first, all digits; missing values are empty."""
-        buffer = io.StringIO()
-        writer = csv.DictWriter(buffer, [column.key for column in self.columns], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(self.rows)
-        return buffer.getvalue()
+        return csv_text([column.key for column in self.columns], self.rows)
 
     def markup(self) -> Markup:
         """As HTML that scrolls when it is too wide. The best value of a column with a direction is bold."""
