@@ -166,7 +166,7 @@ def test_a_full_disk_ends_keeping_and_not_measuring(tmp_path):
     with full.open("wb", buffering=0) as file, kept.writing():
         kept._file = file
         kept.add(row)
-        kept.add(PairRow(1, 0, "a", False, False, *[0.0] * 7))
+        kept.add(PairRow(1, 0, "a", False, False, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
     assert kept.rows == {("a", 0): row}
     assert not kept.is_writable
     assert len(said) == 1
