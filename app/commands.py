@@ -141,6 +141,11 @@ class UndoMark:
 
 
 @dataclass(frozen=True, slots=True)
+class RedoMark:
+    """Do again what UndoMark took back last; a new mark or removal ends that."""
+
+
+@dataclass(frozen=True, slots=True)
 class HomeView:
     """Frame the point that the cameras look at."""
 
@@ -172,6 +177,7 @@ Command = (
     | MarkRegion
     | RemoveRegion
     | UndoMark
+    | RedoMark
     | HomeView
     | DismissNotice
 )

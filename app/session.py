@@ -205,6 +205,8 @@ class Session:
                 self._marking.remove(index)
             case commands.UndoMark():
                 self._marking.undo()
+            case commands.RedoMark():
+                self._marking.redo()
             case commands.HomeView():
                 self.view.home()
             case commands.DismissNotice(index=index):
@@ -603,6 +605,7 @@ _TITLES: dict[type, str] = {
     commands.MarkRegion: "The region cannot be marked",
     commands.RemoveRegion: "The region cannot be removed",
     commands.UndoMark: "The last mark cannot be taken back",
+    commands.RedoMark: "The mark cannot be made again",
 }
 
 

@@ -177,6 +177,7 @@ class RegionsStatus:
         can_mark: Whether a region can be marked or removed now.
         why_not: The reason if it cannot, and what to do.
         can_undo: Whether there is a mark or a removal to take back.
+        can_redo: Whether there is one that was taken back and can be done again.
         effect: In which clips they take effect.
     """
 
@@ -184,6 +185,7 @@ class RegionsStatus:
     can_mark: bool = False
     why_not: str = ""
     can_undo: bool = False
+    can_redo: bool = False
     effect: str = ""
 
 

@@ -203,7 +203,7 @@ class Frame:
         self._guard("Help", lambda: draw_help(ui))
         size = imgui.get_main_viewport().size
         whole = Rect(0.0, 0.0, size.x, size.y - STATUS_BAR_HEIGHT)
-        toast_area = ui.rects.get("viewport.canvas", whole)
+        toast_area = ui.rects.get("viewport.free", whole)
         self._guard("Notices", lambda: self.notices.draw(session, dispatch, ui, toast_area))
 
     def dispatch(self, command: object) -> None:

@@ -83,7 +83,8 @@ def _draw_rows(
     for shortcut in SHORTCUTS:
         if is_on_only and shortcut.is_on is None:
             continue
-        if shortcut.group not in groups or (shortcut.needs_choosing and not ui.regions.is_active):
+        is_offered = shortcut.is_listed and (ui.regions.is_active or not shortcut.needs_choosing)
+        if shortcut.group not in groups or not is_offered:
             continue
         is_on = shortcut.is_on is not None and session.capture is not None and shortcut.is_on(session)
         if _item(ui, shortcut.text, shortcut.label, is_on=is_on):

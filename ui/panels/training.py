@@ -21,7 +21,7 @@ from ui.widgets import format_count, primary_button, text_right, text_wrapped_di
 MAX_PLOT_POINTS = 600
 TICK_ROOM = 52.0
 """What the numbers on the left and the margins take of a plot, units."""
-MIN_TICK_DISTANCE = 52.0
+MIN_TICK_DISTANCE = 46.0
 ANCHORS_TOOLTIP = """All anchors of a clip, whichever frames they are alive in.
 Reference clip: reference anchors, which later clips inherit.
 Later clips: inherited + residual anchors."""
@@ -115,8 +115,7 @@ def _draw_progress(status: Any, ui: UiState) -> None:
     imgui.spacing()
     imgui.text(f"{words[status.state]} clip {status.clip_index}")
     if status.stage:
-        imgui.same_line()
-        imgui.text_disabled(stage_words(status))
+        text_wrapped_dim(stage_words(status))
     bar_color = theme.YELLOW if status.state == "paused" else theme.SKY
     imgui.push_style_color(imgui.Col_.plot_histogram, ImVec4(*bar_color))
     imgui.progress_bar(min(max(share, 0.0), 1.0), ImVec2(-1, 8), "")
@@ -128,7 +127,7 @@ def _draw_progress(status: Any, ui: UiState) -> None:
         _pair(rate, f"{duration_text(status.eta_s)} left")
     else:
         left = "" if status.eta_s is None else f"about {duration_text(status.eta_s)} left"
-        _pair(left, f"{share * 100:.0f} % of this stage" if status.stage else "")
+        _pair(left, f"{share * 100:.0f} % of this stage" if share > 0 else "")
     if status.message:
         text_wrapped_dim(str(status.message))
 
