@@ -384,7 +384,7 @@ SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("y", "Ctrl+Y", "Do again what was taken back", MARK, _redo_mark, is_ctrl=True, is_listed=False),
     Shortcut("t", "T", "Train the next clip, pause or resume", TRAIN, _train),
     Shortcut("t", "Ctrl+T", "Stop training and keep what was learned", TRAIN, _stop_training, is_ctrl=True),
-    Shortcut("o", "Ctrl+O", "Open a capture folder", WINDOW, _open, is_ctrl=True, needs_capture=False),
+    Shortcut("o", "Ctrl+O", "Open a capture or project folder", WINDOW, _open, is_ctrl=True, needs_capture=False),
     Shortcut("equal", "Ctrl++", "Larger interface", WINDOW, _scale_by(1), **_SCALING),
     Shortcut("minus", "Ctrl+-", "Smaller interface", WINDOW, _scale_by(-1), **_SCALING),
     Shortcut("_0", "Ctrl+0", "Interface at the screen's own size", WINDOW, _reset_scale, **_SCALING),
@@ -401,7 +401,7 @@ MOUSE_HELP: tuple[tuple[str, str], ...] = (
     ("Camera click", "Look through the camera whose pyramid it is"),
     ("Timeline drag", "Move through time"),
     ("White line drag", "Wipe between render and captured picture"),
-    ("Folder drop", "Open it as a capture"),
+    ("Folder drop", "Open it: a capture or a project"),
 )
 
 

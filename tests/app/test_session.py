@@ -51,7 +51,8 @@ def test_opening_makes_a_project_and_frames_the_rig(make_session, tmp_path):
     assert np.allclose(session.view.pivot, session.rig.focus_point())
     assert session.training.can_train_next
     assert session.training.next_clip_index == 0
-    assert str(session.capture.path.resolve()) in session.settings.recent
+    (recent,) = session.settings.recent
+    assert (recent.folder, recent.capture) == (tmp_path / "p", str(session.capture.path.resolve()))
 
 
 def test_what_is_not_a_capture_becomes_a_notice_and_leaves_nothing(make_session, tmp_path):
@@ -193,7 +194,7 @@ def test_training_the_reference_again_makes_source_clips_stale(make_session):
     train_next(session)
     train_next(session)
     session.project.update(replace(session.project.settings, overrides={"joint_steps": 9}))  # another result
-    session.dispatch(c.TrainClip(0))
+    session.dispatch(c.TrainClip(0, is_confirmed=True))
     poll_until(session, lambda: session.training.state == "idle")
     assert [state.state for state in session.clip_states] == ["trained", "stale"]
     assert session.training.next_clip_index == 1
@@ -211,7 +212,7 @@ def test_training_a_clip_again_makes_those_stale_that_went_on_from_it(make_sessi
         train_next(session)
     assert {state.state for state in session.clip_states} == {"trained"}
     session.project.update(replace(session.project.settings, overrides=overrides | {"joint_steps": 9}))
-    session.dispatch(c.TrainClip(1))
+    session.dispatch(c.TrainClip(1, is_confirmed=True))
     poll_until(session, lambda: session.training.state == "idle")
     later = "stale" if goes_on else "trained"
     assert [state.state for state in session.clip_states] == ["trained", "trained"] + [later] * (n_clips - 2)
@@ -228,7 +229,7 @@ def test_training_again_leaves_the_finished_clip_and_its_curves_until_it_is_fini
     slow = make_slow if ends_by == "stopping" else partial(_fails_at, step=3)
     session = make_session(make_training=slow, name=folder.name)
     poll_until(session, lambda: session.training.psnr_history == history, what="the curve on disk")
-    session.dispatch(c.TrainClip(0))
+    session.dispatch(c.TrainClip(0, is_confirmed=True))
     assert session.training.psnr_history == history  # the picture is that of the finished clip as well
     assert session.clip_states[0].held_out_psnr == psnr
     if ends_by == "stopping":
@@ -243,7 +244,7 @@ def test_training_again_leaves_the_finished_clip_and_its_curves_until_it_is_fini
     poll_until(session, lambda: session.training.psnr_history == history, what="the curve of the finished clip")
     session.close()
     session = make_session(make_training=partial(_until, n_steps=status.resume_step + 2), name=folder.name)
-    session.dispatch(c.TrainClip(0))
+    session.dispatch(c.TrainClip(0, is_confirmed=True))
     poll_until(session, lambda: session.training.state == "idle")
     assert session.clip_states[0].resume_step is None
     steps = [step for step, _ in session.training.psnr_history]
