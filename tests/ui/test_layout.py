@@ -169,7 +169,7 @@ def test_the_screen_s_own_scale_is_taken(monkeypatch: pytest.MonkeyPatch, dpi: i
             return Screen()
 
     monkeypatch.setattr("pyglet.display.get_display", Display)
-    monkeypatch.setitem(pyglet.options, "headless", False)
+    monkeypatch.setattr(pyglet.options, "headless", False)
     monkeypatch.setattr("sys.platform", "linux")
     assert screen_scale() == scale
     assert UiScale(of_screen=screen_scale()).wanted == scale
