@@ -42,6 +42,18 @@ def list_folders(folder: Path) -> list[str]:
     return sorted(names, key=str.lower)[:_MAX_LISTED]
 
 
+def typed_path(text: str) -> Path | None:
+    """The path that a text names; None where it is empty or cannot be one: too long, a home that nobody has."""
+    if not text.strip():
+        return None
+    try:
+        path = Path(text).expanduser()
+        path.is_dir()
+    except (OSError, RuntimeError, ValueError):
+        return None
+    return path
+
+
 class OpenFolderDialog:
     """One question for a folder: native when possible, else drawn. Owns the running question only."""
 
@@ -104,10 +116,10 @@ class OpenFolderDialog:
         flags = imgui.InputTextFlags_.enter_returns_true
         is_entered, self._text = imgui.input_text("##path", self._text, flags)
         ui.mark("open.path")
-        folder = Path(self._text).expanduser()
-        is_folder = folder.is_dir()
+        folder = typed_path(self._text)
+        is_folder = folder is not None and folder.is_dir()
         if imgui.begin_child("folders", ImVec2(0, -46), imgui.ChildFlags_.borders):
-            self._draw_folders(folder if is_folder else folder.parent)
+            self._draw_folders(self._start if folder is None else folder if is_folder else folder.parent)
         imgui.end_child()
         if not is_folder:
             imgui.align_text_to_frame_padding()
@@ -121,7 +133,7 @@ class OpenFolderDialog:
         is_clicked = imgui.button("Open", ImVec2(120, 0))
         ui.mark("open.accept")
         imgui.end_disabled()
-        if (is_clicked or is_entered) and is_folder:
+        if (is_clicked or is_entered) and folder is not None and is_folder:
             self._start = folder
             dispatch(OpenCapture(folder))
             imgui.close_current_popup()

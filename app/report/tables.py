@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,6 +24,7 @@ class TableColumn:
         n_digits: Digits after the point; None shows a number with five digits in all, and anything else as it is.
         is_higher_better: Direction, for an arrow and the best value in bold; None for neither.
         unit: Shown behind the title; empty for none.
+        labels: What the page shows in place of values that are texts; files keep those.
     """
 
     key: str
@@ -31,6 +32,7 @@ class TableColumn:
     n_digits: int | None = None
     is_higher_better: bool | None = None
     unit: str = ""
+    labels: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def heading(self) -> str:
@@ -87,7 +89,7 @@ class Table:
             cells = []
             for column in self.columns:
                 value = row[column.key]
-                text = value_text(value, column.n_digits)
+                text = column.labels.get(str(value)) or value_text(value, column.n_digits)
                 is_best = value is not None and value == best[column.key]
                 kind = "n" if self._is_numeric(column) else "w" if len(text) > _WIDE_TEXT else None
                 cells.append(tag("td", tag("b", text) if is_best else text, class_=kind))

@@ -221,8 +221,8 @@ def _not_a_capture(folder: Path, reasons: Sequence[str]) -> CaptureError:
     if inside:
         hint = f"Open {inside[0]} inside it, which is one."
     else:
-        layouts = "; or ".join(reader.LAYOUT for reader in FORMATS)
-        hint = f"A capture is a folder with {layouts}. For other recordings write cameras.json, see the README."
+        layouts = ", or ".join(reader.LAYOUT for reader in FORMATS)
+        hint = f"A capture holds {layouts}. For other recordings write cameras.json, see the README."
     return CaptureError(
         f"This folder is not a capture ({'; '.join(reasons)}). In it: {folder_contents(folder)}.",
         hint=hint,

@@ -1,6 +1,7 @@
 """The Session driven by commands, with training inline: no process, no wait, no window."""
 
 import contextlib
+import shutil
 from dataclasses import replace
 from functools import partial
 
@@ -81,6 +82,24 @@ def test_why_something_could_not_be_opened_goes_when_a_capture_opens(make_sessio
     assert "File name too long" in session.notices[1].detail
     session.dispatch(c.OpenCapture(capture_folder))
     poll_until(session, lambda: session.capture is not None)
+    assert len(session.notices) == 0
+
+
+def test_links_outside_are_followed_when_the_user_says_so_and_then_by_the_project(
+    make_session, capture_folder, tmp_path
+):
+    capture = tmp_path / "linked"
+    shutil.copytree(capture_folder, capture)
+    (capture / "ims").rename(tmp_path / "another disk")
+    (capture / "ims").symlink_to(tmp_path / "another disk")
+    session = make_session(is_open=False)
+    session.dispatch(c.OpenCapture(capture))
+    poll_until(session, lambda: len(session.notices) > 0)
+    assert "--follow-links" in session.notices[0].hint
+    session.dispatch(c.OpenCapture(capture, follow_links=True))
+    poll_until(session, lambda: session.capture is not None)
+    assert session.capture.follow_links
+    assert read_settings(session.project.folder).follow_links
     assert len(session.notices) == 0
 
 

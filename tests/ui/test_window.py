@@ -404,6 +404,24 @@ def test_path_box_opens_a_typed_folder(
     assert pilot.sent(OpenCapture) == [OpenCapture(tmp_path)]
 
 
+@pytest.mark.parametrize("text", ["", "/" + "x" * 300, "~nobody-has-this-name/x"])
+def test_path_box_takes_any_text(
+    open_pilot: Callable[..., Pilot], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ui.dialogs.has_native_dialog", lambda: False)
+    pilot = open_pilot(FakeSession(has_capture=False))
+    pilot.studio.frame.dialog.open(tmp_path)
+    pilot.draw(3)
+    pilot.key(key.A, modifiers=(CTRL,))
+    pilot.key(key.BACKSPACE)
+    pilot.type(text)
+    pilot.draw(3)
+    pilot.click("open.accept")
+    pilot.draw(2)
+    assert len(pilot.session.notices) == 0
+    assert pilot.sent(OpenCapture) == []
+
+
 def test_a_panel_that_raises_becomes_one_notice_and_the_others_go_on(
     pilot: Pilot, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -36,7 +36,7 @@ from engine.errors import CaptureError
 from engine.text import shown
 
 FORMAT = "sample"
-LAYOUT = "cameras.json with one video per camera"
+LAYOUT = "cameras.json and one video per camera"
 """The layout in words."""
 SCHEMA = 1
 CAMERAS_FILE = "cameras.json"
