@@ -138,7 +138,7 @@ class Frame:
     def update(self, dt_s: float) -> bool:
         """Drain the session and move time on. True when a frame has to be drawn."""
         session = self.session
-        has_news = session.poll()
+        has_news = self._drain()
         self.remembering.follow(session)
         has_news |= session.timeline.tick(min(dt_s, MAX_TICK_S), is_shown=self.viewport.shows_playhead(session))
         self._has_news |= has_news or self.viewport.has_news(session)

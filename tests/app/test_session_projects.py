@@ -152,7 +152,7 @@ def test_what_taking_up_a_result_raises_ends_with_the_job():
     faults: list[tuple[str, Exception]] = []
     jobs = Jobs(lambda name, error: faults.append((name, error)))
 
-    def take(result: int) -> None:
+    def take(result: object) -> None:
         raise ValueError(result)
 
     taken: list[int] = []
