@@ -52,10 +52,12 @@ class QuestionDialogs:
                 dispatch(CloseQuestion())
             return
         imgui.push_text_wrap_pos(0.0)
+        # the key that led to the question is still pressed in its first frame, and is no answer to it
+        is_agreed = not is_new and imgui.is_key_pressed(imgui.Key.enter, False)
         if isinstance(question, RetrainQuestion):
-            answer = _draw_retrain(question, ui)
+            answer = _draw_retrain(question, ui, is_agreed)
         else:
-            answer = self._draw_projects(question, ui)
+            answer = self._draw_projects(question, ui, is_agreed)
         imgui.pop_text_wrap_pos()
         if answer is None and (not is_kept or (not is_new and imgui.is_key_pressed(imgui.Key.escape, False))):
             answer = CloseQuestion()
@@ -65,7 +67,7 @@ class QuestionDialogs:
         if answer is not None:
             dispatch(answer)
 
-    def _draw_projects(self, question: ProjectQuestion, ui: UiState) -> object | None:
+    def _draw_projects(self, question: ProjectQuestion, ui: UiState, is_agreed: bool) -> object | None:
         imgui.text_wrapped(f"This capture has {len(question.choices)} projects. Which one do you want to open?")
         text_wrapped_dim(question.capture)
         imgui.spacing()
@@ -84,7 +86,7 @@ class QuestionDialogs:
             answer = new
         ui.mark("question.new")
         imgui.spacing()
-        if _button_row(ui, "Open") or imgui.is_key_pressed(imgui.Key.enter, False):
+        if _button_row(ui, "Open") or is_agreed:
             chosen = self._chosen
             answer = OpenProject(Path(question.choices[chosen].project)) if chosen < n_rows - 1 else new
         return answer or (CloseQuestion() if _cancelled(ui) else None)
@@ -116,7 +118,7 @@ def _title(question: Any) -> str:
     return "Several projects###question"
 
 
-def _draw_retrain(question: RetrainQuestion, ui: UiState) -> object | None:
+def _draw_retrain(question: RetrainQuestion, ui: UiState, is_agreed: bool) -> object | None:
     for text in retrain_texts(question):
         imgui.text_wrapped(text)
         imgui.spacing()
@@ -126,7 +128,7 @@ def _draw_retrain(question: RetrainQuestion, ui: UiState) -> object | None:
         imgui.text_wrapped(outdated_text(question))
         ui.mark("question.outdated")
         imgui.spacing()
-    if _button_row(ui, "Train again") or imgui.is_key_pressed(imgui.Key.enter, False):
+    if _button_row(ui, "Train again") or is_agreed:
         return TrainClip(question.clip_index, is_confirmed=True)
     return CloseQuestion() if _cancelled(ui) else None
 

@@ -16,7 +16,7 @@ from app import commands
 from app.arrays import AnchorArrays, Picture, PointArrays
 from app.marking import after_marking
 from app.notices import Notices
-from app.questions import Question
+from app.questions import Question, RetrainQuestion
 from app.recents import RecentProject
 from app.status import (
     ClipStatus,
@@ -159,6 +159,9 @@ class FakeSession:
                 self._set_regions(after_marking(self.regions.regions, [sphere]))
             case commands.RemoveRegion(index=index):
                 self._set_regions((*self.regions.regions[:index], *self.regions.regions[index + 1 :]))
+            case commands.TrainClip(clip_index=clip_index, is_confirmed=False):
+                if self.clip_states[clip_index].state == "trained":
+                    self.question = RetrainQuestion(clip_index, False, "", 29.7, (), None, True, None, None)
             case commands.CloseQuestion() | commands.OpenProject() | commands.TrainClip(is_confirmed=True):
                 self.question = None
             case commands.DismissNotice():

@@ -70,6 +70,20 @@ def test_training_again_is_asked_and_answered_by_keyboard(pilot: Pilot, symbol: 
     assert "question.yes" not in pilot.rects
 
 
+def test_the_key_that_leads_to_the_question_does_not_answer_it(pilot: Pilot) -> None:
+    pilot.session.clip_states[0] = ClipStatus("trained", 1.0, 29.7)
+    pilot.draw()
+    pilot.tap(*pilot.rects["timeline.clip0"].center, button=mouse.RIGHT)
+    pilot.key(key.DOWN)  # the keyboard takes over from the pointer
+    pilot.key(key.DOWN)
+    pilot.key(key.ENTER)
+    pilot.draw(3)
+    assert pilot.sent(TrainClip) == [TrainClip(0)]
+    assert "question.yes" in pilot.rects
+    pilot.key(key.ENTER)
+    assert pilot.session.commands[-1] == TrainClip(0, is_confirmed=True)
+
+
 def test_the_question_is_answered_by_its_buttons(pilot: Pilot) -> None:
     for name, answer in (("question.no", CloseQuestion()), ("question.yes", TrainClip(0, is_confirmed=True))):
         pilot.session.question = dataclasses.replace(RETRAIN)
