@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from tests.faults.mutate import damaged_bytes, damaged_json, put_odd_file
-from tests.faults.tally import Case, Outcome, judge, run_cases, take_outside, watch_files
+from tests.faults.tally import Case, Outcome, judge, run_cases, start_memory, take_outside, watch_files
 
 N_FRAMES = 4
 BACKGROUNDS_KEY = {"capture": "none", "cameras": ["a", "b"], "size": [13, 6], "frames": 5, "is_corrected": True}
@@ -296,6 +296,7 @@ def run_case(case: Case) -> Outcome:
         for name, (place, read, _) in FILES.items():
             _good[name] = _plain(read(pristine, pristine / place))
         watch_files([case.work_dir])
+        start_memory()
     names = [name for name, (_, _, weight) in FILES.items() for _ in range(weight)]
     name, has_checksum = rng.choice(names), rng.random() < 0.7
     place, read, _ = FILES[name]
