@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import logging
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
 from engine.capture.capture import Capture
 from engine.errors import ProjectError
-from engine.text import shown
+from engine.text import printable, shown
 
 logger = logging.getLogger(__name__)
 
@@ -38,8 +39,15 @@ _LONGEST_INSIDE = 200
 def fail(code: int, message: str) -> int:
     """Say in one line, and in the log, why a subcommand ends with this exit code. Returns the code."""
     logger.error("exit %d: %s", code, message)
-    print(f"clipgstream: {message}", file=sys.stderr)
+    print(printable(f"clipgstream: {message}"), file=sys.stderr)
     return code
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """ " Did you mean X?" for what was probably meant; empty where nothing is near."""
+    near = difflib.get_close_matches(word.lower(), {name.lower(): name for name in known}, n=1, cutoff=0.6)
+    names = [name for name in known if near and name.lower() == near[0]]
+    return f" Did you mean {names[0]}?" if names else ""
 
 
 class PlainParser(argparse.ArgumentParser):
@@ -50,10 +58,19 @@ class PlainParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """End the program with exit code 2 and one line."""
-        self.exit(EXIT_BAD_INPUT, f"{self.prog}: {message}. See `{self.prog} --help`.\n")
+        end = "" if message.endswith("?") else "."
+        self.exit(EXIT_BAD_INPUT, printable(f"{self.prog}: {message}{end} See `{self.prog} --help`.") + "\n")
+
+    def options_of(self, command: str | None) -> list[str]:
+        """Options of a subcommand, or of this parser where there is none, as they are written."""
+        parser: argparse.ArgumentParser = self
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction) and command in action.choices:
+                parser = action.choices[command]
+        return list(parser._option_string_actions)
 
 
-def parse(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> argparse.Namespace:
+def parse(parser: PlainParser, argv: Sequence[str] | None) -> argparse.Namespace:
     """Arguments after the program's name (those of the process when None) as options.
 
     What is left over is said with the help of the subcommand it was meant for. Raises SystemExit as argparse does.
@@ -61,8 +78,10 @@ def parse(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> argpar
     options, unknown = parser.parse_known_args(argv)
     if unknown:
         command = getattr(options, "command", None)
+        known = parser.options_of(command)
+        near = next((found for part in unknown if part.startswith("-") and (found := suggestion(part, known))), "")
         parser.prog = f"{parser.prog} {command}" if command else parser.prog
-        parser.error(f"unrecognized arguments: {' '.join(unknown)}")
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}" + (f".{near}" if near else ""))
     return options
 
 
@@ -143,7 +162,7 @@ def parse_range(text: str, n: int, *, option: str, what: str) -> range:
         if not colon and not first.strip():
             raise ValueError
     except ValueError as error:
-        raise ProjectError(f"{option} is '{text}', which is no range A:B.", hint=allowed) from error
+        raise ProjectError(f"{option} is '{text}', which is not a range A:B.", hint=allowed) from error
     if not 0 <= start < stop <= n:
         raise ProjectError(f"{option} is '{text}', which is empty or reaches outside.", hint=allowed)
     return range(start, stop)
@@ -165,6 +184,7 @@ def parse_cameras(text: str, capture: Capture) -> tuple[str, ...]:
         elif part and part.lower() != "none":
             shown = f"{', '.join(names[:6])}, ... {names[-1]}" if len(names) > 7 else ", ".join(names)
             raise ProjectError(
-                f"There is no camera '{part}'.", hint=f"Cameras are {shown}, or numbers from 0 to {len(names) - 1}."
+                f"There is no camera '{part}'.{suggestion(part, names)}",
+                hint=f"Cameras are {shown}, or numbers from 0 to {len(names) - 1}.",
             )
     return tuple(dict.fromkeys(chosen))

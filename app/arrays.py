@@ -23,6 +23,8 @@ class GaussianArrays:
         near_plane: Nearest depth that should be drawn, scene units.
         clip_index, frame_index, revision: What it shows: a frame, and the state of the clip it was decoded from.
         step: Training steps behind that state; None when unknown.
+        is_still: Whether that state holds nothing that changes over time, as a reference clip before its motion is
+            learned.
     """
 
     means: np.ndarray
@@ -36,6 +38,7 @@ class GaussianArrays:
     frame_index: int = 0
     revision: str = ""
     step: int | None = None
+    is_still: bool = False
 
     def __len__(self) -> int:
         return len(self.means)
@@ -105,8 +108,8 @@ class Picture:
         key: What it shows; equal keys mean equal pictures.
         is_stale: It is not what was asked for now, but the newest there is. What it is says the rest:
         duration_s: How long it took to make; 0 when unknown.
-        clip_index, frame_index, revision, step: The frame it shows, and the state of the clip; None and "" where that
-            is not known or, for a captured picture, without meaning.
+        clip_index, frame_index, revision, step, is_still: The frame it shows, and the state of the clip, see
+            GaussianArrays; None and "" where that is not known or, for a captured picture, without meaning.
         camera_index: The capture camera that took it, or that a rendered one looks through; None for a free view.
         look: From where and through which lens it was rendered, whatever its size; see OrbitView.look_key.
     """
@@ -119,6 +122,7 @@ class Picture:
     frame_index: int | None = None
     revision: str = ""
     step: int | None = None
+    is_still: bool = False
     camera_index: int | None = None
     look: Hashable = None
 

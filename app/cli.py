@@ -11,6 +11,7 @@ import argparse
 import contextlib
 import logging
 import signal
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -22,6 +23,7 @@ from app.evaluation_command import add_eval_arguments, evaluate
 from app.gate_command import add_gate_arguments, gate
 from app.inspect_command import add_inspect_arguments, inspect
 from app.logs import start_logging
+from app.printable_stream import PrintableStream
 from app.render_command import add_render_arguments, render
 from app.report.command import add_report_arguments, report
 from app.train_command import add_train_arguments, train
@@ -44,7 +46,7 @@ _INTERRUPTED = {
 """What has become of the work, by command."""
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> PlainParser:
     """Arguments of every subcommand."""
     parser = PlainParser(prog="clipgstream", description="Train, measure and render dynamic captures without a window.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -69,7 +71,7 @@ def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -
         return int(error.code or 0)
     log_file = start_logging()
     try:
-        with _terminating_like_ctrl_c():
+        with _terminating_like_ctrl_c(), contextlib.redirect_stdout(PrintableStream(sys.stdout)):
             return _COMMANDS[options.command].run(options, launch)
     except DiskError as error:
         return fail(EXIT_FAILED, str(error))

@@ -11,11 +11,14 @@ from pathlib import Path
 
 @dataclass(frozen=True, slots=True)
 class OpenCapture:
-    """Open a capture folder, and the project that belongs to it. A project folder is opened as such."""
+    """Open a capture folder, and the project that belongs to it; asks where there are several. A project folder is
+    opened as such."""
 
     path: Path
     scale: float | None = None
     """Share of the original picture size to work at; None picks one that suits the size."""
+    is_new_project: bool = False
+    """Start another project, whatever there is."""
     follow_links: bool = False
     """Whether the user allows the capture's files to lie outside of its folder; noted in its project."""
 
@@ -34,9 +37,10 @@ class TrainNextClip:
 
 @dataclass(frozen=True, slots=True)
 class TrainClip:
-    """Train one clip, again if it is trained already."""
+    """Train one clip. One that is finished, or damaged, is trained again only once that is confirmed."""
 
     clip_index: int
+    is_confirmed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,8 +145,25 @@ class UndoMark:
 
 
 @dataclass(frozen=True, slots=True)
+class RedoMark:
+    """Do again what UndoMark took back last; a new mark or removal ends that."""
+
+
+@dataclass(frozen=True, slots=True)
 class HomeView:
     """Frame the point that the cameras look at."""
+
+
+@dataclass(frozen=True, slots=True)
+class CloseQuestion:
+    """Do nothing of what was asked."""
+
+
+@dataclass(frozen=True, slots=True)
+class ForgetRecent:
+    """Take a project or capture out of the list of recent ones; its files stay."""
+
+    folder: Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +193,9 @@ Command = (
     | MarkRegion
     | RemoveRegion
     | UndoMark
+    | RedoMark
     | HomeView
+    | CloseQuestion
+    | ForgetRecent
     | DismissNotice
 )

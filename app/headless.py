@@ -229,6 +229,17 @@ def open_trained(project: Project) -> TrainedProject:
     return TrainedProject(project, capture, clips, reference)
 
 
+def _runs(ranges: Sequence[range]) -> list[tuple[int, int]]:
+    """Ranges of frames in their order, those that follow each other joined. First and beyond-last frames."""
+    runs: list[tuple[int, int]] = []
+    for frames in ranges:
+        if runs and runs[-1][1] == frames.start:
+            runs[-1] = (runs[-1][0], frames.stop)
+        else:
+            runs.append((frames.start, frames.stop))
+    return runs
+
+
 def render_frames(
     opened: TrainedProject, *, camera_index: int, frame_indices: Sequence[int], features: Features = "both"
 ) -> Iterator[tuple[int, np.ndarray]]:
@@ -248,9 +259,12 @@ def render_frames(
     needed = list(dict.fromkeys(clip_of[frame].clip_index for frame in frame_indices))
     missing = [clip_index for clip_index in needed if clip_index not in opened.trained]
     if missing:
+        first = next(frame for frame in frame_indices if clip_of[frame].clip_index in missing)
+        ranges = [f"{start}:{stop}" for start, stop in _runs([opened.clips[i].frame_indices() for i in opened.trained])]
         raise ProjectError(
-            f"Frames {frame_indices[0]} to {frame_indices[-1]} need clips {missing}, which are not trained.",
-            hint=f"Trained are {opened.trained}.",
+            f"Frame {first} lies in clip {clip_of[first].clip_index}, which is not trained; of the {len(needed)} clips "
+            f"asked for {len(missing)} {'is' if len(missing) == 1 else 'are'} not.",
+            hint=f"Train with `clipgstream train` first, or render what is trained: --frames {' or '.join(ranges)}.",
             path=opened.project.folder,
         )
     for clip_index in needed:  # a damaged one is found before anything is written; only one at a time is kept

@@ -93,10 +93,15 @@ class Job:
 
 
 class Jobs:
-    """The running jobs."""
+    """The running jobs.
 
-    def __init__(self) -> None:
+    Args:
+        on_fault: Told the name of a job and what taking up its result has raised; by default it is only logged.
+    """
+
+    def __init__(self, on_fault: Callable[[str, Exception], None] | None = None) -> None:
         self._jobs: list[Job] = []
+        self._on_fault = on_fault
 
     def start(
         self,
@@ -116,11 +121,16 @@ class Jobs:
         return [job.context.status for job in self._jobs]
 
     def poll(self) -> bool:
-        """Deliver finished jobs on this thread. Whether there were any."""
+        """Deliver finished jobs on this thread. Whether there were any. What taking up a result raises ends here."""
         finished = [job for job in self._jobs if not job.is_running]
         self._jobs = [job for job in self._jobs if job not in finished]
         for job in finished:
-            job.deliver()
+            try:
+                job.deliver()
+            except Exception as error:  # the edge of a job: one bad result must not end the window
+                logger.exception("%s: the result could not be taken up", job.context.status.name)
+                if self._on_fault is not None:
+                    self._on_fault(job.context.status.name, error)
         return bool(finished)
 
     def close(self, timeout_s: float = 1.0) -> None:

@@ -23,10 +23,10 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.printable import printable
 from engine.errors import ProjectError
 from engine.files import atomic_path
 from engine.json_files import JsonError, read_json_object
+from engine.text import printable
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock

@@ -89,6 +89,7 @@ class Marking:
         self._project: Project | None = None
         self._regions: tuple[GateRegion, ...] = ()
         self._past: list[tuple[GateRegion, ...]] = []
+        self._future: list[tuple[GateRegion, ...]] = []
         self._number = 0
         self._awaited: int | None = None
         self._problem = ""
@@ -103,7 +104,7 @@ class Marking:
         """Let go of the project once everything is kept."""
         self._settle_for_good()
         self._files.forget()
-        self._project, self._regions, self._past = None, (), []
+        self._project, self._regions, self._past, self._future = None, (), [], []
         self._awaited, self._problem = None, ""
 
     # ---------------------------------------------------------------- changes
@@ -133,13 +134,26 @@ class Marking:
             ProjectError: Nothing can be changed now.
         """
         if self._past:
+            now, future = self._regions, self._future
             self._change(self._past[-1])
             del self._past[-2:]  # what was just undone, and the way back to it
+            self._future = [*future, now]
+
+    def redo(self) -> None:
+        """Do again what was taken back last; nothing happens when nothing was, or when something else was done since.
+
+        Raises:
+            ProjectError: Nothing can be changed now.
+        """
+        if self._future:
+            future = self._future
+            self._change(future[-1])
+            self._future = future[:-1]
 
     def _change(self, regions: tuple[GateRegion, ...]) -> None:
         project = self._checked()
         self._past = [*self._past, self._regions][-MAX_UNDO:]
-        self._regions = regions
+        self._regions, self._future = regions, []
         self._number += 1
         self._files.request(RegionsRequest(self._number, regions, project))
 
@@ -163,7 +177,7 @@ class Marking:
     def _read(self) -> None:
         assert self._project is not None
         self._number += 1
-        self._awaited, self._past = self._number, []
+        self._awaited, self._past, self._future = self._number, [], []
         self._files.request(RegionsRequest(self._number, None, self._project))
 
     def take_error(self) -> tuple[RegionsRequest, Exception] | None:
@@ -216,6 +230,7 @@ class Marking:
             can_mark=not why_not,
             why_not=why_not,
             can_undo=bool(self._past) and not why_not,
+            can_redo=bool(self._future) and not why_not,
             effect="" if project is None else effect_text(started, gate=project.settings.config().gate),
         )
 

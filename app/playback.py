@@ -208,6 +208,7 @@ class Playback:
             frame_index=request.frame_index,
             revision=request.revision,
             step=loaded.step,
+            is_still=loaded.model.field is None,
         )
         shown = ShownFrame(arrays, anchors)
         if request.generation == self.worker.generation:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from app.arrays import PointArrays
+from app.children import undisturbed
 from app.jobs import JobContext
 from app.pictures import downsized
 from app.playback import point_spacing
@@ -77,7 +78,8 @@ def make_cloud(
     process = multiprocessing.get_context("spawn").Process(
         target=write_cloud, args=(str(capture_path), holdout, str(path), follow_links), name="first cloud", daemon=True
     )
-    process.start()
+    with undisturbed():
+        process.start()
     try:
         while process.is_alive():
             context.report(0.0, "from one moment, in small")

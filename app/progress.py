@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any, TextIO
 
 from app.training.rate import Rate
+from engine.text import printable
 
 BAR_WIDTH = 24
 REDRAW_EVERY_S = 0.1
@@ -53,6 +54,7 @@ class ProgressLine:
         if is_new:
             self._close_line()
         self._stage, self._written_s = stage, now_s
+        stage, detail = printable(stage), printable(detail)
         done = min(max(done, 0.0), 1.0)
         if not self._is_terminal:
             self._write(f"{stage} {done * 100:3.0f} %  {detail}".rstrip() + "\n")
@@ -67,7 +69,7 @@ class ProgressLine:
         """A line that stays."""
         if not self._is_quiet:
             self._close_line()
-            self._write(text + "\n")
+            self._write(printable(text) + "\n")
 
     def finish(self) -> None:
         """Leave the last line standing."""

@@ -115,6 +115,7 @@ def render(request: RenderRequest) -> Picture:
         frame_index=arrays.frame_index,
         revision=arrays.revision,
         step=arrays.step,
+        is_still=arrays.is_still,
         camera_index=request.camera_index,
         look=request.look,
     )

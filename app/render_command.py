@@ -63,7 +63,9 @@ def render(options: argparse.Namespace, launch: Launch) -> int:
         n_images = write_video(out, (image for _, image in images()), fps=capture.fps)
     elif out.suffix and not out.is_dir():
         raise ProjectError(
-            f"--out ends in '{out.suffix}', which is no known video.", hint="Write FILE.mp4 or a folder.", path=out
+            f"--out ends in '{out.suffix}', which is not a video format this program writes.",
+            hint="Write FILE.mp4, or name a folder for PNG files.",
+            path=out,
         )
     else:
         check_writable(out / "frame.png")

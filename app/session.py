@@ -7,11 +7,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from app import commands
 from app.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
+from app.clip_catalog import ClipCatalog
 from app.jobs import Job, JobContext, Jobs
 from app.latest import LatestWorker
 from app.marking import Marking
@@ -22,6 +24,8 @@ from app.pictures import CapturedPictures
 from app.playback import FrameRequest, Playback, ShownFrame, static_points
 from app.preview import make_cloud, picture_hint, read_cloud
 from app.project import Project, check_settings
+from app.questions import ProjectQuestion, Question, retrain_question
+from app.recents import RecentProject, missing_folders, project_name
 from app.render import Renderer
 from app.settings import Settings
 from app.status import (
@@ -31,6 +35,7 @@ from app.status import (
     JobStatus,
     Overlays,
     PlanStatus,
+    ProjectStatus,
     RegionsStatus,
     TrainingStatus,
     WantedFrame,
@@ -75,6 +80,9 @@ class Session:
         timeline, view, overlays: What the user looks at; the window may change them directly.
         training, clip_states, plan, regions: Status values, remade by `poll` and `dispatch`. The plan is that of the
             next clip; None while something trains or nothing is left to train.
+        opened: The open project: its name, where it lies, how far it is trained; None before.
+        question: What the user has to answer; None while there is nothing to ask.
+        missing: Folders of recent projects that are not there any more.
         notices: What the user has to know.
         holdout: Camera indices that training never sees.
 
@@ -107,12 +115,15 @@ class Session:
         self.training = TrainingStatus()
         self.clip_states: list[ClipStatus] = []
         self.plan: PlanStatus | None = None
+        self.opened: ProjectStatus | None = None
+        self.question: Question | None = None
+        self.missing: frozenset[Path] = frozenset()
         self.holdout: tuple[int, ...] = ()
         self._project_dir, self._launch, self._opener = project_dir, launch, opener
         self._refusals: list[Notice] = []
         self._service: TrainingService | None = None
         self._closing: list[tuple[TrainingService, Project]] = []
-        self._jobs = Jobs()
+        self._jobs, self._looks = Jobs(self._take_fault), Jobs()
         self._playback = Playback()
         self._renderer = Renderer()
         self._pictures = CapturedPictures()
@@ -126,6 +137,7 @@ class Session:
         self._is_preloading = is_preloading
         self._first_cloud: Job | None = None
         self._seen = self._finished_keys()
+        self._look_for_recent()
         if is_preloading:
             self._renderer.worker.start()
             self._playback.worker.start()
@@ -163,14 +175,18 @@ class Session:
 
     def _obey(self, command: commands.Command) -> None:
         match command:
-            case commands.OpenCapture(path=path, scale=scale, follow_links=follow_links):
-                self._open(Path(path), scale, follow_links=follow_links)
+            case commands.OpenCapture(path=path, scale=scale):
+                self._open(Path(path), scale, is_new_project=command.is_new_project, follow_links=command.follow_links)
             case commands.OpenProject(path=path):
                 self._open(Path(path), None)
+            case commands.ForgetRecent(folder=folder):
+                self.settings.forget_recent(Path(folder))
+            case commands.CloseQuestion():
+                self.question = None
             case commands.TrainNextClip():
                 self._train(None if self._service is None else self._service.next_clip_index)
-            case commands.TrainClip(clip_index=clip_index):
-                self._train(clip_index)
+            case commands.TrainClip(clip_index=clip_index, is_confirmed=is_confirmed):
+                self._train(clip_index, is_confirmed=is_confirmed)
             case commands.PauseTraining():
                 self._with_service(TrainingService.pause)
             case commands.ResumeTraining():
@@ -205,6 +221,8 @@ class Session:
                 self._marking.remove(index)
             case commands.UndoMark():
                 self._marking.undo()
+            case commands.RedoMark():
+                self._marking.redo()
             case commands.HomeView():
                 self.view.home()
             case commands.DismissNotice(index=index):
@@ -216,13 +234,20 @@ class Session:
         if self._service is not None:
             act(self._service)
 
-    def _train(self, clip_index: int | None) -> None:
-        if self._service is None:
+    def _train(self, clip_index: int | None, *, is_confirmed: bool = False) -> None:
+        service = self._service
+        self.question = None
+        if service is None:
             self.notices.add("warn", "There is nothing to train yet", "No capture is open.", "Open a capture folder.")
         elif clip_index is None:
-            self.notices.add("info", "Every clip is trained")
+            waiting = [
+                i for i, status in enumerate(self.clip_states) if status.state in ("damaged", "stale", "untrained")
+            ]
+            self.notices.add("info", *_NOTHING_TO_TRAIN[bool(waiting)])
+        elif not is_confirmed and service.is_finished(clip_index):
+            self.question = retrain_question(service.catalog, clip_index)
         else:
-            self._service.enqueue(clip_index)
+            service.enqueue(clip_index)
 
     def _set_holdout(self, camera_indices: tuple[int, ...]) -> None:
         if self.capture is not None:
@@ -257,8 +282,12 @@ class Session:
 
     # ---------------------------------------------------------------- opening
 
-    def _open(self, path: Path, scale: float | None, *, follow_links: bool = False) -> None:
+    def _open(
+        self, path: Path, scale: float | None, *, is_new_project: bool = False, follow_links: bool = False
+    ) -> None:
         current = None if self.project is None else self.project.folder
+        recent = tuple(self.settings.recent)
+        self.question = None
 
         def work(context: JobContext) -> Opened:
             return self._opener(
@@ -267,6 +296,8 @@ class Session:
                 project_dir=self._project_dir,
                 current=current,
                 context=context,
+                recent=recent,
+                is_new_project=is_new_project,
                 follow_links=follow_links,
             )
 
@@ -283,6 +314,9 @@ class Session:
         for notice in self._refusals:  # something is open now; why something else was not is no news any more
             self.notices.withdraw(notice)
         self._refusals.clear()
+        if opened.choices:
+            self.question = ProjectQuestion(str(opened.capture.path), opened.choices, opened.follow_links)
+            return
         if opened.project is None:  # it is open already
             self.view.home()
             return
@@ -290,12 +324,12 @@ class Session:
         self.capture, self.project = opened.capture, opened.project
         self.view = OrbitView(opened.capture.rig)
         self._marking.open(opened.project)
-        self._take_clips(opened.capture, opened.project)
-        self.settings.add_recent(opened.capture.path)
+        self._take_clips(opened.capture, opened.project, opened.catalog)
+        self._keep_recent()
         for sentence in opened.capture.warnings:
             self.notices.add("warn", "The capture is odd but usable", sentence)
         if opened.note is not None:
-            self.notices.add("warn", *opened.note)
+            self.notices.add(*opened.note)
         if self._is_preloading and opened.project.is_writable:
             self._build_first_cloud(opened.capture, opened.project)
 
@@ -314,13 +348,39 @@ class Session:
 
         self._first_cloud = self._jobs.start("Building a first cloud", work, lambda _: None, failed)
 
-    def _take_clips(self, capture: Capture, project: Project) -> None:
+    def _keep_recent(self) -> None:
+        """Put the open project, as far as it is trained now, first in the list of recent ones."""
+        if self.project is None or self.capture is None or self._service is None:
+            return
+        catalog, place = self._service.catalog, str(Path(self.capture.path).resolve())
+        folder = self.project.folder.resolve()
+        now = datetime.now(UTC).isoformat(timespec="seconds")
+        name = project_name(folder, place)
+        self.settings.add_recent(RecentProject(str(folder), place, name, catalog.n_trained, len(catalog), now))
+
+    def _look_for_recent(self) -> None:
+        """See on a thread which of the recent projects are still there: a network folder may take its time."""
+        entries = tuple(self.settings.recent)
+
+        def found(missing: frozenset[Path]) -> None:
+            self.missing = missing
+
+        def failed(error: Exception) -> None:
+            logger.warning("recent projects could not be looked for: %s", error)
+
+        self._looks.start("Looking for recent projects", lambda context: missing_folders(entries), found, failed)
+
+    def _take_clips(self, capture: Capture, project: Project, catalog: ClipCatalog | None = None) -> None:
         frame_index = self.timeline.frame_index
         self.timeline = Timeline(project.clips(capture.n_frames), fps=capture.fps)
         self.timeline.seek(frame_index if self._service is not None else 0)
         known = [name for name in project.settings.holdout if name in capture.rig.names]
         self.holdout = tuple(capture.camera_indices(known))
-        self._service = TrainingService(project, self.timeline.clips, holdout=self.holdout, launch=self._launch_worker)
+        if self._service is not None:
+            self._service.close()
+        self._service = TrainingService(
+            project, self.timeline.clips, holdout=self.holdout, launch=self._launch_worker, catalog=catalog
+        )
 
     def _launch_worker(self, job: TrainJob, project: Project) -> Worker:
         self._marking.settle()  # a region marked a moment ago is meant to count
@@ -360,6 +420,7 @@ class Session:
     def poll(self) -> bool:
         """Take in what threads and workers finished. Whether something visible changed."""
         has_changed = self._jobs.poll()
+        self._looks.poll()
         if self._service is not None:
             for event in self._service.poll():
                 self._take_event(event)
@@ -380,7 +441,12 @@ class Session:
             workers = (*workers, self._service.curves.worker)
         newest = [worker.newest for worker in (*workers, self._points, self._next_plan)]
         statuses = [(job.name, job.done, job.message) for job in self.jobs]
-        return (*(None if found is None else found[0] for found in newest), *statuses, self.notices.revision)
+        return (
+            *(None if found is None else found[0] for found in newest),
+            *statuses,
+            self.notices.revision,
+            self.missing,
+        )
 
     def _take_event(self, event: Event) -> None:
         tell(event, self.notices)
@@ -388,6 +454,7 @@ class Session:
             self._unread = event
         elif isinstance(event, ENDINGS):
             self._unread = self._live_counts = None
+            self._keep_recent()
 
     def _release_snapshot(self) -> None:
         """Tell the worker that its snapshot was read, or that nobody looks at that clip."""
@@ -434,6 +501,12 @@ class Session:
             self._service.snapshot_consumed(self._service.worker.job.clip_index, self._unread.revision)
         self._unread = None
 
+    def _take_fault(self, job_name: str, error: Exception) -> None:
+        if isinstance(error, EngineError):
+            self.notices.add_error(f"{job_name} has failed", error)
+        else:
+            self._report_fault(f"{job_name} has failed", error)
+
     def _report_fault(self, title: str, error: Exception) -> None:
         logger.error("%s", title, exc_info=error)
         self.notices.add(
@@ -443,7 +516,7 @@ class Session:
     def _refresh(self) -> None:
         """Remake the status values."""
         if self._service is None:
-            self.training, self.clip_states, self.plan = TrainingStatus(), [], None
+            self.training, self.clip_states, self.plan, self.opened = TrainingStatus(), [], None, None
             self.regions = self._marking.status([])
             return
         clip = self.timeline.clip
@@ -456,8 +529,13 @@ class Session:
         self.regions = self._marking.status(self.clip_states)
         self.plan = None
         if self.project is not None and self.capture is not None:
+            self.opened = self._project_status(self.project, self._service.catalog)
             can_measure = self._is_preloading and not self.jobs
             self.plan = self._next_plan.status(self._service, self.project, self.capture, can_measure=can_measure)
+
+    def _project_status(self, project: Project, catalog: ClipCatalog) -> ProjectStatus:
+        name = project_name(project.folder.absolute(), project.settings.capture)
+        return ProjectStatus(name, project.folder, catalog.n_trained, len(catalog), project.is_writable)
 
     def close(self) -> None:
         """End workers and threads, keeping what was learned. Blocks for a few seconds at most. May be called twice."""
@@ -467,8 +545,10 @@ class Session:
         self._marking.close()
         if self._service is not None:
             self._service.close()
+            self._keep_recent()
         if self.project is not None:
             self.project.close()
+        self._looks.close(timeout_s=0.1)
         self._jobs.close(timeout_s=6.0 if self._closing else 1.0)
         for worker in (self._playback, self._renderer, self._pictures, self._points):
             worker.close()
@@ -593,6 +673,16 @@ class Session:
         return self._pictures.picture(self.capture, camera_index, frame_index, max_width)
 
 
+_NOTHING_TO_TRAIN = {
+    False: ("Every clip is trained",),
+    True: (
+        "No clip can be trained next",
+        "What is left is damaged, or needs a clip that is.",
+        "Restore the damaged file from a copy, or train the clip again: right-click it in the timeline.",
+    ),
+}
+"""By whether there is a clip that is not trained: title, detail and hint."""
+
 _TITLES: dict[type, str] = {
     commands.TrainClip: "The clip cannot be trained",
     commands.TrainNextClip: "The clip cannot be trained",
@@ -603,6 +693,7 @@ _TITLES: dict[type, str] = {
     commands.MarkRegion: "The region cannot be marked",
     commands.RemoveRegion: "The region cannot be removed",
     commands.UndoMark: "The last mark cannot be taken back",
+    commands.RedoMark: "The mark cannot be made again",
 }
 
 

@@ -1,4 +1,4 @@
-"""The user's preferences: recent folders. A small JSON file in the platform's configuration folder."""
+"""The user's preferences: projects opened lately. A small JSON file in the platform's configuration folder."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import os
 import sys
 from pathlib import Path
 
+from app.recents import RecentProject, read_recents, recents_document, with_entry
 from engine.json_files import JsonError, read_checked_json, write_checked_json
 
 logger = logging.getLogger(__name__)
 
-MAX_RECENT = 12
 MAX_BYTES = 1 << 20
 
 
@@ -29,30 +29,40 @@ def config_dir() -> Path:
 class Settings:
     """Preferences, saved at once when they change. A file that cannot be read counts as empty, never as a failure.
 
+    Attributes:
+        recent: Projects that were opened lately, newest first.
+
     Args:
         path: The file; the platform's place when None.
     """
 
     def __init__(self, path: Path | None = None) -> None:
         self.path = config_dir() / "settings.json" if path is None else path
-        self.recent: list[str] = _read_recent(self.path)
+        self.recent: list[RecentProject] = _read_recent(self.path)
 
-    def add_recent(self, folder: Path) -> None:
-        """Put a folder first in the list of recent ones."""
-        text = str(Path(folder).resolve())
-        self.recent = [text, *(known for known in self.recent if known != text)][:MAX_RECENT]
+    def add_recent(self, entry: RecentProject) -> None:
+        """Put a project first in the list of recent ones."""
+        self._set_recent(with_entry(self.recent, entry))
+
+    def forget_recent(self, folder: Path) -> None:
+        """Take a project or capture out of the list; its files stay."""
+        self._set_recent([entry for entry in self.recent if entry.folder != folder])
+
+    def _set_recent(self, entries: list[RecentProject]) -> None:
+        self.recent = entries
         try:
-            write_checked_json(self.path, {"schema": 1, "recent": self.recent})
+            write_checked_json(self.path, {"schema": 1} | recents_document(entries))
         except OSError as error:
             logger.warning("preferences could not be saved (%s) - %s", error.strerror, self.path)
 
 
-def _read_recent(path: Path) -> list[str]:
+def _read_recent(path: Path) -> list[RecentProject]:
     try:
-        recent = read_checked_json(path, max_bytes=MAX_BYTES).get("recent")
-        if not isinstance(recent, list) or not all(isinstance(folder, str) for folder in recent):
-            raise JsonError("it has no list of recent folders")
-        return recent[:MAX_RECENT]
+        document = read_checked_json(path, max_bytes=MAX_BYTES)
+        for name in ("projects", "recent"):
+            if not isinstance(document.get(name, []), list):
+                raise JsonError(f'its entry "{name}" is not a list')
+        return read_recents(document)
     except FileNotFoundError:
         return []
     except (OSError, JsonError) as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from engine.cloud.regions import GateRegion
 
@@ -56,6 +57,29 @@ class WantedFrame:
     look: Hashable = None
     is_loaded: bool = False
     has_failed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ProjectStatus:
+    """The open project.
+
+    Attributes:
+        name: As shown to the user.
+        folder: Where it lies.
+        n_trained, n_clips: Clips that are finished and up to date, and all of them.
+        is_writable: Whether it can be trained into.
+    """
+
+    name: str
+    folder: Path
+    n_trained: int = 0
+    n_clips: int = 0
+    is_writable: bool = True
+
+    @property
+    def trained_text(self) -> str:
+        """How far it is trained, in words."""
+        return f"{self.n_trained} of {self.n_clips} clips trained"
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +201,7 @@ class RegionsStatus:
         can_mark: Whether a region can be marked or removed now.
         why_not: The reason if it cannot, and what to do.
         can_undo: Whether there is a mark or a removal to take back.
+        can_redo: Whether there is one that was taken back and can be done again.
         effect: In which clips they take effect.
     """
 
@@ -184,6 +209,7 @@ class RegionsStatus:
     can_mark: bool = False
     why_not: str = ""
     can_undo: bool = False
+    can_redo: bool = False
     effect: str = ""
 
 

@@ -13,6 +13,8 @@ import zlib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from engine.files import atomic_path, read_bytes
 
 MAX_JSON_BYTES = 64 << 20
@@ -24,7 +26,9 @@ MAX_DIGITS = 40
 CHECKSUM = "checksum"
 HAND_EDITED = f'If it was edited by hand, take out its entry "{CHECKSUM}"; otherwise restore it from a copy.'
 """What to do about a checksum that does not fit."""
-_LARGE_NUMBER = re.compile(rb"\d{%d}|[eE]\+?\d{3}" % MAX_DIGITS)
+_LARGE_EXPONENT = re.compile(rb"[eE]\+?\d{3}")
+_ALL_DIGITS_ZERO = bytes.maketrans(b"123456789", b"0" * 9)
+_BLOCK_BYTES = 1 << 20
 _HALF_CHARACTER = re.compile(rb"\\u[dD][89a-fA-F]")
 
 
@@ -50,7 +54,7 @@ def parse_json(data: bytes | str, *, is_nan_allowed: bool = False) -> Any:
     try:
         text = raw.decode("utf-8")
         # the checks of numbers cost a call each: only where one may be large
-        is_large = _LARGE_NUMBER.search(raw) is not None
+        is_large = b"0" * MAX_DIGITS in raw.translate(_ALL_DIGITS_ZERO) or _LARGE_EXPONENT.search(raw) is not None
         document = json.loads(
             text,
             parse_int=_int if is_large else None,
@@ -67,7 +71,7 @@ def parse_json(data: bytes | str, *, is_nan_allowed: bool = False) -> Any:
         raise JsonError(f"{error.msg} in line {error.lineno}, column {error.colno}") from error
     except RecursionError as error:
         raise JsonError(f"brackets are nested more than {MAX_DEPTH} deep") from error
-    if raw.count(b"[") + raw.count(b"{") > MAX_DEPTH and _is_deep(document):
+    if _may_be_deep(raw) and _is_deep(document):
         raise JsonError(f"brackets are nested more than {MAX_DEPTH} deep")
     return document
 
@@ -87,6 +91,22 @@ def _float(text: str) -> float:
 
 def _no_constant(text: str) -> float:
     raise JsonError(f"{text} is not a number of JSON")
+
+
+def _may_be_deep(raw: bytes) -> bool:
+    """Whether brackets, those inside texts included, are nested more than MAX_DEPTH deep."""
+    if raw.count(b"[") + raw.count(b"{") <= MAX_DEPTH:
+        return False
+    depth = 0
+    for start in range(0, len(raw), _BLOCK_BYTES):
+        block = np.frombuffer(raw, np.uint8, min(_BLOCK_BYTES, len(raw) - start), start)
+        letters = block | 0x20  # brackets and braces differ in this bit
+        steps = (letters == ord("{")).astype(np.int32) - (letters == ord("}"))
+        depths = depth + np.cumsum(steps)
+        if depths.max() > MAX_DEPTH:
+            return True
+        depth = int(depths[-1])
+    return False
 
 
 def _is_deep(document: Any) -> bool:

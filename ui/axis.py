@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 
 def whole_ticks(last: float, most: int) -> list[int]:
     """Steps at which an axis from 0 to `last` gets a number: multiples of 1, 2 or 5 times a power of ten.
@@ -13,10 +11,12 @@ def whole_ticks(last: float, most: int) -> list[int]:
         most: At most this many numbers, at least one.
     """
     end = max(int(last), 1)
-    smallest = end / max(most - 1, 1)
-    power = 10 ** max(math.floor(math.log10(max(smallest, 1.0))), 0)
-    step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= smallest)
-    return list(range(0, end + 1, step))
+    power = 1
+    while True:
+        for factor in (1, 2, 5):
+            if end // (factor * power) < max(most, 1):
+                return list(range(0, end + 1, factor * power))
+        power *= 10
 
 
 def ticks_that_fit(last: float, width: float, half_width_of: dict[int, float], ticks: list[int]) -> list[int]:

@@ -21,7 +21,7 @@ from ui.state import Dispatch, UiState
 from ui.widgets import text_wrapped_dim
 
 _LINUX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
-_POPUP = "Open a capture folder"
+_POPUP = "Open a capture or project folder"
 _MAX_LISTED = 500
 
 
@@ -40,6 +40,18 @@ def list_folders(folder: Path) -> list[str]:
     except OSError:
         return []
     return sorted(names, key=str.lower)[:_MAX_LISTED]
+
+
+def typed_path(text: str) -> Path | None:
+    """The path that a text names; None where it is empty or cannot be one: too long, a home that nobody has."""
+    if not text.strip():
+        return None
+    try:
+        path = Path(text).expanduser()
+        path.is_dir()
+    except (OSError, RuntimeError, ValueError):
+        return None
+    return path
 
 
 class OpenFolderDialog:
@@ -96,7 +108,7 @@ class OpenFolderDialog:
             dispatch(OpenCapture(Path(answer)))
 
     def _draw_box(self, dispatch: Dispatch, ui: UiState) -> None:
-        imgui.text_disabled("Folder with the cameras and their videos or pictures")
+        imgui.text_disabled("Folder with the cameras and their videos or pictures, or of a project")
         if self._is_keyboard_wanted:
             self._is_keyboard_wanted = False
             imgui.set_keyboard_focus_here()
@@ -104,10 +116,10 @@ class OpenFolderDialog:
         flags = imgui.InputTextFlags_.enter_returns_true
         is_entered, self._text = imgui.input_text("##path", self._text, flags)
         ui.mark("open.path")
-        folder = Path(self._text).expanduser()
-        is_folder = folder.is_dir()
+        folder = typed_path(self._text)
+        is_folder = folder is not None and folder.is_dir()
         if imgui.begin_child("folders", ImVec2(0, -46), imgui.ChildFlags_.borders):
-            self._draw_folders(folder if is_folder else folder.parent)
+            self._draw_folders(self._start if folder is None else folder if is_folder else folder.parent)
         imgui.end_child()
         if not is_folder:
             imgui.align_text_to_frame_padding()
@@ -121,7 +133,7 @@ class OpenFolderDialog:
         is_clicked = imgui.button("Open", ImVec2(120, 0))
         ui.mark("open.accept")
         imgui.end_disabled()
-        if (is_clicked or is_entered) and is_folder:
+        if (is_clicked or is_entered) and folder is not None and is_folder:
             self._start = folder
             dispatch(OpenCapture(folder))
             imgui.close_current_popup()

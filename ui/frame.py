@@ -29,6 +29,7 @@ from ui.panels.status_bar import draw_status_bar
 from ui.panels.timeline import draw_timeline
 from ui.panels.training import draw_training
 from ui.panels.viewport import ViewportPanel
+from ui.questions import QuestionDialogs
 from ui.redraw import FRAMES_AFTER_INPUT, RedrawPlan
 from ui.remembering import Remembering
 from ui.scene import Scene
@@ -95,6 +96,7 @@ class Frame:
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
         self.notices = NoticesPanel()
         self.dialog = OpenFolderDialog()
+        self.questions = QuestionDialogs()
         self._redraw = RedrawPlan()
         self._redraw.request(FIRST_FRAMES)
         self._shown: tuple[int, int] | None = None
@@ -201,9 +203,10 @@ class Frame:
             self.dialog.open()
         self._guard("Open dialog", lambda: self.dialog.draw(dispatch, ui))
         self._guard("Help", lambda: draw_help(ui))
+        self._guard("Question", lambda: self.questions.draw(session, dispatch, ui))
         size = imgui.get_main_viewport().size
         whole = Rect(0.0, 0.0, size.x, size.y - STATUS_BAR_HEIGHT)
-        toast_area = ui.rects.get("viewport.canvas", whole)
+        toast_area = ui.rects.get("viewport.free", whole)
         self._guard("Notices", lambda: self.notices.draw(session, dispatch, ui, toast_area))
 
     def dispatch(self, command: object) -> None:
@@ -212,7 +215,7 @@ class Frame:
         self.request_redraw()
 
     def open_path(self, path: Path) -> None:
-        """Open a capture folder, or the folder of a file that was dropped."""
+        """Open a capture or project folder, or the folder of a file that was dropped."""
         from app.commands import OpenCapture  # here to keep the module's imports about drawing
 
         self.dispatch(OpenCapture(path if path.is_dir() or not path.exists() else path.parent))

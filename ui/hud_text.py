@@ -37,6 +37,7 @@ class ShownPicture:
     Attributes:
         kind: One of the words above.
         clip_index, frame_index, revision, step: Of what it shows; None and "" for what belongs to no frame.
+        is_still: Whether nothing that moves is in it yet.
         camera_index: The capture camera looked through, or that took it; None for a free view.
         look: From where and through which lens it was rendered; see OrbitView.look_key.
         size, full_size: Width and height it has, and will have when nothing moves, px.
@@ -49,6 +50,7 @@ class ShownPicture:
     frame_index: int | None = None
     revision: str = ""
     step: int | None = None
+    is_still: bool = False
     camera_index: int | None = None
     look: Hashable = None
     size: tuple[int, int] = (0, 0)
@@ -210,7 +212,8 @@ def _note(shown: ShownPicture, wanted: WantedFrame, state: str, state_words: str
         if state == "trained" or shown.clip_index != wanted.clip_index:
             return ""
         step = "" if shown.step is None else f", picture of step {format_count(shown.step)}"
-        return f"clip {wanted.clip_index} {state_words}{step}"
+        still = ", moving objects are missing until they are learned" if shown.is_still else ""
+        return f"clip {wanted.clip_index} {state_words}{step}{still}"
     what = _STANDS_IN[shown.kind]
     if wanted.has_failed:
         return f"{what}, not the trained result"

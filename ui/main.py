@@ -11,7 +11,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.arguments import COMMANDS, PlainParser, add_follow_links, path_argument
+from app.arguments import COMMANDS, PlainParser, add_follow_links, parse, path_argument, suggestion
+from app.logs import PrintableFormatter, start_logging
 from engine.assets import asset_path
 from engine.kernels.cache import use_kernel_cache
 from ui.ui_scale import parse_scale
@@ -29,7 +30,7 @@ def has_display() -> bool:
     return bool(os.environ.get("DISPLAY"))
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> PlainParser:
     """Arguments of the window and of the headless demo; the other commands have their own."""
     parser = PlainParser(
         prog="clipgstream",
@@ -80,13 +81,31 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments and arguments[0] == "demo":
         use_kernel_cache()
         return _run_demo(build_demo_parser().parse_args(arguments[1:]))
-    options = build_parser().parse_args(arguments)
+    parser = build_parser()
+    mistake = _mistyped_command(arguments)
+    if mistake:
+        parser.error(mistake)
+    options = parse(parser, arguments)
     use_kernel_cache()
-    logging.basicConfig(level=logging.DEBUG if options.verbose else logging.INFO, format="%(levelname)s %(message)s")
+    logging.basicConfig(level=logging.DEBUG if options.verbose else logging.INFO)
+    for handler in logging.getLogger().handlers:
+        handler.setFormatter(PrintableFormatter("%(levelname)s %(message)s"))
+    start_logging(level=logging.DEBUG if options.verbose else logging.INFO)
     if not has_display():
         demo_arguments = [] if options.path is None else [str(options.path)]
         return _run_demo(build_demo_parser().parse_args(demo_arguments))
     return _run_window(options)
+
+
+def _mistyped_command(arguments: Sequence[str]) -> str:
+    """What to say where the first argument was most likely meant as a command; a path that exists is always a path."""
+    word = arguments[0] if arguments else ""
+    if not word or word.startswith("-") or os.path.lexists(word):
+        return ""
+    near = suggestion(word, COMMANDS | DEMO)
+    is_word = not os.path.dirname(word) and len(arguments) > 1 and not arguments[1].startswith("-")
+    said = f"'{word}' is neither a command nor a file or folder"
+    return f"{said}.{near}" if near else said if is_word else ""
 
 
 def _run_demo(options: argparse.Namespace) -> int:
@@ -98,7 +117,7 @@ def _run_demo(options: argparse.Namespace) -> int:
 def _parse_size(text: str) -> tuple[int, int]:
     width, _, height = text.lower().partition("x")
     if not (width.isdigit() and height.isdigit() and int(width) > 0 and int(height) > 0):
-        raise argparse.ArgumentTypeError(f"'{text}' is no size such as 1440x900")
+        raise argparse.ArgumentTypeError(f"'{text}' is not a size; write WIDTHxHEIGHT, for example 1440x900")
     return int(width), int(height)
 
 

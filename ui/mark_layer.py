@@ -34,6 +34,8 @@ MAX_INHERITED_MARKS, MAX_RESIDUAL_MARKS = 2_500, 500
 crowd where something is new, and that is what one wants to see."""
 RING_SIZE, DIAMOND_SIZE, RIM = 6.5, 8.0, 0.9
 """Diameters, and the width of the dark rim that keeps marks apart from any picture; units."""
+ROOMY_SIDE, SMALLEST_SHARE = 800.0, 0.6
+"""In a picture with a shorter side than this, units, marks are smaller, down to this share: they crowd there."""
 HIDDEN_SHARE = 0.22
 """Opacity of a mark behind what the picture shows, of that of the others."""
 POINTED_SHARE = 2.2
@@ -165,6 +167,8 @@ class MarkLayer:
         camera = (view.world_to_camera, view.K, view.width, view.height)
         overlays, unit = session.overlays, self.pixels_per_unit
         size, opacity = self._look(session)
+        room = np.sqrt(view.width * view.height) / (ROOMY_SIDE * unit)
+        size *= float(np.clip(room, SMALLEST_SHARE, 1.0))
         if overlays.show_frusta and session.view.look_through is None:
             # from inside a camera the others are only in the way
             self._frusta.draw(target, *camera, width_px=1.5 * unit, opacity=0.8)

@@ -19,7 +19,7 @@ def stage_words(training: TrainingStatus) -> str:
 def band_words(status: ClipStatus, training: TrainingStatus, clip_index: int, state_words: str) -> str:
     """The state of a clip on the timeline. state_words: Of the state alone."""
     if status.state == "preparing" and training.clip_index == clip_index and training.n_stages:
-        return f"{state_words}, stage {training.stage_number} of {training.n_stages}"
+        return f"{state_words}, {training.stage_number} of {training.n_stages}"
     if status.state in COUNTED_IN_STEPS and status.progress > 0:
         return f"{state_words} {status.progress * 100:.0f} %"
     return state_words

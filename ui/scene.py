@@ -241,6 +241,7 @@ class Scene:
             frame_index=picture.frame_index,
             revision=picture.revision,
             step=picture.step,
+            is_still=picture.is_still,
             camera_index=picture.camera_index,
             look=picture.look,
             size=picture.size,
@@ -261,6 +262,7 @@ class Scene:
             frame_index=gaussians.frame_index,
             revision=gaussians.revision,
             step=gaussians.step,
+            is_still=gaussians.is_still,
         )
         is_current = wanted is None or (shown.is_of(wanted) and shown.revision == wanted.revision)
         return gaussians.key, replace(shown, is_on_its_way=not is_current)

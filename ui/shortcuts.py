@@ -13,6 +13,7 @@ from app.commands import (
     HomeView,
     LookThrough,
     PauseTraining,
+    RedoMark,
     RemoveRegion,
     ResumeTraining,
     SetCompare,
@@ -46,6 +47,7 @@ class Shortcut:
         needs_choosing: Ignored unless a region is being chosen.
         repeats: Holding the key repeats the action.
         is_any_shift: With Shift or without, for signs that need it on some keyboards.
+        is_listed: In menus; a second key of an entry is not.
         is_on: Of what can be on or off, whether it is; menus show a tick.
     """
 
@@ -61,6 +63,7 @@ class Shortcut:
     repeats: bool = False
     is_any_shift: bool = False
     is_on: Callable[[Any], bool] | None = None
+    is_listed: bool = True
 
     @property
     def key(self) -> Any:
@@ -282,6 +285,11 @@ def _menu(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_menu_wanted = True
 
 
+def _redo_mark(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    if session.regions.can_redo:
+        dispatch(RedoMark())
+
+
 def _help(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_help_open = not ui.is_help_open
 
@@ -372,9 +380,11 @@ SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("n", "N", "Highlight the next marked region", MARK, _next_region),
     Shortcut("delete", "Delete", "Remove the highlighted region", MARK, _remove_region),
     Shortcut("z", "Ctrl+Z", "Take back the last mark or removal", MARK, _undo_mark, is_ctrl=True),
+    Shortcut("z", "Ctrl+Shift+Z", "Do again what was taken back", MARK, _redo_mark, is_ctrl=True, is_shift=True),
+    Shortcut("y", "Ctrl+Y", "Do again what was taken back", MARK, _redo_mark, is_ctrl=True, is_listed=False),
     Shortcut("t", "T", "Train the next clip, pause or resume", TRAIN, _train),
     Shortcut("t", "Ctrl+T", "Stop training and keep what was learned", TRAIN, _stop_training, is_ctrl=True),
-    Shortcut("o", "Ctrl+O", "Open a capture folder", WINDOW, _open, is_ctrl=True, needs_capture=False),
+    Shortcut("o", "Ctrl+O", "Open a capture or project folder", WINDOW, _open, is_ctrl=True, needs_capture=False),
     Shortcut("equal", "Ctrl++", "Larger interface", WINDOW, _scale_by(1), **_SCALING),
     Shortcut("minus", "Ctrl+-", "Smaller interface", WINDOW, _scale_by(-1), **_SCALING),
     Shortcut("_0", "Ctrl+0", "Interface at the screen's own size", WINDOW, _reset_scale, **_SCALING),
@@ -390,7 +400,7 @@ MOUSE_HELP: tuple[tuple[str, str], ...] = (
     ("Click, wheel", "While a region is chosen: fix its place, change its size (Ctrl + wheel moves the view)"),
     ("Timeline drag", "Move through time"),
     ("White line drag", "Wipe between render and captured picture"),
-    ("Folder drop", "Open it as a capture"),
+    ("Folder drop", "Open it: a capture or a project"),
 )
 
 

@@ -96,6 +96,7 @@ class Icon:
     REGION = "\uf05b"
     TRASH = "\uf1f8"
     UNDO = "\uf2ea"
+    ADD = "\u002b"
     CLOCK_BACK = "\uf1da"
     BROKEN = "\uf127"
 

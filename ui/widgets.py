@@ -72,6 +72,20 @@ def elided(text: str, width: float) -> str:
     return f"{text[:fits].rstrip()}..."
 
 
+def elided_path(path: str, width: float) -> str:
+    """The path, or as much of its end as fits into a width: the last folders tell most."""
+    if imgui.calc_text_size(path).x <= width:
+        return path
+    too_long, fits = 0, len(path)
+    while fits - too_long > 1:
+        middle = (fits + too_long) // 2
+        if imgui.calc_text_size(f"...{path[middle:]}").x <= width:
+            fits = middle
+        else:
+            too_long = middle
+    return f"...{path[fits:]}"
+
+
 def format_count(number: int) -> str:
     """A count as it is written everywhere: 4,320."""
     return f"{number:,}"

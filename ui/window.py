@@ -65,6 +65,12 @@ def make_window(width: int, height: int, *, is_visible: bool = True) -> Any:
     return window
 
 
+def window_title(session: Any) -> str:
+    """The open project, how far it is trained and where it lies."""
+    opened = session.opened
+    return TITLE if opened is None else f"{opened.name} - {opened.trained_text} - {opened.folder} - {TITLE}"
+
+
 def screen_scale() -> float:
     """How many pixels the platform wants for what takes one on an ordinary screen: Xft.dpi / 96 on X11, the scale of
     the first screen on Windows. On macOS 1: there a window has more pixels than its size says."""
@@ -184,8 +190,7 @@ class StudioWindow:
             drawn += 1
 
     def _show_title(self) -> None:
-        capture = self.session.capture
-        title = TITLE if capture is None else f"{capture.path.name} - {TITLE}"
+        title = window_title(self.session)
         if title != self._title:
             self._title = title
             self.window.set_caption(title)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from app.csv_text import csv_text
 from engine.metrics.flicker import definition_of
 
 COLUMNS: dict[str, tuple[str, int]] = {
@@ -87,8 +86,4 @@ def as_text(lines: Sequence[dict[str, Any]]) -> str:
 def as_csv(lines: Sequence[dict[str, Any]]) -> str:
     """The table with full precision."""
     names = ["variant", "n_seeds", "n_frames", *(part for name in COLUMNS for part in (name, f"{name}_std"))]
-    text = io.StringIO()
-    writer = csv.DictWriter(text, names, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(lines)
-    return text.getvalue()
+    return csv_text(names, [{name: line.get(name) for name in names} for line in lines])

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
+from app.children import undisturbed
 from app.memory import peak_bytes
 
 MEMORY_TIMEOUT_S = 120.0
@@ -60,7 +61,8 @@ def in_fresh_process(call: Callable[..., float], *arguments: Any, timeout_s: flo
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(target=_send_result, args=(theirs, call, arguments), daemon=True)
-    process.start()
+    with undisturbed():
+        process.start()
     theirs.close()
     try:
         with suppress(EOFError, OSError):
@@ -74,7 +76,9 @@ def in_fresh_process(call: Callable[..., float], *arguments: Any, timeout_s: flo
 
 
 def _send_result(pipe: Connection, call: Callable[..., float], arguments: tuple[Any, ...]) -> None:
-    pipe.send_bytes(str(call(*arguments)).encode())
+    number = call(*arguments)
+    with suppress(OSError):  # whoever asked has gone
+        pipe.send_bytes(str(number).encode())
 
 
 def peak_extra_mb(prepare: Callable[..., Callable[[], object]], *arguments: Any) -> float | None:

@@ -8,9 +8,11 @@ from typing import Any
 
 from app.report.charts import Curve, CurvePanel, draw_over_time, draw_pictures
 from app.report.comparison import main_group
+from app.report.labels import FIGURE_LABELS, figure_label
 from app.report.parts import Figure, Folded, Section
 from app.report.pictures import Pictures
 from app.report.tables import Table, TableColumn
+from engine.metrics.columns import COLUMNS
 
 GROUP_WORDS = {"held_out": "held out", "trained_on": "trained on"}
 _DIRECTIONS = {True: "higher", False: "lower", None: ""}
@@ -22,10 +24,14 @@ Tick = Callable[[], None]
 
 def clips_section(evaluation: dict[str, Any]) -> Section:
     """Every column of every clip, held-out and trained-on cameras apart."""
-    means, described = evaluation["means"], evaluation["columns"]
+    means, described = evaluation["means"], measured_columns(evaluation)
     groups = [group for group in GROUP_WORDS if means.get(group)]
     parts = [("all", means), *((clip, means["clips"][clip]) for clip in means["clips"])]
-    columns = [TableColumn("figure", "Figure"), TableColumn("unit", "Unit"), TableColumn("better", "Better")]
+    columns = [
+        TableColumn("figure", "Figure", labels=FIGURE_LABELS),
+        TableColumn("unit", "Unit"),
+        TableColumn("better", "Better"),
+    ]
     columns += [
         TableColumn(f"{name}_{group}", f"{'All clips' if name == 'all' else f'Clip {name}'}, {GROUP_WORDS[group]}")
         for name, _ in parts
@@ -52,21 +58,34 @@ def clips_section(evaluation: dict[str, Any]) -> Section:
         for name, column in described.items()
     ]
     meaning_columns = (
-        TableColumn("figure", "Figure"),
+        TableColumn("figure", "Figure", labels=FIGURE_LABELS),
         TableColumn("definition", "Definition"),
         TableColumn("n_rows", "Pictures with it"),
         TableColumn("n_missing", "Pictures without"),
     )
     said = (
-        f"Means over {len(evaluation['rows'])} pictures: every frame of every camera. Figures without suffix are of "
-        "raw colours, _fit after a least-squares gain and offset per channel, _moving and _rest of a part of the "
-        "pixels. A mean leaves out pictures without the figure."
+        f"Means over {len(evaluation['rows'])} pictures: every frame of every camera. Figures are of raw colours, or "
+        "after the colour fit, a least-squares gain and offset per channel. A mean leaves out pictures without the "
+        "figure."
     )
+    n_left_out = len(evaluation["columns"]) - len(described)
+    if n_left_out:
+        said += f" {n_left_out} figures that take longer were not asked for; --metrics all measures them too."
     table = Table("clip_metrics", "Figures per clip", columns, rows)
     definitions = Table("columns", "Columns", meaning_columns, meaning)
     rows_table = _rows_table("pictures", "Every picture that was measured", evaluation["rows"])
     parts_shown = [said, table, Folded("What each figure is", definitions), _cameras(evaluation), rows_table]
     return Section("clips", "Figures per clip", parts_shown)
+
+
+def measured_columns(evaluation: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Columns of an evaluation without those that were not asked for."""
+    is_quick = evaluation["metrics"] == "quick"
+    return {
+        name: column
+        for name, column in evaluation["columns"].items()
+        if not (is_quick and name in COLUMNS and not COLUMNS[name].is_quick)
+    }
 
 
 def missing_text(column: dict[str, Any]) -> str:
@@ -76,10 +95,10 @@ def missing_text(column: dict[str, Any]) -> str:
 
 def _cameras(evaluation: dict[str, Any]) -> Folded:
     shown = ("psnr", "psnr_fit", "psnr_moving", "psnr_rest", "ssim", "flip")
-    described = evaluation["columns"]
+    described = measured_columns(evaluation)
     columns = [TableColumn("camera", "Camera"), TableColumn("is_held_out", "Held out")]
     columns += [
-        TableColumn(name, name, unit="dB" if described[name]["unit"] == "dB" else "")
+        TableColumn(name, figure_label(name), unit="dB" if described[name]["unit"] == "dB" else "")
         for name in shown
         if name in described
     ]

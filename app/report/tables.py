@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from app.csv_text import csv_text
 from app.report.markup import Markup, tag
 
 MISSING = "–"
@@ -25,6 +24,7 @@ class TableColumn:
         n_digits: Digits after the point; None shows a number with five digits in all, and anything else as it is.
         is_higher_better: Direction, for an arrow and the best value in bold; None for neither.
         unit: Shown behind the title; empty for none.
+        labels: What the page shows in place of values that are texts; files keep those.
     """
 
     key: str
@@ -32,6 +32,7 @@ class TableColumn:
     n_digits: int | None = None
     is_higher_better: bool | None = None
     unit: str = ""
+    labels: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def heading(self) -> str:
@@ -74,11 +75,7 @@ class Table:
 
     def csv_text(self) -> str:
         """Comma-separated, keys first, all digits; missing values are empty."""
-        buffer = io.StringIO()
-        writer = csv.DictWriter(buffer, [column.key for column in self.columns], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(self.rows)
-        return buffer.getvalue()
+        return csv_text([column.key for column in self.columns], self.rows)
 
     def markup(self) -> Markup:
         """As HTML that scrolls when it is too wide. The best value of a column with a direction is bold."""
@@ -92,7 +89,7 @@ class Table:
             cells = []
             for column in self.columns:
                 value = row[column.key]
-                text = value_text(value, column.n_digits)
+                text = column.labels.get(str(value)) or value_text(value, column.n_digits)
                 is_best = value is not None and value == best[column.key]
                 kind = "n" if self._is_numeric(column) else "w" if len(text) > _WIDE_TEXT else None
                 cells.append(tag("td", tag("b", text) if is_best else text, class_=kind))

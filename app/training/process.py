@@ -6,6 +6,7 @@ import multiprocessing
 from contextlib import suppress
 from typing import Protocol
 
+from app.children import undisturbed
 from app.logs import tail
 from app.project import Project
 from app.training.build import build_training
@@ -60,7 +61,8 @@ class ProcessWorker:
             name=f"clip {job.clip_index}",
             daemon=True,
         )
-        self.process.start()
+        with undisturbed():
+            self.process.start()
         child_commands.close()  # the child has its own; ours would hide its end
         child_events.close()
 

@@ -48,6 +48,7 @@ from engine.json_files import checked_line
 from engine.model.clip_state import ClipState, read_clip_header
 from engine.model.compact import CompactClip
 from engine.training.report import Progress, ReportProgress, StepStats
+from engine.training.stages import remove_stages
 
 logger = logging.getLogger(__name__)
 
@@ -351,6 +352,7 @@ class TrainingRun:
             logger.warning("the curves could not be put in their place (%s)", error.strerror)
         with suppress(OSError):
             self._project.checkpoint_path(self._job.clip_index).unlink(missing_ok=True)
+        remove_stages(self._project.prep_dir, self._job.clip_index)
         self._snapshots.clear()
         logger.info("clip %d is trained: %d steps", self._job.clip_index, training.steps_done)
         if self._n_clipped:
@@ -503,6 +505,7 @@ class TrainingRun:
         checkpoint = self._project.checkpoint_path(self._job.clip_index)
         if self._stop is not None and not self._stop.keep:
             self._project.discard_progress(self._job.clip_index)
+            remove_stages(self._project.prep_dir, self._job.clip_index)
         elif can_write and self._training is not None:
             self._checkpoint_refusals.written()  # said again if it is refused now
             self._write_checkpoint(self._training)

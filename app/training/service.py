@@ -130,6 +130,10 @@ class TrainingService:
         """The clip that trains; None while nothing does."""
         return None if self.worker is None else self.worker.job.clip_index
 
+    def is_finished(self, clip_index: int) -> bool:
+        """Whether a finished clip would be replaced by training this one: it is trained, or damaged."""
+        return 0 <= clip_index < len(self.clips) and self.catalog[clip_index].state in ("trained", "damaged")
+
     def shown_state(self, clip_index: int) -> ShownState | None:
         """The state of a clip to look at: the newest snapshot while it trains, else what is on disk, if anything."""
         if clip_index == self.running_clip and self._run is not None and self._run.file is not None:

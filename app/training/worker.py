@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from app.kernels import use_threads
-from app.logs import FORMAT
+from app.logs import FORMAT, PrintableFormatter
 from app.priority import lower_process
 from app.training.messages import Command, Event, TrainJob, decode, encode
 from app.training.run import MakeTraining, TrainingRun
@@ -63,7 +63,10 @@ def _redirect_output(path: Path) -> None:
     sys.stderr.flush()
     _point_output_to(descriptor)
     logging.raiseExceptions = False  # a log on a full disk is not worth a word, and must not end anything
-    logging.basicConfig(level=logging.INFO, format=FORMAT, stream=sys.stderr, force=True)
+    logging.raiseExceptions = False  # a full disk takes the log, not the training, and needs no traceback
+    logging.basicConfig(level=logging.INFO, stream=sys.stderr, force=True)
+    for handler in logging.getLogger().handlers:
+        handler.setFormatter(PrintableFormatter(FORMAT))
 
 
 def _point_output_to(descriptor: int) -> None:

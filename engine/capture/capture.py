@@ -20,7 +20,7 @@ from engine.capture.formats import panoptic, sample
 from engine.capture.frames import FrameStore
 from engine.capture.layout import Layout
 from engine.capture.rig import CameraRig
-from engine.capture.rig_checks import check_rig, rig_warnings
+from engine.capture.rig_checks import check_rig, rig_extent, rig_warnings
 from engine.capture.seen import MAX_LOOKED_AT, folder_contents
 from engine.errors import CaptureError
 
@@ -147,7 +147,8 @@ def open_capture(
             path=error.filename or folder,
         ) from error
     native_rig = layout.rig()
-    raise_problems(check_rig(native_rig, folder), folder)
+    extent = rig_extent(native_rig)
+    raise_problems(check_rig(native_rig, extent, folder), folder)
     rig = native_rig.resized(working_sizes(native_rig.image_sizes, scale, folder))
     store = FrameStore(
         [camera.source for camera in layout.cameras],
@@ -165,7 +166,7 @@ def open_capture(
         scale=scale,
         native_rig=native_rig,
         default_holdout=layout.default_holdout,
-        warnings=(*layout.warnings, *rig_warnings(native_rig)),
+        warnings=(*layout.warnings, *rig_warnings(native_rig, extent)),
         fingerprint=fingerprint(layout),
         store=store,
         follow_links=follow_links,
@@ -220,8 +221,8 @@ def _not_a_capture(folder: Path, reasons: Sequence[str]) -> CaptureError:
     if inside:
         hint = f"Open {inside[0]} inside it, which is one."
     else:
-        layouts = "; or ".join(reader.LAYOUT for reader in FORMATS)
-        hint = f"A capture is a folder with {layouts}. For other recordings write cameras.json, see the README."
+        layouts = ", or ".join(reader.LAYOUT for reader in FORMATS)
+        hint = f"A capture holds {layouts}. For other recordings write cameras.json, see the README."
     return CaptureError(
         f"This folder is not a capture ({'; '.join(reasons)}). In it: {folder_contents(folder)}.",
         hint=hint,

@@ -11,8 +11,8 @@ from engine.text import shown
 MAX_NAME_BYTES = 1024
 """Longest file name with its folders that a capture may use."""
 _ALLOW = (
-    "Copy the files into the folder. If you trust this capture, --follow-links allows it: with `clipgstream inspect`, "
-    "with `clipgstream PATH` for the window, and with `clipgstream train`, which notes it in the project."
+    "Copy the files into the folder. If you trust this capture, open it with `clipgstream PATH --follow-links`; "
+    "inspect and train take that option too, and projects keep it."
 )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -26,9 +26,9 @@ def rig_extent(rig: CameraRig) -> float:
     return max(float(distances.max()) for _, distances in _distances(rig.centers))
 
 
-def check_rig(rig: CameraRig, path: Path) -> list[CaptureError]:
-    """All cameras at one point: depth cannot be seen from there, so nothing can be trained."""
-    if len(rig) < 2 or rig_extent(rig) > 1e-9 * max(1.0, float(np.abs(rig.centers).max())):
+def check_rig(rig: CameraRig, extent: float, path: Path) -> list[CaptureError]:
+    """All cameras at one point, as their extent says: depth cannot be seen from there, so nothing can be trained."""
+    if len(rig) < 2 or extent > 1e-9 * max(1.0, float(np.abs(rig.centers).max())):
         return []
     hint = "Export their positions too."
     if rig_extent(_inverted(rig)) > 0:
@@ -37,12 +37,15 @@ def check_rig(rig: CameraRig, path: Path) -> list[CaptureError]:
     return [CaptureError(f"All {len(rig)} cameras stand at one point ({place}).", hint=hint, path=path)]
 
 
-def rig_warnings(rig: CameraRig) -> list[str]:
-    """Odd but usable, as sentences: one camera, cameras in one place, different sizes, cameras that look away."""
+def rig_warnings(rig: CameraRig, extent: float) -> list[str]:
+    """Odd but usable, as sentences: one camera, cameras in one place, different sizes, cameras that look away.
+
+    extent: Of the rig, see `rig_extent`.
+    """
     warnings = []
     if len(rig) == 1:
         warnings.append("There is only one camera; training needs at least two.")
-    twins = _twins(rig)
+    twins = _twins(rig, extent)
     if twins:
         warnings.append(
             f"Cameras in the same place: {_listed(twins)}. If one of them was listed twice, take it out; otherwise "
@@ -51,7 +54,7 @@ def rig_warnings(rig: CameraRig) -> list[str]:
     sizes = sorted({(int(width), int(height)) for width, height in rig.image_sizes})
     if len(sizes) > 1:
         warnings.append(f"Image sizes differ: {_listed([f'{width}x{height}' for width, height in sizes])}.")
-    if _looks_inverted(rig):
+    if _looks_inverted(rig, extent):
         warnings.append(
             "The poses look like camera-to-world maps: inverted, the cameras stand around a scene and look at it, as "
             "written they do not. Export the inverses, world to camera."
@@ -65,8 +68,8 @@ def rig_warnings(rig: CameraRig) -> list[str]:
     return warnings
 
 
-def _twins(rig: CameraRig) -> list[str]:
-    nearest = NEAR_TWIN_SHARE * rig_extent(rig)
+def _twins(rig: CameraRig, extent: float) -> list[str]:
+    nearest = NEAR_TWIN_SHARE * extent
     pairs = []
     for start, distances in _distances(rig.centers):
         rows, others = np.nonzero(distances <= nearest)
@@ -74,12 +77,14 @@ def _twins(rig: CameraRig) -> list[str]:
     return [f"{rig.names[a]} and {rig.names[b]}" for a, b in pairs]
 
 
-def _distances(centers: np.ndarray) -> list[tuple[int, np.ndarray]]:
+def _distances(centers: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
     """Rows of the matrix of distances [C, C], some at a time with the index of the first."""
-    return [
-        (start, np.linalg.norm(centers[start : start + _ROWS, None] - centers[None], axis=-1))
-        for start in range(0, len(centers), _ROWS)
-    ]
+    offsets = centers - centers.mean(0)  # products of small numbers lose no digits of small differences
+    squares = (offsets**2).sum(-1)
+    for start in range(0, len(centers), _ROWS):
+        rows = slice(start, start + _ROWS)
+        products = offsets[rows] @ offsets.T
+        yield start, np.sqrt(np.maximum(squares[rows, None] + squares - 2 * products, 0.0))
 
 
 def _cosines(rig: CameraRig) -> np.ndarray:
@@ -92,14 +97,14 @@ def _miss_deg(rig: CameraRig) -> float:
     return float(np.degrees(np.arccos(np.clip(_cosines(rig), -1.0, 1.0))).mean())
 
 
-def _looks_inverted(rig: CameraRig) -> bool:
+def _looks_inverted(rig: CameraRig, extent: float) -> bool:
     """Whether the cameras make a better rig when their poses are inverted."""
     if len(rig) < 3:
         return False
     inverted = _inverted(rig)
-    if rig_extent(inverted) < LARGER * rig_extent(rig) or _miss_deg(inverted) > FIT_DEG:
-        return False
-    return _miss_deg(rig) > MISS_DEG or _agreement(inverted) > _agreement(rig) + STEADIER
+    is_steadier = _miss_deg(rig) > MISS_DEG or _agreement(inverted) > _agreement(rig) + STEADIER
+    is_fitting = is_steadier and _miss_deg(inverted) < FIT_DEG
+    return is_fitting and rig_extent(inverted) > LARGER * extent
 
 
 def _agreement(rig: CameraRig) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 from engine.capture.rig import CameraRig
 from engine.cloud.fusion import keep_inliers
 from engine.cloud.hull import Grid, carve, hull_colors, hull_visibility, surface_rows
+from engine.cloud.keeping import Arrays, Keep, do_now
 from engine.cloud.projection import project, projection_matrices
 from engine.cloud.range import near_plane
 
@@ -67,6 +68,7 @@ def build_moving_cloud(
     max_points: int = 30_000,
     voxel_size: float | None = None,
     report: Report,
+    keep: Keep = do_now,
 ) -> MovingCloud:
     """Hull surfaces of every frame of a clip, fused.
 
@@ -79,6 +81,7 @@ def build_moving_cloud(
         max_points: The voxel grows until about no more than this many points remain over the clip.
         voxel_size: Voxel edge to use as it is, scene units; a source clip takes its reference's. None derives it.
         report: Gets one line per step with counts and the reason.
+        keep: Keeps what took long, under names that belong to these arguments alone.
     Returns:
         MovingCloud; empty where nothing moves.
     """
@@ -90,13 +93,17 @@ def build_moving_cloud(
 
     def surface(frame_in_clip: int, grid: Grid) -> np.ndarray:
         nonlocal n_hidden
+        found = keep(f"hull of frame {frame_in_clip} at {grid.size!r}", lambda: carve_frame(frame_in_clip, grid))
+        n_hidden += int(found["n_hidden"][0])
+        return found["voxels"]
+
+    def carve_frame(frame_in_clip: int, grid: Grid) -> Arrays:
         frame_masks = masks[frame_in_clip]
         voxels = carve(frame_masks, projections, grid, near=near, n_misses=n_misses, min_hits=min_hits)
         voxels = voxels[surface_rows(voxels, grid)]
         _, is_visible = hull_visibility(grid.centers(voxels), grid.size, frame_masks, projections, near=near)
         is_kept = is_visible.sum(axis=0) >= MIN_VISIBLE
-        n_hidden += int((~is_kept).sum())
-        return voxels[is_kept]
+        return {"voxels": voxels[is_kept], "n_hidden": np.array([(~is_kept).sum()])}
 
     low, high = np.asarray(bounds_min, dtype=np.float64), np.asarray(bounds_max, dtype=np.float64)
     probe = Grid.over(low, high, float((high - low).max()) / N_PROBE_VOXELS)
@@ -133,7 +140,10 @@ def build_moving_cloud(
     is_kept = keep_inliers(points)
     points, presence = points[is_kept], presence[is_kept]
     started = time.perf_counter()
-    colors = _colors(points, presence, frames, masks, projections, gains, size=size, near=near)
+    colors = keep(
+        "colours of what moves",
+        lambda: {"colors": _colors(points, presence, frames, masks, projections, gains, size=size, near=near)},
+    )["colors"]
     report(
         f"Moving cloud: {len(points)} points, {(~is_kept).sum()} statistical outliers removed; coloured by the median "
         f"of the cameras that see them ({time.perf_counter() - started:.1f} s)"

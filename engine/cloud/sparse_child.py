@@ -1,19 +1,25 @@
-"""The child process of engine.cloud.sparse: `python -m engine.cloud.sparse_child JOB.npz RESULT.npz`.
+"""The child process of engine.cloud.sparse: `python -m engine.cloud.sparse_child JOB.npz RESULT.npz BEAT`.
 
 Never imported by the program: pycolmap must stay out of its processes.
 """
 
 from __future__ import annotations
 
+import os
+import shutil
 import sys
-import tempfile
+import threading
+import time
 import zlib  # noqa: F401  must be loaded before pycolmap, whose own zlib symbols otherwise replace it
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
 MAX_FEATURES = 2048
+MAX_SIDE_PX = 1280
+"""Larger pictures are matched smaller: SIFT on full HD takes minutes, and depth ranges need no more."""
 MAX_ERROR_PX = 2.0
 
 
@@ -21,8 +27,10 @@ def main(job: Path, result: Path) -> None:
     """Read the job's arrays, triangulate, write points, colors, errors and n_features."""
     with np.load(job) as arrays:
         images, Ks, poses = arrays["images"], arrays["Ks"], arrays["world_to_camera"]
-    with tempfile.TemporaryDirectory(prefix="clipgstream-colmap-") as folder:
-        points, colors, errors, n_features = triangulate_folder(Path(folder), images, Ks, poses)
+    folder = job.with_name("colmap")
+    shutil.rmtree(folder, ignore_errors=True)  # of an attempt before
+    folder.mkdir()
+    points, colors, errors, n_features = triangulate_folder(folder, images, Ks, poses)
     partial = result.with_name("partial.npz")
     np.savez(partial, points=points, colors=colors, errors=errors, n_features=n_features)
     partial.replace(result)
@@ -51,6 +59,7 @@ def triangulate_folder(
     pycolmap.import_images(database, pictures, pycolmap.CameraMode.PER_IMAGE, image_names=names, options=reader)
     extraction = pycolmap.FeatureExtractionOptions()
     extraction.sift.max_num_features = MAX_FEATURES
+    extraction.max_image_size = MAX_SIDE_PX
     pycolmap.extract_features(
         database,
         pictures,
@@ -100,5 +109,26 @@ def _known_reconstruction(pycolmap, tables, names: list[str], Ks: np.ndarray, po
     return reconstruction
 
 
+def _beat(path: Path) -> None:
+    """Touch a file for as long as this process works, so that the parent can tell work from standing still."""
+    worked_s = 0.0
+    while True:
+        time.sleep(1.0)
+        if (now_s := time.process_time()) > worked_s + 0.005:
+            worked_s = now_s
+            with suppress(OSError):
+                path.touch()
+
+
+def _end_with_parent(folder: Path) -> None:
+    """Wait until the parent has died, then clear up and end, whatever the other threads do."""
+    with suppress(OSError):
+        os.read(0, 1)  # not sys.stdin, whose lock would be held when this process ends
+    shutil.rmtree(folder, ignore_errors=True)
+    os._exit(1)
+
+
 if __name__ == "__main__":
+    threading.Thread(target=_beat, args=(Path(sys.argv[3]),), daemon=True).start()
+    threading.Thread(target=_end_with_parent, args=(Path(sys.argv[1]).parent,), daemon=True).start()
     main(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -20,6 +21,7 @@ from engine.cloud.fill import fill_inverse_depth
 from engine.cloud.fusion import Samples, fuse_tiers, keep_inliers
 from engine.cloud.gains import gain_spread, gains_from_observations, gains_from_pictures, scene_colors
 from engine.cloud.image_filters import block_mean, erode
+from engine.cloud.keeping import Arrays, Keep, do_now
 from engine.cloud.parallel import map_ordered
 from engine.cloud.projection import is_in_picture, project, projection_matrices, unproject
 from engine.cloud.range import MIN_POINTS, depth_ranges, focus_distances, near_plane
@@ -44,6 +46,8 @@ MIN_AGREE = 2
 MIN_AGREED_PIXELS = 100
 """With fewer agreed pixels their range says nothing about the rest of the picture."""
 COLOR_DEPTH_TOLERANCE = 0.05
+KEPT_CAMERAS = 8
+"""Depth maps that are kept together: some seconds of work, and enough of them for every core."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +95,7 @@ def build_static_cloud(
     sparse_points: np.ndarray | None = None,
     color: str = "auto",
     report: Report,
+    keep: Keep = do_now,
 ) -> StaticCloud:
     """Points, colours and per-camera gains of the static scene.
 
@@ -102,12 +107,15 @@ def build_static_cloud(
         sparse_points: Triangulated points [P, 3] that set the depth ranges, if there are any.
         color: "auto": gains where the cameras differ by more than the estimate errs. "gain": always. "off": never.
         report: Gets one line per step with counts and the reason.
+        keep: Keeps what took long, under names that belong to these arguments alone.
     Raises:
         PreparationError: Fewer than 2 cameras, or nothing could be reconstructed.
     """
     if len(rig) < 2:
         raise PreparationError(f"{len(rig)} camera cannot give depth; at least 2 training cameras are needed.")
-    first_gains, maps = estimate_depth_maps(backgrounds, is_stable, rig, sparse_points=sparse_points, report=report)
+    first_gains, maps = estimate_depth_maps(
+        backgrounds, is_stable, rig, sparse_points=sparse_points, report=report, keep=keep
+    )
     started = time.perf_counter()
     tiers = _sample_tiers(maps, _working_pictures(backgrounds, len(maps.depths[0][0])) / first_gains[:, None, None])
     shares = [len(tier.points) / maps.depths.size for tier in tiers]
@@ -159,13 +167,20 @@ def estimate_depth_maps(
     *,
     sparse_points: np.ndarray | None,
     report: Report,
+    keep: Keep = do_now,
 ) -> tuple[np.ndarray, DepthMaps]:
     """First gains [C, 3] and a complete, checked depth map per camera. Arguments as in build_static_cloud."""
     started = time.perf_counter()
-    near, far = _search_ranges(backgrounds, is_stable, rig, sparse_points, report)
+
+    def search() -> Arrays:
+        near, far = _search_ranges(backgrounds, is_stable, rig, sparse_points, report)
+        return {"near": near, "far": far}
+
+    ranges = keep("depth range", search)
+    near, far = ranges["near"], ranges["far"]
     greys, is_usable, small_rig, gains = _prepare(backgrounds, is_stable, rig, WORKING_PIXELS)
     sources = choose_sources(small_rig, near, far)
-    inverse, n_planes = _sweep_all(greys, is_usable, small_rig, sources, near, far)
+    inverse, n_planes = _sweep_all(greys, is_usable, small_rig, sources, near, far, keep)
     height, width = greys.shape[1:]
     report(
         f"Depth sweep: {len(rig)} cameras at {width} x {height}, {min(n_planes)}-{max(n_planes)} planes of at most "
@@ -281,6 +296,7 @@ def _sweep_all(
     sources: list[list[int]],
     near: np.ndarray,
     far: np.ndarray,
+    keep: Keep = do_now,
 ) -> tuple[np.ndarray, list[int]]:
     """Smoothed inverse depth of every camera [C, h, w] float64 and the planes each one used."""
 
@@ -289,8 +305,19 @@ def _sweep_all(
         costs = matching_costs(greys, is_usable, rig, camera=camera, sources=sources[camera], inverse_depths=planes)
         return smooth_inverse_depth(costs, greys[camera], planes), len(planes)
 
-    results = map_ordered(sweep_one, range(len(rig)))
-    return np.stack([result[0] for result in results]).astype(np.float64), [result[1] for result in results]
+    def sweep(cameras: range) -> Arrays:
+        results = map_ordered(sweep_one, cameras)
+        return {
+            "inverse": np.stack([result[0] for result in results]),
+            "n_planes": np.array([result[1] for result in results]),
+        }
+
+    parts = []
+    for first in range(0, len(rig), KEPT_CAMERAS):
+        cameras = range(first, min(first + KEPT_CAMERAS, len(rig)))
+        parts.append(keep(f"depth maps from {first}", partial(sweep, cameras)))
+    inverse = np.concatenate([part["inverse"] for part in parts]).astype(np.float64)
+    return inverse, [int(n) for part in parts for n in part["n_planes"]]
 
 
 def _median_footprint(maps: DepthMaps) -> float:

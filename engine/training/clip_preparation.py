@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -18,6 +19,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.cloud.gate import GateTable, measure_gate
 from engine.cloud.inside import frames_inside
+from engine.cloud.keeping import Keep
 from engine.cloud.moving_cloud import MovingCloud
 from engine.cloud.regions import GateRegion
 from engine.cloud.static_cloud import StaticCloud
@@ -50,6 +52,7 @@ from engine.training.preparation import (
     write_backgrounds,
 )
 from engine.training.report import Progress, ReportProgress
+from engine.training.stages import Stages
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +92,7 @@ class ClipPreparation:
         regions: Where the user overrules the gate.
         seed: Of new decoder heads.
         generator: Draws all other initial values.
-        prep_dir: Folder that keeps backgrounds between clips.
+        prep_dir: Folder that keeps backgrounds between clips, and finished pieces of this preparation.
         report: Receives progress.
     """
 
@@ -115,6 +118,7 @@ class ClipPreparation:
         self._base, self._previous, self._regions = base, previous, tuple(regions)
         self._seed, self._generator = seed, generator
         self._prep_dir, self._report = prep_dir, report
+        self._stages = Stages(prep_dir, clip.clip_index, self._key(), report)
 
     def read_pictures(self) -> TrainingPictures:
         """The clip's pictures of the training cameras.
@@ -136,7 +140,7 @@ class ClipPreparation:
             PreparationError: No static point was found.
         """
         backgrounds = self._estimated()
-        cloud = self._static_cloud(backgrounds)
+        cloud = self._static_cloud(backgrounds, self._stages.keep)
         gains = nn.Parameter(torch.from_numpy(cloud.gains).float())
         model = static_model(cloud, self._clip, self._config, self._generator)
         self._say("Building the static cloud", f"{len(cloud.points)} static anchors, spacing {cloud.spacing:.4g}")
@@ -144,7 +148,8 @@ class ClipPreparation:
 
     def with_motion(self, parts: ClipParts, pictures: TrainingPictures) -> ClipParts:
         """A reference clip whose static anchors were trained, with corrected backgrounds and what moves."""
-        backgrounds = self._corrected(parts.backgrounds, parts.model, parts.gains, pictures)
+        keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
+        backgrounds = self._corrected(parts.backgrounds, parts.model, parts.gains, pictures, keep)
         try:
             self.keep_backgrounds(backgrounds)
         except DiskError as error:  # clips after this one need them, this one does not: tried again at its end
@@ -174,10 +179,12 @@ class ClipPreparation:
         self._say("Taking over the reference", said)
         backgrounds = read_backgrounds(self._prep_dir, self._key_of_corrected())
         if backgrounds is None:
-            backgrounds = self._corrected(self._estimated(), model, gains, pictures)
+            estimated = self._estimated()
+            keep = self._keep_after(model, gains, estimated)
+            backgrounds = self._corrected(estimated, model, gains, pictures, keep)
         choose_decoder(model, self._config, seed=self._seed)
         if self._config.inherit == "off":
-            own = self._static_cloud(backgrounds)
+            own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
             drop_inherited(model, own, self._config)
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         parts = ClipParts(model, gains, backgrounds, reference.header["spacing"])
@@ -198,24 +205,56 @@ class ClipPreparation:
         if kept is None or not kept.equals(backgrounds):
             write_backgrounds(self._prep_dir, backgrounds, key)
 
+    # ---------------------------------------------------------------- what is kept of an attempt
+
+    def _key(self) -> dict[str, Any]:
+        """What a preparation depends on, apart from what `_keep_after` adds."""
+
+        def named(state: ClipState | None) -> str | None:
+            return None if state is None else state.header["fingerprint"]
+
+        return {
+            "capture": self._capture.fingerprint,
+            "size": [int(side) for side in self._rig.image_sizes[0]],
+            "cameras": list(self._rig.names),
+            "frames": [self._clip.start, self._clip.n_frames, self._clip.clip_length],
+            "config": self._config.difference(),
+            "regions": [region.as_dict() for region in self._regions],
+            "base": named(self._base),
+            "previous": named(self._previous),
+            "seed": self._seed,
+        }
+
+    def _keep_after(self, model: ClipModel, gains: nn.Parameter, backgrounds: Backgrounds) -> Keep:
+        """Keeps what follows from a model as it is now, the gains and the backgrounds."""
+        arrays = model.own_arrays() | {"gains": gains.detach().numpy(), "backgrounds": backgrounds.images}
+        name = ClipState(arrays, {}).fingerprint
+        return lambda piece, work: self._stages.keep(f"{name} {piece}", work)
+
     # ---------------------------------------------------------------- what does not move
 
     def _estimated(self) -> Backgrounds:
-        return estimate_backgrounds(self._capture, self._camera_indices, self._config, self._report)
+        keep = self._stages.keep
+        return estimate_backgrounds(self._capture, self._camera_indices, self._config, self._report, keep)
 
     def _corrected(
-        self, backgrounds: Backgrounds, model: ClipModel, gains: nn.Parameter, pictures: TrainingPictures
+        self,
+        backgrounds: Backgrounds,
+        model: ClipModel,
+        gains: nn.Parameter,
+        pictures: TrainingPictures,
+        keep: Keep,
     ) -> Backgrounds:
         def render(camera_row: int) -> np.ndarray:
             return _render_static(model, self._views[camera_row], gains[camera_row])
 
-        return correct_backgrounds(backgrounds, pictures, render, self._report)
+        return correct_backgrounds(backgrounds, pictures, render, self._report, keep)
 
     def _key_of_corrected(self) -> dict:
         return key_of_corrected(self._capture, self._camera_indices, self._config)
 
-    def _static_cloud(self, backgrounds: Backgrounds) -> StaticCloud:
-        cloud = static_cloud(backgrounds, self._rig, self._config, self._report)
+    def _static_cloud(self, backgrounds: Backgrounds, keep: Keep) -> StaticCloud:
+        cloud = static_cloud(backgrounds, self._rig, self._config, self._report, keep)
         if len(cloud.points) == 0:
             raise PreparationError(
                 "No static point was found by any two cameras.",
@@ -231,13 +270,24 @@ class ClipPreparation:
     ) -> tuple[MovingCloud, np.ndarray, float | None]:
         """What moves, frames of each static anchor inside a hull [A], and the spacing of moving anchors."""
         static_points = parts.model.anchor_set("static").positions.numpy()
-        masks = motion_masks(pictures, parts.backgrounds, self._report)
-        is_measured = self._config.gate == "images"
-        n_inside = frames_inside(static_points, masks, self._rig) if is_measured else np.zeros(0, np.int64)
+        keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
+        masks = motion_masks(pictures, parts.backgrounds, self._report, keep)
+        n_inside = np.zeros(0, np.int64)
+        if self._config.gate == "images":
+            inside = keep("frames inside", lambda: {"n": frames_inside(static_points, masks, self._rig)})
+            n_inside = inside["n"]
         gains = parts.gains.detach().numpy()
         voxel_size = None if self._base is None else self._base.header["moving_spacing"]
         cloud = moving_cloud(
-            pictures, masks, self._rig, gains, static_points, self._config, self._report, voxel_size=voxel_size
+            pictures,
+            masks,
+            self._rig,
+            gains,
+            static_points,
+            self._config,
+            self._report,
+            voxel_size=voxel_size,
+            keep=keep,
         )
         moving_spacing = float(cloud.spacing) if len(cloud.points) else voxel_size
         if self._config.gate != "off":

@@ -11,6 +11,7 @@ import json
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from engine.array_files import ArraysError, read_arrays, write_arrays
 from engine.capture.capture import Capture
 from engine.capture.rig import CameraRig
 from engine.cloud.background import estimate_background
+from engine.cloud.keeping import Arrays, Keep, do_now
 from engine.cloud.masks import motion_mask
 from engine.cloud.moving_cloud import MovingCloud, build_moving_cloud, motion_bounds
 from engine.cloud.recheck import recheck_background
@@ -61,14 +63,20 @@ def estimate_backgrounds(
     camera_indices: Sequence[int],
     config: TrainConfig,
     report: ReportProgress,
+    keep: Keep = do_now,
 ) -> Backgrounds:
     """Backgrounds from frames spread over the whole capture."""
     frames = spread_frames(capture.n_frames, config.background_frames)
+
+    def estimate(camera: int) -> Arrays:
+        background = estimate_background(capture.frames_of(camera, frames))
+        return {"image": background.image, "is_stable": np.packbits(background.is_stable, axis=-1)}
+
     images, stable = [], []
     for row, camera in enumerate(camera_indices):
-        background = estimate_background(capture.frames_of(camera, frames))
-        images.append(background.image)
-        stable.append(background.is_stable)
+        kept = keep(f"background {row}", partial(estimate, camera))
+        images.append(kept["image"])
+        stable.append(np.unpackbits(kept["is_stable"], axis=-1, count=kept["image"].shape[1]).astype(bool))
         report(Progress("Looking for what stands still", (row + 1) / len(camera_indices)))
     is_stable = np.stack(stable)
     share = 100 * is_stable.mean()
@@ -87,21 +95,41 @@ def static_cloud(
     rig: CameraRig,
     config: TrainConfig,
     report: ReportProgress,
+    keep: Keep = do_now,
 ) -> StaticCloud:
     """Dense points of what stands still, with white balance gains."""
+
+    def build() -> Arrays:
+        cloud = _build_static_cloud(backgrounds, rig, config, report, keep)
+        return {name: np.asarray(getattr(cloud, name)) for name in ("points", "colors", "gains", "spacing")}
+
+    arrays = keep("static cloud", build)
+    return StaticCloud(arrays["points"], arrays["colors"], arrays["gains"], float(arrays["spacing"]))
+
+
+def _build_static_cloud(
+    backgrounds: Backgrounds, rig: CameraRig, config: TrainConfig, report: ReportProgress, keep: Keep
+) -> StaticCloud:
 
     def say(line: str) -> None:
         report(Progress("Building the static cloud", 0.5, line))
 
-    sparse = triangulate(backgrounds.images, rig, report=say)
+    def find_sparse() -> Arrays:
+        def alive() -> None:  # whoever wants to stop is heard here
+            report(Progress("Building the static cloud", 0.5))
+
+        return {"points": triangulate(backgrounds.images, rig, report=say, alive=alive).points}
+
+    sparse_points = keep("sparse points", find_sparse)["points"]
     return build_static_cloud(
         backgrounds.images,
         backgrounds.is_stable,
         rig,
         max_points=config.max_static_points,
-        sparse_points=sparse.points if len(sparse.points) else None,
+        sparse_points=sparse_points if len(sparse_points) else None,
         color=config.color,
         report=say,
+        keep=keep,
     )
 
 
@@ -110,6 +138,7 @@ def correct_backgrounds(
     pictures: TrainingPictures,
     render_static: Callable[[int], np.ndarray],
     report: ReportProgress,
+    keep: Keep = do_now,
 ) -> Backgrounds:
     """Backgrounds after a look at the trained static part, which knows what other cameras saw behind a person.
 
@@ -117,14 +146,19 @@ def correct_backgrounds(
         render_static: Camera row to the static render in that camera's colours. [H, W, 3] float
     """
     corrected = backgrounds.images.copy()
-    for row in range(len(corrected)):
+
+    def correct(row: int) -> Arrays:
         frames = np.stack([pictures.raw(row, i) for i in range(pictures.clip.n_frames)])
-        corrected[row] = recheck_background(
+        image = recheck_background(
             backgrounds.images[row],
             backgrounds.is_stable[row],
             render_static(row),
             frames,
         )
+        return {"image": image}
+
+    for row in range(len(corrected)):
+        corrected[row] = keep(f"corrected background {row}", partial(correct, row))["image"]
         report(Progress("Checking backgrounds", (row + 1) / len(corrected)))
     changed = 100 * (corrected != backgrounds.images).any(-1).mean()
     report(
@@ -137,13 +171,20 @@ def correct_backgrounds(
     return Backgrounds(corrected, backgrounds.is_stable)
 
 
-def motion_masks(pictures: TrainingPictures, backgrounds: Backgrounds, report: ReportProgress) -> np.ndarray:
+def motion_masks(
+    pictures: TrainingPictures, backgrounds: Backgrounds, report: ReportProgress, keep: Keep = do_now
+) -> np.ndarray:
     """What differs from the background, per frame and camera. [M, C, H, W] bool"""
     n_frames, n_cameras = pictures.clip.n_frames, len(pictures.camera_indices)
     masks = np.empty((n_frames, *backgrounds.is_stable.shape), bool)
+
+    def find(row: int) -> Arrays:
+        found = [motion_mask(pictures.raw(row, frame), backgrounds.images[row]) for frame in range(n_frames)]
+        return {"masks": np.packbits(np.stack(found), axis=-1)}
+
     for row in range(n_cameras):
-        for frame in range(n_frames):
-            masks[frame, row] = motion_mask(pictures.raw(row, frame), backgrounds.images[row])
+        packed = keep(f"motion masks {row}", partial(find, row))["masks"]
+        masks[:, row] = np.unpackbits(packed, axis=-1, count=masks.shape[-1])
         report(Progress("Finding what moves", (row + 1) / n_cameras))
     report(Progress("Finding what moves", 1.0, f"{100 * masks.mean():.1f} % of pixels move"))
     return masks
@@ -159,6 +200,7 @@ def moving_cloud(
     report: ReportProgress,
     *,
     voxel_size: float | None,
+    keep: Keep = do_now,
 ) -> MovingCloud:
     """Surface points of what moves, fused over the frames of the clip, with the frames each exists in.
 
@@ -181,6 +223,7 @@ def moving_cloud(
         max_points=config.max_moving_points,
         voxel_size=voxel_size,
         report=say,
+        keep=keep,
     )
 
 

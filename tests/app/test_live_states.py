@@ -107,7 +107,7 @@ def test_states_of_a_clip_that_is_trained_again_have_names_of_their_own(make_ses
     session.dispatch(c.SetClipLength(3))
     names: list[set[str]] = []
     for _ in range(2):
-        session.dispatch(c.TrainClip(0))
+        session.dispatch(c.TrainClip(0, is_confirmed=True))
         seen: set[str] = set()
 
         def is_done(seen: set[str] = seen) -> bool:

@@ -123,6 +123,27 @@ def test_removing_and_taking_back(make_session):
     assert len(session.notices) == 0
 
 
+def test_what_was_taken_back_is_done_again_until_something_else_is(make_session):
+    session = ready(make_session())
+    session.dispatch(c.RedoMark())  # nothing was taken back
+    for command, expected, can_redo in (
+        (MARK_BALL, (BALL,), False),
+        (MARK_OTHER, (BALL, OTHER), False),
+        (c.UndoMark(), (BALL,), True),
+        (c.UndoMark(), (), True),
+        (c.RedoMark(), (BALL,), True),
+        (c.RedoMark(), (BALL, OTHER), False),
+        (c.UndoMark(), (BALL,), True),
+        (c.RemoveRegion(0), (), False),
+        (c.UndoMark(), (BALL,), True),
+    ):
+        session.dispatch(command)
+        assert session.regions.regions == expected
+        assert session.regions.can_redo == can_redo
+        assert on_disk(session) == expected
+    assert len(session.notices) == 0
+
+
 @pytest.mark.parametrize(
     ("command", "expected"),
     [

@@ -91,6 +91,7 @@ def test_a_frame_says_what_it_is(playback: Playback, tmp_path: Path):
     assert shown is not None
     gaussians = shown.gaussians
     assert (gaussians.clip_index, gaussians.frame_index, gaussians.revision, gaussians.step) == (0, 2, "live-1", 4)
+    assert gaussians.is_still
 
 
 def test_what_was_decoded_for_one_project_is_not_shown_in_the_next(playback: Playback, tmp_path: Path):

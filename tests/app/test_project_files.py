@@ -15,6 +15,7 @@ from app.project_files import (
     write_regions,
     write_settings,
 )
+from app.recents import RecentProject
 from app.settings import Settings
 from engine.cloud.regions import parse_region
 from engine.errors import ProjectError
@@ -138,8 +139,9 @@ def test_rows_with_an_odd_step_are_left_out(tmp_path: Path, step: str) -> None:
 def test_preferences_that_cannot_be_read_count_as_empty(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     path = tmp_path / "settings.json"
     settings = Settings(path)
-    settings.add_recent(tmp_path)
-    assert Settings(path).recent == [str(tmp_path)]
+    kept = RecentProject(str(tmp_path), str(tmp_path / "capture"), "p")
+    settings.add_recent(kept)
+    assert Settings(path).recent == [kept]
     for bad in (path.read_bytes().replace(b"recent", b"resent"), b"\xff", b"[" * 10_000, b'{"recent": "all"}', b"null"):
         path.write_bytes(bad)
         assert Settings(path).recent == []

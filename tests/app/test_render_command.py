@@ -8,8 +8,8 @@ def test_rendering_names_what_is_wrong_with_its_arguments(run, capture_folder, t
         (("--camera", "9"), "no camera '9'"),
         (("--camera", "0,1"), "one camera"),
         (("--camera", "1", "--frames", "4:99"), "frames 0 to 5"),
-        (("--camera", "1", "--frames", "0:6"), "need clips [1]"),
-        (("--camera", "1", "--frames", "0:2", "--out", tmp_path / "o.gif"), "no known video"),
+        (("--camera", "1", "--frames", "0:6"), "Frame 3 lies in clip 1, which is not trained"),
+        (("--camera", "1", "--frames", "0:2", "--out", tmp_path / "o.gif"), "not a video format"),
     ):
         code, _, err = run(*render, *extra)
         assert (code, expected in err) == (2, True), err

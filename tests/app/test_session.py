@@ -1,6 +1,7 @@
 """The Session driven by commands, with training inline: no process, no wait, no window."""
 
 import contextlib
+import shutil
 from dataclasses import replace
 from functools import partial
 
@@ -51,7 +52,8 @@ def test_opening_makes_a_project_and_frames_the_rig(make_session, tmp_path):
     assert np.allclose(session.view.pivot, session.rig.focus_point())
     assert session.training.can_train_next
     assert session.training.next_clip_index == 0
-    assert str(session.capture.path.resolve()) in session.settings.recent
+    (recent,) = session.settings.recent
+    assert (recent.folder, recent.capture) == (tmp_path / "p", str(session.capture.path.resolve()))
 
 
 def test_what_is_not_a_capture_becomes_a_notice_and_leaves_nothing(make_session, tmp_path):
@@ -80,6 +82,24 @@ def test_why_something_could_not_be_opened_goes_when_a_capture_opens(make_sessio
     assert "File name too long" in session.notices[1].detail
     session.dispatch(c.OpenCapture(capture_folder))
     poll_until(session, lambda: session.capture is not None)
+    assert len(session.notices) == 0
+
+
+def test_links_outside_are_followed_when_the_user_says_so_and_then_by_the_project(
+    make_session, capture_folder, tmp_path
+):
+    capture = tmp_path / "linked"
+    shutil.copytree(capture_folder, capture)
+    (capture / "ims").rename(tmp_path / "another disk")
+    (capture / "ims").symlink_to(tmp_path / "another disk")
+    session = make_session(is_open=False)
+    session.dispatch(c.OpenCapture(capture))
+    poll_until(session, lambda: len(session.notices) > 0)
+    assert "--follow-links" in session.notices[0].hint
+    session.dispatch(c.OpenCapture(capture, follow_links=True))
+    poll_until(session, lambda: session.capture is not None)
+    assert session.capture.follow_links
+    assert read_settings(session.project.folder).follow_links
     assert len(session.notices) == 0
 
 
@@ -193,7 +213,7 @@ def test_training_the_reference_again_makes_source_clips_stale(make_session):
     train_next(session)
     train_next(session)
     session.project.update(replace(session.project.settings, overrides={"joint_steps": 9}))  # another result
-    session.dispatch(c.TrainClip(0))
+    session.dispatch(c.TrainClip(0, is_confirmed=True))
     poll_until(session, lambda: session.training.state == "idle")
     assert [state.state for state in session.clip_states] == ["trained", "stale"]
     assert session.training.next_clip_index == 1
@@ -211,7 +231,7 @@ def test_training_a_clip_again_makes_those_stale_that_went_on_from_it(make_sessi
         train_next(session)
     assert {state.state for state in session.clip_states} == {"trained"}
     session.project.update(replace(session.project.settings, overrides=overrides | {"joint_steps": 9}))
-    session.dispatch(c.TrainClip(1))
+    session.dispatch(c.TrainClip(1, is_confirmed=True))
     poll_until(session, lambda: session.training.state == "idle")
     later = "stale" if goes_on else "trained"
     assert [state.state for state in session.clip_states] == ["trained", "trained"] + [later] * (n_clips - 2)
@@ -228,7 +248,7 @@ def test_training_again_leaves_the_finished_clip_and_its_curves_until_it_is_fini
     slow = make_slow if ends_by == "stopping" else partial(_fails_at, step=3)
     session = make_session(make_training=slow, name=folder.name)
     poll_until(session, lambda: session.training.psnr_history == history, what="the curve on disk")
-    session.dispatch(c.TrainClip(0))
+    session.dispatch(c.TrainClip(0, is_confirmed=True))
     assert session.training.psnr_history == history  # the picture is that of the finished clip as well
     assert session.clip_states[0].held_out_psnr == psnr
     if ends_by == "stopping":
@@ -243,7 +263,7 @@ def test_training_again_leaves_the_finished_clip_and_its_curves_until_it_is_fini
     poll_until(session, lambda: session.training.psnr_history == history, what="the curve of the finished clip")
     session.close()
     session = make_session(make_training=partial(_until, n_steps=status.resume_step + 2), name=folder.name)
-    session.dispatch(c.TrainClip(0))
+    session.dispatch(c.TrainClip(0, is_confirmed=True))
     poll_until(session, lambda: session.training.state == "idle")
     assert session.clip_states[0].resume_step is None
     steps = [step for step, _ in session.training.psnr_history]

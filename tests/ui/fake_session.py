@@ -16,11 +16,14 @@ from app import commands
 from app.arrays import AnchorArrays, Picture, PointArrays
 from app.marking import after_marking
 from app.notices import Notices
+from app.questions import Question
+from app.recents import RecentProject
 from app.status import (
     ClipStatus,
     JobStatus,
     Overlays,
     PlanStatus,
+    ProjectStatus,
     RegionsStatus,
     SettingStatus,
     TrainingStatus,
@@ -73,7 +76,16 @@ class FakeSession:
         self.notices = Notices()
         self.jobs: list[JobStatus] = []
         self.overlays = Overlays()
-        self.settings = SimpleNamespace(recent=["/captures/kitchen", "/captures/dance_floor"])
+        self.settings = SimpleNamespace(
+            recent=[
+                RecentProject("/projects/kitchen-toy", "/captures/kitchen", "kitchen-toy", 2, 3),
+                RecentProject("/projects/gone", "/captures/dance_floor", "gone", 1, 70),
+                RecentProject("", "/captures/dance_floor", "dance_floor"),
+            ]
+        )
+        self.missing = frozenset({Path("/projects/gone")})
+        self.opened: ProjectStatus | None = None
+        self.question: Question | None = None
         self.training = TrainingStatus(can_train_next=True, next_clip_index=0)
         self.plan: PlanStatus | None = PlanStatus(
             clip_index=0,
@@ -116,6 +128,7 @@ class FakeSession:
         self.capture, self.rig = capture, capture.rig
         self.clips = split_clips(capture.n_frames, 10)
         self.clip_states = [ClipStatus() for _ in self.clips]
+        self.opened = ProjectStatus("juggling", Path("/projects/juggling"), 1, len(self.clips))
         self.timeline = Timeline(self.clips, fps=capture.fps)
         self.view = OrbitView(capture.rig)
         self.regions = RegionsStatus(
@@ -127,6 +140,7 @@ class FakeSession:
         self.commands.append(command)
         match command:
             case commands.OpenCapture(path=path):
+                self.question = None
                 self._open(replace(FakeCapture(make_rig()), path=Path(path)))
             case commands.SetFrame():
                 self.timeline.seek(command.frame_index)
@@ -145,6 +159,8 @@ class FakeSession:
                 self._set_regions(after_marking(self.regions.regions, [sphere]))
             case commands.RemoveRegion(index=index):
                 self._set_regions((*self.regions.regions[:index], *self.regions.regions[index + 1 :]))
+            case commands.CloseQuestion() | commands.OpenProject() | commands.TrainClip(is_confirmed=True):
+                self.question = None
             case commands.DismissNotice():
                 self.notices.dismiss(command.index)
 

@@ -24,9 +24,12 @@ def describe(studio: Any) -> dict[str, Any]:
     """What a test wants to know of the running window."""
     session = studio.session
     view, timeline, training = session.view, session.timeline, session.training
-    rects = {name: [r.x0, r.y0, r.x1, r.y1] for name, r in studio.frame.ui.rects.items()}
+    scale = studio.frame.backend.pixels_per_unit
+    rects = {name: [v * scale for v in (r.x0, r.y0, r.x1, r.y1)] for name, r in studio.frame.ui.rects.items()}
     return {
         "rects": rects,
+        "scale": scale,
+        "n_popups": len(studio.frame.backend.context.open_popup_stack),
         "capture": None if session.capture is None else str(session.capture.path),
         "frame_index": timeline.frame_index,
         "n_frames": timeline.n_frames,

@@ -219,6 +219,16 @@ def test_playing_every_frame_shows_each_one(window: Pilot) -> None:
     assert hud(window).rate.endswith("every frame")
 
 
+def test_playback_tells_the_rate_that_is_seen_and_that_frames_are_skipped(window: Pilot) -> None:
+    """The clock of the playhead runs ten times faster than the window: nine of ten frames are left out."""
+    show_frame(window, 0)
+    window.key(key.SPACE)
+    window.session.timeline.fps = 300.0
+    draw_until(window, lambda: "frames skipped" in hud(window).rate, "a rate")
+    assert hud(window).rate.endswith(" of 300 fps, frames skipped")
+    assert 0.0 < float(hud(window).rate.partition(" ")[0]) < 100.0
+
+
 def test_the_cloud_key_does_something_on_a_trained_clip_and_says_what(window: Pilot) -> None:
     show_frame(window, 0)
     before = picture(window)

@@ -80,7 +80,7 @@ def test_shortcut_table_is_complete_and_unambiguous() -> None:
     for shortcut in SHORTCUTS:
         assert shortcut.key is not None
         assert shortcut.is_ctrl == shortcut.label.startswith("Ctrl+")
-        assert shortcut.is_shift == shortcut.label.startswith("Shift+")
+        assert shortcut.is_shift == ("Shift+" in shortcut.label)
 
 
 @pytest.mark.parametrize("module", ["ui.main", "ui.__main__"])
@@ -148,7 +148,13 @@ def test_help_says_what_each_command_does(capsys: pytest.CaptureFixture[str]) ->
 def test_nonsense_arguments_end_with_2_and_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     from ui.main import main
 
-    for arguments, expected in ((["--size", "wide"], "'wide' is no size"), (["a", "b"], "unrecognized arguments: b")):
+    cases = (
+        (["--size", "wide"], "'wide' is not a size"),
+        (["a", "b"], "'a' is neither a command nor a file or folder"),
+        ([".", "b"], "unrecognized arguments: b"),
+        (["--siez", "9x9"], "unrecognized arguments: --siez. Did you mean --size?"),
+    )
+    for arguments, expected in cases:
         with pytest.raises(SystemExit) as ended:
             main(arguments)
         message = capsys.readouterr().err

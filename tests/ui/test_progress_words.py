@@ -15,7 +15,7 @@ def test_a_preparation_is_counted_in_stages_and_never_in_percent() -> None:
         state="preparing", clip_index=2, stage="Carving what moves", stage_number=4, n_stages=6, progress=1.0
     )
     assert stage_words(training) == "stage 4 of 6, Carving what moves"
-    assert band_words(ClipStatus("preparing"), training, 2, "preparing") == "preparing, stage 4 of 6"
+    assert band_words(ClipStatus("preparing"), training, 2, "preparing") == "preparing, 4 of 6"
     assert band_words(ClipStatus("queued"), training, 3, "waiting") == "waiting"
 
 

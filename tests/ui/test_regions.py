@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from pyglet.window import key
 
-from app.commands import LookThrough, MarkRegion, RemoveRegion, UndoMark
+from app.commands import LookThrough, MarkRegion, RedoMark, RemoveRegion, UndoMark
 from app.status import ClipStatus
 from tests.ui.fake_session import FakeSession, make_rig
 from tests.ui.pilot import CTRL, SHIFT, Pilot
@@ -137,6 +138,14 @@ def test_the_whole_job_by_keys_alone(pilot: Pilot) -> None:
     pilot.key(key.DELETE)
     assert pilot.sent(RemoveRegion) == [RemoveRegion(0)]
     pilot.key(key.Z, modifiers=(CTRL,))
+    assert len(pilot.sent(UndoMark)) == 1
+    pilot.key(key.Z, modifiers=(CTRL, SHIFT))
+    assert pilot.sent(RedoMark) == [], "nothing was taken back yet"
+    pilot.session.regions = replace(pilot.session.regions, can_redo=True)
+    pilot.key(key.Z, modifiers=(CTRL, SHIFT))
+    pilot.key(key.Y, modifiers=(CTRL,))
+    pilot.click("regions.redo")
+    assert len(pilot.sent(RedoMark)) == 3
     assert len(pilot.sent(UndoMark)) == 1
 
 

@@ -390,12 +390,6 @@ def test_dropped_folder_and_dropped_file_open_the_capture(open_pilot: Callable[.
     assert pilot.sent(OpenCapture) == [OpenCapture(tmp_path), OpenCapture(tmp_path)]
 
 
-def test_a_recent_capture_opens_with_a_click(open_pilot: Callable[..., Pilot]) -> None:
-    pilot = open_pilot(FakeSession(has_capture=False))
-    pilot.click("welcome.recent1")
-    assert [command.path.name for command in pilot.sent(OpenCapture)] == ["dance_floor"]
-
-
 def test_path_box_opens_a_typed_folder(
     open_pilot: Callable[..., Pilot], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -408,6 +402,24 @@ def test_path_box_opens_a_typed_folder(
     pilot.key(key.RETURN)
     pilot.draw(2)
     assert pilot.sent(OpenCapture) == [OpenCapture(tmp_path)]
+
+
+@pytest.mark.parametrize("text", ["", "/" + "x" * 300, "~nobody-has-this-name/x"])
+def test_path_box_takes_any_text(
+    open_pilot: Callable[..., Pilot], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("ui.dialogs.has_native_dialog", lambda: False)
+    pilot = open_pilot(FakeSession(has_capture=False))
+    pilot.studio.frame.dialog.open(tmp_path)
+    pilot.draw(3)
+    pilot.key(key.A, modifiers=(CTRL,))
+    pilot.key(key.BACKSPACE)
+    pilot.type(text)
+    pilot.draw(3)
+    pilot.click("open.accept")
+    pilot.draw(2)
+    assert len(pilot.session.notices) == 0
+    assert pilot.sent(OpenCapture) == []
 
 
 def test_a_panel_that_raises_becomes_one_notice_and_the_others_go_on(

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import os
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
 if __name__ == "__main__":  # run as a program: the repository root is not on the path then
@@ -22,6 +24,12 @@ if __name__ == "__main__":  # run as a program: the repository root is not on th
 from tests.ui.desk import Desk, missing_programs  # noqa: E402
 
 ORBIT_RADIANS_PER_PX = 0.006
+
+
+def read_png(path: Path) -> np.ndarray:
+    """A picture file. [H, W, 3] uint8"""
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB"))
 
 
 def journey(desk: Desk, pictures: Path) -> None:
@@ -59,6 +67,9 @@ def journey(desk: Desk, pictures: Path) -> None:
     desk.key("bracketright")
     desk.key("f")
     desk.wait_for("the home view", lambda s: s["look_through"] is None)
+
+    label = desk.wait_for("the words over the picture", lambda s: s["hud"] is not None)["hud"]["label"]
+    assert label.startswith("clip 0   frame 0   0.00 s   free view   "), label
 
     desk.click("timeline.play")
     desk.wait_for("playing", lambda s: s["is_playing"] and s["frame_index"] > 0)
@@ -118,6 +129,43 @@ def test_the_window_obeys_a_real_pointer_and_keyboard(desk: Desk, tmp_path: Path
     journey(desk, tmp_path / "pictures")
     assert desk.state["notices"] == []
     assert desk.close() == 0, "SIGTERM ends the program cleanly"
+
+
+@pytest.mark.e2e
+@pytest.mark.gl
+def test_taps_open_menus_and_the_window_comes_back_as_it_was_left(
+    desk: Desk, tiny_capture: Path, tmp_path: Path
+) -> None:
+    desk.wait_for("an open capture", lambda s: s["capture"] is not None and "timeline.track" in s["rects"], 60)
+    desk.focus()
+    desk.key("ctrl+plus")
+    desk.wait_for("a larger interface", lambda s: s["scale"] == 1.25)
+    desk.key("End")
+    desk.wait_for("the last frame", lambda s: s["frame_index"] == s["n_frames"] - 1)
+    for name, button in (("timeline.clip0", 3), ("menu.View", 1), ("viewport.overlays", 1)):
+        desk.wait_for("no popup", lambda s: s["n_popups"] == 0)
+        picture = read_png(desk.screenshot(tmp_path / "before.png"))
+        desk.move(*desk.center(name))
+        desk.do(f"mousedown {button}", f"mouseup {button}")  # with no time between
+        desk.wait_for(f"the popup of {name}", lambda s: s["n_popups"] == 1)
+        time.sleep(0.5)  # nothing else comes: what is not drawn by now never is
+        shown = read_png(desk.screenshot(tmp_path / f"{name}.png"))
+        assert (shown != picture).any(axis=2).sum() > 8_000, f"the popup of {name} was drawn"
+        desk.key("Escape")
+    desk.wait_for("Escape to close it", lambda s: s["n_popups"] == 0)
+    left = desk.state
+    assert desk.close() == 0
+    folder = tmp_path / "again"
+    folder.mkdir()
+    again = Desk(folder, [str(tiny_capture)])
+    try:
+        state = again.wait_for(
+            "the capture again", lambda s: "timeline.track" in s["rects"] and s["frame_index"] > 0, 60
+        )
+        assert (state["frame_index"], state["scale"]) == (left["frame_index"], 1.25)
+        assert state["rects"]["timeline.track"] == pytest.approx(left["rects"]["timeline.track"], abs=2)
+    finally:
+        again.close()
 
 
 @pytest.mark.e2e

@@ -24,6 +24,8 @@ BUSY_REDRAW_S = 0.25
 """The mark of something on its way turns this often."""
 LINE_HEIGHT, GAP, MARGIN = 24.0, 8.0, 12.0
 BUSY_WIDTH = 20.0
+LEGEND_WIDTH = 760.0
+"""In a picture at least this wide, units, the legend stands beside what is being chosen."""
 
 
 def wrapped(text: str, width: float, measure: Callable[[str], float]) -> list[str]:
@@ -53,7 +55,8 @@ class Hud:
             self._draw_plates(self.text, ui, area)
             if self.text.pending or scene.shown.is_on_its_way:
                 ui.redraw_within(BUSY_REDRAW_S)
-        self._draw_legend(session, scene, area)
+        if not ui.regions.is_active or area.width >= LEGEND_WIDTH:  # what is being chosen needs the room
+            self._draw_legend(session, ui, scene, area)
 
     def _text(self, session: Any, scene: Scene) -> HudText | None:
         wanted, timeline, shown = session.wanted_frame(), session.timeline, scene.shown
@@ -115,11 +118,12 @@ class Hud:
                 at = ImVec2(plate.x0 + 9 + extra, plate.y0 + 4 + row * imgui.get_text_line_height())
                 draw.add_text(at, theme.u32(color), line)
             x, row_height = plate.x1 + GAP, max(row_height, height)
+        ui.mark_rect("viewport.free", Rect(area.x0, area.y0, area.x1, bottom - row_height))
 
-    def _draw_legend(self, session: Any, scene: Scene, area: Rect) -> None:
+    def _draw_legend(self, session: Any, ui: UiState, scene: Scene, area: Rect) -> None:
         draw = imgui.get_window_draw_list()
         is_labelled = session.overlays.compare == "wipe" and session.view.look_through is not None
-        y = area.y0 + (44 if is_labelled else 12)
+        y = (ui.rects["viewport.rendered"].y0 + 44) if is_labelled else area.y0 + 12
         for shape, color, text in legend_rows(session, scene):
             width = imgui.calc_text_size(text).x
             x = area.x1 - width - 46

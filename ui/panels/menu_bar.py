@@ -6,14 +6,18 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from app.commands import OpenCapture
-from ui.panels.welcome import SAMPLE_PATH
+from app.commands import ForgetRecent, OpenCapture
+from ui.panels.training import next_label
+from ui.panels.welcome import SAMPLE_PATH, open_recent
 from ui.shortcuts import COMPARE, MARK, SHORTCUTS, TIME, VIEW, choose_scale, train_or_pause
 from ui.state import PANELS, Dispatch, UiState
 from ui.theme import Icon
 from ui.ui_scale import CHOICES, scale_text
+from ui.widgets import elided_path
 
 FIRST_MENU = "File"
+MIN_PATH_WIDTH = 60.0
+"""Less of a path says nothing."""
 
 
 def draw_menu_bar(session: Any, dispatch: Dispatch, ui: UiState) -> None:
@@ -27,8 +31,9 @@ def draw_menu_bar(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         imgui.open_popup(FIRST_MENU)
     has_capture = session.capture is not None
     if _begin_menu(FIRST_MENU, ui):
-        if _item(ui, f"{Icon.FOLDER}  Open a capture folder", "Ctrl+O"):
+        if _item(ui, f"{Icon.FOLDER}  Open a capture or project folder", "Ctrl+O"):
             ui.is_open_requested = True
+        _draw_recent_menu(session, dispatch, ui)
         if SAMPLE_PATH.is_dir() and _item(ui, f"{Icon.FILM}  Open the sample capture"):
             dispatch(OpenCapture(SAMPLE_PATH))
         imgui.separator()
@@ -46,8 +51,10 @@ def draw_menu_bar(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         imgui.end_menu()
     if _begin_menu("Train", ui, is_enabled=has_capture):
         is_going = session.training.state in ("starting", "preparing", "running")
-        label = "Pause" if is_going else "Resume" if session.training.state == "paused" else "Train next clip"
-        if _item(ui, f"{Icon.TRAIN}  {label}", "T"):
+        label = f"{Icon.PAUSE}  Pause" if is_going else next_label(session)
+        if session.training.state == "paused":
+            label = f"{Icon.PLAY}  Resume"
+        if _item(ui, label, "T"):
             train_or_pause(session, dispatch)
         imgui.end_menu()
     if _begin_menu("Mark", ui, is_enabled=has_capture):
@@ -56,7 +63,7 @@ def draw_menu_bar(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     if _begin_menu("Window", ui):
         _draw_window_menu(ui)
         imgui.end_menu()
-    _draw_name(session)
+    _draw_name(session, ui)
     imgui.end_main_menu_bar()
 
 
@@ -83,7 +90,8 @@ def _draw_rows(
     for shortcut in SHORTCUTS:
         if is_on_only and shortcut.is_on is None:
             continue
-        if shortcut.group not in groups or (shortcut.needs_choosing and not ui.regions.is_active):
+        is_offered = shortcut.is_listed and (ui.regions.is_active or not shortcut.needs_choosing)
+        if shortcut.group not in groups or not is_offered:
             continue
         is_on = shortcut.is_on is not None and session.capture is not None and shortcut.is_on(session)
         if _item(ui, shortcut.text, shortcut.label, is_on=is_on):
@@ -116,10 +124,40 @@ def _draw_window_menu(ui: UiState) -> None:
         ui.is_help_open = not ui.is_help_open
 
 
-def _draw_name(session: Any) -> None:
-    name = session.capture.path.name if session.capture is not None else "no capture open"
+def _draw_recent_menu(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    if not imgui.begin_menu("Open a recent project", bool(session.settings.recent)):
+        ui.mark("menu.recent")
+        return
+    for index, entry in enumerate(session.settings.recent):
+        is_gone = entry.folder in session.missing
+        words = "not found" if is_gone else entry.trained_text
+        if imgui.menu_item(f"{entry.name}##{index}", words, False, not is_gone)[0]:
+            dispatch(open_recent(entry))
+        ui.mark(f"menu.recent{index}")
+        imgui.set_item_tooltip(str(entry.folder))
+    gone = [entry.folder for entry in session.settings.recent if entry.folder in session.missing]
+    if gone:
+        imgui.separator()
+        if _item(ui, "Remove those that were not found"):
+            for folder in gone:
+                dispatch(ForgetRecent(folder))
+    imgui.end_menu()
+
+
+def _draw_name(session: Any, ui: UiState) -> None:
+    """What is open: name, how far it is trained and where it lies, as much of it as there is room for."""
+    opened = session.opened
+    name = "no project open" if opened is None else f"{opened.name} - {opened.trained_text}"
+    room = imgui.get_window_width() - imgui.get_cursor_pos_x() - 40
+    if opened is not None:
+        path_room = room - imgui.calc_text_size(f"{name} - ").x
+        if path_room > MIN_PATH_WIDTH:
+            name = f"{name} - {elided_path(str(opened.folder), path_room)}"
     width = imgui.calc_text_size(name).x
-    left = imgui.get_window_width() - width - 24
-    if left > imgui.get_cursor_pos_x():
-        imgui.same_line(left)
-        imgui.text_disabled(name)
+    if width > room:
+        return
+    imgui.same_line(imgui.get_window_width() - width - 24)
+    imgui.text_disabled(name)
+    ui.mark("menu.project")
+    if opened is not None:
+        imgui.set_item_tooltip(str(opened.folder))

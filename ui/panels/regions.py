@@ -7,7 +7,7 @@ from typing import Any
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.commands import RemoveRegion, UndoMark
+from app.commands import RedoMark, RemoveRegion, UndoMark
 from ui import theme
 from ui.region_tool import REGION_WORDS
 from ui.state import REGIONS, Dispatch, Rect, UiState
@@ -52,6 +52,13 @@ def draw_regions(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     ui.mark("regions.undo")
     imgui.end_disabled()
     imgui.set_item_tooltip("Takes back the last mark or removal (Ctrl+Z)")
+    imgui.same_line()
+    imgui.begin_disabled(not status.can_redo)
+    if imgui.button(f"{Icon.LOOP}  Redo"):
+        dispatch(RedoMark())
+    ui.mark("regions.redo")
+    imgui.end_disabled()
+    imgui.set_item_tooltip("Does again what was taken back (Ctrl+Shift+Z or Ctrl+Y)")
     imgui.spacing()
     if status.effect:
         text_wrapped_dim(status.effect)

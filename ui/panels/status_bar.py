@@ -49,9 +49,8 @@ def status_text(session: Any) -> str:
         words = {"starting": "Starting", "preparing": "Preparing", "stopping": "Stopping", "paused": "Paused:"}
         return f"{words[status.state]} clip {status.clip_index}  {stage_words(status)}  {status.message or ''}"
     if session.capture is None:
-        return "Open a capture folder to begin"
-    trained = sum(state.state == "trained" for state in session.clip_states)
-    return f"{trained} of {len(session.clips)} clips trained"
+        return "Open a capture or a project to begin"
+    return "" if session.opened is None else session.opened.trained_text
 
 
 def _right_text(session: Any, *, is_software: bool) -> str:

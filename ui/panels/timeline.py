@@ -19,6 +19,7 @@ RULER_HEIGHT = 22.0
 BAND_GAP = 6.0
 MIN_TRACK_HEIGHT = RULER_HEIGHT + 18.0
 MIN_TICK_SPACING_PX = 56.0
+NOTE_WIDTH = 380.0
 
 STATE_WORDS: dict[str, str] = {
     "untrained": "not trained",
@@ -32,6 +33,16 @@ STATE_WORDS: dict[str, str] = {
     "stale": "out of date",
     "damaged": "damaged",
 }
+
+
+def state_note(status: Any) -> str:
+    """What there is to say of a clip's state beyond its word; empty where that says it all."""
+    texts = [status.reason]
+    if status.resume_step is not None and status.state in ("trained", "stale", "damaged"):
+        texts.append(f"It was being trained again: that was stopped at step {format_count(status.resume_step)}.")
+    elif status.resume_step is not None and status.state in ("stopped", "failed"):
+        texts.append(f"Its training goes on at step {format_count(status.resume_step)}.")
+    return " ".join(text for text in texts if text)
 
 
 def tick_step(frames: int, width_px: float) -> int:
@@ -136,7 +147,7 @@ def _draw_track(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         if frame_index != timeline.frame_index:
             dispatch(SetFrame(frame_index))
     hovered = frame_at(imgui.get_io().mouse_pos.x, track, timeline.n_frames) if imgui.is_item_hovered() else None
-    _draw_menu(session, dispatch, track)
+    _draw_menu(session, dispatch, ui, track)
 
     draw = imgui.get_window_draw_list()
     draw.add_rect_filled(track.low, track.high, theme.u32(theme.BACKDROP), 4)
@@ -150,13 +161,28 @@ def _draw_track(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         ui.mark_rect(f"timeline.clip{clip.clip_index}", band)
         _draw_band(draw, band, session, clip, status, ui)
     _draw_ruler(draw, track, timeline.n_frames, timeline.frame_index)
+    if hovered is not None and imgui.get_io().mouse_pos.y >= band_top:
+        _draw_note(session, hovered)
     if hovered is not None and hovered != timeline.frame_index:
         _draw_hover(draw, track, hovered, timeline.n_frames)
     _draw_playhead(draw, track, timeline.frame_index, timeline.n_frames, ui)
     draw.pop_clip_rect()
 
 
-def _draw_menu(session: Any, dispatch: Dispatch, track: Rect) -> None:
+def _draw_note(session: Any, frame_index: int) -> None:
+    """The reason of a clip's state, where the pointer is over its band."""
+    clip = session.timeline.clip_of(frame_index)
+    note = "" if clip is None else state_note(session.clip_states[clip.clip_index])
+    if note and clip is not None:
+        state = session.clip_states[clip.clip_index].state
+        imgui.begin_tooltip()
+        imgui.push_text_wrap_pos(NOTE_WIDTH)
+        imgui.text_wrapped(f"{_clip_title(clip.clip_index, session)}: {STATE_WORDS.get(state, state)}. {note}")
+        imgui.pop_text_wrap_pos()
+        imgui.end_tooltip()
+
+
+def _draw_menu(session: Any, dispatch: Dispatch, ui: UiState, track: Rect) -> None:
     imgui.open_popup_on_item_click("clip menu", imgui.PopupFlags_.mouse_button_right)
     if not imgui.begin_popup("clip menu"):
         return
@@ -170,9 +196,11 @@ def _draw_menu(session: Any, dispatch: Dispatch, track: Rect) -> None:
         is_free = session.training.state in ("idle", "failed")
         reference = session.reference_index
         has_reference = clip_index == reference or session.clip_states[reference].state == "trained"
-        verb = "Train again" if state == "trained" else "Train"
+        status = session.clip_states[clip_index]
+        verb = "Train again" if state in ("trained", "damaged") else "Train" if status.resume_step is None else "Resume"
         if imgui.menu_item(f"{Icon.TRAIN}  {verb} this clip", "", False, is_free and has_reference)[0]:
             dispatch(TrainClip(clip_index))
+        ui.mark("clip menu.train")
         if not has_reference:
             imgui.text_disabled(f"Clip {reference}, the reference, has to be trained first")
         if imgui.menu_item(f"{Icon.PLAY}  Go to its first frame", "", False, True)[0]:

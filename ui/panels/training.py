@@ -12,7 +12,7 @@ from app.commands import PauseTraining, ResumeTraining, StopTraining, TrainNextC
 from ui import theme
 from ui.axis import ticks_that_fit, whole_ticks
 from ui.panels.plan import draw_plan
-from ui.panels.timeline import STATE_WORDS
+from ui.panels.timeline import STATE_WORDS, state_note
 from ui.progress_words import stage_words
 from ui.state import Dispatch, UiState
 from ui.theme import Icon
@@ -21,7 +21,7 @@ from ui.widgets import format_count, primary_button, text_right, text_wrapped_di
 MAX_PLOT_POINTS = 600
 TICK_ROOM = 52.0
 """What the numbers on the left and the margins take of a plot, units."""
-MIN_TICK_DISTANCE = 52.0
+MIN_TICK_DISTANCE = 46.0
 ANCHORS_TOOLTIP = """All anchors of a clip, whichever frames they are alive in.
 Reference clip: reference anchors, which later clips inherit.
 Later clips: inherited + residual anchors."""
@@ -63,6 +63,17 @@ def draw_training(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     _draw_clips(session)
 
 
+def next_label(session: Any) -> str:
+    """What starts the next clip, with its icon: a clip that was stopped goes on where that was."""
+    index, step = session.training.next_clip_index, session.training.resume_step
+    if index is None:
+        is_all = all(state.state == "trained" for state in session.clip_states)
+        return f"{Icon.CHECK}  Every clip is trained" if is_all else f"{Icon.WARNING}  No clip can be trained next"
+    if step is not None:
+        return f"{Icon.PLAY}  Resume clip {index} at step {format_count(step)}"
+    return f"{Icon.TRAIN}  Train next clip"
+
+
 def _draw_buttons(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     status = session.training
     width = imgui.get_content_region_avail().x
@@ -70,8 +81,7 @@ def _draw_buttons(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         index = status.next_clip_index
         is_offered = bool(status.can_train_next) and index is not None
         imgui.begin_disabled(not is_offered)
-        label = f"{Icon.TRAIN}  Train next clip" if index is not None else f"{Icon.CHECK}  Every clip is trained"
-        if primary_button(label, ImVec2(width, 36), ui):
+        if primary_button(next_label(session), ImVec2(width, 36), ui):
             dispatch(TrainNextClip())
         ui.mark("training.next")
         imgui.end_disabled()
@@ -83,6 +93,8 @@ def _draw_buttons(session: Any, dispatch: Dispatch, ui: UiState) -> None:
                 if index == session.reference_index
                 else "it starts from the reference"
             )
+            if status.resume_step is not None:
+                kind = f"stopped at step {format_count(status.resume_step)}"
             text_wrapped_dim(f"Next: clip {index}, frames {clip.start} to {clip.stop - 1}, {kind}.")
         if session.plan is not None:
             draw_plan(session.plan, dispatch, ui)
@@ -115,8 +127,7 @@ def _draw_progress(status: Any, ui: UiState) -> None:
     imgui.spacing()
     imgui.text(f"{words[status.state]} clip {status.clip_index}")
     if status.stage:
-        imgui.same_line()
-        imgui.text_disabled(stage_words(status))
+        text_wrapped_dim(stage_words(status))
     bar_color = theme.YELLOW if status.state == "paused" else theme.SKY
     imgui.push_style_color(imgui.Col_.plot_histogram, ImVec4(*bar_color))
     imgui.progress_bar(min(max(share, 0.0), 1.0), ImVec2(-1, 8), "")
@@ -128,7 +139,7 @@ def _draw_progress(status: Any, ui: UiState) -> None:
         _pair(rate, f"{duration_text(status.eta_s)} left")
     else:
         left = "" if status.eta_s is None else f"about {duration_text(status.eta_s)} left"
-        _pair(left, f"{share * 100:.0f} % of this stage" if status.stage else "")
+        _pair(left, f"{share * 100:.0f} % of this stage" if share > 0 else "")
     if status.message:
         text_wrapped_dim(str(status.message))
 
@@ -207,17 +218,28 @@ def _draw_clips(session: Any) -> None:
     imgui.table_setup_column("Anchors")
     imgui.table_headers_row()
     imgui.set_item_tooltip(ANCHORS_TOOLTIP)
-    for clip, status in zip(session.clips, session.clip_states, strict=False):
-        imgui.table_next_row()
-        imgui.table_next_column()
-        icon = theme.CLIP_ICONS.get(status.state, "")
-        words: str = STATE_WORDS.get(status.state, str(status.state))
-        imgui.text(f"{clip.clip_index}")
-        imgui.same_line(24)
-        imgui.text_colored(ImVec4(*theme.status_color(status.state)), f"{icon}  {words}" if icon else words)
-        imgui.table_next_column()
-        imgui.text("–" if status.held_out_psnr is None else f"{status.held_out_psnr:.1f}")
-        imgui.table_next_column()
-        imgui.text(anchors_text(status.n_inherited, status.n_own))
-        imgui.set_item_tooltip(ANCHORS_TOOLTIP)
+    clipper = imgui.ListClipper()
+    clipper.begin(min(len(session.clips), len(session.clip_states)))
+    while clipper.step():
+        for index in range(clipper.display_start, clipper.display_end):
+            _draw_clip_row(session.clips[index], session.clip_states[index])
+    clipper.end()
     imgui.end_table()
+
+
+def _draw_clip_row(clip: Any, status: Any) -> None:
+    imgui.table_next_row()
+    imgui.table_next_column()
+    icon = theme.CLIP_ICONS.get(status.state, "")
+    words: str = STATE_WORDS.get(status.state, str(status.state))
+    imgui.text(f"{clip.clip_index}")
+    imgui.same_line(24)
+    imgui.text_colored(ImVec4(*theme.status_color(status.state)), f"{icon}  {words}" if icon else words)
+    note = state_note(status)
+    if note:
+        imgui.set_item_tooltip(note)
+    imgui.table_next_column()
+    imgui.text("–" if status.held_out_psnr is None else f"{status.held_out_psnr:.1f}")
+    imgui.table_next_column()
+    imgui.text(anchors_text(status.n_inherited, status.n_own))
+    imgui.set_item_tooltip(ANCHORS_TOOLTIP)

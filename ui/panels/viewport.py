@@ -139,8 +139,8 @@ class ViewportPanel:
         self._draw_picture(session, dispatch, ui, area, panes)
         self.hud.draw(session, ui, area, self.scene)
         if ui.regions.is_active:
-            below_label = 44 if panes.captured is not None else 12
-            free = Rect(area.x0 + 12, area.y0 + below_label, area.x1, area.y1)
+            top = panes.captured.y0 + 44 if panes.captured is not None else area.y0 + 12  # below what names the pane
+            free = Rect(area.x0 + 12, top, area.x1, area.y1)
             draw_chosen_sphere(ui, imgui.get_window_draw_list(), free, self.scene.regions.counts)
 
     # ---- toolbar ---------------------------------------------------------------------------------------------

@@ -7,15 +7,17 @@ from typing import Any
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.commands import OpenCapture
+from app.commands import ForgetRecent, OpenCapture, OpenProject
+from app.recents import RecentProject
 from ui import theme
 from ui.state import Dispatch, Rect, UiState
 from ui.theme import Icon
-from ui.widgets import pop_bold, primary_button, push_bold, text_wrapped_dim
+from ui.widgets import elided_path, pop_bold, primary_button, push_bold, text_wrapped_dim
 
 SAMPLE_PATH = Path(__file__).resolve().parents[2] / "assets" / "sample"
-CARD_SIZE = (520.0, 380.0)
-MAX_RECENT = 3
+CARD_SIZE = (560.0, 440.0)
+MAX_RECENT = 4
+RECENT_HEIGHT = 34.0
 
 
 def draw_welcome(session: Any, dispatch: Dispatch, ui: UiState, area: Rect) -> None:
@@ -32,12 +34,12 @@ def draw_welcome(session: Any, dispatch: Dispatch, ui: UiState, area: Rect) -> N
     imgui.text("ClipGStream Studio")
     pop_bold(ui)
     text_wrapped_dim(
-        "See a multi-camera capture in space and time. Open a folder, train it clip by clip, and watch it sharpen."
+        "See a multi-camera capture in space and time. Open a capture, train it clip by clip, and watch it sharpen."
     )
     imgui.dummy(ImVec2(0, 8))
     is_busy = bool(session.jobs)
     imgui.begin_disabled(is_busy)
-    if primary_button(f"{Icon.FOLDER}  Open a capture folder", ImVec2(-1, 40), ui):
+    if primary_button(f"{Icon.FOLDER}  Open a capture or project folder", ImVec2(-1, 40), ui):
         ui.is_open_requested = True
     ui.mark("welcome.open")
     if SAMPLE_PATH.is_dir():
@@ -58,10 +60,44 @@ def draw_welcome(session: Any, dispatch: Dispatch, ui: UiState, area: Rect) -> N
     imgui.pop_style_color()
 
 
+def open_recent(entry: RecentProject) -> OpenProject | OpenCapture:
+    """What opens an entry of the list of recent projects."""
+    return OpenProject(entry.folder) if entry.project else OpenCapture(entry.folder)
+
+
 def _draw_recent(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    recent = [Path(folder) for folder in session.settings.recent if Path(folder) != SAMPLE_PATH][:MAX_RECENT]
-    for i, folder in enumerate(recent):
-        if imgui.selectable(f"{Icon.CLOCK}  {folder.name}##recent{i}", False)[0]:
-            dispatch(OpenCapture(folder))
-        ui.mark(f"welcome.recent{i}")
-        imgui.set_item_tooltip(str(folder))
+    """One row per project: its name and how far it is trained, its path; those that are gone can be removed."""
+    for index, entry in enumerate(session.settings.recent[:MAX_RECENT]):
+        _draw_recent_row(index, entry, session, dispatch, ui)
+
+
+def _draw_recent_row(index: int, entry: RecentProject, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    is_gone = entry.folder in session.missing
+    start, width = imgui.get_cursor_pos(), imgui.get_content_region_avail().x
+    row = ImVec2(width - (34 if is_gone else 0), RECENT_HEIGHT)
+    imgui.begin_disabled(is_gone)
+    if imgui.selectable(f"##recent{index}", False, imgui.SelectableFlags_.none, row)[0]:
+        dispatch(open_recent(entry))
+    imgui.end_disabled()
+    ui.mark(f"welcome.recent{index}")
+    if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+        imgui.set_tooltip(f"{entry.folder}\n{'There is nothing any more.' if is_gone else entry.trained_text}")
+    end = imgui.get_cursor_pos()
+    words = "not found" if is_gone else entry.trained_text
+    right = start.x + row.x - imgui.calc_text_size(words).x - 6
+    imgui.set_cursor_pos(ImVec2(start.x, start.y))
+    imgui.text_colored(ImVec4(*(theme.TEXT_DIM if is_gone else theme.TEXT)), f"{Icon.CLOCK}  {entry.name}")
+    imgui.set_cursor_pos(ImVec2(right, start.y))
+    imgui.text_colored(ImVec4(*(theme.ORANGE if is_gone else theme.TEXT_DIM)), words)
+    imgui.set_cursor_pos(ImVec2(start.x + 23, start.y + 16))
+    imgui.push_font(None, ui.fonts.small_size)
+    imgui.text_disabled(elided_path(str(entry.folder), row.x - 30))
+    imgui.pop_font()
+    if is_gone:
+        imgui.set_cursor_pos(ImVec2(start.x + width - 28, start.y + 4))
+        if imgui.button(f"{Icon.CLOSE}##forget{index}", ImVec2(26, 26)):
+            dispatch(ForgetRecent(entry.folder))
+        ui.mark(f"welcome.forget{index}")
+        imgui.set_item_tooltip("Take it out of this list")
+    imgui.set_cursor_pos(end)
+    imgui.dummy(ImVec2(0, 0))

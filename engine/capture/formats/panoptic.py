@@ -36,7 +36,7 @@ from engine.capture.places import place_in
 from engine.errors import CaptureError
 
 FORMAT = "panoptic"
-LAYOUT = "train_meta.json and test_meta.json with images below ims/ (CMU Panoptic, as for Dynamic 3D Gaussians)"
+LAYOUT = "train_meta.json, test_meta.json and images below ims/ (CMU Panoptic, as for Dynamic 3D Gaussians)"
 """The layout in words."""
 FPS = 30.0
 META_FILES = ("train_meta.json", "test_meta.json")

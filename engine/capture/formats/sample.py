@@ -6,6 +6,7 @@ cameras.json: {"schema": 1, "fps", "n_frames", "default_holdout": [names], "came
 
 from __future__ import annotations
 
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -35,12 +36,14 @@ from engine.errors import CaptureError
 from engine.text import shown
 
 FORMAT = "sample"
-LAYOUT = "cameras.json with one video per camera"
+LAYOUT = "cameras.json and one video per camera"
 """The layout in words."""
 SCHEMA = 1
 CAMERAS_FILE = "cameras.json"
 
 
+THREADS = 4
+"""Videos looked at side by side: FFmpeg works, or waits for the disk, without the interpreter."""
 RATE_TOLERANCE = 0.01
 """Share by which the rate of a video may differ from fps, as 29.97 does from 30."""
 
@@ -51,12 +54,14 @@ class _Reading:
 
     Attributes:
         headers: Of the videos that could be opened, by camera.
+        looks: Places and headers of all videos, by the name of their file, as they are looked at by a few threads.
     """
 
     folder: Path
     follow_links: bool
     problems: list[CaptureError] = field(default_factory=list)
     headers: dict[str, VideoHeader] = field(default_factory=dict)
+    looks: dict[str, Future[tuple[Path, VideoHeader]]] = field(default_factory=dict)
 
 
 def probe(folder: Path) -> str | None:
@@ -90,7 +95,11 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
 
     reading = _Reading(folder, follow_links)
     problems = reading.problems
-    cameras = [camera for i, row in enumerate(rows) if (camera := _read_camera(i, row, reading)) is not None]
+    with ThreadPoolExecutor(THREADS) as pool:
+        for row in rows:
+            if isinstance(row, dict) and isinstance(row.get("file"), str):
+                reading.looks[row["file"]] = pool.submit(_look_at_video, reading, row["file"])
+        cameras = [camera for i, row in enumerate(rows) if (camera := _read_camera(i, row, reading)) is not None]
     if cameras or not problems:
         names = [row["name"] for row in rows if isinstance(row, dict) and isinstance(row.get("name"), str)]
         problems += check_names(names, path)
@@ -139,6 +148,12 @@ def _warnings(document: dict[str, Any], headers: dict[str, VideoHeader]) -> list
     return warnings
 
 
+def _look_at_video(reading: _Reading, name: str) -> tuple[Path, VideoHeader]:
+    named_in = reading.folder / CAMERAS_FILE
+    place = place_in(reading.folder, name, follow_links=reading.follow_links, named_in=named_in)
+    return place, read_video_header(place)
+
+
 def _read_camera(index: int, row: Any, reading: _Reading) -> CameraEntry | None:
     """One entry of "cameras". Adds its problems; None when there is too little to go on."""
     path = reading.folder / CAMERAS_FILE
@@ -166,8 +181,7 @@ def _read_camera(index: int, row: Any, reading: _Reading) -> CameraEntry | None:
         found += check_pose(name, world_to_camera, path)
     header, place = None, reading.folder
     try:
-        place = place_in(reading.folder, row["file"], follow_links=reading.follow_links, named_in=path)
-        header = read_video_header(place)
+        place, header = reading.looks[row["file"]].result()
         found += check_image_size(name, header.size, size, place)
     except CaptureError as error:
         found.append(CaptureError(f'Camera "{name}": {error.message}', hint=error.hint, path=error.path))

@@ -35,7 +35,7 @@ def test_what_cannot_be_compared_is_said(project, tmp_path, capture_folder):
         (["{tmp}/plain"], "no project"),
         (["{tmp}/untrained"], "Nothing is trained"),
         (["{tmp}/p", "--compare", "{tmp}/nowhere"], "no such folder"),
-        (["{tmp}/p", "--compare", "{tmp}/plain"], "is no project and holds none"),
+        (["{tmp}/p", "--compare", "{tmp}/plain"], "is not a project and holds none"),
         (["{tmp}/p", "--compare", "{tmp}/untrained"], "Nothing is trained"),
         (["{tmp}/p", "--out", "{tmp}/a_file"], "is a file"),
         (["{tmp}/p", "--metrics", "some"], "invalid choice"),

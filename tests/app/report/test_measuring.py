@@ -8,6 +8,8 @@ from functools import partial
 
 from app.report.cache import evaluation_of
 from app.report.facts import read_facts
+from app.report.labels import FIGURE_LABELS
+from engine.metrics.columns import COLUMNS
 from tests.app.report.made_up import CAMERAS, Measure, Page, change_header, report, train
 
 
@@ -37,10 +39,13 @@ def test_a_training_without_recorded_times_is_not_drawn(project):
     assert page.tables["times"][0][2:] == ["–"] * 5
 
 
-def test_quick_figures_say_what_was_not_measured(project):
+def test_quick_figures_are_no_rows_of_nothing(project):
     page = Page(report(project, metrics="quick").read_text(encoding="utf-8"))
     rows = {row[0]: row for row in page.tables["clip_metrics"]}
-    assert rows["flip"][-1] == "quick choice (24 pictures)"
+    quick = [name for name, column in COLUMNS.items() if column.is_quick]
+    assert list(rows) == [FIGURE_LABELS[name] for name in quick]
+    assert f"{len(COLUMNS) - len(quick)} figures that take longer were not asked for; --metrics all" in page.text
+    assert not any("not measured" in cell or "quick choice" in cell for row in rows.values() for cell in row)
     assert "worst_flip" not in page.tables
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from PIL import Image
 
+from app.report.labels import FIGURE_LABELS
 from app.report.tables import value_text
 from engine.metrics.columns import COLUMNS
 from tests.app.fakes import write_capture
@@ -133,7 +134,7 @@ def test_page_csv_and_json_have_the_same_numbers(page, numbers, made):
             assert len(page.tables[name]) == len(table["rows"]), name
             for shown, row in zip(page.tables[name], table["rows"], strict=True):
                 for text, key in zip(shown, keys, strict=True):
-                    assert_shows(text, row[key])
+                    assert_shows(text, FIGURE_LABELS.get(row[key], row[key]) if key == "figure" else row[key])
     hidden = numbers["tables"].keys() - page.tables.keys()
     assert hidden == {"pictures", "frames", "seam_pairs"}
     assert len(numbers["tables"]["pictures"]["rows"]) == 6 * len(CAMERAS)
@@ -153,12 +154,13 @@ def assert_shows(text: str, value: Any) -> None:
 
 def test_every_column_is_there_with_unit_direction_and_why_it_is_missing(page):
     rows = {row[0]: row for row in page.tables["clip_metrics"]}
-    assert list(rows) == list(COLUMNS)
-    assert rows["psnr_fit_moving"][1:3] == ["dB", "higher"]
-    assert rows["flip"][1:3] == ["1", "lower"]
-    assert rows["moving_share"][1:3] == ["1", ""]
-    assert rows["lpips"][3:] == ["–"] * 6 + [f"no network here ({6 * len(CAMERAS)} pictures)"]
-    assert rows["psnr"][-1] == ""
+    assert list(rows) == [FIGURE_LABELS[name] for name in COLUMNS]
+    assert len(rows) == len(COLUMNS)
+    assert rows["PSNR, moving pixels, after the colour fit"][1:3] == ["dB", "higher"]
+    assert rows["FLIP"][1:3] == ["1", "lower"]
+    assert rows["Share of moving pixels"][1:3] == ["1", ""]
+    assert rows["LPIPS"][3:] == ["–"] * 6 + [f"no network here ({6 * len(CAMERAS)} pictures)"]
+    assert rows["PSNR"][-1] == ""
 
 
 def test_bytes_and_seconds_add_up(page, made, numbers):

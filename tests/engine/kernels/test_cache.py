@@ -213,8 +213,7 @@ import engine, engine.kernels.cache, engine.kernels.warm, engine.errors
 assert "numba" not in __import__("sys").modules
 import numba, torch
 between = dict(os.environ)
-import engine.kernels.threads, engine.model.decoding, engine.raster.rasterize
-import engine.cloud.sweep, engine.training.losses
+import engine.kernels.threads, engine.cloud.sweep, engine.cloud.voxel  # which compile nothing yet
 after = dict(os.environ)
 from numba.core import config
 print(sorted(set(after.items()) ^ set(between.items())), repr(config.CACHE_DIR))

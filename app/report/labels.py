@@ -1,0 +1,34 @@
+"""Names of figures as a reader of a report sees them; files and JSON keep the short ones."""
+
+from __future__ import annotations
+
+from engine.metrics.columns import COLUMNS
+
+_KINDS = {
+    "psnr": "PSNR",
+    "ssim": "SSIM",
+    "dssim1": "DSSIM1",
+    "dssim_range2": "DSSIM, constants of range 2",
+    "dssim_ms": "DSSIM, multi-scale",
+    "flip": "FLIP",
+    "lpips": "LPIPS",
+    "lpips_unscaled": "LPIPS, inputs not scaled",
+    "moving_share": "Share of moving pixels",
+}
+_PARTS = {"moving": "moving pixels", "rest": "pixels that do not move"}
+
+
+def figure_label(name: str) -> str:
+    """The label of a column of engine.metrics, as "PSNR, moving pixels, after the colour fit"; else the name itself."""
+    if name not in COLUMNS:
+        return name
+    rest, words = name, []
+    for part, said in _PARTS.items():
+        if name not in _KINDS and rest.endswith(f"_{part}"):
+            rest, words = rest.removesuffix(f"_{part}"), [said]
+    if rest.endswith("_fit"):
+        rest, words = rest.removesuffix("_fit"), [*words, "after the colour fit"]
+    return ", ".join([_KINDS.get(rest, rest), *words])
+
+
+FIGURE_LABELS = {name: figure_label(name) for name in COLUMNS}

@@ -1,0 +1,122 @@
+"""Projects in the window: recent ones, the name of what is open, what is asked before a clip is trained again."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from pyglet.window import key, mouse
+
+from app.commands import CloseQuestion, ForgetRecent, OpenCapture, OpenProject, TogglePlay, TrainClip
+from app.questions import ProjectQuestion, RetrainQuestion
+from app.recents import RecentProject
+from app.status import ClipStatus
+from tests.ui.fake_session import FakeSession
+from tests.ui.pilot import Pilot
+from ui.questions import outdated_text, retrain_texts
+from ui.window import window_title
+
+pytestmark = pytest.mark.gl
+
+RETRAIN = RetrainQuestion(0, False, "", 29.7, (1, 2), 104.0, False, 190.0, 810)
+PROJECTS = ProjectQuestion(
+    "/captures/kitchen",
+    (
+        RecentProject("/projects/kitchen-toy", "/captures/kitchen", "kitchen-toy", 2, 3),
+        RecentProject("/data/ClipGStream/projects/kitchen-12ab", "/captures/kitchen", "kitchen", 0, 3),
+    ),
+)
+
+
+def test_recent_projects_open_with_a_click_and_those_that_are_gone_can_be_removed(
+    open_pilot: Callable[..., Pilot],
+) -> None:
+    pilot = open_pilot(FakeSession(has_capture=False))
+    pilot.click("welcome.recent0")
+    assert pilot.sent(OpenProject) == [OpenProject(Path("/projects/kitchen-toy"))]
+    pilot.click("welcome.recent1")  # it is gone
+    assert len(pilot.sent(OpenProject)) == 1
+    assert "welcome.forget0" not in pilot.rects
+    pilot.click("welcome.forget1")
+    assert pilot.sent(ForgetRecent) == [ForgetRecent(Path("/projects/gone"))]
+    pilot.click("welcome.recent2")  # a capture, as earlier versions kept them
+    assert pilot.sent(OpenCapture) == [OpenCapture(Path("/captures/dance_floor"))]
+
+
+def test_the_window_names_its_project(pilot: Pilot) -> None:
+    assert window_title(pilot.session) == "juggling - 1 of 3 clips trained - /projects/juggling - ClipGStream Studio"
+    assert "menu.project" in pilot.rects
+
+
+@pytest.mark.parametrize(
+    ("symbol", "answer"), [(key.ENTER, TrainClip(0, is_confirmed=True)), (key.ESCAPE, CloseQuestion())]
+)
+def test_training_again_is_asked_and_answered_by_keyboard(pilot: Pilot, symbol: int, answer: object) -> None:
+    pilot.session.question = RETRAIN
+    pilot.draw(4)
+    assert "question.outdated" in pilot.rects
+    pilot.key(key.SPACE if symbol == key.ESCAPE else key.L)  # keys of the window wait
+    pilot.session.question = RETRAIN
+    pilot.draw(2)
+    assert pilot.sent(TogglePlay) == []
+    pilot.key(symbol)
+    pilot.draw(3)
+    assert pilot.session.commands[-1] == answer
+    assert pilot.session.question is None
+    assert "question.yes" not in pilot.rects
+
+
+def test_the_question_is_answered_by_its_buttons(pilot: Pilot) -> None:
+    for name, answer in (("question.no", CloseQuestion()), ("question.yes", TrainClip(0, is_confirmed=True))):
+        pilot.session.question = dataclasses.replace(RETRAIN)
+        pilot.draw(4)
+        pilot.click(name)
+        assert pilot.session.commands[-1] == answer
+
+
+def test_what_is_asked_says_what_depends_on_the_clip_and_what_it_costs() -> None:
+    text = "\n".join([*retrain_texts(RETRAIN), outdated_text(RETRAIN)])
+    for part in ("29.7 dB", "stays as it is", "goes on at step 810", "about 1:44", "2 clips", "1, 2", "about 3:10"):
+        assert part in text
+    damaged = RetrainQuestion(3, True, "Its header cannot be read.", None, (), None, True, None, None)
+    text = "\n".join(retrain_texts(damaged))
+    assert "Its header cannot be read." in text
+    assert "replaces the file for good" in text
+
+
+def test_one_of_several_projects_is_chosen(pilot: Pilot) -> None:
+    pilot.session.question = PROJECTS
+    pilot.draw(4)
+    pilot.key(key.DOWN)
+    pilot.key(key.ENTER)
+    assert pilot.session.commands[-1] == OpenProject(Path(PROJECTS.choices[1].project))
+    pilot.session.question = dataclasses.replace(PROJECTS)
+    pilot.draw(4)
+    pilot.key(key.UP)  # the last row
+    pilot.key(key.ENTER)
+    assert pilot.session.commands[-1] == OpenCapture(Path("/captures/kitchen"), is_new_project=True)
+
+
+def test_a_stopped_clip_says_where_it_goes_on_and_a_damaged_one_is_not_offered(pilot: Pilot) -> None:
+    session = pilot.session
+    session.clip_states = [
+        ClipStatus("trained", 1.0, 29.7, resume_step=400),
+        ClipStatus("damaged", reason="The file is damaged: its header cannot be read."),
+        ClipStatus("stopped", 0.19, 21.4, resume_step=810),
+    ]
+    session.training = dataclasses.replace(session.training, next_clip_index=2, resume_step=810)
+    pilot.draw(3)
+    pilot.move(*pilot.rects["timeline.clip1"].center)
+    pilot.draw(3)
+    from ui.panels.training import next_label
+
+    assert next_label(session).endswith("Resume clip 2 at step 810")
+    session.training = dataclasses.replace(session.training, next_clip_index=None, resume_step=None)
+    assert next_label(session).endswith("No clip can be trained next")
+    pilot.press(mouse.RIGHT)
+    pilot.release(mouse.RIGHT)
+    pilot.draw(3)
+    pilot.click("clip menu.train")
+    assert pilot.sent(TrainClip) == [TrainClip(1)]
