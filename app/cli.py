@@ -39,11 +39,11 @@ _GOES_ON = "What was learned is kept; the same command goes on from there."
 _INTERRUPTED = {
     "train": _GOES_ON,
     "ablate": _GOES_ON,
-    "eval": "Nothing was written.",
-    "report": "The page was not written; projects that were measured to the end need not be measured again.",
+    "eval": "The result was not written.",
+    "report": "The page was not written.",
     "render": "A video was not written; single pictures that were finished are there.",
 }
-"""What has become of the work, by command."""
+"""What has become of the work, by command, beside what the interruption itself says."""
 
 
 def build_parser() -> PlainParser:
@@ -81,8 +81,9 @@ def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -
         return fail(EXIT_FAILED, str(error))
     except PermissionError as error:  # a path of the command line below a folder that may not even be looked into
         return fail(EXIT_BAD_INPUT, f"{error.strerror}. Choose a folder you may use. - {error.filename}")
-    except KeyboardInterrupt:
-        return fail(EXIT_INTERRUPTED, f"Interrupted. {_INTERRUPTED.get(options.command, '')}".rstrip())
+    except KeyboardInterrupt as error:
+        said = ["Interrupted.", str(error), _INTERRUPTED.get(options.command, "")]
+        return fail(EXIT_INTERRUPTED, " ".join(part for part in said if part))
     except BrokenPipeError:  # whoever read our output has left
         return EXIT_FAILED
     except Exception as error:  # the edge of the command line: one line, no traceback

@@ -36,7 +36,12 @@ def evaluate(options: argparse.Namespace, launch: Launch) -> int:
     line = ProgressLine(is_quiet=options.quiet)
     progress = row_progress(line, "Measuring")
     document = evaluate_project(
-        opened, clip_indices=chosen, metrics=options.metrics, precision=options.precision, on_progress=progress
+        opened,
+        clip_indices=chosen,
+        metrics=options.metrics,
+        precision=options.precision,
+        on_progress=progress,
+        say=line.say,
     )
     line.finish()
     text = json_text(document, indent=1)

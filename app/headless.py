@@ -172,6 +172,11 @@ class TrainedProject:
         """Indices of the finished clips."""
         return [clip.clip_index for clip in self.clips if self.project.is_trained(clip.clip_index)]
 
+    @property
+    def last_trained(self) -> int:
+        """Index of the finished clip that comes last in the order of training."""
+        return next(i for i in reversed(self.project.training_order(len(self.clips))) if i in self.trained)
+
     def header(self, clip_index: int) -> dict[str, Any]:
         """Header of a finished clip, see engine.model.clip_state.
 
@@ -202,8 +207,7 @@ class TrainedProject:
         base = state if state.is_reference or self.reference is None else self.reference
         model = load_clip_model(state, self.reference)
         if self.project.settings.config().field == "continue":  # one field for all clips: as the last one left it
-            order = [i for i in self.project.training_order(len(self.clips)) if i in self.trained]
-            last = read_clip_state(self.project.clip_path(order[-1]))
+            last = read_clip_state(self.project.clip_path(self.last_trained))
             if last.header["field"] and model.field is not None:
                 model.attach_field(read_field(last).requires_grad_(requires_grad=False))
         return TrainedClip(self.clips[clip_index], model, base)

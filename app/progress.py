@@ -91,6 +91,7 @@ def row_progress(line: ProgressLine, stage: str) -> Callable[[int, int, Any], No
 
     def show(done: int, n: int, _row: Any) -> None:
         rate.update(done, time.monotonic())
-        line.update(stage, done / max(n, 1), f"{done}/{n}, {duration_text(rate.eta_s(n - done))} left")
+        speed = f"{rate.per_s:.1f}/s, " if rate.per_s > 0 else ""
+        line.update(stage, done / max(n, 1), f"{done}/{n}, {speed}{duration_text(rate.eta_s(n - done))} left")
 
     return show

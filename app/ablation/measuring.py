@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from engine.metrics.colors import Precision
     from engine.metrics.picture import Choice
 
-MEASURED_SCHEMA = 4
+MEASURED_SCHEMA = 5
 MEASURED_FILE = "measured.json"
 
 

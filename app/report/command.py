@@ -34,8 +34,7 @@ def add_report_arguments(command: argparse.ArgumentParser) -> None:
 
 def report(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream report: write a page about a project. Returns the exit code."""
-    from app.report.cache import REPORTS
-    from app.report.write import PAGE_FILE, write_report
+    from app.report.write import PAGE_FILE, REPORTS, write_report
 
     read_settings(options.project)  # a folder that is no project is said first
     check_writable((options.project / REPORTS if options.out is None else options.out) / PAGE_FILE)
@@ -53,6 +52,7 @@ def report(options: argparse.Namespace, launch: Launch) -> int:
             metrics=options.metrics,
             precision=options.precision,
             on_stage=show,
+            say=line.say,
         )
     finally:
         line.finish()

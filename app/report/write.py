@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -9,14 +10,14 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.evaluation import evaluate_project
+from app.evaluation import Measuring
 from app.headless import TrainedProject, open_trained
 from app.report.about import capture_section, settings_section, setup_section, split_section
-from app.report.cache import REPORTS, Measure, evaluation_of
 from app.report.comparison import Compared, comparison_section, speed_section
 from app.report.costs import storage_section, times_section
 from app.report.facts import find_projects, read_facts, short_names
 from app.report.measured import clips_section, time_section, worst_pictures, worst_section
+from app.report.measuring import evaluation_of
 from app.report.page import page_html
 from app.report.parts import Section
 from app.report.pictures import Pictures, ProjectPictures
@@ -31,7 +32,11 @@ if TYPE_CHECKING:
     from engine.metrics.colors import Precision
     from engine.metrics.picture import Choice
 
+logger = logging.getLogger(__name__)
+
 REPORT_SCHEMA = 1
+REPORTS = "reports"
+"""Folder of a project for its reports."""
 PAGE_FILE, NUMBERS_FILE = "report.html", "report.json"
 FIGURES, TABLES = "figures", "tables"
 _OWN_FILE = re.compile(rf"(?:{FIGURES}|{TABLES})/[\w-]+\.(?:png|csv)")
@@ -47,7 +52,8 @@ def write_report(
     metrics: Choice | None = None,
     precision: Precision = "float",
     on_stage: OnStage,
-    measure: Measure = evaluate_project,
+    say: Callable[[str], None] = logger.warning,
+    measuring: Measuring | None = None,
     make_pictures: Callable[[TrainedProject], Pictures] = ProjectPictures,
 ) -> Path:
     """Write the report of a project.
@@ -63,7 +69,8 @@ def write_report(
             all where they were measured before.
         precision: Of all projects: pictures as rendered, or rounded to 8 bit.
         on_stage: Told what is done.
-        measure, make_pictures: Tests bring quick ones.
+        say: Told what the user should know, see app.evaluation.evaluate_project.
+        measuring, make_pictures: Tests bring quick ones.
     Returns:
         The page.
     Raises:
@@ -84,13 +91,12 @@ def write_report(
         try:
             one = read_facts(path, name)
             document = evaluation_of(
-                one,
+                open_trained(one.project) if compared else opened,
                 choices=choices,
                 precision=precision,
-                fallback_dir=out,
                 on_progress=_measuring(on_stage, name),
-                measure=measure,
-                opened=opened if not compared else None,
+                say=say,
+                measuring=measuring,
             )
         except (ProjectError, CaptureError) as error:
             if is_named:

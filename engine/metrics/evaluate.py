@@ -7,7 +7,7 @@ Pictures are compared as they are rendered: at most two frames of one camera are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,26 +84,60 @@ class Evaluation:
         clip = trained.clip
         chosen = list(clip.frame_indices() if frames is None else frames)
         neighbour = before if before is not None and before.clip.stop == clip.start else None
+        later = [frame for frame in chosen if frame - 1 in chosen or (frame == clip.start and neighbour is not None)]
         rows = []
         for camera in self.cameras:
-            name, is_held_out = self.capture.rig.names[camera], camera in self.holdout
-            last: _Shot | None = None
-            for frame in chosen:
-                shot = self._shot(trained, camera, frame)
+            found = self.of_camera(
+                trained, camera, before=neighbour, frames=chosen, pairs=() if on_pair is None else later
+            )
+            for item in found:
+                if isinstance(item, PairRow):
+                    assert on_pair is not None
+                    on_pair(item)
+                    continue
+                rows.append(item)
+                if on_row is not None:
+                    on_row(item)
+        return rows
+
+    def of_camera(
+        self,
+        trained: TrainedClip,
+        camera: int,
+        *,
+        before: TrainedClip | None = None,
+        frames: Collection[int],
+        pairs: Collection[int],
+    ) -> Iterator[EvalRow | PairRow]:
+        """What one camera has to say of a clip, frame by frame: the row, then the pair with the frame before.
+
+        May be iterated for several cameras on several threads at a time.
+
+        Args:
+            before: The clip that ends where this one starts; where the pair at the first frame is wanted.
+            frames: Capture frame indices of the rows that are wanted.
+            pairs: Of the pairs that are wanted, by the later frame. Frames that only pairs need are rendered too.
+        """
+        clip = trained.clip
+        name, is_held_out = self.capture.rig.names[camera], camera in self.holdout
+        last: _Shot | None = None
+        for frame in clip.frame_indices():
+            if frame not in frames and frame not in pairs:
+                continue
+            shot = self._shot(trained, camera, frame)
+            if frame in frames:
                 measured = measure_picture(
                     shot.image, shot.pixels, shot.is_moving, metrics=self.metrics, precision=self.precision
                 )
-                row = EvalRow(clip.clip_index, frame, name, is_held_out, measured.figures, measured.missing)
-                rows.append(row)
-                if on_row is not None:
-                    on_row(row)
-                if on_pair is not None:
-                    if frame == clip.start and neighbour is not None:
-                        on_pair(self._boundary(clip, shot, neighbour, camera)[0])
-                    elif last is not None and last.frame_index == frame - 1:
-                        on_pair(_pair_row(self._maps(shot, last), clip, frame, name, is_held_out, is_boundary=False))
-                last = shot
-        return rows
+                yield EvalRow(clip.clip_index, frame, name, is_held_out, measured.figures, measured.missing)
+            if frame in pairs and frame == clip.start:
+                assert before is not None, "the pair at a boundary needs the clip before it"
+                yield self._boundary(clip, shot, before, camera)[0]
+            elif frame in pairs:
+                if last is None or last.frame_index != frame - 1:
+                    last = self._shot(trained, camera, frame - 1)
+                yield _pair_row(self._maps(shot, last), clip, frame, name, is_held_out, is_boundary=False)
+            last = shot
 
     def boundary_maps(self, before: TrainedClip, after: TrainedClip, camera: int) -> SeamMaps:
         """R, G and E of one camera at the boundary between two neighbouring clips, for a picture.

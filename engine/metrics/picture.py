@@ -23,6 +23,8 @@ from engine.metrics.similarity import (
 
 Choice = Literal["quick", "all"]
 CHOICES: tuple[Choice, ...] = get_args(Choice)
+FIGURES_VERSION = 2
+"""Raised when a figure of the same picture changes: kept figures of earlier versions are not mixed with new ones."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from app.evaluation import Frames, Scope
+from app.headless import TrainedProject
 from app.project import create_project, default_settings
 from app.report.write import write_report
 from engine.capture.capture import open_capture
-from engine.metrics import seams, summary
 from engine.metrics.columns import COLUMNS
 from engine.metrics.seams import PairRow, SeamMaps
 from engine.metrics.summary import EvalRow
@@ -25,55 +26,47 @@ CAMERAS = ("0", "1", "2", "3")
 
 
 class Measure:
-    """Stands in for evaluate_project: made-up figures, real means; counts how often it is asked."""
+    """Stands in for app.evaluation.ClipMeasuring: made-up figures; says what it was asked for.
+
+    Attributes:
+        asked: Project, choice of metrics and clip, in order.
+        n_rows: Rows that it gave.
+    """
 
     def __init__(self) -> None:
-        self.asked: list[tuple[str, str]] = []
+        self.asked: list[tuple[str, str, int]] = []
+        self.n_rows = 0
 
-    def __call__(self, opened, *, clip_indices, metrics="all", precision="float", on_progress) -> dict[str, Any]:
-        self.asked.append((opened.project.folder.name, metrics))
-        draw = random.Random(len(opened.project.folder.name)).random
-        rows, pairs = [], []
-        for clip_index in clip_indices:
-            for frame in opened.clips[clip_index].frame_indices():
-                for camera in CAMERAS:
-                    missing = {name: "no network here" for name in COLUMNS if name.startswith("lpips")}
-                    if metrics == "quick":
-                        missing = {name: "quick choice" for name, c in COLUMNS.items() if not c.is_quick}
-                    figures = {
-                        name: None if name in missing else (20.0 if column.unit == "dB" else 0.0) + draw()
-                        for name, column in COLUMNS.items()
-                    }
-                    rows.append(
-                        EvalRow(clip_index, frame, camera, camera in opened.project.settings.holdout, figures, missing)
+    def __call__(
+        self, opened: TrainedProject, scope: Scope, clip_index: int, unknown: Frames
+    ) -> Iterator[EvalRow | PairRow]:
+        self.asked.append((opened.project.folder.name, scope.metrics, clip_index))
+        draw = random.Random(len(opened.project.folder.name) + clip_index).random
+        for camera_index, (frames, pairs) in unknown.items():
+            camera = CAMERAS[camera_index]
+            is_held_out = camera in opened.project.settings.holdout
+            for frame in frames:
+                missing = {name: "no network here" for name in COLUMNS if name.startswith("lpips")}
+                if scope.metrics == "quick":
+                    missing = {name: "quick choice" for name, c in COLUMNS.items() if not c.is_quick}
+                figures = {
+                    name: None if name in missing else (20.0 if column.unit == "dB" else 0.0) + draw()
+                    for name, column in COLUMNS.items()
+                }
+                self.n_rows += 1
+                yield EvalRow(clip_index, frame, camera, is_held_out, figures, missing)
+            for frame in pairs:
+                is_boundary = frame == opened.clips[clip_index].start
+                yield self.pair(
+                    PairRow(
+                        frame, clip_index, camera, is_held_out, is_boundary,
+                        *(draw() * 0.01 for _ in range(6)), static_share=0.9,
                     )
-                    if frame > 0 and (frame != opened.clips[clip_index].start or clip_index - 1 in clip_indices):
-                        pairs.append(
-                            PairRow(
-                                frame, clip_index, camera, camera in opened.project.settings.holdout,
-                                frame == opened.clips[clip_index].start,
-                                *(draw() * 0.01 for _ in range(6)), static_share=0.9,
-                            )
-                        )  # fmt: skip
-        on_progress(len(rows), len(rows), rows[-1])
-        return {
-            "schema": 1,
-            "holdout": list(opened.project.settings.holdout),
-            "clips": list(clip_indices),
-            "metrics": metrics,
-            "precision": precision,
-            "columns": summary.columns_of(rows),
-            "rows": [row.as_dict() for row in rows],
-            "means": {
-                "all": summary.means(rows),
-                **summary.by_group(rows),
-                "clips": {str(i): summary.by_group([r for r in rows if r.clip_index == i]) for i in clip_indices},
-                "cameras": summary.by_camera(rows),
-                "frames": summary.by_frame(rows),
-                "worst": summary.worst_by_group(rows),
-            },
-            "seams": {"rows": [pair.as_dict() for pair in pairs], **seams.summarize(pairs)},
-        }
+                )  # fmt: skip
+
+    def pair(self, row: PairRow) -> PairRow:
+        """What is told of a pair; tests change it."""
+        return row
 
 
 class FakePictures:
@@ -154,11 +147,11 @@ def change_header(path: Path, change: Callable[[dict[str, Any]], None]) -> None:
     write_clip_state(path, ClipState(state.arrays, state.header))
 
 
-def report(project: Path, measure: Callable[..., dict[str, Any]] | None = None, **options: Any) -> Path:
+def report(project: Path, measure: Measure | None = None, **options: Any) -> Path:
     stages: list[str] = []
     page = write_report(
         project,
-        measure=measure or Measure(),
+        measuring=measure or Measure(),
         make_pictures=FakePictures,
         on_stage=lambda stage, done, n: stages.append(stage),
         **options,

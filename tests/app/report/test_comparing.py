@@ -68,28 +68,33 @@ def test_a_report_that_cannot_be_finished_is_taken_back(project, tmp_path, monke
 
 
 def test_the_command_writes_the_page(project, tmp_path, monkeypatch, capsys):
-    quick = partial(write_report, measure=Measure(), make_pictures=FakePictures)
+    quick = partial(write_report, measuring=Measure(), make_pictures=FakePictures)
     monkeypatch.setattr(write, "write_report", quick)
     assert main(["report", str(project), "--out", str(tmp_path / "out")]) == 0
     message = capsys.readouterr().err
-    assert "Measuring p 100 %" in message
+    assert "Measuring p   0 %  0/24, ? left" in message
     assert f"Report: {tmp_path / 'out' / 'report.html'}" in message
     assert (tmp_path / "out" / "report.html").is_file()
 
 
-def test_an_interrupted_report_keeps_what_was_measured_and_writes_no_page(
-    project, tmp_path, capture_folder, monkeypatch, capsys
-):
-    train(tmp_path / "other", capture_folder)
+def test_an_interrupted_report_says_what_is_kept_and_goes_on_from_there(project, monkeypatch, capsys):
     measure = Measure()
 
-    def interrupted(opened, **options):
-        if opened.project.folder.name == "other":
-            raise KeyboardInterrupt
-        return measure(opened, **options)
+    def interrupted(opened, scope, clip_index, unknown):
+        for n, item in enumerate(measure(opened, scope, clip_index, unknown)):
+            if clip_index == 1 and n == 7:
+                raise KeyboardInterrupt
+            yield item
 
-    monkeypatch.setattr(write, "write_report", partial(write_report, measure=interrupted, make_pictures=FakePictures))
-    arguments = ["report", str(project), "--compare", str(tmp_path / "other"), "--quiet"]
-    assert main(arguments) == 130
-    assert "were measured to the end need not" in capsys.readouterr().err
-    assert [path.name for path in (project / "reports").iterdir()] == ["eval-all.json"]
+    quick = partial(write_report, make_pictures=FakePictures)
+    monkeypatch.setattr(write, "write_report", partial(quick, measuring=interrupted))
+    assert main(["report", str(project), "--quiet"]) == 130
+    said = capsys.readouterr().err
+    assert "Interrupted. 16 of 24 pictures were measured and are kept; the same command goes on from there." in said
+    assert "The page was not written." in said
+    assert not (project / "reports").exists()
+    monkeypatch.setattr(write, "write_report", partial(quick, measuring=measure))
+    n_before = measure.n_rows
+    assert main(["report", str(project)]) == 0
+    assert measure.n_rows - n_before == 24 - 16
+    assert "16/24" in capsys.readouterr().err  # the work shown begins with what is kept

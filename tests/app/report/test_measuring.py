@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 import shutil
-from functools import partial
+from dataclasses import replace
 
-from app.report.cache import evaluation_of
-from app.report.facts import read_facts
+from app.evaluation import Scope, is_measured
+from app.headless import open_trained
+from app.project import open_project
 from app.report.labels import FIGURE_LABELS
+from engine.json_files import checked_line
 from engine.metrics.columns import COLUMNS
+from engine.metrics.seams import PairRow
+from engine.model.clip_state import read_clip_header
 from tests.app.report.made_up import CAMERAS, Measure, Page, change_header, report, train
 
 
@@ -61,17 +65,20 @@ def test_a_shorter_report_leaves_no_files_of_the_longer_one(project):
 
 
 def test_two_clips_are_shown_where_the_clip_before_says_more_than_its_last_frame(project):
-    def measured(*, held: set[str]) -> Page:
-        def with_two_clips(opened, **options):
-            document = Measure()(opened, **options)
-            for row in document["seams"]["rows"]:
-                if row["is_boundary"]:
-                    row |= {"is_held": row["camera"] in held, "two_clips_static": 0.02, "two_clips_moving": None}
-                    row |= {"change_static": 0.01 * (1 + (row["camera"] == "0"))}
-            return document
+    class WithTwoClips(Measure):
+        def __init__(self, held: set[str]) -> None:
+            super().__init__()
+            self.held = held
 
-        shutil.rmtree(project / "reports", ignore_errors=True)
-        return Page(report(project, with_two_clips).read_text(encoding="utf-8"))
+        def pair(self, row: PairRow) -> PairRow:
+            if not row.is_boundary:
+                return row
+            change = 0.01 * (1 + (row.camera == "0"))
+            return replace(row, is_held=row.camera in self.held, two_clips_static=0.02, change_static=change)
+
+    def measured(*, held: set[str]) -> Page:
+        shutil.rmtree(project / "evaluations", ignore_errors=True)
+        return Page(report(project, WithTwoClips(held)).read_text(encoding="utf-8"))
 
     said = "At 1 of the borders the field of the clip before ends with its last frame"
     page = measured(held=set(CAMERAS))
@@ -86,13 +93,43 @@ def test_a_second_report_measures_nothing(project):
     measure = Measure()
     report(project, measure)
     report(project, measure, metrics="quick")  # all columns are at least as good
-    assert measure.asked == [("p", "all")]
+    assert measure.asked == [("p", "all", 0), ("p", "all", 1)]
+
+
+def test_a_clip_that_changed_is_measured_again_and_no_other(project):
+    measure = Measure()
+    report(project, measure)
     change_header(project / "clips" / "0001.safetensors", lambda header: header.update(fingerprint="another"))
     report(project, measure)
-    assert measure.asked == [("p", "all")] * 2
-    (project / "reports" / "eval-all.json").write_text("{")
+    assert measure.asked[2:] == [("p", "all", 1)]
+    assert measure.n_rows == 24 + 12
+
+
+def test_of_a_clip_behind_one_that_changed_only_the_boundary_is_measured_again(project):
+    measure = Measure()
     report(project, measure)
-    assert measure.asked == [("p", "all")] * 3
+    before = (project / "evaluations" / "0001-all-float.jsonl").read_bytes()
+    other = Scope([0, 1], range(4), "all", "float")
+    opened = open_trained(open_project(project, is_writable=False))
+    assert is_measured(opened, other)
+    rows = [json.loads(line) for line in before.splitlines()]
+    assert sum("row" in row for row in rows) == 12
+    assert sum("pair" in row for row in rows) == 12
+    assert {row["before"] for row in rows if row.get("pair", {}).get("is_boundary")} == {rows_fingerprint(project)}
+    lines = before.replace(rows_fingerprint(project).encode(), b"0" * 16).splitlines(keepends=True)
+    kept = [checked_line({k: v for k, v in json.loads(line).items() if k != "checksum"}) for line in lines[1:]]
+    (project / "evaluations" / "0001-all-float.jsonl").write_bytes(
+        before.splitlines(keepends=True)[0] + "".join(kept).encode()
+    )
+    report(project, measure)
+    assert measure.asked[2:] == [("p", "all", 1)]
+    assert measure.n_rows == 24  # pairs alone
+
+
+def rows_fingerprint(project) -> str:
+    header = read_clip_header(project / "clips" / "0000.safetensors")
+    assert header is not None
+    return header["fingerprint"]
 
 
 def test_rounded_pictures_are_measured_and_kept_by_themselves(project):
@@ -101,10 +138,9 @@ def test_rounded_pictures_are_measured_and_kept_by_themselves(project):
     report(project, measure, precision="8bit")
     page = Page(report(project, measure, precision="8bit").read_text(encoding="utf-8"))
     assert ["Figures", "all columns, pictures compared as 8bit"] in page.tables["setup"]
-    assert measure.asked == [("p", "all")] * 2
-    assert json.loads((project / "reports" / "eval-all-8bit.json").read_text())["evaluation"]["precision"] == "8bit"
+    assert measure.asked == [("p", "all", 0), ("p", "all", 1)] * 2
     report(project, measure)
-    assert len(measure.asked) == 2
+    assert len(measure.asked) == 4
 
 
 def test_compared_projects_are_measured_quickly_unless_all_is_there(project, tmp_path, capture_folder):
@@ -113,25 +149,16 @@ def test_compared_projects_are_measured_quickly_unless_all_is_there(project, tmp
     measure = Measure()
     report(tmp_path / "more" / "a", measure)
     page = Page(report(project, measure, compare=[tmp_path / "more"]).read_text(encoding="utf-8"))
-    assert measure.asked == [("a", "all"), ("p", "all"), ("b", "quick")]
+    assert measure.asked[::2] == [("a", "all", 0), ("p", "all", 0), ("b", "quick", 0)]
     assert [row[-1] for row in page.tables["comparison"]] == ["all", "all", "quick"]
     report(project, measure, compare=[tmp_path / "more"], metrics="all")
-    assert measure.asked[3:] == [("b", "all")]
+    assert measure.asked[6:] == [("b", "all", 0), ("b", "all", 1)]
 
 
-def test_where_a_project_cannot_be_written_to_its_figures_are_kept_beside_the_page(project, tmp_path):
-    (project / "reports").touch()  # a file where the folder would be
-    measure = Measure()
+def test_where_a_project_cannot_be_written_to_figures_are_measured_and_that_is_said(project, tmp_path):
+    (project / "evaluations").touch()  # a file where the folder would be
+    measure, said = Measure(), []
     for _ in range(2):
-        report(project, measure, out=tmp_path / "out")
-    assert measure.asked == [("p", "all")]
-    assert len(list((tmp_path / "out" / "evaluations").iterdir())) == 1
-
-
-def test_an_evaluation_is_of_these_clips_and_this_choice(project):
-    measure = Measure()
-    facts = read_facts(project, "p")
-    ask = partial(evaluation_of, fallback_dir=project, on_progress=lambda *_: None, measure=measure)
-    assert ask(facts, choices=["quick"]) == ask(facts, choices=["all", "quick"])
-    ask(facts, choices=["all"])
-    assert [choice for _, choice in measure.asked] == ["quick", "all"]
+        report(project, measure, out=tmp_path / "out", say=said.append)
+    assert measure.asked == [("p", "all", 0), ("p", "all", 1)] * 2
+    assert all("Figures are not kept (" in words for words in said)
