@@ -6,8 +6,8 @@ from pathlib import Path
 
 from app.kernels import warm_up_reporting
 from app.project import Project, open_project
+from app.training.interface import Training
 from app.training.messages import TrainJob
-from app.training.run import Training
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError
 from engine.model.clip_state import ClipState, read_clip_state

@@ -6,8 +6,9 @@ import time
 from collections import deque
 
 from app.training.build import build_training
+from app.training.interface import MakeTraining
 from app.training.messages import ENDINGS, Command, Event, Stop, TrainJob, decode, encode
-from app.training.run import MakeTraining, TrainingRun
+from app.training.run import TrainingRun
 
 
 class InlineWorker:

@@ -10,8 +10,8 @@ from app.children import undisturbed
 from app.logs import tail
 from app.project import Project
 from app.training.build import build_training
+from app.training.interface import MakeTraining
 from app.training.messages import ENDINGS, Command, Event, Stop, TrainJob, WorkerDied, decode, encode
-from app.training.run import MakeTraining
 from app.training.worker import main
 
 MAX_EVENTS_PER_POLL = 200

@@ -14,11 +14,12 @@ import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from app.memory import peak_bytes
 from app.project import Project, open_project
 from app.project_files import read_metrics
+from app.training.interface import MakeTraining, Training
 from app.training.keeping import FolderWatch, ProjectGone, Refusals, Retries
 from app.training.messages import (
     ClipTrained,
@@ -45,9 +46,9 @@ from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
 from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch, stages_of
 from engine.errors import DiskError, EngineError, NonFiniteLoss, ProjectError
 from engine.json_files import checked_line
-from engine.model.clip_state import ClipState, read_clip_header
+from engine.model.clip_state import read_clip_header
 from engine.model.compact import CompactClip
-from engine.training.report import Progress, ReportProgress, StepStats
+from engine.training.report import Progress, StepStats
 from engine.training.stages import remove_stages
 
 logger = logging.getLogger(__name__)
@@ -65,51 +66,6 @@ CHECKPOINT_SHARE = 0.5
 METRICS_EVERY_S = 0.5
 
 
-class Training(Protocol):
-    """What the loop needs of engine.training.ClipTraining; tests bring a small one."""
-
-    @property
-    def n_steps(self) -> int:
-        """Steps of the whole clip."""
-        ...
-
-    @property
-    def steps_done(self) -> int:
-        """Steps done."""
-        ...
-
-    def prepare(self) -> None:
-        """Build what the first step needs; may take a minute and report often."""
-        ...
-
-    def step(self) -> StepStats:
-        """One optimiser step."""
-        ...
-
-    def state(self) -> ClipState:
-        """A copy of the model."""
-        ...
-
-    def finish(self) -> CompactClip:
-        """The model as it is stored; what is measured after that is what is stored. A checkpoint written later still
-        holds what was trained. Raises DiskError, before anything has changed, where what other clips share cannot be
-        kept."""
-        ...
-
-    def write_checkpoint(self, path: Path | str) -> None:
-        """Everything needed to go on."""
-        ...
-
-    def restore_checkpoint(self, path: Path | str) -> None:
-        """Instead of prepare."""
-        ...
-
-    def held_out_psnr(self) -> float:
-        """dB; NaN without held-out cameras."""
-        ...
-
-
-MakeTraining = Callable[[TrainJob, ReportProgress], Training]
 Receive = Callable[[float], Command | None]
 """The next command, waiting at most this many seconds. Raises EOFError when nobody is left to send one."""
 Send = Callable[[Event], None]

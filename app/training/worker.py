@@ -17,8 +17,9 @@ from pathlib import Path
 from app.kernels import use_threads
 from app.logs import FORMAT, PrintableFormatter
 from app.priority import lower_process
+from app.training.interface import MakeTraining
 from app.training.messages import Command, Event, TrainJob, decode, encode
-from app.training.run import MakeTraining, TrainingRun
+from app.training.run import TrainingRun
 from engine.kernels.cache import use_kernel_cache
 
 logger = logging.getLogger(__name__)

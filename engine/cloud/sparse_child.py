@@ -5,7 +5,6 @@ Never imported by the program: pycolmap must stay out of its processes.
 
 from __future__ import annotations
 
-import os
 import shutil
 import sys
 import threading
@@ -16,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
+
+from engine.kernels.parent import end_with_parent
 
 MAX_FEATURES = 2048
 MAX_SIDE_PX = 1280
@@ -120,15 +121,7 @@ def _beat(path: Path) -> None:
                 path.touch()
 
 
-def _end_with_parent(folder: Path) -> None:
-    """Wait until the parent has died, then clear up and end, whatever the other threads do."""
-    with suppress(OSError):
-        os.read(0, 1)  # not sys.stdin, whose lock would be held when this process ends
-    shutil.rmtree(folder, ignore_errors=True)
-    os._exit(1)
-
-
 if __name__ == "__main__":
     threading.Thread(target=_beat, args=(Path(sys.argv[3]),), daemon=True).start()
-    threading.Thread(target=_end_with_parent, args=(Path(sys.argv[1]).parent,), daemon=True).start()
+    end_with_parent(lambda: shutil.rmtree(Path(sys.argv[1]).parent, ignore_errors=True))
     main(Path(sys.argv[1]), Path(sys.argv[2]))

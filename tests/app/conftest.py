@@ -16,8 +16,8 @@ from app.project import Project
 from app.session import Session
 from app.settings import Settings
 from app.training.inline import InlineWorker
+from app.training.interface import MakeTraining
 from app.training.messages import TrainJob
-from app.training.run import MakeTraining
 from engine.training.forecasting import MachineSpeed
 from tests.app.fakes import make_fake, write_capture
 

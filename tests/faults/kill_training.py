@@ -73,7 +73,8 @@ class KillTest:
         settings, clips: Arguments of the training.
         every_s: Checkpoint cadence; None leaves the default.
         rng: Chooses moments and kinds.
-        longest_s: Latest moment of a kill after the start of the program.
+        longest_s: Latest moment of a kill after the start of the program,
+        after_step_s: or after the first step of a training.
     """
 
     def __init__(
@@ -85,9 +86,10 @@ class KillTest:
         every_s: float | None,
         rng: random.Random,
         longest_s: float = 14.0,
+        after_step_s: float = 5.0,
     ) -> None:
         self._work, self._settings, self._clips, self._every_s = work, settings, clips, every_s
-        self._rng, self._longest_s = rng, longest_s
+        self._rng, self._longest_s, self._after_step_s = rng, longest_s, after_step_s
         self.tally = Tally()
 
     def reference(self) -> dict[int, Kept]:
@@ -114,16 +116,16 @@ class KillTest:
             is_last = sum(self.tally.kills.values()) >= n_kills
             command = self._start(project, scratch)
             kind = self._rng.choice(KINDS)
-            after_s = LONGEST_RUN_S if is_last else self._moment()
-            if command.wait(after_s):
+            has_ended = command.wait(LONGEST_RUN_S) if is_last else self._wait(command, project)
+            if has_ended:
                 self._check_output(command, "end", (0,))
             elif is_last:
                 command.kill_group()
-                self.tally.faults.append(f"{name}: not finished after {after_s:.0f} s: {command.said()[-500:]}")
+                self.tally.faults.append(f"{name}: not finished after {LONGEST_RUN_S:.0f} s: {command.said()[-500:]}")
                 return
             else:
                 self._kill(command, kind, project)
-            finished = self._check(project, finished, expected, f"{name}, {kind} after {after_s:.2f} s")
+            finished = self._check(project, finished, expected, f"{name}, {kind}")
         if command is not None:
             self._check_orphans(command)
         self.tally.faults += [f"{name}: left over: {path}" for path in leftovers(project, scratch)]
@@ -136,6 +138,7 @@ class KillTest:
         self.tally.kills[kind] += 1
         state, lost_s = _progress(project, command.started_s)
         self.tally.states[state] += 1
+        print(f"  {time.time() - command.started_s:5.1f} s: {kind}, {state}, {lost_s:.1f} s unkept", flush=True)
         if kind == "group":
             command.kill_group()
         elif kind == "worker":
@@ -188,11 +191,18 @@ class KillTest:
                 self.tally.faults.append(f"{where}: the header of clip {index} differs from that without kills")
         return clips
 
-    def _moment(self) -> float:
-        """Seconds from the start of the program to a kill; every fifth in the first three."""
-        if self._rng.random() < 0.2:
-            return self._rng.uniform(0.05, 3.0)
-        return self._rng.uniform(2.0, self._longest_s)
+    def _wait(self, command: Command, project: Path) -> bool:
+        """Wait for a moment to kill it: in its first seconds, at any time, or while it learns. Whether it has ended."""
+        choice = self._rng.random()
+        if choice < 0.15:
+            return command.wait(self._rng.uniform(0.05, 3.0))
+        if choice < 0.5:
+            return command.wait(self._rng.uniform(2.0, self._longest_s))
+        after_s = self._rng.uniform(0.0, self._after_step_s)
+        while not _has_stepped(project, command.started_s):
+            if command.wait(0.05):
+                return True
+        return command.wait(after_s)
 
     def _folders(self, name: str) -> tuple[Path, Path]:
         scratch = self._work / name / "scratch"
@@ -213,10 +223,17 @@ def _progress(project: Path, started_s: float) -> tuple[str, float]:
         for path in project.glob(pattern):
             with suppress(OSError):
                 kept_s = max(kept_s, path.stat().st_mtime)
-    has_stepped = any(row["step"] > 0 for path in project.glob("metrics/*.jsonl") for row in read_metrics(path))
-    is_kept = any(project.glob("checkpoints/*.safetensors"))
-    state = "training" if is_kept or has_stepped else "starting or preparing"
+    state = "training" if _has_stepped(project, started_s) else "starting or preparing"
     return state, time.time() - kept_s
+
+
+def _has_stepped(project: Path, started_s: float) -> bool:
+    """Whether a training has written curves since then."""
+    for path in project.glob("metrics/*.jsonl"):
+        with suppress(OSError):
+            if path.stat().st_mtime > started_s and any("train_psnr" in row for row in read_metrics(path)[-4:]):
+                return True
+    return False
 
 
 def main() -> int:
@@ -227,6 +244,7 @@ def main() -> int:
     parser.add_argument("--clips", default="0:2")
     parser.add_argument("--every", type=float, default=1.0, help="checkpoint cadence, seconds; 0: the default")
     parser.add_argument("--longest", type=float, default=14.0, help="latest moment of a kill, seconds")
+    parser.add_argument("--after-step", type=float, default=5.0, help="or seconds after the first step")
     parser.add_argument("--fast", action="store_true", help="so few steps that a clip takes seconds")
     parser.add_argument("--reference", type=Path, help="project trained with the same settings that nobody disturbed")
     options = parser.parse_args()
@@ -238,6 +256,7 @@ def main() -> int:
             every_s=options.every or None,
             rng=random.Random(options.seed),
             longest_s=options.longest,
+            after_step_s=options.after_step,
         )
         expected = test.reference() if options.reference is None else kept_clips(options.reference)
         first, _, end = options.clips.partition(":")

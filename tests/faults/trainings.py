@@ -17,9 +17,9 @@ from app.cli import main
 from app.project import open_project
 from app.training import run
 from app.training.build import build_training
+from app.training.interface import Training
 from app.training.messages import TrainJob
 from app.training.process import ProcessWorker
-from app.training.run import Training
 from engine.assets import asset_path
 from engine.errors import EngineError
 from engine.model.clip_state import read_clip_state
@@ -107,7 +107,7 @@ class Command:
             environment[CADENCE] = str(every_s)
         with self._errors.open("wb") as errors:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "tests.faults.trainings", *arguments],
+                [sys.executable, "-c", "from tests.faults.trainings import run_command; run_command()", *arguments],
                 stdout=subprocess.DEVNULL,
                 stderr=errors,
                 env=environment,
@@ -167,9 +167,9 @@ def make_training(job: TrainJob, report: ReportProgress) -> Training:
 if CADENCE in os.environ:
     run.CHECKPOINT_EVERY_S = float(os.environ[CADENCE])
 
-if __name__ == "__main__":
+
+def run_command() -> None:
+    """The process of a `Command`."""
     # whatever started the tests in the background made its children ignore Ctrl+C; a terminal does not
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    from tests.faults.trainings import make_training as make  # under the name by which a worker imports it
-
-    sys.exit(main(sys.argv[1:], launch=lambda job, project: ProcessWorker(job, project, make)))
+    sys.exit(main(sys.argv[1:], launch=lambda job, project: ProcessWorker(job, project, make_training)))

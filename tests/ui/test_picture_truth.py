@@ -236,6 +236,11 @@ def test_the_cloud_key_does_something_on_a_trained_clip_and_says_what(window: Pi
     draw_until(window, lambda: window.studio.frame.viewport.scene.shows == CLOUD, "the cloud")
     assert hud(window).note == "point cloud, not the trained result (4 switches)"
     assert not np.array_equal(picture(window), before)
+    window.key(key.SPACE)
+    window.draw(40)
+    assert hud(window).rate == "", "a cloud does not change, so no rate of pictures is told"
+    window.key(key.SPACE)
+    window.session.dispatch(c.SetFrame(0))
     window.key(key._4)
     draw_until(window, lambda: window.studio.frame.viewport.scene.shows == RENDERED, "the picture again")
     assert hud(window).note == ""

@@ -63,10 +63,8 @@ class Hud:
         if wanted is None:
             return None
         rate, now_s = None, time.perf_counter()
-        if timeline.is_playing:
-            self._rate.note(
-                timeline.frame_index if shown.frame_index is None else shown.frame_index, timeline.n_frames, now_s
-            )
+        if timeline.is_playing and shown.frame_index is not None:  # a cloud stands still, whatever the playhead does
+            self._rate.note(shown.frame_index, timeline.n_frames, now_s)
             rate = self._rate.rate(now_s, is_every_frame=timeline.is_every_frame)
         else:
             self._rate.stop()

@@ -117,10 +117,10 @@ def test_folders_of_killed_processes_are_removed_and_those_of_living_ones_stay(s
 
 
 WAITING_CHILD = """
-import sys, threading, time
+import shutil, sys, time
 from pathlib import Path
-from engine.cloud.sparse_child import _end_with_parent
-threading.Thread(target=_end_with_parent, args=(Path(sys.argv[1]).parent,), daemon=True).start()
+from engine.kernels.parent import end_with_parent
+end_with_parent(lambda: shutil.rmtree(Path(sys.argv[1]).parent))
 time.sleep(60)
 """
 
