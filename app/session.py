@@ -42,6 +42,7 @@ from app.status import (
 )
 from app.telling import tell
 from app.timeline import Timeline
+from app.training.curves import CurveReader
 from app.training.messages import ENDINGS, Event, SnapshotWritten, TrainJob
 from app.training.process import ProcessWorker, Worker
 from app.training.service import Launch, ShownState, TrainingService
@@ -129,6 +130,7 @@ class Session:
         self._pictures = CapturedPictures()
         self._points: LatestWorker[PointsRequest, PointArrays] = LatestWorker("points", _compute_points)
         self._next_plan = NextPlan()
+        self._curves = CurveReader()
         self._marking = Marking()
         self.regions: RegionsStatus = self._marking.status([])
         self._unread: SnapshotWritten | None = None
@@ -138,7 +140,9 @@ class Session:
         self._first_cloud: Job | None = None
         self._seen = self._finished_keys()
         self._look_for_recent()
-        if is_preloading:
+        if is_preloading:  # while others import, starting a thread makes the window wait
+            for worker in (self._pictures.viewing, self._pictures.thumbnails, self._points, self._curves.worker):
+                worker.start()
             self._renderer.worker.start()
             self._playback.worker.start()
 
@@ -379,7 +383,12 @@ class Session:
         if self._service is not None:
             self._service.close()
         self._service = TrainingService(
-            project, self.timeline.clips, holdout=self.holdout, launch=self._launch_worker, catalog=catalog
+            project,
+            self.timeline.clips,
+            holdout=self.holdout,
+            launch=self._launch_worker,
+            catalog=catalog,
+            curves=self._curves,
         )
 
     def _launch_worker(self, job: TrainJob, project: Project) -> Worker:
@@ -437,9 +446,7 @@ class Session:
 
     def _finished_keys(self) -> tuple[object, ...]:
         workers = (self._playback.worker, self._renderer.worker, self._pictures.viewing, self._pictures.thumbnails)
-        if self._service is not None:
-            workers = (*workers, self._service.curves.worker)
-        newest = [worker.newest for worker in (*workers, self._points, self._next_plan)]
+        newest = [worker.newest for worker in (*workers, self._points, self._next_plan, self._curves.worker)]
         statuses = [(job.name, job.done, job.message) for job in self.jobs]
         return (
             *(None if found is None else found[0] for found in newest),
@@ -549,6 +556,7 @@ class Session:
         if self.project is not None:
             self.project.close()
         self._looks.close(timeout_s=0.1)
+        self._curves.close()
         self._jobs.close(timeout_s=6.0 if self._closing else 1.0)
         for worker in (self._playback, self._renderer, self._pictures, self._points):
             worker.close()

@@ -47,6 +47,8 @@ ATTENDED_S = 0.5
 """For this long after an input, every picture that arrives is shown at once."""
 MAX_TICK_S = 0.25
 NOTHING = ImVec4(0, 0, 0, 0)
+SESSION = "Session"
+"""Stands for the session among the panels that failed."""
 
 
 def _recover(stack: Any) -> None:
@@ -136,13 +138,31 @@ class Frame:
     def update(self, dt_s: float) -> bool:
         """Drain the session and move time on. True when a frame has to be drawn."""
         session = self.session
-        has_news = session.poll()
+        has_news = self._drain()
         self.remembering.follow(session)
         has_news |= session.timeline.tick(min(dt_s, MAX_TICK_S), is_shown=self.viewport.shows_playhead(session))
         self._has_news |= has_news or self.viewport.has_news(session)
         if not self._redraw.is_due and (self.backend.needs_follow_up or self._is_news_due()):
             self._redraw.request(1)
         return self._redraw.is_due
+
+    def _drain(self) -> bool:
+        """Let the session take in what was finished; a fault there becomes a notice and never ends the loop."""
+        try:
+            has_news = self.session.poll()
+        except Exception as error:  # the loop's edge: the window has to survive it, and what trains goes on
+            if SESSION not in self._failed_panels:
+                self._failed_panels.add(SESSION)
+                logger.exception("The session could not take in what was finished")
+                self.session.notices.add(
+                    "error",
+                    "Something that was finished could not be taken in",
+                    f"{type(error).__name__}: {error}",
+                    "The window goes on. This is a fault of the program; the log has more.",
+                )
+            return True
+        self._failed_panels.discard(SESSION)
+        return has_news
 
     def _is_news_due(self) -> bool:
         """Is it time to show what came without input?"""

@@ -95,6 +95,7 @@ class TrainingService:
         launch: Starts a worker; a process by default.
         is_window_open: Passed on to workers, which then leave room for it.
         catalog: What lies on disk; read here, which takes a while in a long project, when None.
+        curves: Reads the curves of clips that are looked at; stays open when the service is closed.
     """
 
     def __init__(
@@ -106,13 +107,15 @@ class TrainingService:
         launch: Launch = ProcessWorker,
         is_window_open: bool = True,
         catalog: ClipCatalog | None = None,
+        curves: CurveReader | None = None,
     ) -> None:
         self.project, self.clips, self.holdout = project, list(clips), tuple(holdout)
         self._launch, self._is_window_open = launch, is_window_open
         self.catalog = ClipCatalog(project, len(self.clips)) if catalog is None else catalog
         self.queue: deque[int] = deque()
         self.worker: Worker | None = None
-        self.curves = CurveReader()
+        self.curves = CurveReader() if curves is None else curves
+        self._owns_curves = curves is None
         self._failed: set[int] = set()
         self._run: Run | None = None
         self._stage = StageReported("", 0.0)
@@ -226,7 +229,8 @@ class TrainingService:
             self.worker.close(timeout_s=timeout_s)
             self.catalog.update(self.worker.job.clip_index)
             self.worker = None
-        self.curves.close()
+        if self._owns_curves:
+            self.curves.close()
 
     def _start_next(self) -> None:
         if self.worker is not None or not self.queue:

@@ -24,7 +24,8 @@ def clip_header(clip_index: int, **entries: Any) -> dict[str, Any]:
 
 def write_header(path: Path, header: dict[str, Any]) -> None:
     """A clip file, or a checkpoint, with this header and next to no arrays."""
-    write_clip_state(path, ClipState({"value": np.zeros(1, np.float32)}, header))
+    points = np.zeros((3, 3), np.float32)
+    write_clip_state(path, ClipState({"sets.static.positions": points, "sets.static.color_logits": points}, header))
 
 
 def make_project(folder: Path, **settings: Any) -> Project:

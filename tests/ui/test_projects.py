@@ -13,6 +13,8 @@ from app.commands import CloseQuestion, ForgetRecent, OpenCapture, OpenProject, 
 from app.questions import ProjectQuestion, RetrainQuestion
 from app.recents import RecentProject
 from app.status import ClipStatus
+from app.timeline import Timeline
+from engine.capture.clip import split_clips
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot
 from ui.questions import outdated_text, retrain_texts
@@ -120,3 +122,26 @@ def test_a_stopped_clip_says_where_it_goes_on_and_a_damaged_one_is_not_offered(p
     pilot.draw(3)
     pilot.click("clip menu.train")
     assert pilot.sent(TrainClip) == [TrainClip(1)]
+
+
+def test_a_fault_of_the_session_becomes_one_notice_and_the_window_goes_on(pilot: Pilot) -> None:
+    def fail() -> bool:
+        raise UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid start byte")
+
+    pilot.session.poll = fail
+    pilot.draw(3)
+    (notice,) = pilot.session.notices
+    assert notice.kind == "error"
+    assert "UnicodeDecodeError" in notice.detail
+
+
+def test_a_thousand_clips_are_drawn_in_runs_of_one_state(pilot: Pilot) -> None:
+    session = pilot.session
+    session.clips = split_clips(1000, 1)
+    states = ["trained"] * 400 + ["damaged"] + ["trained"] * 99 + ["untrained"] * 500
+    session.clip_states = [ClipStatus(state) for state in states]
+    session.timeline = Timeline(session.clips)
+    pilot.draw(3)
+    bands = [name for name in pilot.rects if name.startswith("timeline.clip")]
+    assert sorted(bands) == ["timeline.clip0", "timeline.clip400", "timeline.clip401", "timeline.clip500"]
+    assert pilot.rects["timeline.clip400"].width >= 1

@@ -20,6 +20,8 @@ BAND_GAP = 6.0
 MIN_TRACK_HEIGHT = RULER_HEIGHT + 18.0
 MIN_TICK_SPACING_PX = 56.0
 NOTE_WIDTH = 380.0
+MIN_BAND_WIDTH = 4.0
+"""Clips narrower than this are drawn in runs."""
 
 STATE_WORDS: dict[str, str] = {
     "untrained": "not trained",
@@ -154,18 +156,50 @@ def _draw_track(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     draw.push_clip_rect(track.low, track.high, True)
     band_top = track.y0 + RULER_HEIGHT
     band_bottom = min(track.y1 - 6, band_top + 52)
-    for clip, status in zip(session.clips, session.clip_states, strict=False):
-        x0 = cell_left(clip.start, track, timeline.n_frames) + 1
-        x1 = cell_left(clip.start + clip.n_frames, track, timeline.n_frames) - 1
-        band = Rect(x0, band_top, x1, band_bottom)
-        ui.mark_rect(f"timeline.clip{clip.clip_index}", band)
-        _draw_band(draw, band, session, clip, status, ui)
+    for first, last in band_runs(session, track):
+        x0 = cell_left(session.clips[first].start, track, timeline.n_frames) + 1
+        x1 = cell_left(session.clips[last].stop, track, timeline.n_frames) - 1
+        band = Rect(x0, band_top, max(x1, x0 + 1), band_bottom)
+        ui.mark_rect(f"timeline.clip{first}", band)
+        if first == last:
+            _draw_band(draw, band, session, session.clips[first], session.clip_states[first], ui)
+        else:
+            _draw_run(draw, band, first, last, session.clip_states[first].state)
     _draw_ruler(draw, track, timeline.n_frames, timeline.frame_index)
     if hovered is not None and imgui.get_io().mouse_pos.y >= band_top:
         _draw_note(session, hovered)
     if hovered is not None and hovered != timeline.frame_index:
         _draw_hover(draw, track, hovered, timeline.n_frames)
     _draw_playhead(draw, track, timeline.frame_index, timeline.n_frames, ui)
+    draw.pop_clip_rect()
+
+
+def band_runs(session: Any, track: Rect) -> list[tuple[int, int]]:
+    """First and last clip of every band: one clip each, or where that is too narrow to see, a run in one state."""
+    n_clips = min(len(session.clips), len(session.clip_states))
+    if n_clips and track.width / n_clips >= MIN_BAND_WIDTH:
+        return [(index, index) for index in range(n_clips)]
+    starts = [
+        index
+        for index in range(n_clips)
+        if index == 0 or session.clip_states[index].state != session.clip_states[index - 1].state
+    ]
+    return [(first, after - 1) for first, after in zip(starts, [*starts[1:], n_clips], strict=True)]
+
+
+def _draw_run(draw: Any, band: Rect, first: int, last: int, state: str) -> None:
+    """Many clips in one state as one band."""
+    color = theme.status_color(state)
+    draw.add_rect_filled(band.low, band.high, theme.u32(theme.RAISED), 3)
+    draw.push_clip_rect(band.low, band.high, True)
+    draw.add_rect_filled(band.low, band.high, theme.u32(theme.faded(color, 0.38 if state == "trained" else 0.22)), 3)
+    if state in ("failed", "stale", "damaged", "stopped"):
+        _hatch(draw, band, theme.faded(color, 0.55), 7.0, is_crossed=state == "damaged")
+    draw.add_rect_filled(ImVec2(band.x0, band.y1 - 3), band.high, theme.u32(color), 2)
+    if band.width >= 60:
+        words = f"{theme.CLIP_ICONS.get(state, '')}  {STATE_WORDS.get(state, state)}"
+        draw.add_text(ImVec2(band.x0 + 9, band.y0 + 6), theme.u32(theme.TEXT), f"Clips {first} to {last}")
+        draw.add_text(ImVec2(band.x0 + 9, band.y0 + 25), theme.u32(theme.TEXT), words.strip())
     draw.pop_clip_rect()
 
 

@@ -1,0 +1,163 @@
+"""The session and its projects: recent ones, several of one capture, retraining that is asked first, damaged clips."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from app import commands as c
+from app.jobs import Jobs
+from app.project import data_dir
+from app.questions import ProjectQuestion, RetrainQuestion
+from app.session import Session
+from app.settings import Settings
+from tests.app.conftest import inline, poll_until
+from tests.app.fakes import make_fake
+
+
+def train_next(session: Session) -> None:
+    session.dispatch(c.TrainNextClip())
+    poll_until(session, lambda: session.training.state in ("idle", "failed"), what="the end of the training")
+
+
+@pytest.fixture
+def open_session(tmp_path: Path):
+    """Sessions as the window makes them: projects lie in the user's data folder unless one is opened by its path."""
+    made: list[Session] = []
+
+    def make(path: Path | None) -> Session:
+        settings = Settings(tmp_path / "settings.json")
+        session = Session(launch=partial(inline, make_training=make_fake), settings=settings, is_preloading=False)
+        made.append(session)
+        if path is not None:
+            session.dispatch(c.OpenCapture(path))
+            poll_until(session, lambda: session.capture is not None or session.question is not None, what="opening")
+        return session
+
+    yield make
+    for session in made:
+        session.close()
+
+
+def test_recent_lists_the_project_and_how_far_it_is_trained(open_session, make_session, capture_folder, tmp_path):
+    session = make_session(name="own")
+    session.dispatch(c.SetClipLength(3))
+    train_next(session)
+    assert (session.opened.name, session.opened.trained_text) == ("own", "1 of 2 clips trained")
+    session.close()
+    again = open_session(None)
+    (entry,) = again.settings.recent
+    assert (entry.folder, entry.n_trained, entry.n_clips) == (tmp_path / "own", 1, 2)
+    again.dispatch(c.OpenProject(entry.folder))
+    poll_until(again, lambda: again.capture is not None, what="the project")
+    assert [state.state for state in again.clip_states] == ["trained", "untrained"]
+
+
+def test_a_capture_opens_the_project_that_it_was_last_trained_in_and_says_so(
+    open_session, make_session, capture_folder, tmp_path
+):
+    session = make_session(name="own")
+    train_next(session)
+    session.close()
+    again = open_session(capture_folder)
+    assert again.project.folder == tmp_path / "own"
+    (notice,) = again.notices
+    assert (notice.kind, notice.detail) == ("info", f"1 of 1 clips trained - {tmp_path / 'own'}")
+    assert not (data_dir() / "projects").exists()
+
+
+def test_of_several_projects_of_a_capture_the_user_chooses(open_session, make_session, capture_folder, tmp_path):
+    open_session(capture_folder).close()  # one in the data folder
+    own = make_session(name="own")
+    own.close()
+    session = open_session(capture_folder)
+    assert session.capture is None
+    assert isinstance(session.question, ProjectQuestion)
+    folders = [Path(choice.project) for choice in session.question.choices]
+    assert len(folders) == 2
+    assert tmp_path / "own" in folders
+    session.dispatch(c.OpenCapture(capture_folder, is_new_project=True))
+    assert session.question is None
+    poll_until(session, lambda: session.capture is not None, what="the new project")
+    assert session.project.folder not in folders
+    assert session.project.folder.parent == data_dir() / "projects"
+
+
+def test_what_is_gone_is_known_and_can_be_removed(open_session, make_session, tmp_path):
+    make_session(name="own").close()
+    (tmp_path / "own" / "project.json").unlink()
+    session = open_session(None)
+    poll_until(session, lambda: session.missing == {tmp_path / "own"}, what="a look at the disk")
+    session.dispatch(c.ForgetRecent(tmp_path / "own"))
+    assert Settings(session.settings.path).recent == []
+
+
+def test_training_a_finished_clip_again_is_asked_first(make_session):
+    session = make_session()
+    session.dispatch(c.SetClipLength(2))
+    for _ in range(3):
+        train_next(session)
+    session.dispatch(c.TrainClip(0))
+    question = session.question
+    assert isinstance(question, RetrainQuestion)
+    assert session.training.state == "idle"
+    assert (question.clip_index, question.outdated, question.is_damaged) == (0, (1, 2), False)
+    assert question.held_out_psnr == session.clip_states[0].held_out_psnr
+    assert question.seconds is not None
+    assert question.outdated_seconds is not None
+    session.dispatch(c.CloseQuestion())
+    assert session.question is None
+    session.dispatch(c.TrainClip(0, is_confirmed=True))
+    assert session.training.state != "idle"
+
+
+def test_a_damaged_clip_is_shown_as_such_and_only_trained_again_when_confirmed(make_session):
+    session = make_session(name="own")
+    session.dispatch(c.SetClipLength(2))
+    for _ in range(2):
+        train_next(session)
+    path = session.project.clip_path(1)
+    session.close()
+    damaged = b"\xff" * 200
+    path.write_bytes(damaged)
+    session = make_session(name="own")
+    assert [state.state for state in session.clip_states] == ["trained", "damaged", "untrained"]
+    assert "damaged" in session.clip_states[1].reason
+    assert session.opened.n_trained == 1
+    train_next(session)  # the one after it
+    assert [state.state for state in session.clip_states] == ["trained", "damaged", "trained"]
+    train_next(session)
+    assert session.notices[-1].title == "No clip can be trained next"
+    assert path.read_bytes() == damaged
+    session.dispatch(c.TrainClip(1))
+    assert session.question.is_damaged
+    session.dispatch(c.TrainClip(1, is_confirmed=True))
+    poll_until(session, lambda: session.clip_states[1].state == "trained", what="the clip")
+
+
+def test_a_bad_byte_in_the_curves_does_not_keep_the_project_closed(make_session):
+    session = make_session(name="own")
+    train_next(session)
+    path = session.project.metrics_path(0)
+    session.close()
+    path.write_bytes(path.read_bytes() + b"\xff\n")
+    session = make_session(name="own")
+    assert session.clip_states[0].state == "trained"
+    poll_until(session, lambda: len(session.training.psnr_history) > 0, what="the curves")
+
+
+def test_what_taking_up_a_result_raises_ends_with_the_job():
+    faults: list[tuple[str, Exception]] = []
+    jobs = Jobs(lambda name, error: faults.append((name, error)))
+
+    def take(result: object) -> None:
+        raise ValueError(result)
+
+    taken: list[int] = []
+    for job in (jobs.start("Bad", lambda context: 1, take, take), jobs.start("Good", lambda _: 2, taken.append, take)):
+        job.join(10.0)
+    assert jobs.poll()
+    assert [(name, str(error)) for name, error in faults] == [("Bad", "1")]
+    assert taken == [2]
