@@ -35,7 +35,9 @@ N_FRAMES = 4
 BACKGROUNDS_KEY = {"capture": "none", "cameras": ["a", "b"], "size": [13, 6], "frames": 5, "is_corrected": True}
 PLACE = {"phases": [["static", 3], ["joint", 5]], "phase_index": 1, "steps_in_phase": 2, "generator": [1, 2, 250]}
 EXPECTED = {"clip_index": 1, "camera_names": ["a", "b", "c"], "seed": 0}
-EVALUATION = {"rows": [{"psnr": 30.0 + i, "camera": "a"} for i in range(20)], "means": {"held_out": {"psnr": 31.5}}}
+CONTENT = {"schema": 3, "clip": "abc", "cameras": ["a"]}
+"""What the kept figures depend on."""
+_said: list[str] = []
 OLD = "old-"
 """Begins the names of the kinds without a checksum."""
 
@@ -45,12 +47,14 @@ OLD = "old-"
 
 def make_project(folder: Path) -> None:
     """Two trained clips, a checkpoint, a live snapshot, curves, regions, caches; beside them the files of the user."""
-    from app.preview import write_arrays
+    from app.kept_figures import KeptFigures
     from app.project import create_project
     from app.project_files import ProjectSettings
+    from app.recents import RecentProject
     from app.settings import Settings
+    from engine.array_files import write_arrays
     from engine.cloud.regions import parse_region
-    from engine.json_files import checked_line, write_checked_json
+    from engine.json_files import checked_line
     from engine.model.clip_state import write_clip_state
     from engine.model.compact import compact_clip, write_compact_clip
     from engine.training.checkpoint import write_checkpoint
@@ -71,8 +75,11 @@ def make_project(folder: Path) -> None:
     write_backgrounds(project.prep_dir, _backgrounds(), BACKGROUNDS_KEY)
     cloud = {"points": np.ones((9, 3), np.float32), "colors": np.zeros((9, 3), np.float32)}
     write_arrays(project.first_cloud_path, cloud, {}, what="The cloud")
-    write_checked_json(folder / "reports" / "eval-all.json", {"schema": 2, "key": "k", "evaluation": EVALUATION})
-    Settings(folder / "user" / "settings.json").add_recent(folder)
+    figures = KeptFigures(folder / "evaluations" / "0000.jsonl", CONTENT, None, _said.append)
+    with figures.writing():
+        for row in _figure_rows():
+            figures.add(row)
+    Settings(folder / "user" / "settings.json").add_recent(RecentProject(str(folder), "nowhere", "a"))
 
 
 def _states() -> tuple[Any, Any]:
@@ -110,6 +117,14 @@ def _backgrounds() -> Any:
     return Backgrounds(rng.integers(0, 255, (2, 6, 13, 3)).astype(np.uint8), rng.random((2, 6, 13)) > 0.5)
 
 
+def _figure_rows() -> list[Any]:
+    from engine.metrics.columns import COLUMNS
+    from engine.metrics.summary import EvalRow
+
+    figures = dict.fromkeys(COLUMNS, 0.5)
+    return [EvalRow(0, i, "a", i % 2 == 0, figures | {"psnr": 30.0 + i}, {}) for i in range(12)]
+
+
 def _rows() -> list[dict[str, Any]]:
     return [{"step": 10 * i, "loss": 1.0 / (i + 1), "held_out_psnr": 20.0 + i} for i in range(30)]
 
@@ -140,9 +155,9 @@ def _read_clip(project: Path, path: Path) -> Any:
 
 
 def _read_evaluation(project: Path, path: Path) -> Any:
-    from app.report import cache
+    from app.kept_figures import KeptFigures
 
-    return cache._read(path, "k")
+    return {repr(row) for row in KeptFigures(path, CONTENT, None, _said.append).rows.values()}, set()
 
 
 def _read_checkpoint(project: Path, path: Path) -> Any:
@@ -199,7 +214,7 @@ FILES: dict[str, tuple[str, Read, int]] = {
     "curves": ("metrics/0000.jsonl", _read_curves, 4),
     "backgrounds": ("prep/backgrounds.safetensors", _read_backgrounds, 3),
     "first cloud": ("prep/first_cloud.safetensors", _read_cloud, 2),
-    "evaluation": ("reports/eval-all.json", _read_evaluation, 2),
+    "evaluation": ("evaluations/0000.jsonl", _read_evaluation, 2),
     "preferences": ("user/settings.json", _read_preferences, 2),
 }
 """Name of a kind to its file in the project, its reader, and how often it is drawn."""
@@ -326,7 +341,7 @@ def run_case(case: Case) -> Outcome:
 def _is_as_written(name: str, found: Any) -> bool:
     if found in _NOTHING:
         return True
-    if name == "curves":  # rows may be left out, none may be changed
+    if name in ("curves", "evaluation"):  # rows may be left out, none may be changed
         return all(part <= whole for part, whole in zip(found, _good[name], strict=True))
     return bool(_plain(found) == _good[name])
 
