@@ -52,6 +52,7 @@ class WindowMemory:
     mark_opacity: float | None = None
     views: dict[str, dict[str, Any]] = field(default_factory=dict)
     _saved: dict[str, Any] = field(default_factory=dict, repr=False)
+    _has_failed: bool = False
 
     def keep_view(self, folder: str, view: dict[str, Any]) -> None:
         """Keep what was looked at in a project; the one that was not used for longest is forgotten."""
@@ -77,7 +78,9 @@ class WindowMemory:
         try:
             write_checked_json(self.path, document)
         except (OSError, EngineError) as error:
-            logger.warning("the look of the window could not be kept (%s) - %s", error, self.path)
+            level = logging.DEBUG if self._has_failed else logging.WARNING  # once is enough
+            logger.log(level, "the look of the window could not be kept (%s) - %s", error, self.path)
+            self._has_failed = True
         self._saved = document
 
 

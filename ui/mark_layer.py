@@ -34,7 +34,7 @@ MAX_INHERITED_MARKS, MAX_RESIDUAL_MARKS = 2_500, 500
 crowd where something is new, and that is what one wants to see."""
 RING_SIZE, DIAMOND_SIZE, RIM = 6.5, 8.0, 0.9
 """Diameters, and the width of the dark rim that keeps marks apart from any picture; units."""
-ROOMY_SIDE, SMALLEST_SHARE = 800.0, 0.6
+ROOMY_SIDE, SMALLEST_SHARE = 800.0, 0.75
 """In a picture with a shorter side than this, units, marks are smaller, down to this share: they crowd there."""
 HIDDEN_SHARE = 0.22
 """Opacity of a mark behind what the picture shows, of that of the others."""
@@ -172,7 +172,7 @@ class MarkLayer:
         if overlays.show_frusta and session.view.look_through is None:
             # from inside a camera the others are only in the way
             self._frusta.draw(target, *camera, width_px=1.5 * unit, opacity=0.8)
-        rim = RIM * unit
+        rim = RIM * min(size, 1.0) * unit
         if self.counts.n_inherited and overlays.show_inherited:
             ring = RING_SIZE * size * unit
             self._inherited.draw(target, *camera, shape="ring", size=ring, outline_px=rim, opacity=opacity)

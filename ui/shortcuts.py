@@ -398,6 +398,7 @@ MOUSE_HELP: tuple[tuple[str, str], ...] = (
     ("Right drag", "Move the view sideways (also Shift + middle drag)"),
     ("Wheel", "Move nearer or farther (also Ctrl + middle drag)"),
     ("Click, wheel", "While a region is chosen: fix its place, change its size (Ctrl + wheel moves the view)"),
+    ("Camera click", "Look through the camera whose pyramid it is"),
     ("Timeline drag", "Move through time"),
     ("White line drag", "Wipe between render and captured picture"),
     ("Folder drop", "Open it: a capture or a project"),

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pyglet
 import pytest
 from imgui_bundle import imgui
 from pyglet.window import key
@@ -16,6 +17,7 @@ from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, Pilot
 from ui.state import Rect, UiState
 from ui.ui_scale import MIN_UNITS, UiScale, next_choice, parse_scale
+from ui.window import screen_scale
 
 pytestmark = pytest.mark.gl
 PADDING = 5.0
@@ -154,3 +156,20 @@ def test_scales_as_typed_and_as_they_fit() -> None:
     assert UiScale(1.5, of_screen=2.0).wanted == 1.5
     assert UiScale(2.0).fitting(MIN_UNITS[0], 4000) == 1.0, "shown smaller rather than cut off"
     assert UiScale(of_screen=float("nan")).wanted == 1.0
+
+
+@pytest.mark.parametrize(("dpi", "scale"), [(192, 2.0), (96, 1.0), (144, 1.5)])
+def test_the_screen_s_own_scale_is_taken(monkeypatch: pytest.MonkeyPatch, dpi: int, scale: float) -> None:
+    class Screen:
+        def get_dpi(self) -> int:
+            return dpi
+
+    class Display:
+        def get_default_screen(self) -> Screen:
+            return Screen()
+
+    monkeypatch.setattr("pyglet.display.get_display", Display)
+    monkeypatch.setattr(pyglet.options, "headless", False)
+    monkeypatch.setattr("sys.platform", "linux")
+    assert screen_scale() == scale
+    assert UiScale(of_screen=screen_scale()).wanted == scale

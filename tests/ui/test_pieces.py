@@ -149,6 +149,7 @@ def test_nonsense_arguments_end_with_2_and_one_line(capsys: pytest.CaptureFixtur
     from ui.main import main
 
     cases = (
+        (["--ui-scale", "big"], "'big' is not a scale"),
         (["--size", "wide"], "'wide' is not a size"),
         (["a", "b"], "'a' is neither a command nor a file or folder"),
         ([".", "b"], "unrecognized arguments: b"),

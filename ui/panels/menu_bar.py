@@ -110,6 +110,9 @@ def _draw_scale_menu(ui: UiState) -> None:
             choose_scale(ui, choice)
     imgui.separator()
     imgui.text_disabled("Ctrl + plus and Ctrl + minus change it, too")
+    drawn = imgui.get_io().display_framebuffer_scale.x
+    if drawn < scale.wanted - 1e-3:
+        imgui.text_disabled(f"Drawn at {scale_text(drawn)}: the window has no room for more")
     imgui.end_menu()
 
 
