@@ -121,7 +121,7 @@ def _figure_rows() -> list[Any]:
     from engine.metrics.columns import COLUMNS
     from engine.metrics.summary import EvalRow
 
-    figures = dict.fromkeys(COLUMNS, 0.5)
+    figures: dict[str, float | None] = dict.fromkeys(COLUMNS, 0.5)
     return [EvalRow(0, i, "a", i % 2 == 0, figures | {"psnr": 30.0 + i}, {}) for i in range(12)]
 
 
