@@ -225,6 +225,14 @@ def test_a_new_project_in_which_something_was_learned_is_not_taken_back(run, cap
     assert read_clip_state(tmp_path / "p" / "checkpoints" / "0000.safetensors").header["step"] > 0
 
 
+def test_nor_is_one_whose_checkpoint_could_not_be_written(run, capture_folder, tmp_path, monkeypatch):
+    Disk(monkeypatch, "checkpoints")
+    code, _, err = run("train", capture_folder, "--project", tmp_path / "p", make_training=_breaks_at_the_end)
+    assert code == 2
+    assert "could not be kept" in err
+    assert (tmp_path / "p" / "project.json").is_file()
+
+
 def _breaks_at_the_end(job, report):
     training = make_fake(job, report)
 
