@@ -8,7 +8,7 @@ SETUP_FLAGS :=
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run test lint types fmt bench golden clean
+.PHONY: help setup run test lint types fmt bench faults golden clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /  make \1	/p' Makefile | expand -t 16
@@ -39,6 +39,11 @@ bench: setup ## measure the figures of the README, print them as tables, draw ou
 	@$(BIN)/python -m tests.benchmarks.bench_quality $(SAMPLE)
 	@$(BIN)/clipgstream bench --full --out out
 	@$(BIN)/python -m tests.benchmarks.bench_window $(SAMPLE)
+
+faults: setup ## damage files and captures, contend for locks, kill trainings, fill disks: the figures of the README
+	@for script in $$(grep -l "^if __name__" tests/faults/*.py); do \
+		$(BIN)/python -m $$(echo $${script%.py} | tr / .) || exit 1; \
+	done
 
 golden: setup ## draw the golden pictures anew; look at each before committing it
 	@$(BIN)/python -m pytest tests --update-golden -k golden

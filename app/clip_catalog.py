@@ -122,6 +122,20 @@ class ClipCatalog:
         self._records = self._judged()
         self.revision += 1
 
+    def note_damage(self, path: Path | None, reason: str) -> bool:
+        """Somebody found that the arrays of a finished clip are damaged, which its header does not show.
+
+        Returns:
+            Whether the file is that of a clip which counted as good.
+        """
+        for index in range(len(self)):
+            if path is not None and self._good(index) is not None and path == self._project.clip_path(index):
+                self._clips[index] = FoundHeader({}, reason, 0)
+                self._records = self._judged()
+                self.revision += 1
+                return True
+        return False
+
     def outdated_by(self, clip_index: int) -> list[int]:
         """Clips that are good now and would be out of date if this one were trained again with another result."""
         now, then = self._bases(), self._bases(replaced=clip_index)

@@ -498,6 +498,8 @@ class Session:
                     self._drop_unread()
                 logger.info("a live state could not be read: %s", error)
             elif isinstance(error, EngineError):
+                if self._service is not None and isinstance(request, FrameRequest | PointsRequest):
+                    self._service.catalog.note_damage(error.path, error.message)
                 if not any(str(error.message) in notice.detail for notice in self.notices):
                     self.notices.add_error(title, error)
             else:

@@ -19,7 +19,7 @@ from engine.capture.clip import Clip
 from engine.cloud.gains import in_gauge
 from engine.cloud.range import near_plane
 from engine.cloud.regions import GateRegion
-from engine.errors import NonFiniteLoss, PreparationError
+from engine.errors import NonFiniteLoss, PreparationError, ProjectError
 from engine.metrics.psnr import psnr
 from engine.model.clip_header import SCHEMA
 from engine.model.clip_model import ClipModel, decoder_sizes, load_clip_model
@@ -410,6 +410,8 @@ class ClipTraining:
         self.pictures = self._preparation.read_pictures()
         try:
             self._go_on(kept)
+        except ProjectError as error:  # what was rebuilt knows no file
+            raise ProjectError(error.message, hint=error.hint, path=error.path or path) from error
         except (
             ArithmeticError,
             AssertionError,

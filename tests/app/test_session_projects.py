@@ -137,6 +137,29 @@ def test_a_damaged_clip_is_shown_as_such_and_only_trained_again_when_confirmed(m
     poll_until(session, lambda: session.clip_states[1].state == "trained", what="the clip")
 
 
+def test_a_clip_whose_arrays_turn_out_to_be_damaged_is_shown_as_such(make_session):
+    session = make_session(name="own")
+    session.dispatch(c.SetClipLength(3))
+    for _ in range(2):
+        train_next(session)
+    path = session.project.clip_path(1)
+    session.close()
+    data = bytearray(path.read_bytes())
+    data[-3] ^= 0xFF  # in an array: the header is as it was
+    path.write_bytes(bytes(data))
+    session = make_session(name="own")
+    assert [state.state for state in session.clip_states] == ["trained", "trained"]
+    session.dispatch(c.SetFrame(4))
+
+    def is_found() -> bool:
+        session.shown_gaussians()
+        return session.clip_states[1].state == "damaged"
+
+    poll_until(session, is_found, what="the damage")
+    assert session.clip_states[0].state == "trained"
+    assert session.training.next_clip_index is None
+
+
 def test_a_bad_byte_in_the_curves_does_not_keep_the_project_closed(make_session):
     session = make_session(name="own")
     train_next(session)

@@ -161,14 +161,12 @@ def _serve(pipe: Connection, run_case: RunCase) -> None:
             case = pipe.recv()
         except EOFError:
             return
-        before = _resident_bytes()
-        with suppress(OSError):  # the peak counts from here on
-            Path("/proc/self/clear_refs").write_text("5")
+        start_memory()
         try:
             outcome = run_case(case)
         except Exception:  # noqa: BLE001 - the harness itself: shown as a fault
             outcome = Outcome(f"case {case.index}", "untyped", traceback.format_exc())
-        pipe.send(replace(outcome, extra_bytes=max(_peak_bytes() - before, 0)))
+        pipe.send(replace(outcome, extra_bytes=max(_peak_bytes() - _before[0], 0)))
 
 
 def judge(act: Callable[[], object]) -> tuple[str, str]:
@@ -216,6 +214,16 @@ def _on_audit(event: str, arguments: tuple[object, ...]) -> None:
 
 
 # ---------------------------------------------------------------- memory
+
+
+_before = [0]
+
+
+def start_memory() -> None:
+    """The case's memory counts from here on: called again by a case after what it loads or makes only once."""
+    with suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5")  # the peak is what is resident now
+    _before[0] = _resident_bytes()
 
 
 def _resident_bytes() -> int:

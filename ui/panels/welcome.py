@@ -81,7 +81,7 @@ def _draw_recent_row(index: int, entry: RecentProject, session: Any, dispatch: D
     imgui.end_disabled()
     ui.mark(f"welcome.recent{index}")
     if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
-        imgui.set_tooltip(f"{entry.folder}\n{'There is nothing any more.' if is_gone else entry.trained_text}")
+        imgui.set_tooltip(f"{entry.folder}\n{'It is not there any more.' if is_gone else entry.trained_text}")
     end = imgui.get_cursor_pos()
     words = "not found" if is_gone else entry.trained_text
     right = start.x + row.x - imgui.calc_text_size(words).x - 6

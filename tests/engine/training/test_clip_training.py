@@ -1,5 +1,6 @@
 """ClipTraining from pixels: learning, freezing, resuming, stopping on bad numbers. The sample at half size."""
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,10 +16,12 @@ from engine.errors import NonFiniteLoss, PreparationError, ProjectError
 from engine.metrics.evaluate import evaluate_clip
 from engine.metrics.summary import means
 from engine.model.clip_model import load_clip_model
-from engine.model.clip_state import ClipState
+from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
+from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from engine.training.stopping import loss_not_finite
+from tests.engine.training.damaged_states import damaged_states
 
 CLIP_LENGTH = 10
 CONFIG = TrainConfig(
@@ -193,6 +196,32 @@ def test_a_checkpoint_of_another_clip_is_refused(setting, source, tmp_path):
     other = start(setting.capture, 0, setting.prep_dir)
     with pytest.raises(ProjectError, match="clip_index"):
         other.restore_checkpoint(tmp_path / "kept.safetensors")
+
+
+def test_every_damage_to_a_checkpoint_is_an_error_that_names_the_file(source, tmp_path):
+    training = source()
+    training.prepare()
+    training.step()
+    kept = tmp_path / "kept.safetensors"
+    training.write_checkpoint(kept)
+    good, state = kept.read_bytes(), read_clip_state(kept)
+    other = source()
+    for name, bad in damaged_states(state).items():
+        write_clip_state(kept, bad)
+        with pytest.raises(ProjectError) as caught:
+            other.restore_checkpoint(kept)
+        assert (name, caught.value.path) == (name, kept)
+    rng = np.random.default_rng(1)
+    for at in rng.integers(0, len(good), 20):
+        kept.write_bytes(good[:at] + bytes([good[at] ^ 0x10]) + good[at + 1 :])
+        with pytest.raises(ProjectError):
+            read_checkpoint(kept, {})
+    write_clip_state(kept, ClipState(state.arrays, state.header | {"resume": json.dumps(state.header["resume"])}))
+    other = source()
+    other.restore_checkpoint(kept)  # as the version before wrote it
+    training.step()
+    other.step()
+    assert other.state().fingerprint == training.state().fingerprint
 
 
 def test_a_gradient_that_is_no_number_stops_with_the_cause_and_keeps_the_model(source):
