@@ -43,7 +43,7 @@ def effect_text(started: Sequence[int], *, gate: str) -> str:
     """In which clips regions take effect. started: Clips whose training has started."""
     if gate == "off":
         return "Without effect here: the clips of this project are trained without a gate (gate=off)."
-    text = "What is marked counts in clips whose training starts from now on."
+    text = "Marks apply to clips whose training starts from now on."
     if not started:
         return text
     names = _clip_names(sorted(started))

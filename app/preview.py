@@ -82,7 +82,7 @@ def make_cloud(
         process.start()
     try:
         while process.is_alive():
-            context.report(0.0, "from one moment, in small")
+            context.report(0.0, "from a single frame, at reduced size")
             process.join(POLL_EVERY_S)
     finally:
         if process.is_alive():

@@ -312,7 +312,7 @@ class Session:
             else:
                 self._report_fault(f"{name} cannot be opened", error)
 
-        self._jobs.start("Opening the capture", work, self._take_opened, failed)
+        self._jobs.start("Opening", work, self._take_opened, failed)
 
     def _take_opened(self, opened: Opened) -> None:
         for notice in self._refusals:  # something is open now; why something else was not is no news any more

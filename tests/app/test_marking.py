@@ -90,7 +90,7 @@ def test_window_and_command_line_keep_the_same_file(make_session, capsys):
     assert by_window.read_bytes() == text
     said = capsys.readouterr().out
     assert "static in the sphere of 2 around (0, 0, 0)" in said
-    assert "What is marked counts in clips whose training starts from now on." in said
+    assert "Marks apply to clips whose training starts from now on." in said
 
 
 def test_regions_come_back_when_the_project_is_opened_again(make_session):
@@ -221,7 +221,7 @@ def test_what_could_not_be_kept_is_not_shown_as_if_it_were(make_session, monkeyp
 def test_it_is_said_which_clips_a_mark_reaches(make_session):
     session = ready(make_session())
     session.dispatch(c.SetClipLength(3))
-    assert session.regions.effect == "What is marked counts in clips whose training starts from now on."
+    assert session.regions.effect == "Marks apply to clips whose training starts from now on."
     train_next(session)
     assert "Clip 0 has started already: it stays as it is until it is trained again." in session.regions.effect
     assert "Clips 0 to 2, 5 have started already" in effect_text([5, 0, 1, 2], gate="hull")

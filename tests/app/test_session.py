@@ -60,7 +60,7 @@ def test_what_is_not_a_capture_becomes_a_notice_and_leaves_nothing(make_session,
     session = make_session(is_open=False)
     (tmp_path / "empty").mkdir()
     session.dispatch(c.OpenCapture(tmp_path / "empty"))
-    assert [job.name for job in session.jobs] == ["Opening the capture"]
+    assert [job.name for job in session.jobs] == ["Opening"]
     poll_until(session, lambda: len(session.notices) > 0)
     assert session.notices[0].kind == "error"
     assert "not a capture" in session.notices[0].detail

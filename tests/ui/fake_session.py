@@ -132,7 +132,7 @@ class FakeSession:
         self.timeline = Timeline(self.clips, fps=capture.fps)
         self.view = OrbitView(capture.rig)
         self.regions = RegionsStatus(
-            can_mark=True, effect="What is marked counts in clips whose training starts from now on."
+            can_mark=True, effect="Marks apply to clips whose training starts from now on."
         )
 
     def dispatch(self, command: Any) -> None:

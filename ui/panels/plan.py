@@ -30,7 +30,7 @@ def draw_plan(plan: Any, dispatch: Dispatch, ui: UiState) -> None:
     _draw_settings(plan, dispatch, ui)
     imgui.end_disabled()
     if not plan.can_edit:
-        text_wrapped_dim("Settings are fixed: clips were trained with them.")
+        text_wrapped_dim("These settings can no longer change: clips have been trained with them.")
     _draw_lines(plan)
 
 
