@@ -19,7 +19,7 @@ from app.training.service import TrainingService
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
-from engine.model.clip_state import ClipState, read_clip_header, read_clip_state
+from engine.model.clip_state import ClipState, DamagedClip, look_at_clip, read_clip_state
 
 if TYPE_CHECKING:
     from engine.metrics.features_apart import Features
@@ -183,9 +183,11 @@ class TrainedProject:
         Raises:
             ProjectError: It is not trained or damaged.
         """
-        header = read_clip_header(self.project.clip_path(clip_index))
+        header = look_at_clip(self.project.clip_path(clip_index))
         if header is None:
-            raise ProjectError(f"Clip {clip_index} is not trained or damaged.", path=self.project.folder)
+            raise ProjectError(f"Clip {clip_index} is not trained.", hint="Train it first.", path=self.project.folder)
+        if isinstance(header, DamagedClip):
+            raise header.error()
         return header
 
     def load(self, clip_index: int) -> TrainedClip:

@@ -97,11 +97,7 @@ def read_facts(folder: Path, name: str, *, leave_out_damaged: bool = False) -> P
     clips = [clip for clip in found if isinstance(clip, ClipFacts)]
     damaged = tuple(clip for clip in found if isinstance(clip, DamagedClip))
     if damaged and not (clips and leave_out_damaged):
-        raise ProjectError(
-            f"The clip file is damaged or not a clip file ({damaged[0].reason}).",
-            hint="Restore it from a copy, or remove it and train the clip again.",
-            path=damaged[0].path,
-        )
+        raise damaged[0].error()
     if not clips:
         raise ProjectError(
             "Nothing is trained in this project yet.", hint="Run `clipgstream train` first.", path=folder

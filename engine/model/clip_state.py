@@ -97,11 +97,7 @@ def read_clip_state(path: Path | str) -> ClipState:
         hint = "Use the version that wrote it or train the clip again."
         raise ProjectError(f"The clip file cannot be read: {error}.", hint=hint, path=path) from error
     except _DAMAGE as error:
-        raise ProjectError(
-            f"The clip file is damaged or not a clip file ({reason_of(error)}).",
-            hint="Restore it from a copy, or remove it and train the clip again.",
-            path=path,
-        ) from error
+        raise DamagedClip(path, reason_of(error)).error() from error
     return ClipState(arrays, header)
 
 
@@ -133,6 +129,14 @@ class DamagedClip:
 
     path: Path
     reason: str
+
+    def error(self) -> ProjectError:
+        """What to raise where the clip is needed."""
+        return ProjectError(
+            f"The clip file is damaged or not a clip file ({self.reason}).",
+            hint="Restore it from a copy, or remove it and train the clip again.",
+            path=self.path,
+        )
 
 
 def look_at_clip(path: Path, *, with_arrays: bool = False) -> dict[str, Any] | DamagedClip | None:

@@ -136,11 +136,8 @@ def test_what_a_command_does_not_know_is_said_with_its_own_help(run, arguments, 
     [
         (["train", "c", "--project", "p"], "What was learned is kept; the same command goes on from there."),
         (["ablate", "c", "--project", "p"], "What was learned is kept; the same command goes on from there."),
-        (["eval", "p", "--json", "-"], "Nothing was written."),
-        (
-            ["report", "p"],
-            "The page was not written; projects that were measured to the end need not be measured again.",
-        ),
+        (["eval", "p", "--json", "-"], "The result was not written."),
+        (["report", "p"], "The page was not written."),
         (["render", "p", "--camera", "0", "--out", "o"], "A video was not written; single pictures that were finished"),
         (["inspect", "p"], ""),
         (["bench"], ""),

@@ -22,8 +22,8 @@ def takes(tmp_path: Path) -> tuple[Capture, Capture]:
     """The same cameras twice; the second take is black."""
     first = write_capture(tmp_path / "a", n_cameras=2, n_frames=2)
     second = Path(shutil.copytree(first, tmp_path / "b"))
-    for path in second.rglob("*.jpg"):
-        Image.fromarray(np.zeros((24, 32, 3), np.uint8)).save(path)
+    for index, path in enumerate(sorted(second.rglob("*.jpg"))):  # no two files alike, as in a real capture
+        Image.fromarray(np.full((24, 32, 3), index, np.uint8)).save(path, quality=95 - index)
     return open_capture(first), open_capture(second)
 
 

@@ -46,7 +46,7 @@ def test_trained_clips_are_not_trained_again(run, capture_folder, tmp_path):
     ("arguments", "expected"),
     [
         (["--clips", "0:9"], "clips 0 to 0"),
-        (["--clips", "x"], "no range A:B"),
+        (["--clips", "x"], "not a range A:B"),
         (["--clips", "1:1"], "empty or reaches outside"),
         (["--holdout", "0,99"], "no camera '99'"),
         (["--holdout", "0,1,2"], "leaves 1 for training"),

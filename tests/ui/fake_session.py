@@ -131,9 +131,7 @@ class FakeSession:
         self.opened = ProjectStatus("juggling", Path("/projects/juggling"), 1, len(self.clips))
         self.timeline = Timeline(self.clips, fps=capture.fps)
         self.view = OrbitView(capture.rig)
-        self.regions = RegionsStatus(
-            can_mark=True, effect="Marks apply to clips whose training starts from now on."
-        )
+        self.regions = RegionsStatus(can_mark=True, effect="Marks apply to clips whose training starts from now on.")
 
     def dispatch(self, command: Any) -> None:
         """Record the command; carry out what needs no worker."""

@@ -35,7 +35,7 @@ def test_the_list_needs_no_capture(run):
         (["--n-clips", "3"], "--n-clips is 3"),
         (["--reference-clip", "2"], "reference clip is 2"),
         (["--reference-clip", "1", "--n-clips", "1"], "none of the 1 clips of the ablation. Choose one from 0 to 0"),
-        (["--seed", "3"], "unrecognized arguments: --seed 3. See `clipgstream ablate --help`"),
+        (["--seed", "3"], "unrecognized arguments: --seed 3. Did you mean --seeds? See `clipgstream ablate --help`"),
         (["--variants", " , "], "--variants is ' , ', which names none"),
         (["--variants", "full,nonsense"], "no variant called nonsense"),
         (["--preset", "nonsense"], "no preset called 'nonsense'"),
