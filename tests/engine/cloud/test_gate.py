@@ -258,5 +258,5 @@ def test_regions_hold_points_and_travel_as_plain_values():
     ],
 )
 def test_what_is_no_region_is_refused(values):
-    with pytest.raises(ProjectError, match=r"no region|not finite"):
+    with pytest.raises(ProjectError, match=r"not a region|not finite"):
         parse_region(values)

@@ -207,6 +207,9 @@ def _run_beside_forbidden_pages(say: Say) -> None:
 
 
 def _build_clouds(say: Say) -> None:
+    from engine.kernels.cache import use_kernel_cache
+
+    use_kernel_cache()  # that of kernels that look at bounds: before any of them is imported
     from engine.capture.rig import CameraRig
     from engine.cloud.background import estimate_background
     from engine.cloud.consistency import check_depths
