@@ -65,7 +65,7 @@ def problems_of(project: Path) -> list[str]:
         kept_clips(project)
     except EngineError as error:
         found.append(f"the project does not open: {error}")
-    for path in (project / "checkpoints").glob("*.safetensors"):
+    for path in (project / "checkpoints").glob("[0-9]*.safetensors"):  # not what a process that still lives is writing
         try:
             read_clip_state(path)
         except EngineError as error:
