@@ -137,6 +137,8 @@ class Session:
         self._live_counts: tuple[int, int] | None = None  # anchors of the running clip, once a state was loaded
         self._is_closed = False
         self._is_preloading = is_preloading
+        self._opening: object | None = None
+        """Stands for what was asked to be opened last."""
         self._first_cloud: Job | None = None
         self._seen = self._finished_keys()
         self._look_for_recent()
@@ -292,6 +294,7 @@ class Session:
         current = None if self.project is None else self.project.folder
         recent = tuple(self.settings.recent)
         self.question = None
+        self._opening = opening = object()
 
         def work(context: JobContext) -> Opened:
             return self._opener(
@@ -305,6 +308,13 @@ class Session:
                 follow_links=follow_links,
             )
 
+        def take(opened: Opened) -> None:
+            if opening is self._opening:
+                self._take_opened(opened)
+            elif opened.project is not None:  # something else was asked for meanwhile
+                opened.project.close()
+                opened.capture.close()
+
         def failed(error: Exception) -> None:
             name = printable(path.name or str(path))
             if isinstance(error, EngineError):
@@ -312,7 +322,7 @@ class Session:
             else:
                 self._report_fault(f"{name} cannot be opened", error)
 
-        self._jobs.start("Opening", work, self._take_opened, failed)
+        self._jobs.start("Opening", work, take, failed)
 
     def _take_opened(self, opened: Opened) -> None:
         for notice in self._refusals:  # something is open now; why something else was not is no news any more

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import threading
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from app import commands as c
 from app.jobs import Jobs
+from app.opening import Opened, open_for_window
 from app.project import data_dir
 from app.questions import ProjectQuestion, RetrainQuestion
 from app.session import Session
 from app.settings import Settings
 from tests.app.conftest import inline, poll_until
-from tests.app.fakes import make_fake
+from tests.app.fakes import make_fake, write_capture
 
 
 def train_next(session: Session) -> None:
@@ -53,6 +56,26 @@ def test_recent_lists_the_project_and_how_far_it_is_trained(open_session, make_s
     again.dispatch(c.OpenProject(entry.folder))
     poll_until(again, lambda: again.capture is not None, what="the project")
     assert [state.state for state in again.clip_states] == ["trained", "untrained"]
+
+
+def test_of_two_captures_the_one_asked_for_last_is_opened_however_long_the_other_takes(tmp_path):
+    first, second = (write_capture(tmp_path / name, n_cameras=3, n_frames=2) for name in ("first", "second"))
+    go_on = threading.Event()
+
+    def opener(path: Path, **options: Any) -> Opened:
+        assert path != first or go_on.wait(20)
+        return open_for_window(path, **options)
+
+    session = Session(settings=Settings(tmp_path / "settings.json"), opener=opener, is_preloading=False)
+    session.dispatch(c.OpenCapture(first))
+    session.dispatch(c.OpenCapture(second))
+    poll_until(session, lambda: session.capture is not None, what="the second capture")
+    go_on.set()
+    poll_until(session, lambda: not session.jobs, what="the first capture")
+    assert session.capture is not None
+    assert Path(session.capture.path) == second
+    assert not list((data_dir() / "projects").glob("first-*/lock"))  # let go of
+    session.close()
 
 
 def test_a_capture_opens_the_project_that_it_was_last_trained_in_and_says_so(
