@@ -10,7 +10,6 @@ on standard error, a hang, a file opened outside of the capture, and JSON with N
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import json
@@ -18,7 +17,6 @@ import os
 import random
 import shutil
 import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -27,7 +25,7 @@ import numpy as np
 from PIL import Image
 
 from tests.faults.mutate import ODD_TEXTS, damaged_bytes, damaged_json, put_odd_file
-from tests.faults.tally import Case, Outcome, judge, run_cases, take_outside, watch_files
+from tests.faults.tally import Case, Outcome, fuzz_main, judge, take_outside, watch_files
 
 SIZE = (48, 32)
 N_FRAMES = 4
@@ -272,27 +270,5 @@ def _refuse(text: str) -> float:
     raise ValueError(f"{text} is not JSON")
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Run cases and print each fault and the result in one line. Returns 1 when there was a fault."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else None)
-    parser.add_argument("--cases", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--first", type=int, default=0, help="index of the first case")
-    options = parser.parse_args(argv)
-    with tempfile.TemporaryDirectory() as folder:
-        tally = run_cases(
-            f"fuzz_capture seed {options.seed}",
-            run_case,
-            n_cases=options.cases,
-            seed=options.seed,
-            work_dir=Path(folder),
-            first=options.first,
-        )
-    for outcome in tally.faults:
-        print(f"{outcome.verdict}: {outcome.what}: {outcome.detail}")
-    print(tally.line())
-    return 1 if tally.faults else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(fuzz_main("fuzz_capture", __doc__ or "", run_case))

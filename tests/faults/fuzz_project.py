@@ -11,7 +11,6 @@ what was written although the file has a checksum. A file without one can only b
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import json
@@ -19,9 +18,7 @@ import os
 import random
 import shutil
 import sys
-import tempfile
 import zlib
-from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -29,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from tests.faults.mutate import damaged_bytes, damaged_json, put_odd_file
-from tests.faults.tally import Case, Outcome, judge, run_cases, start_memory, take_outside, watch_files
+from tests.faults.tally import Case, Outcome, fuzz_main, judge, start_memory, take_outside, watch_files
 
 N_FRAMES = 4
 BACKGROUNDS_KEY = {"capture": "none", "cameras": ["a", "b"], "size": [13, 6], "frames": 5, "is_corrected": True}
@@ -346,29 +343,5 @@ def _is_as_written(name: str, found: Any) -> bool:
     return bool(_plain(found) == _good[name])
 
 
-def main(argv: list[str] | None = None) -> int:
-    """Run cases and print each fault and the result in one line. Returns 1 when there was a fault."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0] if __doc__ else None)
-    parser.add_argument("--cases", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--first", type=int, default=0, help="index of the first case")
-    options = parser.parse_args(argv)
-    with tempfile.TemporaryDirectory() as folder:
-        tally = run_cases(
-            f"fuzz_project seed {options.seed}",
-            run_case,
-            n_cases=options.cases,
-            seed=options.seed,
-            work_dir=Path(folder),
-            first=options.first,
-        )
-    for outcome in tally.faults:
-        print(f"{outcome.verdict}: {outcome.what}: {outcome.detail}")
-    kinds = Counter(outcome.what.partition(":")[0] for outcome in tally.outcomes)
-    print(", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items())))
-    print(tally.line())
-    return 1 if tally.faults else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(fuzz_main("fuzz_project", __doc__ or "", run_case))

@@ -6,9 +6,11 @@ used for many cases; one that hangs is killed and its process replaced. Opened f
 
 from __future__ import annotations
 
+import argparse
 import multiprocessing
 import os
 import sys
+import tempfile
 import time
 import traceback
 from collections import Counter
@@ -239,3 +241,31 @@ def _status(key: str) -> int:
         if line.startswith(key):
             return int(line.split()[1]) * 1024
     return 0
+
+
+def fuzz_main(name: str, description: str, run_case: RunCase) -> int:
+    """The command line of a script that damages things: prints each fault, what was damaged, and one line of results.
+
+    Returns:
+        The exit code: 1 when there was a fault.
+    """
+    parser = argparse.ArgumentParser(description=description.partition("\n")[0])
+    parser.add_argument("--cases", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="index of the first case")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        tally = run_cases(
+            f"{name} seed {options.seed}",
+            run_case,
+            n_cases=options.cases,
+            seed=options.seed,
+            work_dir=Path(folder),
+            first=options.first,
+        )
+    for outcome in tally.faults:
+        print(f"{outcome.verdict}: {outcome.what}: {outcome.detail}")
+    kinds = Counter(outcome.what.partition(":")[0] for outcome in tally.outcomes)
+    print(", ".join(f"{n} {kind}" for kind, n in sorted(kinds.items())))
+    print(tally.line())
+    return 1 if tally.faults else 0
