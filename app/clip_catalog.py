@@ -102,11 +102,6 @@ class ClipCatalog:
         return self._records[clip_index]
 
     @property
-    def goes_on(self) -> bool:
-        """Whether clips begin with what the clip before has learned."""
-        return self._goes_on
-
-    @property
     def n_trained(self) -> int:
         """Clips that are finished, readable and up to date."""
         return self._n_trained

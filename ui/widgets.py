@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from imgui_bundle import ImVec2, ImVec4, imgui
@@ -60,30 +61,26 @@ def chip(draw: Any, x: float, y: float, text: str, *, color: theme.Color = theme
 
 def elided(text: str, width: float) -> str:
     """The text, or as much of its beginning as fits into a width, with three dots."""
+    return _longest_fit(text, width, lambda n: f"{text[:n].rstrip()}...")
+
+
+def elided_path(path: str, width: float) -> str:
+    """The path, or as much of its end as fits into a width: the last folders tell most."""
+    return _longest_fit(path, width, lambda n: f"...{path[len(path) - n :]}")
+
+
+def _longest_fit(text: str, width: float, cut: Callable[[int], str]) -> str:
+    """The text if it fits, otherwise its longest cut that does; `cut` leaves that many characters."""
     if imgui.calc_text_size(text).x <= width:
         return text
     fits, too_long = 0, len(text)
     while too_long - fits > 1:
         middle = (fits + too_long) // 2
-        if imgui.calc_text_size(f"{text[:middle].rstrip()}...").x <= width:
+        if imgui.calc_text_size(cut(middle)).x <= width:
             fits = middle
         else:
             too_long = middle
-    return f"{text[:fits].rstrip()}..."
-
-
-def elided_path(path: str, width: float) -> str:
-    """The path, or as much of its end as fits into a width: the last folders tell most."""
-    if imgui.calc_text_size(path).x <= width:
-        return path
-    too_long, fits = 0, len(path)
-    while fits - too_long > 1:
-        middle = (fits + too_long) // 2
-        if imgui.calc_text_size(f"...{path[middle:]}").x <= width:
-            fits = middle
-        else:
-            too_long = middle
-    return f"...{path[fits:]}"
+    return cut(fits)
 
 
 def format_count(number: int) -> str:
