@@ -139,20 +139,15 @@ class DamagedClip:
         )
 
 
-def look_at_clip(path: Path, *, with_arrays: bool = False) -> dict[str, Any] | DamagedClip | None:
+def look_at_clip(path: Path) -> dict[str, Any] | DamagedClip | None:
     """Header of a clip, checkpoint or snapshot; None when there is no such file, the reason when it cannot be read.
 
-    Args:
-        with_arrays: Compare the arrays with their checksums too, which reads the whole file.
+    Damage of arrays shows when they are read: `read_clip_state`.
     """
     try:
-        if with_arrays:
-            return read_clip_state(path).header
         return _header_of(read_clip_metadata(path)[0])
     except FileNotFoundError:
         return None
-    except ProjectError as error:
-        return DamagedClip(path, reason_of(error.__cause__ or error)) if path.exists() else None
     except _DAMAGE as error:
         return DamagedClip(path, reason_of(error))
 

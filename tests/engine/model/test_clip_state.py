@@ -78,7 +78,8 @@ def test_missing_and_damaged_are_told_apart(tmp_path):
     assert read_clip_header(path) is None
     path.write_bytes(good[:-1] + bytes([good[-1] ^ 1]))
     assert look_at_clip(path) == make_state().header
-    assert look_at_clip(path, with_arrays=True) == DamagedClip(path, "the numbers of b do not fit their checksum")
+    with pytest.raises(ProjectError, match="the numbers of b do not fit their checksum"):
+        read_clip_state(path)
     path.unlink()
     os.mkfifo(path)
     assert look_at_clip(path) == DamagedClip(path, "it is a pipe or a device, not a file")
