@@ -6,7 +6,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from engine.cloud.regions import GateRegion
+from engine.gate.regions import GateRegion
 
 OVERLAY_NAMES = ("show_frusta", "show_inherited", "show_residual", "show_points", "show_cloud", "show_regions")
 COMPARE_MODES = ("off", "wipe", "side")

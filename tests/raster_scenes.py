@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from app.bench.scenes import Scene, camera, gaussians_of, layered_scene, simple_scene
+from app.lab.bench.scenes import Scene, camera, gaussians_of, layered_scene, simple_scene
 from engine.raster import Gaussians
 
 __all__ = ["Scene", "camera", "gaussians_of", "gradient", "gradients", "layered_scene", "simple_scene"]

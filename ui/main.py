@@ -11,11 +11,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.arguments import COMMANDS, PlainParser, add_follow_links, parse, path_argument, suggestion
-from app.logs import PrintableFormatter, start_logging
+from app.background.logs import PrintableFormatter, start_logging
+from app.cli.arguments import COMMANDS, PlainParser, add_follow_links, parse, path_argument, suggestion
 from engine.assets import asset_path
 from engine.kernels.cache import use_kernel_cache
-from ui.ui_scale import parse_scale
+from ui.style.ui_scale import parse_scale
 
 DEMO = {"demo": "train the first two clips and leave figures, a picture of the window and a video"}
 SWITCH_INTERVAL_S = 0.0005
@@ -75,7 +75,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
     if arguments and arguments[0] in COMMANDS:
-        from app.cli import main as run_command
+        from app.cli.cli import main as run_command
 
         return int(run_command(arguments) or 0)
     if arguments and arguments[0] == "demo":
@@ -109,7 +109,7 @@ def _mistyped_command(arguments: Sequence[str]) -> str:
 
 
 def _run_demo(options: argparse.Namespace) -> int:
-    from ui.demo import run_demo
+    from ui.shell.demo import run_demo
 
     return run_demo(options.path or asset_path("sample"), options.out, quick=options.quick)
 
@@ -126,12 +126,12 @@ def _run_window(options: argparse.Namespace) -> int:
 
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     pyglet.options.shadow_window = False  # no hidden second context
-    # Sizes are pixels of the screen, of which ui.ui_scale makes units; on macOS they are the system's points.
+    # Sizes are pixels of the screen, of which ui.style.ui_scale makes units; on macOS they are the system's points.
     pyglet.options.dpi_scaling = "stretch" if sys.platform == "darwin" else "real"
-    from app.commands import OpenCapture
-    from app.session import Session
-    from app.window_memory import read_window_memory
-    from ui.window import StudioWindow
+    from app.session.commands import OpenCapture
+    from app.session.session import Session
+    from app.session.window_memory import read_window_memory
+    from ui.shell.window import StudioWindow
 
     width, height = options.size or (None, None)
     memory = read_window_memory()

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from app.kernels import warm_up_reporting
-from app.project import Project, open_project
+from app.background.kernels import warm_up_reporting
+from app.project.project import Project, open_project
 from app.training.interface import Training
 from app.training.messages import TrainJob
 from engine.capture.capture import open_capture
+from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.errors import ProjectError
-from engine.model.clip_state import ClipState, read_clip_state
+from engine.progress import Progress, ReportProgress
 from engine.training.config import TrainConfig
-from engine.training.report import Progress, ReportProgress
 
 
 def build_training(job: TrainJob, report: ReportProgress) -> Training:

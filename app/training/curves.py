@@ -8,8 +8,8 @@ from collections import OrderedDict
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from app.latest import LatestWorker
-from app.project_files import read_metrics
+from app.background.latest import LatestWorker
+from app.project.project_files import read_metrics
 
 Points = list[tuple[int, float]]
 """(step, value)."""

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Protocol
 
 from app.training.messages import TrainJob
-from engine.model.clip_state import ClipState
-from engine.model.compact import CompactClip
-from engine.training.report import ReportProgress, StepStats
+from engine.clip_files.clip_state import ClipState
+from engine.clip_files.compact import CompactClip
+from engine.progress import ReportProgress, StepStats
 
 
 class Training(Protocol):

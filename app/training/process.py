@@ -6,9 +6,9 @@ import multiprocessing
 from contextlib import suppress
 from typing import Protocol
 
-from app.children import undisturbed
-from app.logs import tail
-from app.project import Project
+from app.background.children import undisturbed
+from app.background.logs import tail
+from app.project.project import Project
 from app.training.build import build_training
 from app.training.interface import MakeTraining
 from app.training.messages import ENDINGS, Command, Event, Stop, TrainJob, WorkerDied, decode, encode

@@ -16,9 +16,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from app.memory import peak_bytes
-from app.project import Project, open_project
-from app.project_files import read_metrics
+from app.background.memory import peak_bytes
+from app.project.project import Project, open_project
+from app.project.project_files import read_metrics
 from app.training.interface import MakeTraining, Training
 from app.training.keeping import FolderWatch, ProjectGone, Refusals, Retries
 from app.training.messages import (
@@ -44,12 +44,12 @@ from app.training.messages import (
 from app.training.rate import Rate
 from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
 from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch, stages_of
+from engine.clip_files.clip_state import read_clip_header
+from engine.clip_files.compact import CompactClip
 from engine.errors import DiskError, EngineError, NonFiniteLoss, ProjectError
-from engine.json_files import checked_line
-from engine.model.clip_state import read_clip_header
-from engine.model.compact import CompactClip
-from engine.training.report import Progress, StepStats
-from engine.training.stages import remove_stages
+from engine.progress import Progress, StepStats
+from engine.storage.json_files import checked_line
+from engine.training.preparation.stages import remove_stages
 
 logger = logging.getLogger(__name__)
 

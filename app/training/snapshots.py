@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from app.training.messages import SnapshotWritten
+from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
+from engine.clip_files.compact import CompactClip, write_compact_clip
 from engine.errors import DiskError, ProjectError
-from engine.files import disk_error, replace_file
-from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
-from engine.model.compact import CompactClip, write_compact_clip
+from engine.storage.files import disk_error, replace_file
 
 
 class Cadence:

@@ -14,9 +14,9 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from app.kernels import use_threads
-from app.logs import FORMAT, PrintableFormatter
-from app.priority import lower_process
+from app.background.kernels import use_threads
+from app.background.logs import FORMAT, PrintableFormatter
+from app.background.priority import lower_process
 from app.training.interface import MakeTraining
 from app.training.messages import Command, Event, TrainJob, decode, encode
 from app.training.run import TrainingRun

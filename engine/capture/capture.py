@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.capture.checks import raise_problems
+from engine.camera.rig import CameraRig
+from engine.capture.folder_contents import MAX_LOOKED_AT, folder_contents
+from engine.capture.format_checks import raise_problems
+from engine.capture.format_result import Layout
 from engine.capture.formats import panoptic, sample
 from engine.capture.frames import FrameStore
-from engine.capture.layout import Layout
-from engine.capture.rig import CameraRig
 from engine.capture.rig_checks import check_rig, rig_extent, rig_warnings
-from engine.capture.seen import MAX_LOOKED_AT, folder_contents
 from engine.errors import CaptureError
 
 logger = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 
 from engine.errors import CaptureError
-from engine.files import open_regular
+from engine.storage.files import open_regular
 
 SAMPLE_BYTES = 64 << 10
 """Read at the beginning, the middle and the end of a file."""

@@ -27,7 +27,7 @@ from engine.capture.media import (
     shown_pts,
 )
 from engine.errors import CaptureError
-from engine.files import open_regular
+from engine.storage.files import open_regular
 
 MAX_FORWARD_DECODE = 64
 """Frames decoded forward before a seek is considered cheaper even inside one group of pictures."""

@@ -22,7 +22,7 @@ from PIL import Image
 
 from engine.capture.limits import MAX_PIXELS
 from engine.errors import CaptureError
-from engine.files import check_regular, open_regular
+from engine.storage.files import check_regular, open_regular
 
 END_BYTES = 64
 """Bytes at the end of an image file searched for its end marker; some writers pad behind it."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.capture.rig import CameraRig
+from engine.camera.rig import CameraRig
 from engine.errors import CaptureError
 
 NEAR_TWIN_SHARE = 1e-3

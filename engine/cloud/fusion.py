@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from engine.cloud.parallel import n_workers
 from engine.cloud.voxel import voxel_means
+from engine.parallel import n_workers
 
 logger = logging.getLogger(__name__)
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.capture.rig import CameraRig
-from engine.cloud.background import estimate_background
-from engine.cloud.consistency import check_depths
-from engine.cloud.gate import measure_gate
-from engine.cloud.hull import Grid, carve, hull_colors, hull_visibility
-from engine.cloud.image_filters import dilate
-from engine.cloud.masks import motion_mask
-from engine.cloud.projection import projection_matrices
-from engine.cloud.smoothing import smooth_inverse_depth
-from engine.cloud.sweep import matching_costs
+from engine.camera.projection import projection_matrices
+from engine.camera.rig import CameraRig
+from engine.cloud.background.background import estimate_background
+from engine.cloud.background.masks import motion_mask
+from engine.cloud.motion.hull import Grid, carve, hull_colors, hull_visibility
+from engine.cloud.stereo.consistency import check_depths
+from engine.cloud.stereo.smoothing import smooth_inverse_depth
+from engine.cloud.stereo.sweep import matching_costs
+from engine.gate.image_gate import measure_gate
+from engine.images.image_filters import dilate
 
 _SIZE_PX = 16
 

@@ -16,12 +16,12 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from engine.cloud.reasons import NO_REASON
+from engine.clip_files.clip_state import ClipState
 from engine.errors import ProjectError
+from engine.gate.reasons import NO_REASON
 from engine.model.anchors import AnchorSet
-from engine.model.clip_state import ClipState
+from engine.model.decode.decoding import ChosenAnchors, decode_anchors
 from engine.model.decoder import Decoder
-from engine.model.decoding import ChosenAnchors, decode_anchors
 from engine.model.field import FieldShape, SpatioTemporalField
 from engine.model.grid import CornerTable
 from engine.model.roles import ROLES
@@ -49,7 +49,7 @@ class AnchorView:
         inherited_is_dynamic: Likewise. [A0] bool
         own_roles: Role of each own anchor, in engine.model.roles.ROLES. [A] uint8
         inherited_roles: Likewise. [A0] uint8
-        own_reasons: Why the gate decided so, a code of engine.cloud.reasons. [A] uint8
+        own_reasons: Why the gate decided so, a code of engine.gate.reasons. [A] uint8
         inherited_reasons: Likewise. [A0] uint8
     """
 

@@ -7,7 +7,7 @@ its own, or all knots share one table, as in the published 4D hash: the hash is 
 the entry at a knot is that of space XOR a key of that knot and level (`time_keys`), and the corners stay constants.
 
 Letters: n rows, L levels, T entries per level, C channels. `encode` is plain torch; the fused decode has it as a kernel
-(engine.model.cpu.grid_kernels).
+(engine.model.decode.cpu.grid_kernels).
 """
 
 from __future__ import annotations

@@ -7,9 +7,9 @@ import torch
 
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
+from engine.model.decode.joining import join_frozen
 from engine.model.decoder import Decoder
 from engine.model.field import FieldShape, SpatioTemporalField
-from engine.model.joining import join_frozen
 
 
 def warm_up() -> None:

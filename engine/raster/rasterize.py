@@ -8,12 +8,12 @@ from typing import Literal, Protocol
 import torch
 from torch import Tensor
 
-from engine.checks import require_tensor
+from engine.argument_checks import require_tensor
 from engine.raster.cpu.backend import rasterize_cpu
 from engine.raster.gaussians import Gaussians
+from engine.raster.pinhole_view import PinholeView, n_tiles, pinhole_views
 from engine.raster.reference import rasterize_reference
 from engine.raster.rendering import Rendering
-from engine.raster.view import PinholeView, n_tiles, pinhole_views
 
 BackendName = Literal["auto", "cpu", "reference"]
 

@@ -16,8 +16,8 @@ from torch.utils.checkpoint import checkpoint
 from engine.conventions import ALPHA_MAX, ALPHA_MIN, EPS2D_PX2, TRANSMITTANCE_MIN
 from engine.raster.gaussians import Gaussians
 from engine.raster.limits import EXTENT_MAX_PX, QUAT_NORM_SQUARED_MAX, QUAT_NORM_SQUARED_MIN, VALUE_MAX
+from engine.raster.pinhole_view import TILE_PX, PinholeView
 from engine.raster.rendering import Rendering
-from engine.raster.view import TILE_PX, PinholeView
 
 _PAIRS_PER_STRIP = 1 << 22
 """Gaussian-pixel pairs evaluated at once: 32 MiB per float64 intermediate."""

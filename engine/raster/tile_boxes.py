@@ -12,12 +12,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from engine.checks import require_tensor
+from engine.argument_checks import require_tensor
 from engine.raster.cpu.tile_boxes import covered_tiles, meeting_rows, tile_boxes_cpu
 from engine.raster.gaussians import Gaussians
+from engine.raster.pinhole_view import TILE_PX, PinholeView, n_tiles, pinhole_views
 from engine.raster.rasterize import check_gaussians
 from engine.raster.reference import drawable_rows, pixel_boxes, project
-from engine.raster.view import TILE_PX, PinholeView, n_tiles, pinhole_views
 
 
 @dataclass(frozen=True, slots=True)

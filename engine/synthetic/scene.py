@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engine.capture.rig import CameraRig
+from engine.camera.rig import CameraRig
 from engine.synthetic import meshes, textures
 from engine.synthetic.meshes import Mesh
 from engine.synthetic.textures import Texture

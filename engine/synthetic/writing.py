@@ -19,7 +19,7 @@ from typing import Any
 import av
 import numpy as np
 
-from engine.files import atomic_path
+from engine.storage.files import atomic_path
 from engine.synthetic.raycast import SceneCamera, make_truth
 from engine.synthetic.scene import SAMPLE_CAMERAS, SyntheticScene, make_scene
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.errors import ProjectError
-from engine.json_files import parse_object
-from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
-from engine.training.preparation import Backgrounds
+from engine.storage.json_files import parse_object
+from engine.training.preparation.cloud_preparation import Backgrounds
 
 
 @dataclass(frozen=True, slots=True)

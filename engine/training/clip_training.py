@@ -14,37 +14,37 @@ import numpy as np
 import torch
 from torch import nn
 
+from engine.camera.depth_range import near_plane
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.cloud.gains import in_gauge
-from engine.cloud.range import near_plane
-from engine.cloud.regions import GateRegion
+from engine.clip_files.clip_header import SCHEMA
+from engine.clip_files.clip_state import ClipState
+from engine.clip_files.compact import CompactClip, compact_clip
+from engine.cloud.background.gains import in_gauge
 from engine.errors import NonFiniteLoss, PreparationError, ProjectError
-from engine.metrics.psnr import psnr
-from engine.model.clip_header import SCHEMA
+from engine.gate.regions import GateRegion
+from engine.images.psnr import psnr
 from engine.model.clip_model import ClipModel, decoder_sizes, load_clip_model
-from engine.model.clip_state import ClipState
-from engine.model.compact import CompactClip, compact_clip
-from engine.model.view import REACH_SPACINGS, View, render_gaussians, render_model
-from engine.training.active_tiles import ActivePicture, ActiveTiles
-from engine.training.building import merged
+from engine.model.clip_view import REACH_SPACINGS, View, render_gaussians, render_model
+from engine.progress import Progress, ReportProgress, StepStats
 from engine.training.checkpoint import Checkpoint, Place, damaged_checkpoint, read_checkpoint, write_checkpoint
-from engine.training.clip_field import n_alive
-from engine.training.clip_preparation import ClipParts, ClipPreparation
 from engine.training.config import TrainConfig
-from engine.training.demotion import demote
-from engine.training.fused_loss import LossWorkspace
-from engine.training.half_size import HalfSize
-from engine.training.held_in import MEASURE_EVERY, Patience, held_in_items, steps_to_finish
-from engine.training.losses import photometric_loss
-from engine.training.optimizer import PhaseOptimizer, named_parameters
-from engine.training.order import ErrorOrder, Order, ShuffledOrder
+from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters
 from engine.training.phases import phase_at, phases_of
-from engine.training.pictures import shared_image_size
-from engine.training.report import Progress, ReportProgress, StepStats
-from engine.training.sight import Sight, camera_views
-from engine.training.stopping import gradient_not_finite, loss_not_finite
-from engine.training.volume import volume_sum
+from engine.training.preparation.building import merged
+from engine.training.preparation.clip_field import n_alive
+from engine.training.preparation.clip_preparation import ClipParts, ClipPreparation
+from engine.training.preparation.training_pictures import shared_image_size
+from engine.training.step.active_tiles import ActivePicture, ActiveTiles
+from engine.training.step.demotion import demote
+from engine.training.step.early_stopping import MEASURE_EVERY, Patience, held_in_items, steps_to_finish
+from engine.training.step.fused_loss import LossWorkspace
+from engine.training.step.half_size import HalfSize
+from engine.training.step.losses import photometric_loss
+from engine.training.step.nonfinite import gradient_not_finite, loss_not_finite
+from engine.training.step.order import ErrorOrder, Order, ShuffledOrder
+from engine.training.step.visible_anchors import Sight, camera_views
+from engine.training.step.volume import volume_sum
 
 
 class ClipTraining:

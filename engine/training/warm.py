@@ -13,9 +13,9 @@ def warm_up() -> None:
     About ten seconds of one core when nothing is cached (holding the interpreter lock), a tenth of a second after, plus
     half a second if these are the first kernels of the process.
     """
-    from engine.training.adam import make_adam
-    from engine.training.losses import photometric_loss
-    from engine.training.tile_squares import tile_squares
+    from engine.training.optimizer.adam import make_adam
+    from engine.training.step.losses import photometric_loss
+    from engine.training.step.tile_squares import tile_squares
 
     image, gain = nn.Parameter(torch.full((8, 8, 3), 0.5)), nn.Parameter(torch.ones(3))
     truth = np.zeros((8, 8, 3), np.uint8)

@@ -9,17 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from app.bench import speed
-from app.cli import main
-from app.commands import OpenCapture
-from app.project import Project
-from app.session import Session
-from app.settings import Settings
-from app.training.inline import InlineWorker
+from app.cli.cli import main
+from app.plan import speed
+from app.project.project import Project
+from app.session.commands import OpenCapture
+from app.session.session import Session
+from app.session.settings import Settings
 from app.training.interface import MakeTraining
 from app.training.messages import TrainJob
-from engine.training.forecasting import MachineSpeed
+from engine.training.plan.forecasting import MachineSpeed
 from tests.app.fakes import make_fake, write_capture
+from tests.app.inline_worker import InlineWorker
 
 DEADLINE_S = 30.0
 

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from app.project import open_project
+from app.project.project import open_project
 from app.training.messages import TrainJob
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip
+from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
+from engine.clip_files.compact import CompactClip, compact_clip
 from engine.errors import NonFiniteLoss, ProjectError
-from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
-from engine.model.compact import CompactClip, compact_clip
-from engine.training.report import Progress, StepStats
+from engine.progress import Progress, StepStats
 
 N_STEPS = 6
 N_ANCHORS = 12

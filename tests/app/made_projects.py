@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from app.project import Project, ProjectSettings, create_project
-from engine.model.clip_state import ClipState, write_clip_state
+from app.project.project import Project, ProjectSettings, create_project
+from engine.clip_files.clip_state import ClipState, write_clip_state
 
 
 def clip_header(clip_index: int, **entries: Any) -> dict[str, Any]:

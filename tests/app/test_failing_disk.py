@@ -17,8 +17,8 @@ import pytest
 from app.training import keeping
 from app.training import messages as m
 from app.training.messages import Pause, SnapshotConsumed, Stop
+from engine.clip_files.clip_state import read_clip_state
 from engine.errors import CaptureError
-from engine.model.clip_state import read_clip_state
 from tests.app.fakes import make_fake
 from tests.app.test_run import Bench
 

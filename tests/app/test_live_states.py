@@ -5,10 +5,10 @@ import logging
 import numpy as np
 import pytest
 
-from app import commands as c
+from app.session import commands as c
 from app.training import run
+from engine.clip_files.clip_state import read_clip_state
 from engine.model.clip_model import load_clip_model
-from engine.model.clip_state import read_clip_state
 from tests.app.conftest import poll_until
 from tests.app.fakes import DECODER, HEADS, N_ANCHORS, make_slow
 
@@ -47,7 +47,7 @@ def test_the_states_of_the_fake_training_are_those_of_a_clip(make_session):
 
 def test_a_live_state_is_shown_and_given_back(live_session, caplog):
     session = live_session
-    caplog.set_level(logging.INFO, logger="app.session")
+    caplog.set_level(logging.INFO, logger="app.session.session")
     shown = []
 
     def is_another_shown() -> bool:

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from app.arguments import suggestion
+from app.cli.arguments import suggestion
+from app.cli.printable_stream import PrintableStream
 from app.csv_text import csv_text
-from app.printable_stream import PrintableStream
-from app.project import create_project, default_settings
+from app.project.project import create_project, default_settings
 from engine.capture.capture import open_capture
 from ui import main as ui_main
 
@@ -115,7 +115,7 @@ def test_a_camera_name_cannot_command_the_terminal(capture_folder, tmp_path):
 
     shutil.copytree(capture_folder, tmp_path / "c\x1b[31m\udcff")
     done = subprocess.run(
-        [sys.executable, "-c", "from app.cli import main; import sys; sys.exit(main(sys.argv[1:]))", "inspect",
+        [sys.executable, "-c", "from app.cli.cli import main; import sys; sys.exit(main(sys.argv[1:]))", "inspect",
          tmp_path / "c\x1b[31m\udcff"],
         cwd=ROOT, capture_output=True, check=False,
     )  # fmt: skip

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app import commands as c
-from app.cli import main
-from app.evaluation import boundary_maps
-from app.headless import open_trained
-from app.project import open_project
-from app.session import Session
-from app.settings import Settings
+from app.cli.cli import main
+from app.evaluation.evaluation import boundary_maps
+from app.evaluation.headless import open_trained
+from app.project.project import open_project
+from app.session import commands as c
+from app.session.session import Session
+from app.session.settings import Settings
 from engine.assets import asset_path
 from engine.capture.capture import open_capture
 from tests.app.conftest import poll_until

@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.project import create_project, default_settings
-from app.project_files import read_metrics
+from app.project.project import create_project, default_settings
+from app.project.project_files import read_metrics
 from app.training import messages as m
 from app.training.rate import Rate
 from app.training.run import CHECKPOINT_EVERY_S, TrainingRun
 from app.training.snapshots import Cadence, keep_clip
 from engine.capture.capture import open_capture
+from engine.clip_files.clip_state import ClipState, read_clip_state
+from engine.clip_files.compact import compact_clip
 from engine.errors import NonFiniteLoss, ProjectError
-from engine.model.clip_state import ClipState, read_clip_state
-from engine.model.compact import compact_clip
-from engine.training.report import Progress
+from engine.progress import Progress
 from tests.app.fakes import make_fake
 
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from app import commands as c
-from app.jobs import Jobs
-from app.opening import Opened, open_for_window
-from app.project import data_dir
-from app.questions import ProjectQuestion, RetrainQuestion
-from app.session import Session
-from app.settings import Settings
+from app.background.jobs import Jobs
+from app.project.opening import Opened, open_for_window
+from app.project.project import data_dir
+from app.session import commands as c
+from app.session.questions import ProjectQuestion, RetrainQuestion
+from app.session.session import Session
+from app.session.settings import Settings
 from tests.app.conftest import inline, poll_until
 from tests.app.fakes import make_fake, write_capture
 

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from engine.training import stillness
+from engine.training.plan import stillness
 
 
 def test_a_plan_is_printed_and_nothing_is_made(run, capture_folder, tmp_path):

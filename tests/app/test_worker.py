@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from app import commands as c
+from app.session import commands as c
 from app.training.process import ProcessWorker
 from app.training.worker import n_training_threads
+from engine.clip_files.clip_state import read_clip_state
 from engine.conventions import SPIN_COUNT
 from engine.kernels.cache import kernel_folder
-from engine.model.clip_state import read_clip_state
 from tests.app.conftest import poll_until
 from tests.app.fakes import N_STEPS, make_crashing, make_fake, make_slow, make_telling
 
@@ -92,7 +92,7 @@ def test_closing_ends_the_process_and_keeps_what_it_learned(make_session):
 PARENT = """
 import os, sys
 from pathlib import Path
-from app.project import create_project, default_settings
+from app.project.project import create_project, default_settings
 from app.training.messages import StepReported, TrainJob
 from app.training.process import ProcessWorker
 from engine.capture.capture import open_capture

@@ -9,8 +9,8 @@ scenes called "heads" have no dynamic feature: what is missing there is the hash
 
 from __future__ import annotations
 
-from app.bench.field import SCENES
-from app.bench.suite import Plan
+from app.lab.bench.field import SCENES
+from app.lab.bench.suite import Plan
 from tests.benchmarks.options import make_parser, names, run
 
 

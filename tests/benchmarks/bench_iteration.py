@@ -9,8 +9,8 @@ and half of its anchors static and frozen. Stages are cut apart at their boundar
 
 from __future__ import annotations
 
-from app.bench.iteration import SIZES
-from app.bench.suite import Plan
+from app.lab.bench.iteration import SIZES
+from app.lab.bench.suite import Plan
 from tests.benchmarks.options import make_parser, names, run
 
 

@@ -25,14 +25,14 @@ from scipy import ndimage
 from skimage.metrics import peak_signal_noise_ratio
 from torchmetrics.functional.image import multiscale_structural_similarity_index_measure
 
-from app.kernels import use_threads
+from app.background.kernels import use_threads
 from engine.assets import asset_path
 from engine.capture.capture import open_capture
-from engine.metrics.flip import flip_map
-from engine.metrics.picture import CHOICES, measure_picture
-from engine.metrics.psnr import psnr
-from engine.metrics.similarity import dssim_ms, ssim
-from engine.training.losses import ssim_map
+from engine.images.psnr import psnr
+from engine.metrics.pictures.flip import flip_map
+from engine.metrics.pictures.picture import CHOICES, measure_picture
+from engine.metrics.pictures.similarity import dssim_ms, ssim
+from engine.training.step.losses import ssim_map
 
 
 class Compared(NamedTuple):

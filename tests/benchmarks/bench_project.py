@@ -35,7 +35,7 @@ CALL_TARGET_MS = 100.0
 
 def make(folder: Path, n_clips: int, n_rows: int) -> Path:
     """A capture of one frame per clip, and a project of it in which every clip is trained. Returns the project."""
-    from app.project import PROJECT_FILE, default_settings
+    from app.project.project import PROJECT_FILE, default_settings
     from engine.capture.capture import open_capture
     from tests.app.fakes import write_capture
     from tests.app.made_projects import make_chain
@@ -73,11 +73,11 @@ class Calls:
 
 def measure(folder: Path, n_clips: int) -> tuple[float, Calls]:
     """Open the project and use it. Returns seconds until all states are there, and the calls."""
-    from app import commands
-    from app.session import Session
-    from app.settings import Settings
+    from app.session import commands
+    from app.session.session import Session
+    from app.session.settings import Settings
     from ui.main import SWITCH_INTERVAL_S
-    from ui.window import StudioWindow
+    from ui.shell.window import StudioWindow
 
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     calls = Calls()

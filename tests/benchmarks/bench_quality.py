@@ -24,18 +24,18 @@ from PIL import Image
 
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips
+from engine.clip_files.clip_state import ClipState
+from engine.images.psnr import psnr
 from engine.kernels.threads import configure_threads
-from engine.metrics.evaluate import evaluate_clip
-from engine.metrics.psnr import psnr
-from engine.metrics.summary import means
+from engine.metrics.clips.evaluate import evaluate_clip
+from engine.metrics.clips.summary import means
 from engine.model.clip_model import load_clip_model
-from engine.model.clip_state import ClipState
-from engine.model.view import REACH_SPACINGS, View, render_model
+from engine.model.clip_view import REACH_SPACINGS, View, render_model
+from engine.progress import Progress
 from engine.synthetic.raycast import make_truth
 from engine.synthetic.scene import make_scene
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig, parse_overrides
-from engine.training.report import Progress
 from tests.benchmarks.options import ending_on_bad_input
 
 COLUMNS = (

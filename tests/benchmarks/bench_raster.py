@@ -11,8 +11,8 @@ Gaussian) evaluations; the limit is that of the multiply-add ports, measured bef
 
 from __future__ import annotations
 
-from app.bench.scenes import RECIPES
-from app.bench.suite import Plan
+from app.lab.bench.scenes import RECIPES
+from app.lab.bench.suite import Plan
 from tests.benchmarks.options import make_parser, names, run
 
 

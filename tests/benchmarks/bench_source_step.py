@@ -21,9 +21,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from app.ablation.variants import variant_called
-from app.bench.timing import Timing, interleaved
-from app.kernels import use_threads
+from app.background.kernels import use_threads
+from app.lab.ablation.variants import variant_called
+from app.lab.bench.timing import Timing, interleaved
 from engine.assets import asset_path
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips

@@ -43,8 +43,8 @@ def measure_here(seconds: float) -> list[float]:
     """Milliseconds of every step of the loop in this process."""
     import torch
 
-    from app.bench.scenes import layered_scene
-    from app.kernels import use_threads
+    from app.background.kernels import use_threads
+    from app.lab.bench.scenes import layered_scene
     from engine.raster import Gaussians, rasterize
 
     use_threads(None)

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from app.bench.suite import Plan, document, run_plan
-from app.bench.table import report_text
+from app.lab.bench.suite import Plan, document, run_plan
+from app.lab.bench.table import report_text
 from engine.errors import EngineError
 
 

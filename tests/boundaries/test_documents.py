@@ -34,7 +34,7 @@ def tree_of(text: str) -> set[str]:
 
 
 def shortcut_rows() -> list[tuple[str, str]]:
-    """(key, text) of every row of the table in ui/shortcuts.py, read without importing ImGui."""
+    """(key, text) of every row of the table in ui/panels/shortcuts.py, read without importing ImGui."""
     tree = ast.parse((ROOT / "ui" / "shortcuts.py").read_text("utf-8"))
     rows = []
     for node in ast.walk(tree):
@@ -77,8 +77,8 @@ def test_readme_lists_the_keys_of_the_window() -> None:
 
 def test_readme_lists_the_options_of_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     """In the row of the command, or among the settings that commands share."""
-    from app.arguments import COMMANDS
-    from app.cli import build_parser
+    from app.cli.arguments import COMMANDS
+    from app.cli.cli import build_parser
 
     text = (ROOT / "README.md").read_text("utf-8")
     rows = [line for line in text.splitlines() if line.startswith("| `")]

@@ -85,7 +85,7 @@ def test_importing_the_worker_loads_no_window_library() -> None:
 
 
 def test_importing_the_command_line_loads_no_window_library() -> None:
-    assert not loaded_modules("import app.cli") & WINDOW_LIBRARIES
+    assert not loaded_modules("import app.cli.cli") & WINDOW_LIBRARIES
 
 
 def test_loaded_modules_sees_an_import() -> None:

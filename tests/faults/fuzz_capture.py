@@ -254,7 +254,7 @@ def _look(folder: Path) -> tuple[str, str]:
 
 def _inspect(folder: Path) -> tuple[int, str, str]:
     """Exit code, standard output and standard error of `clipgstream inspect --json`."""
-    from app.cli import main
+    from app.cli.cli import main
 
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):

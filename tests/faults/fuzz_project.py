@@ -44,18 +44,18 @@ OLD = "old-"
 
 def make_project(folder: Path) -> None:
     """Two trained clips, a checkpoint, a live snapshot, curves, regions, caches; beside them the files of the user."""
-    from app.kept_figures import KeptFigures
-    from app.project import create_project
-    from app.project_files import ProjectSettings
-    from app.recents import RecentProject
-    from app.settings import Settings
-    from engine.array_files import write_arrays
-    from engine.cloud.regions import parse_region
-    from engine.json_files import checked_line
-    from engine.model.clip_state import write_clip_state
-    from engine.model.compact import compact_clip, write_compact_clip
+    from app.evaluation.kept_figures import KeptFigures
+    from app.project.project import create_project
+    from app.project.project_files import ProjectSettings
+    from app.project.recents import RecentProject
+    from app.session.settings import Settings
+    from engine.clip_files.clip_state import write_clip_state
+    from engine.clip_files.compact import compact_clip, write_compact_clip
+    from engine.gate.regions import parse_region
+    from engine.storage.array_files import write_arrays
+    from engine.storage.json_files import checked_line
     from engine.training.checkpoint import write_checkpoint
-    from engine.training.preparation import write_backgrounds
+    from engine.training.preparation.cloud_preparation import write_backgrounds
 
     reference, source = _states()
     settings = ProjectSettings("nowhere", "abc", holdout=("b",), clip_length=N_FRAMES, overrides={"passes": 6.0})
@@ -83,8 +83,8 @@ def _states() -> tuple[Any, Any]:
     """A reference clip as it is stored, and the state of one that inherits from it."""
     import torch
 
-    from engine.model.clip_state import ClipState
-    from engine.model.compact import compact_clip
+    from engine.clip_files.clip_state import ClipState
+    from engine.clip_files.compact import compact_clip
     from tests.engine.model.test_clip_model import make_reference, make_source, state_of
 
     torch.manual_seed(0)
@@ -99,7 +99,7 @@ def _states() -> tuple[Any, Any]:
 
 def _checkpoint(state: Any) -> Any:
     from engine.training.checkpoint import Checkpoint, Place
-    from engine.training.order import ShuffledOrder
+    from engine.training.step.order import ShuffledOrder
 
     order = ShuffledOrder(6, 3)
     order.draw()
@@ -108,15 +108,15 @@ def _checkpoint(state: Any) -> Any:
 
 
 def _backgrounds() -> Any:
-    from engine.training.preparation import Backgrounds
+    from engine.training.preparation.cloud_preparation import Backgrounds
 
     rng = np.random.default_rng(3)
     return Backgrounds(rng.integers(0, 255, (2, 6, 13, 3)).astype(np.uint8), rng.random((2, 6, 13)) > 0.5)
 
 
 def _figure_rows() -> list[Any]:
+    from engine.metrics.clips.summary import EvalRow
     from engine.metrics.columns import COLUMNS
-    from engine.metrics.summary import EvalRow
 
     figures: dict[str, float | None] = dict.fromkeys(COLUMNS, 0.5)
     return [EvalRow(0, i, "a", i % 2 == 0, figures | {"psnr": 30.0 + i}, {}) for i in range(12)]
@@ -141,8 +141,8 @@ def _plain(value: Any) -> Any:
 
 
 def _read_clip(project: Path, path: Path) -> Any:
+    from engine.clip_files.clip_state import look_at_clip, read_clip_state
     from engine.model.clip_model import load_clip_model
-    from engine.model.clip_state import look_at_clip, read_clip_state
 
     look_at_clip(path)
     state = read_clip_state(path)
@@ -152,7 +152,7 @@ def _read_clip(project: Path, path: Path) -> Any:
 
 
 def _read_evaluation(project: Path, path: Path) -> Any:
-    from app.kept_figures import KeptFigures
+    from app.evaluation.kept_figures import KeptFigures
 
     return {repr(row) for row in KeptFigures(path, CONTENT, None, _said.append).rows.values()}, set()
 
@@ -164,13 +164,13 @@ def _read_checkpoint(project: Path, path: Path) -> Any:
 
 
 def _read_settings(project: Path, path: Path) -> Any:
-    from app.project_files import read_settings
+    from app.project.project_files import read_settings
 
     return read_settings(project)
 
 
 def _read_regions(project: Path, path: Path) -> Any:
-    from app.project_files import read_regions
+    from app.project.project_files import read_regions
 
     return read_regions(path)
 
@@ -183,19 +183,19 @@ def _read_curves(project: Path, path: Path) -> Any:
 
 
 def _read_backgrounds(project: Path, path: Path) -> Any:
-    from engine.training.preparation import read_backgrounds
+    from engine.training.preparation.cloud_preparation import read_backgrounds
 
     return read_backgrounds(path.parent, BACKGROUNDS_KEY)
 
 
 def _read_cloud(project: Path, path: Path) -> Any:
-    from app.preview import read_cloud
+    from app.playback.preview import read_cloud
 
     return [np.asarray(array) for array in (read_cloud(path).points, read_cloud(path).colors)]
 
 
 def _read_preferences(project: Path, path: Path) -> Any:
-    from app.settings import Settings
+    from app.session.settings import Settings
 
     return Settings(path).recent
 
@@ -225,9 +225,9 @@ def read_project(project: Path) -> None:
     Raises:
         RuntimeError: A command ended with what it calls a fault of the program.
     """
-    from app.cli import main
-    from app.clip_catalog import ClipCatalog
-    from app.project import open_project
+    from app.cli.cli import main
+    from app.project.clip_catalog import ClipCatalog
+    from app.project.project import open_project
     from engine.errors import EngineError
 
     for command in ("inspect", "gate"):

@@ -23,7 +23,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from app.lock import ProcessLock, process_start
+from app.project.lock import ProcessLock, process_start
 from engine.errors import ProjectError
 
 LEFTOVER_SHARE = 0.3

@@ -13,17 +13,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from app.cli import main
-from app.project import open_project
+from app.cli.cli import main
+from app.project.project import open_project
 from app.training import run
 from app.training.build import build_training
 from app.training.interface import Training
 from app.training.messages import TrainJob
 from app.training.process import ProcessWorker
 from engine.assets import asset_path
+from engine.clip_files.clip_state import read_clip_state
 from engine.errors import EngineError
-from engine.model.clip_state import read_clip_state
-from engine.training.report import ReportProgress
+from engine.progress import ReportProgress
 
 ROOT = Path(__file__).resolve().parents[2]
 SETTINGS = ("--preset", "toy", "--scale", "0.25", "--set", "passes=6", "--clip-length", "5")

@@ -11,14 +11,14 @@ import pytest
 pyglet.options.headless = True  # before pyglet.window is imported anywhere in this process
 pyglet.options.shadow_window = False
 
-from app.window_memory import WindowMemory  # noqa: E402
+from app.session.window_memory import WindowMemory  # noqa: E402
 from tests.ui.fake_session import FakeSession  # noqa: E402
 from tests.ui.pilot import Pilot  # noqa: E402
 
 
 def _why_no_window() -> str | None:
     """The reason why no headless window can be made here, or None."""
-    from ui.window import make_window
+    from ui.shell.window import make_window
 
     try:
         window = make_window(64, 64)
@@ -39,7 +39,7 @@ def headless_gl() -> None:
 @pytest.fixture
 def open_pilot(headless_gl: None) -> Iterator[Callable[..., Pilot]]:
     """Factory of driven windows; all are closed at the end of the test."""
-    from ui.window import StudioWindow
+    from ui.shell.window import StudioWindow
 
     opened: list[Any] = []
 

@@ -143,7 +143,7 @@ class Desk:
     def screenshot(self, path: Path) -> Path:
         """The screen as X shows it, cut to the window."""
         from tests.ui.xwd import read_xwd
-        from ui.screenshot import write_png
+        from ui.shell.screenshot import write_png
 
         dump = subprocess.run(
             ["xwd", "-root", "-silent"], env=self._environment, capture_output=True, check=True, timeout=20

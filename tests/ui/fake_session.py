@@ -12,12 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from app import commands
-from app.arrays import AnchorArrays, Picture, PointArrays
-from app.marking import after_marking
-from app.notices import Notices
-from app.questions import Question, RetrainQuestion
-from app.recents import RecentProject
+from app.playback.arrays import AnchorArrays, Picture, PointArrays
+from app.playback.orbit_view import OrbitView
+from app.playback.timeline import Timeline
+from app.project.recents import RecentProject
+from app.session import commands
+from app.session.marking import after_marking
+from app.session.notices import Notices
+from app.session.questions import Question, RetrainQuestion
 from app.status import (
     ClipStatus,
     JobStatus,
@@ -29,11 +31,9 @@ from app.status import (
     TrainingStatus,
     WantedFrame,
 )
-from app.timeline import Timeline
-from app.view import OrbitView
+from engine.camera.rig import CameraRig
 from engine.capture.clip import split_clips
-from engine.capture.rig import CameraRig
-from engine.cloud.regions import GateRegion, sphere_region
+from engine.gate.regions import GateRegion, sphere_region
 
 
 def make_rig(n_cameras: int = 8, width: int = 320, height: int = 240) -> CameraRig:

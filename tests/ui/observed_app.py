@@ -54,7 +54,7 @@ def describe(studio: Any) -> dict[str, Any]:
 
 def watch(state_path: Path) -> None:
     """Hook the window class so that each window reports into the file."""
-    import ui.window as window_module
+    import ui.shell.window as window_module
 
     class ObservedWindow(window_module.StudioWindow):
         """The same window, reporting."""

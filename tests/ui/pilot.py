@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from pyglet.window import key, mouse
 
-from ui.screenshot import read_window
-from ui.state import Rect
+from ui.panels.state import Rect
+from ui.shell.screenshot import read_window
 
 
 class Pilot:

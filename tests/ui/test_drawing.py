@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from pyglet.window import key, mouse
 
-from app.commands import SetFrame, TogglePlay
+from app.session.commands import SetFrame, TogglePlay
 from app.status import ClipStatus
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot
-from ui.redraw import FRAMES_AFTER_CHANGE, FRAMES_AFTER_INPUT, MAX_SETTLING, RedrawPlan
+from ui.shell.redraw import FRAMES_AFTER_CHANGE, FRAMES_AFTER_INPUT, MAX_SETTLING, RedrawPlan
 
 pytestmark = pytest.mark.gl
 
@@ -125,7 +125,7 @@ def test_menus_work_with_the_keyboard_alone(pilot: Pilot, symbol: int) -> None:
 def test_forty_characters_typed_at_once_stand_there_after_one_frame(
     open_pilot: Callable[..., Pilot], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("ui.dialogs.has_native_dialog", lambda: False)
+    monkeypatch.setattr("ui.shell.dialogs.has_native_dialog", lambda: False)
     pilot = open_pilot(FakeSession(has_capture=False))
     pilot.key(key.O, modifiers=(key.LCTRL,))
     pilot.draw(3)

@@ -13,17 +13,17 @@ import numpy as np
 import pytest
 from pyglet.window import key
 
-import app.playback
-from app import commands as c
-from app.session import Session
-from app.settings import Settings
-from app.training.inline import InlineWorker
-from engine.model.clip_state import ClipState
+import app.playback.playback
+from app.session import commands as c
+from app.session.session import Session
+from app.session.settings import Settings
+from engine.clip_files.clip_state import ClipState
 from tests.app.fakes import N_ANCHORS, make_fake, write_capture
+from tests.app.inline_worker import InlineWorker
 from tests.ui.pilot import Pilot
-from ui.hud_text import CLOUD, RENDERED, HudText
 from ui.panels.hud import legend_rows
-from ui.screenshot import read_window
+from ui.shell.screenshot import read_window
+from ui.viewport.hud_text import CLOUD, RENDERED, HudText
 
 pytestmark = pytest.mark.gl
 WAIT_S = 300.0

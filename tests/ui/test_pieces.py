@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.arguments import COMMANDS
+from app.cli.arguments import COMMANDS
 from ui.main import main
+from ui.panels.shortcuts import SHORTCUTS
+from ui.panels.state import Rect
 from ui.panels.timeline import MIN_TICK_SPACING_PX, cell_left, frame_at, tick_step
 from ui.panels.training import MAX_PLOT_POINTS, anchors_text, duration_text, plot_arrays
 from ui.panels.viewport import arrange, fit
-from ui.shortcuts import SHORTCUTS
-from ui.state import Rect
 
 
 @given(frames=st.integers(1, 20_000), width=st.floats(50, 4000))
@@ -98,7 +98,7 @@ def test_the_window_itself_needs_no_torch() -> None:
     code = (
         "import sys, pyglet\n"
         "pyglet.options.headless = True\n"
-        "import ui.window\n"
+        "import ui.shell.window\n"
         "sys.exit(','.join(sorted({'torch', 'numba', 'pycolmap', 'open3d'} & set(sys.modules))) or 0)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
@@ -115,7 +115,7 @@ def test_subcommands_go_to_the_command_line(command: str, monkeypatch: pytest.Mo
             seen.append(list(arguments))
             return 2
 
-    monkeypatch.setitem(sys.modules, "app.cli", FakeCli)
+    monkeypatch.setitem(sys.modules, "app.cli.cli", FakeCli)
     assert main([command, "somewhere"]) == 2
     assert seen == [[command, "somewhere"]]
 
@@ -129,7 +129,7 @@ def test_without_a_display_the_demo_runs_instead(monkeypatch: pytest.MonkeyPatch
             seen.append((path, out, quick))
             return 0
 
-    monkeypatch.setitem(sys.modules, "ui.demo", FakeDemo)
+    monkeypatch.setitem(sys.modules, "ui.shell.demo", FakeDemo)
     monkeypatch.setattr("ui.main.has_display", lambda: False)
     assert main(["some_capture"]) == 0
     assert [str(path) for path, _, _ in seen] == ["some_capture"]

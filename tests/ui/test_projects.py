@@ -9,16 +9,16 @@ from pathlib import Path
 import pytest
 from pyglet.window import key, mouse
 
-from app.commands import CloseQuestion, ForgetRecent, OpenCapture, OpenProject, TogglePlay, TrainClip
-from app.questions import ProjectQuestion, RetrainQuestion
-from app.recents import RecentProject
+from app.playback.timeline import Timeline
+from app.project.recents import RecentProject
+from app.session.commands import CloseQuestion, ForgetRecent, OpenCapture, OpenProject, TogglePlay, TrainClip
+from app.session.questions import ProjectQuestion, RetrainQuestion
 from app.status import ClipStatus
-from app.timeline import Timeline
 from engine.capture.clip import split_clips
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot
-from ui.questions import outdated_text, retrain_texts
-from ui.window import window_title
+from ui.shell.questions import outdated_text, retrain_texts
+from ui.shell.window import window_title
 
 pytestmark = pytest.mark.gl
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from pyglet.window import key
 
-from app.commands import LookThrough, MarkRegion, RedoMark, RemoveRegion, UndoMark
+from app.session.commands import LookThrough, MarkRegion, RedoMark, RemoveRegion, UndoMark
 from app.status import ClipStatus
 from tests.ui.fake_session import FakeSession, make_rig
 from tests.ui.pilot import CTRL, SHIFT, Pilot
-from ui.colors import REGION_COLORS
-from ui.region_tool import FIRST_RADIUS_SHARE, GROWTH, SHIFT_SHARE, RegionTool, rig_radius
-from ui.screenshot import read_window
+from ui.shell.screenshot import read_window
+from ui.style.colors import REGION_COLORS
+from ui.viewport.region_tool import FIRST_RADIUS_SHARE, GROWTH, SHIFT_SHARE, RegionTool, rig_radius
 
 pytestmark = pytest.mark.gl
 

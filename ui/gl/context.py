@@ -1,4 +1,4 @@
-"""GL contexts: made without a window, and asked what they run on. Windows are made in ui.window."""
+"""GL contexts: made without a window, and asked what they run on. Windows are made in ui.shell.window."""
 
 from __future__ import annotations
 

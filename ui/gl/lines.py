@@ -10,11 +10,11 @@ from collections.abc import Collection, Hashable
 import moderngl
 import numpy as np
 
-from engine.capture.rig import CameraRig
-from ui.colors import CHOSEN, HELD_OUT
+from engine.camera.rig import CameraRig
 from ui.gl.camera import NEAR, clip_matrix, uniform_matrix
 from ui.gl.shaders import load_program
 from ui.gl.targets import Target
+from ui.style.colors import CHOSEN, HELD_OUT
 
 LINES_PER_FRUSTUM = 10
 TRAINING_CAMERA_COLOR = (0.82, 0.85, 0.89, 1.0)

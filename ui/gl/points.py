@@ -11,11 +11,11 @@ from typing import Literal
 import moderngl
 import numpy as np
 
-from ui.colors import INHERITED, RESIDUAL
 from ui.gl.camera import NEAR, clip_matrix, uniform_matrix
 from ui.gl.lines import with_alpha
 from ui.gl.shaders import load_program
 from ui.gl.targets import Target
+from ui.style.colors import INHERITED, RESIDUAL
 
 PointShape = Literal["circle", "ring", "diamond"]
 SizeUnit = Literal["px", "world"]

@@ -6,11 +6,11 @@ from typing import Any
 
 from imgui_bundle import ImVec2, imgui
 
-from app.commands import LookThrough
-from ui import theme
-from ui.state import Dispatch, Rect, UiState
-from ui.theme import Icon
-from ui.widgets import elided, format_count, pop_bold, push_bold, text_wrapped_dim
+from app.session.commands import LookThrough
+from ui.panels.state import Dispatch, Rect, UiState
+from ui.panels.widgets import elided, format_count, pop_bold, push_bold, text_wrapped_dim
+from ui.style import theme
+from ui.style.theme import Icon
 
 THUMBNAIL_WIDTH_PX = 160
 ROW_HEIGHT = 50.0

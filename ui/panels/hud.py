@@ -9,16 +9,16 @@ from typing import Any
 
 from imgui_bundle import ImVec2, imgui
 
-from ui import theme
-from ui.hud_text import HudText, count_text, hud_text
 from ui.panels.regions import draw_region_mark
+from ui.panels.state import Rect, UiState
 from ui.panels.timeline import STATE_WORDS
-from ui.picture_rate import PictureRate
-from ui.region_tool import REGION_WORDS
-from ui.scene import Scene
-from ui.state import Rect, UiState
-from ui.theme import Icon
-from ui.widgets import format_count
+from ui.panels.widgets import format_count
+from ui.style import theme
+from ui.style.theme import Icon
+from ui.viewport.hud_text import HudText, count_text, hud_text
+from ui.viewport.picture_rate import PictureRate
+from ui.viewport.region_tool import REGION_WORDS
+from ui.viewport.scene import Scene
 
 BUSY_REDRAW_S = 0.25
 """The mark of something on its way turns this often."""

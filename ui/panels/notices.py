@@ -7,10 +7,10 @@ from typing import Any
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.commands import DismissNotice
-from ui import theme
-from ui.state import Dispatch, Rect, UiState
-from ui.theme import Icon
+from app.session.commands import DismissNotice
+from ui.panels.state import Dispatch, Rect, UiState
+from ui.style import theme
+from ui.style.theme import Icon
 
 TOAST_WIDTH = 420.0
 INFO_LIFETIME_S = 6.0

@@ -6,9 +6,9 @@ from typing import Any
 
 from imgui_bundle import ImVec2, imgui
 
-from app.commands import SetPreset, SetTrainSetting
-from ui.state import Dispatch, UiState
-from ui.widgets import text_wrapped_dim
+from app.session.commands import SetPreset, SetTrainSetting
+from ui.panels.state import Dispatch, UiState
+from ui.panels.widgets import text_wrapped_dim
 
 LINES_HEIGHT = 170.0
 FIELD_WIDTH = 110.0

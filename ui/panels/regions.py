@@ -7,12 +7,12 @@ from typing import Any
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.commands import RedoMark, RemoveRegion, UndoMark
-from ui import theme
-from ui.region_tool import REGION_WORDS
-from ui.state import REGIONS, Dispatch, Rect, UiState
-from ui.theme import Icon
-from ui.widgets import chip, format_count, primary_button, text_right, text_wrapped_dim
+from app.session.commands import RedoMark, RemoveRegion, UndoMark
+from ui.panels.state import REGIONS, Dispatch, Rect, UiState
+from ui.panels.widgets import chip, format_count, primary_button, text_right, text_wrapped_dim
+from ui.style import theme
+from ui.style.theme import Icon
+from ui.viewport.region_tool import REGION_WORDS
 
 MEANINGS = {"static": "Nothing moves or changes in here.", "dynamic": "Everything in here may move or change."}
 ROW_HEIGHT = 44.0

@@ -7,13 +7,13 @@ from typing import Any
 
 from imgui_bundle import ImVec2, imgui
 
-from app.commands import SetFrame, TogglePlay, TrainClip
-from ui import theme
-from ui.progress_words import band_words
-from ui.shortcuts import go_to_frame
-from ui.state import Dispatch, Rect, UiState
-from ui.theme import Icon
-from ui.widgets import format_count, text_right
+from app.session.commands import SetFrame, TogglePlay, TrainClip
+from ui.panels.shortcuts import go_to_frame
+from ui.panels.state import Dispatch, Rect, UiState
+from ui.panels.widgets import format_count, text_right
+from ui.style import theme
+from ui.style.progress_words import band_words
+from ui.style.theme import Icon
 
 RULER_HEIGHT = 22.0
 BAND_GAP = 6.0

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
-from app.commands import PauseTraining, ResumeTraining, StopTraining, TrainNextClip
-from ui import theme
-from ui.axis import ticks_that_fit, whole_ticks
+from app.session.commands import PauseTraining, ResumeTraining, StopTraining, TrainNextClip
 from ui.panels.plan import draw_plan
+from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline import STATE_WORDS, state_note
-from ui.progress_words import stage_words
-from ui.state import Dispatch, UiState
-from ui.theme import Icon
-from ui.widgets import format_count, primary_button, text_right, text_wrapped_dim
+from ui.panels.widgets import format_count, primary_button, text_right, text_wrapped_dim
+from ui.style import theme
+from ui.style.axis import ticks_that_fit, whole_ticks
+from ui.style.progress_words import stage_words
+from ui.style.theme import Icon
 
 MAX_PLOT_POINTS = 600
 TICK_ROOM = 52.0

@@ -1,6 +1,6 @@
 """The viewport: the scene at the user's time and view, compared with the captured picture, with overlays and a HUD.
 
-Turns pointer input over the picture into view changes. What is drawn off screen, and when, is ui.scene's business.
+Turns pointer input over the picture into view changes. What is drawn off screen, and when, is ui.viewport.scene's business.
 """
 
 from __future__ import annotations
@@ -12,20 +12,20 @@ from typing import Any
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.commands import LookThrough, ToggleOverlay
+from app.session.commands import LookThrough, ToggleOverlay
 from app.status import COMPARE_MODES
-from ui import theme
-from ui.hud_text import pane_text
 from ui.panels.hud import Hud
 from ui.panels.regions import begin_choosing, draw_chosen_sphere
+from ui.panels.shortcuts import cloud_overlay, set_compare, shown_compare
+from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.welcome import draw_welcome
-from ui.region_layer import ShownRegions
-from ui.region_tool import GROWTH
-from ui.scene import Scene, SceneView
-from ui.shortcuts import cloud_overlay, set_compare, shown_compare
-from ui.state import Dispatch, Rect, UiState
-from ui.theme import Icon
-from ui.widgets import chip
+from ui.panels.widgets import chip
+from ui.style import theme
+from ui.style.theme import Icon
+from ui.viewport.hud_text import pane_text
+from ui.viewport.region_layer import ShownRegions
+from ui.viewport.region_tool import GROWTH
+from ui.viewport.scene import Scene, SceneView
 
 MOVING_S = 0.22
 """The view counts as moving for this long after the last change of it."""

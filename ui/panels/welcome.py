@@ -7,12 +7,12 @@ from typing import Any
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.commands import ForgetRecent, OpenCapture, OpenProject
-from app.recents import RecentProject
-from ui import theme
-from ui.state import Dispatch, Rect, UiState
-from ui.theme import Icon
-from ui.widgets import elided_path, pop_bold, primary_button, push_bold, text_wrapped_dim
+from app.project.recents import RecentProject
+from app.session.commands import ForgetRecent, OpenCapture, OpenProject
+from ui.panels.state import Dispatch, Rect, UiState
+from ui.panels.widgets import elided_path, pop_bold, primary_button, push_bold, text_wrapped_dim
+from ui.style import theme
+from ui.style.theme import Icon
 
 SAMPLE_PATH = Path(__file__).resolve().parents[2] / "assets" / "sample"
 CARD_SIZE = (560.0, 440.0)

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from engine.capture.checks import (
+from engine.capture.duplicates import CameraFiles, check_duplicates
+from engine.capture.format_checks import (
     check_equal_counts,
     check_image_header,
     check_K,
@@ -27,9 +28,8 @@ from engine.capture.checks import (
     shortened,
     size_problem,
 )
-from engine.capture.duplicates import CameraFiles, check_duplicates
+from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.frames import ImageFrames
-from engine.capture.layout import CameraEntry, Layout
 from engine.capture.limits import MAX_CAMERA_ID
 from engine.capture.media import ImageHeader, read_image_header
 from engine.capture.places import place_in

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from engine.capture.checks import (
+from engine.capture.duplicates import CameraFiles, check_duplicates
+from engine.capture.format_checks import (
     check_equal_counts,
     check_fps,
     check_image_size,
@@ -27,9 +28,8 @@ from engine.capture.checks import (
     shortened,
     size_problem,
 )
-from engine.capture.duplicates import CameraFiles, check_duplicates
+from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.frames import VideoFrames
-from engine.capture.layout import CameraEntry, Layout
 from engine.capture.media import VideoHeader, read_video_header
 from engine.capture.places import place_in
 from engine.errors import CaptureError

@@ -28,8 +28,8 @@ from engine.raster.cpu.camera_row import camera_row
 from engine.raster.cpu.record import BLUE, GREEN, PAIR_FLOATS, RECORD_FLOATS, RED, TILE
 from engine.raster.cpu.tile import SCRATCH_FLOATS
 from engine.raster.gaussians import Gaussians
+from engine.raster.pinhole_view import PinholeView
 from engine.raster.rendering import Rendering
-from engine.raster.view import PinholeView
 
 POOL = WorkspacePool()
 """Idle buffers of this process."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from engine.kernels.lanes import LaneBuilder, Lanes
-from engine.raster.view import PinholeView
+from engine.raster.pinhole_view import PinholeView
 
 _NAMES = (
     *(f"r{row}{column}" for row in range(3) for column in range(3)),

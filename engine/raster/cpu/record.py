@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from engine.conventions import ALPHA_MIN
-from engine.raster.view import TILE_PX
+from engine.raster.pinhole_view import TILE_PX
 
 CENTER_X, CENTER_Y, ROOT_MAJOR, SLOPE, ROOT_MINOR, LOG_OPACITY, RED = range(7)
 GREEN, BLUE, REACH, TILT, HALF_WIDTH, HALF_HEIGHT, INVERSE_ROOT = range(7, 14)

@@ -16,7 +16,7 @@ from engine.raster.cpu import record as rec
 from engine.raster.cpu.binning import mask_sums
 from engine.raster.cpu.camera_row import camera_row
 from engine.raster.gaussians import Gaussians
-from engine.raster.view import PinholeView
+from engine.raster.pinhole_view import PinholeView
 
 POOL = WorkspacePool()
 """Idle buffers of this process."""

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 
 from engine.capture.capture import open_capture
-from engine.capture.inspect import describe
+from engine.capture.capture_summary import describe
 from engine.capture.limits import MAX_SIDE
 from engine.errors import CaptureError
 

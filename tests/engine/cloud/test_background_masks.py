@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.cloud.background import estimate_background
-from engine.cloud.image_filters import block_mean, blurred_difference, dilate, erode, remove_small_blobs
-from engine.cloud.masks import motion_mask
-from engine.cloud.recheck import recheck_background
+from engine.cloud.background.background import estimate_background
+from engine.cloud.background.masks import motion_mask
+from engine.cloud.background.recheck import recheck_background
+from engine.images.image_filters import block_mean, blurred_difference, dilate, erode, remove_small_blobs
 
 
 def noisy_frames(n_frames: int, wall: np.ndarray, seed: int = 0) -> np.ndarray:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from engine.capture.rig import CameraRig
-from engine.cloud.gains import (
+from engine.camera.depth_range import depth_ranges, near_plane
+from engine.camera.rig import CameraRig
+from engine.cloud.background.gains import (
     MIN_SPREAD,
     GainSpread,
     gain_spread,
@@ -15,7 +16,6 @@ from engine.cloud.gains import (
     in_gauge,
 )
 from engine.cloud.median import median_over_cameras
-from engine.cloud.range import depth_ranges, near_plane
 from engine.cloud.voxel import voxel_keys, voxel_means
 
 

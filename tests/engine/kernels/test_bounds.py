@@ -21,17 +21,17 @@ from tests.guarded_memory import SEGMENTATION_FAULT, GuardedMemory, run_child
 Say = Callable[[str], None]
 MODULES = (
     "engine.kernels.arrays",
-    "engine.model.cpu.backend",
-    "engine.model.cpu.layout",
-    "engine.model.joining",
+    "engine.model.decode.cpu.backend",
+    "engine.model.decode.cpu.layout",
+    "engine.model.decode.joining",
     "engine.raster.cpu.backend",
     "engine.raster.cpu.binning",
     "engine.raster.cpu.camera_row",
     "engine.raster.cpu.tile_boxes",
-    "engine.training.adam",
-    "engine.training.fused_loss",
-    "engine.training.losses",
-    "engine.training.tile_squares",
+    "engine.training.optimizer.adam",
+    "engine.training.step.fused_loss",
+    "engine.training.step.losses",
+    "engine.training.step.tile_squares",
 )
 """Modules that make arrays for kernels."""
 FUNCTIONS = ("camera_row", "mask_sums", "_bands")
@@ -81,7 +81,7 @@ def decode_cases(memory: GuardedMemory) -> Iterator[str]:
     """Forward and backward of three sets with a field, one set decoded before, one knot and two."""
     import torch
 
-    from engine.model.decoding import ChosenAnchors, decode_anchors
+    from engine.model.decode.decoding import ChosenAnchors, decode_anchors
     from engine.raster import Gaussians
     from tests.decode_scenes import ODD, PRESET, SINGLE, Scene
 
@@ -126,7 +126,7 @@ def join_cases(memory: GuardedMemory) -> Iterator[str]:
     """Chosen rows of frozen Gaussians in front of learning ones."""
     import torch
 
-    from engine.model.joining import join_frozen
+    from engine.model.decode.joining import join_frozen
     from engine.raster import Gaussians
 
     def some(n: int) -> Gaussians:
@@ -144,9 +144,9 @@ def loss_cases(memory: GuardedMemory) -> Iterator[str]:
     """Value and gradients with every argument in every combination; squares of tiles."""
     import torch
 
-    from engine.training import fused_loss
-    from engine.training.losses import photometric_loss
-    from engine.training.tile_squares import tile_squares
+    from engine.training.step import fused_loss
+    from engine.training.step.losses import photometric_loss
+    from engine.training.step.tile_squares import tile_squares
 
     # without its slack for alignment, which would hide a stray access: the rows are whole cache lines
     fused_loss._aligned_zeros = lambda shape: memory.bytes(4 * int(np.prod(shape))).view(np.float32).reshape(shape)
@@ -178,7 +178,7 @@ def adam_cases(memory: GuardedMemory) -> Iterator[str]:
     """Sizes around the edges of blocks and chunks."""
     import torch
 
-    from engine.training.adam import make_adam
+    from engine.training.optimizer.adam import make_adam
 
     sizes = (1, 63, 64, 65, (1 << 14) - 1, (1 << 14) + 1, 40_000)
     yield f"Adam of {sizes}"
@@ -193,8 +193,8 @@ def adam_cases(memory: GuardedMemory) -> Iterator[str]:
 
 
 def _run_beside_forbidden_pages(say: Say) -> None:
-    from engine.kernels.warm import warm_up_all
-    from engine.model.cpu import backend
+    from engine.kernels.compile_ahead import warm_up_all
+    from engine.model.decode.cpu import backend
 
     warm_up_all()
     for is_behind in (True, False):
@@ -210,15 +210,15 @@ def _build_clouds(say: Say) -> None:
     from engine.kernels.cache import use_kernel_cache
 
     use_kernel_cache()  # that of kernels that look at bounds: before any of them is imported
-    from engine.capture.rig import CameraRig
-    from engine.cloud.background import estimate_background
-    from engine.cloud.consistency import check_depths
-    from engine.cloud.hull import Grid, _integrate, carve, hull_colors, hull_visibility
-    from engine.cloud.image_filters import dilate
-    from engine.cloud.masks import motion_mask
-    from engine.cloud.projection import projection_matrices
-    from engine.cloud.smoothing import smooth_inverse_depth
-    from engine.cloud.sweep import matching_costs
+    from engine.camera.projection import projection_matrices
+    from engine.camera.rig import CameraRig
+    from engine.cloud.background.background import estimate_background
+    from engine.cloud.background.masks import motion_mask
+    from engine.cloud.motion.hull import Grid, _integrate, carve, hull_colors, hull_visibility
+    from engine.cloud.stereo.consistency import check_depths
+    from engine.cloud.stereo.smoothing import smooth_inverse_depth
+    from engine.cloud.stereo.sweep import matching_costs
+    from engine.images.image_filters import dilate
 
     with pytest.raises(IndexError):  # or nothing is checked
         _integrate(np.ones((2, 3), bool), np.zeros((3, 3), np.int32))  # one column too few

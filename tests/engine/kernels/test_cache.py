@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
-from engine.kernels import cache, warm
+from engine.kernels import cache
+from engine.kernels import compile_ahead as warm
 from engine.kernels.cache import (
     MARKER,
     MAX_FOLDERS,
@@ -209,11 +210,11 @@ def test_no_home_at_all_is_no_failure(monkeypatch):
 IMPORTS = """
 import os
 before = dict(os.environ)
-import engine, engine.kernels.cache, engine.kernels.warm, engine.errors
+import engine, engine.kernels.cache, engine.kernels.compile_ahead, engine.errors
 assert "numba" not in __import__("sys").modules
 import numba, torch
 between = dict(os.environ)
-import engine.kernels.threads, engine.cloud.sweep, engine.cloud.voxel  # which compile nothing yet
+import engine.kernels.threads, engine.cloud.stereo.sweep, engine.cloud.voxel  # which compile nothing yet
 after = dict(os.environ)
 from numba.core import config
 print(sorted(set(after.items()) ^ set(between.items())), repr(config.CACHE_DIR))

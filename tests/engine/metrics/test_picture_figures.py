@@ -16,14 +16,14 @@ from torchmetrics.functional.image import (
     structural_similarity_index_measure,
 )
 
-from engine.metrics import lpips
-from engine.metrics.colors import as_shown, fit_colors
+from engine.images.psnr import MAX_PSNR_DB, psnr
 from engine.metrics.columns import COLUMNS
-from engine.metrics.flip import flip
-from engine.metrics.picture import measure_picture
-from engine.metrics.psnr import MAX_PSNR_DB, psnr
-from engine.metrics.similarity import Similarity, dssim1, dssim_ms, dssim_range2, ssim
-from engine.training.losses import ssim_map
+from engine.metrics.pictures import lpips
+from engine.metrics.pictures.colors import as_shown, fit_colors
+from engine.metrics.pictures.flip import flip
+from engine.metrics.pictures.picture import measure_picture
+from engine.metrics.pictures.similarity import Similarity, dssim1, dssim_ms, dssim_range2, ssim
+from engine.training.step.losses import ssim_map
 from tests.engine.metrics.pictures import disturbed, scene
 
 SIZES = ((41, 60), (180, 240), (181, 333))

@@ -9,9 +9,9 @@ import numpy as np
 import torch
 
 from engine.capture.clip import Clip, split_clips
+from engine.clip_files.clip_state import ClipState
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
-from engine.model.clip_state import ClipState
 from engine.model.decoder import Decoder
 from engine.model.field import FieldShape, SpatioTemporalField
 

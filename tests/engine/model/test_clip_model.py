@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 import torch
 
-from engine.cloud.reasons import LIGHT, NO_REASON, STILL
+from engine.clip_files.clip_header import SCHEMA
+from engine.clip_files.clip_state import ClipState
 from engine.errors import ProjectError
+from engine.gate.reasons import LIGHT, NO_REASON, STILL
 from engine.model.anchors import AnchorSet
-from engine.model.clip_header import SCHEMA
 from engine.model.clip_model import ClipModel, decoder_sizes, inherit, load_clip_model
-from engine.model.clip_state import ClipState
 from engine.model.decoder import HEADS, Decoder
 from engine.model.field import FieldShape, SpatioTemporalField
 from engine.model.roles import ROLES

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.model.clip_state import ClipState
+from engine.clip_files.clip_state import ClipState
 
 
 def damaged_states(state: ClipState) -> dict[str, ClipState]:

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture
-from engine.capture.rig import CameraRig
 from engine.synthetic import textures
 from engine.synthetic.scene import looking_at
 

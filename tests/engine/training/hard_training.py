@@ -14,15 +14,15 @@ import torch
 
 from engine.capture.capture import Capture
 from engine.capture.clip import split_clips
-from engine.metrics.psnr import psnr_of, squared_error
-from engine.metrics.trained_clip import TrainedClip, camera_gain
+from engine.clip_files.clip_state import ClipState, read_clip_state
+from engine.clip_files.compact import write_compact_clip
+from engine.images.psnr import psnr_of, squared_error
+from engine.metrics.clips.trained_clip import TrainedClip, camera_gain
 from engine.model.clip_model import load_clip_model
-from engine.model.clip_state import ClipState, read_clip_state
-from engine.model.compact import write_compact_clip
-from engine.model.view import View, render_gaussians
+from engine.model.clip_view import View, render_gaussians
+from engine.progress import Progress
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
-from engine.training.report import Progress
 from tests.engine.training.hard_stage import HELD_OUT, N_CAMERAS, HardScene
 
 SIZES: dict[str, Any] = {

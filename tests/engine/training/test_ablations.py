@@ -7,13 +7,13 @@ import pytest
 import torch
 
 from engine.capture.clip import split_clips
+from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.errors import ProjectError
 from engine.model.clip_model import load_clip_model
-from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
-from engine.training.building import merged
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
-from engine.training.optimizer import named_parameters
+from engine.training.optimizer.optimizer import named_parameters
+from engine.training.preparation.building import merged
 from tests.engine.training.tiny_training import Tiny, finish, live_picture, picture, same_arrays, take_steps
 
 SWITCHES: dict[str, dict[str, str]] = {

@@ -6,7 +6,7 @@ Where another test already is the check it is not written twice:
    as well test_ablations, test_a_switch_trains_and_changes_only_what_it_names.
 5. Clip time is i / M, for partial clips too: tests/engine/capture/test_clip.py,
    test_clip_time_starts_at_zero_steps_evenly_and_stays_below_one; that training and field follow it: below.
-6. Static pixels do not flicker, at clip borders as inside: of given models tests/engine/metrics/test_seams.py,
+6. Static pixels do not flicker, at clip borders as inside: of given models tests/engine/metrics/clips/test_seams.py,
    test_a_static_scene_does_not_flicker_at_all; of trained ones below.
 7. Formats survive a round trip: of the two layouts that are read, below. Readers of poses_bounds and COLMAP files do
    not exist yet, so that part of the check is open.
@@ -28,22 +28,22 @@ import pytest
 import torch
 from PIL import Image
 
+from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture, open_capture
-from engine.capture.rig import CameraRig
-from engine.cloud.moving_cloud import MovingCloud
-from engine.metrics.evaluate import Evaluation
-from engine.metrics.features_apart import with_features
-from engine.metrics.seams import PairRow, summarize
-from engine.metrics.trained_clip import TrainedClip
+from engine.clip_files.clip_state import read_clip_state, write_clip_state
+from engine.cloud.motion.moving_cloud import MovingCloud
+from engine.metrics.clips.evaluate import Evaluation
+from engine.metrics.clips.features_apart import with_features
+from engine.metrics.clips.seams import PairRow, summarize
+from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel, load_clip_model
-from engine.model.clip_state import read_clip_state, write_clip_state
-from engine.model.view import REACH_SPACINGS, View, render_gaussians, render_model
+from engine.model.clip_view import REACH_SPACINGS, View, render_gaussians, render_model
 from engine.synthetic.scene import make_scene
 from engine.synthetic.writing import cameras_document, write_json, write_video
-from engine.training.building import add_residual
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
+from engine.training.preparation.building import add_residual
 from tests.engine.training.tiny_training import Tiny, finish, live_picture, make_training, picture, take_steps
 
 

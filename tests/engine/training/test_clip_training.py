@@ -12,15 +12,15 @@ import torch
 from engine.assets import asset_path
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import split_clips
+from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.errors import NonFiniteLoss, PreparationError, ProjectError
-from engine.metrics.evaluate import evaluate_clip
-from engine.metrics.summary import means
+from engine.metrics.clips.evaluate import evaluate_clip
+from engine.metrics.clips.summary import means
 from engine.model.clip_model import load_clip_model
-from engine.model.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
-from engine.training.stopping import loss_not_finite
+from engine.training.step.nonfinite import loss_not_finite
 from tests.engine.training.damaged_states import damaged_states
 
 CLIP_LENGTH = 10

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from engine.cloud.moving_cloud import MovingCloud
+from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
-from engine.training.building import Coverage, add_residual
 from engine.training.config import TrainConfig
+from engine.training.preparation.building import Coverage, add_residual
 from tests.engine.training.tiny_training import same_arrays
 
 N_SIDE = 6

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from engine.errors import ProjectError
-from engine.model import decoding
+from engine.model.decode import decoding
 from engine.training.config import TrainConfig
 
 SETTINGS = {"gate": "off", "tiles": "all"}

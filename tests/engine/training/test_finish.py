@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from engine.clip_files.clip_state import read_clip_state
+from engine.clip_files.compact import write_compact_clip
 from engine.model.clip_model import load_clip_model
-from engine.model.clip_state import read_clip_state
-from engine.model.compact import write_compact_clip
 from tests.engine.training.tiny_training import Tiny, finish, live_picture, picture, take_steps
 
 

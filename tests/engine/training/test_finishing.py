@@ -10,7 +10,7 @@ import pytest
 
 from engine.errors import DiskError
 from engine.training.clip_training import ClipTraining
-from engine.training.preparation import BACKGROUNDS_FILE
+from engine.training.preparation.cloud_preparation import BACKGROUNDS_FILE
 from tests.engine.training.tiny_training import finish, same_arrays
 
 

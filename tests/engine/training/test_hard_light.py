@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from engine.cloud.reasons import CHANGES, INSIDE, LIGHT
+from engine.gate.reasons import CHANGES, INSIDE, LIGHT
 from tests.engine.training.hard_scenes import (
     BALL,
     DRIFTING,

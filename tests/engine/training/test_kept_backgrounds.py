@@ -9,8 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.array_files import write_arrays
-from engine.training.preparation import BACKGROUNDS_FILE, Backgrounds, read_backgrounds, write_backgrounds
+from engine.storage.array_files import write_arrays
+from engine.training.preparation.cloud_preparation import (
+    BACKGROUNDS_FILE,
+    Backgrounds,
+    read_backgrounds,
+    write_backgrounds,
+)
 
 KEY: dict[str, Any] = {"capture": "none", "cameras": ["a", "b"], "size": [13, 6], "frames": 5, "is_corrected": True}
 

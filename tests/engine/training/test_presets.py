@@ -6,7 +6,7 @@ from torch import nn
 
 from engine.model.clip_model import load_clip_model
 from engine.training.config import TrainConfig
-from engine.training.optimizer import final_ratio, named_parameters
+from engine.training.optimizer.optimizer import final_ratio, named_parameters
 from engine.training.presets import preset
 
 # start and end of the rates as released; the field's is before its scene scale

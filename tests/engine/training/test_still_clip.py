@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 from safetensors.numpy import load_file
 
+from engine.clip_files.clip_state import read_clip_state
+from engine.clip_files.compact import write_compact_clip
 from engine.model.clip_model import load_clip_model
-from engine.model.clip_state import read_clip_state
-from engine.model.compact import write_compact_clip
-from engine.training import clip_preparation
-from engine.training.expected_sizes import counts_of, footage_of
-from engine.training.pictures import TrainingPictures
-from engine.training.plan import make_plan
-from engine.training.preparation import BACKGROUNDS_FILE
+from engine.training.plan.expected_sizes import counts_of, footage_of
+from engine.training.plan.plan import make_plan
+from engine.training.preparation import clip_preparation
+from engine.training.preparation.cloud_preparation import BACKGROUNDS_FILE
+from engine.training.preparation.training_pictures import TrainingPictures
 
 MAX_BYTES = 20_000
 

@@ -8,9 +8,9 @@ from torch import nn
 
 from engine.kernels import routines
 from engine.training.config import TrainConfig
-from engine.training.fused_loss import tile_grid
-from engine.training.losses import photometric_loss
-from engine.training.optimizer import PhaseOptimizer
+from engine.training.optimizer.optimizer import PhaseOptimizer
+from engine.training.step.fused_loss import tile_grid
+from engine.training.step.losses import photometric_loss
 from engine.training.warm import warm_up
 
 

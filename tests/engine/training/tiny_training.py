@@ -12,9 +12,9 @@ import torch
 from engine.assets import asset_path
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips
-from engine.metrics.trained_clip import TrainedClip
+from engine.clip_files.clip_state import ClipState
+from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.clip_model import load_clip_model
-from engine.model.clip_state import ClipState
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 

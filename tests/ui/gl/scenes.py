@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 
-from engine.capture.rig import CameraRig
+from engine.camera.rig import CameraRig
 from engine.raster import Gaussians, rasterize
 
 FIELDS = ("means", "quats", "scales", "opacities", "colors")

@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from engine.capture.rig import CameraRig
+from engine.camera.rig import CameraRig
 from tests.ui.gl.keep import Keep
 from tests.ui.gl.scenes import Camera, centered_camera, make_ring_rig
 from ui.gl.lines import (

@@ -6,14 +6,14 @@ import moderngl
 import numpy as np
 import pytest
 
-from app.arrays import AnchorArrays
-from engine.cloud.regions import sphere_region
+from app.playback.arrays import AnchorArrays
+from engine.gate.regions import sphere_region
 from engine.model.roles import ROLES
 from tests.ui.gl.keep import Keep
 from tests.ui.gl.scenes import Camera, centered_camera
-from ui.colors import CHOSEN, REGION_COLORS
 from ui.gl.targets import Target
-from ui.region_layer import RegionLayer, ShownRegions
+from ui.style.colors import CHOSEN, REGION_COLORS
+from ui.viewport.region_layer import RegionLayer, ShownRegions
 
 pytestmark = pytest.mark.gl
 

@@ -1,0 +1,71 @@
+"""The compiled kernels, as the program uses them: compiling them where no window waits, and threads to run them on.
+
+Compiling holds the interpreter lock for seconds, so it happens in processes of its own (`engine.kernels.compile_ahead`).
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+
+from engine.conventions import SPIN_COUNT
+from engine.kernels.cache import is_cache_warm
+from engine.kernels.compile_ahead import compile_all, warm_up_all
+from engine.progress import Progress, ReportProgress
+
+logger = logging.getLogger(__name__)
+
+COMPILING = "Compiling kernels, first start only"
+
+
+def warm_cache() -> None:
+    """Compile what is not in the cache yet. Blocks until it is done; failing is no failure."""
+    try:
+        compile_all()
+    except OSError as error:
+        logger.warning("kernels could not be compiled ahead: %s", error)
+
+
+def warm_up_reporting(report: ReportProgress) -> None:
+    """Compile what is not in the cache yet, saying how far that is, and load what a training step needs.
+
+    What `report` raises ends the compiling processes and passes on.
+    """
+    said = -1
+
+    def report_groups(done: int, n: int, what: str) -> None:
+        nonlocal said
+        message = f"{done} of {n} groups of kernels are compiled" if done > max(said, 0) else ""
+        said = max(said, done)
+        report(Progress(COMPILING, done / max(n, 1), message))
+
+    warm_up_all(report_groups)
+
+
+def use_threads(n_threads: int | None) -> int:
+    """Set how many threads the calling thread computes with; None for every core. Returns how many it will be.
+
+    To be called before torch is imported where that is possible: OpenMP reads its environment when it is loaded, so
+    the spin count is set here and not only in configure_threads, whose module imports torch.
+    """
+    os.environ.setdefault("GOMP_SPINCOUNT", str(SPIN_COUNT))
+    from engine.kernels.threads import configure_threads
+
+    return configure_threads(n_threads)
+
+
+def prepare_drawing() -> None:
+    """Once on a thread that draws: compiled kernels, one core, and everything loaded that a first picture needs."""
+    warm_cache()
+    use_threads(1)
+    if is_cache_warm():
+        from engine.raster.cpu.warm import warm_up
+
+        warm_up()
+
+
+def prepare_decoding() -> None:
+    """Once on a thread that decodes: one core, and everything loaded that a first frame needs."""
+    import engine.model.clip_model  # noqa: F401
+
+    use_threads(1)

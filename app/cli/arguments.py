@@ -1,0 +1,190 @@
+"""What subcommands share: argparse that says what is wrong in one line, training settings, ranges, cameras, codes."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import logging
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from engine.capture.capture import Capture
+from engine.errors import ProjectError
+from engine.text import printable, shown
+
+logger = logging.getLogger(__name__)
+
+EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT = 0, 1, 2
+COMMANDS = {
+    "train": "train clips of a capture, or go on where it stopped",
+    "eval": "measure trained clips against every camera, and the seams between them",
+    "render": "render a camera of the capture, as video or PNG files",
+    "inspect": "describe a capture, or what the trained clips of a project weigh",
+    "gate": "say what is static in a project and why, and overrule it",
+    "doctor": "look at this machine: versions, memory, compiled kernels, OpenGL, disk",
+    "bench": "measure the kernels on this machine, speed beside error",
+    "report": "write a page about a project, alone or beside others",
+    "ablate": "train variants of the method and baselines, and compare them",
+}
+"""Subcommands that app.cli.cli serves without a window, and what each does."""
+
+
+_LONGEST_INSIDE = 200
+"""Bytes of the longest name that the program adds to a folder it was given."""
+
+
+def fail(code: int, message: str) -> int:
+    """Say in one line, and in the log, why a subcommand ends with this exit code. Returns the code."""
+    logger.error("exit %d: %s", code, message)
+    print(printable(f"clipgstream: {message}"), file=sys.stderr)
+    return code
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """ " Did you mean X?" for what was probably meant; empty where nothing is near."""
+    near = difflib.get_close_matches(word.lower(), {name.lower(): name for name in known}, n=1, cutoff=0.6)
+    names = [name for name in known if near and name.lower() == near[0]]
+    return f" Did you mean {names[0]}?" if names else ""
+
+
+class PlainParser(argparse.ArgumentParser):
+    """Says what is wrong in one line and how to get help. Options are written in full: `--seed` is not `--seeds`."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{"allow_abbrev": False, **options})
+
+    def error(self, message: str) -> NoReturn:
+        """End the program with exit code 2 and one line."""
+        end = "" if message.endswith("?") else "."
+        self.exit(EXIT_BAD_INPUT, printable(f"{self.prog}: {message}{end} See `{self.prog} --help`.") + "\n")
+
+    def options_of(self, command: str | None) -> list[str]:
+        """Options of a subcommand, or of this parser where there is none, as they are written."""
+        parser: argparse.ArgumentParser = self
+        for action in self._actions:
+            if isinstance(action, argparse._SubParsersAction) and command in action.choices:
+                parser = action.choices[command]
+        return list(parser._option_string_actions)
+
+
+def parse(parser: PlainParser, argv: Sequence[str] | None) -> argparse.Namespace:
+    """Arguments after the program's name (those of the process when None) as options.
+
+    What is left over is said with the help of the subcommand it was meant for. Raises SystemExit as argparse does.
+    """
+    options, unknown = parser.parse_known_args(argv)
+    if unknown:
+        command = getattr(options, "command", None)
+        known = parser.options_of(command)
+        near = next((found for part in unknown if part.startswith("-") and (found := suggestion(part, known))), "")
+        parser.prog = f"{parser.prog} {command}" if command else parser.prog
+        parser.error(f"unrecognized arguments: {' '.join(unknown)}" + (f".{near}" if near else ""))
+    return options
+
+
+def add_figure_choices(command: argparse.ArgumentParser, *, default: str | None, said: str) -> None:
+    """Arguments of every subcommand that measures. said: the default of --metrics, for the help."""
+    command.add_argument(
+        "--metrics",
+        choices=("quick", "all"),
+        default=default,
+        help=f"quick: PSNR, SSIM and DSSIM1 only (default: {said})",
+    )
+    command.add_argument(
+        "--precision",
+        choices=("float", "8bit"),
+        default="float",
+        help="compare pictures as rendered, or rounded as in a PNG file (default: float)",
+    )
+
+
+def path_argument(text: str) -> Path:
+    """A path of the command line; what cannot be one is said at once, with exit code 2, whatever it is for."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("it is empty; name a folder")
+    try:
+        os.lstat(os.path.join(text, "x" * _LONGEST_INSIDE))
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        pass  # told better by whoever uses it
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise argparse.ArgumentTypeError(f"{shown(text)} cannot be used as a path ({reason})") from error
+    return Path(text)
+
+
+def add_follow_links(command: argparse.ArgumentParser) -> None:
+    """The argument of every subcommand that opens a capture by its name."""
+    command.add_argument(
+        "--follow-links",
+        action="store_true",
+        help="read files outside of the capture folder if it names some",
+    )
+
+
+def add_training_settings(command: argparse.ArgumentParser) -> None:
+    """Arguments of every subcommand that trains."""
+    command.add_argument("--holdout", metavar="NAMES", help="cameras to leave out, or 'none' (default: the capture's)")
+    command.add_argument("--scale", type=float, help="working size, share of the original in (0, 1] (default: 1)")
+    command.add_argument("--clip-length", type=int, metavar="M", help="frames per clip (default: 10)")
+    command.add_argument("--preset", metavar="NAME", help="toy, small (the default), medium or paper")
+    command.add_argument(
+        "--set",
+        dest="assignments",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a training setting, also one of the preset; may be given several times",
+    )
+
+
+def overrides_of(options: argparse.Namespace) -> dict[str, Any]:
+    """Training settings of the arguments: the preset, and what was set beside it."""
+    from engine.training.config import parse_overrides
+    from engine.training.presets import preset
+
+    return (preset(options.preset) if options.preset else {}) | parse_overrides(options.assignments)
+
+
+def parse_range(text: str, n: int, *, option: str, what: str) -> range:
+    """ "A:B", "A:", ":B", ":" or "A" as a range inside range(n).
+
+    Raises:
+        ProjectError: It is malformed, empty or reaches outside; names what is allowed.
+    """
+    first, colon, last = text.partition(":")
+    allowed = f"The capture has {what} 0 to {n - 1}; write {option} 0:{n} for all of them."
+    try:
+        start = int(first) if first.strip() else 0
+        stop = (int(last) if last.strip() else n) if colon else start + 1
+        if not colon and not first.strip():
+            raise ValueError
+    except ValueError as error:
+        raise ProjectError(f"{option} is '{text}', which is not a range A:B.", hint=allowed) from error
+    if not 0 <= start < stop <= n:
+        raise ProjectError(f"{option} is '{text}', which is empty or reaches outside.", hint=allowed)
+    return range(start, stop)
+
+
+def parse_cameras(text: str, capture: Capture) -> tuple[str, ...]:
+    """Camera names separated by commas; numbers that are no names count cameras from 0. "none" is an empty choice.
+
+    Raises:
+        ProjectError: There is no such camera.
+    """
+    names = capture.rig.names
+    chosen = []
+    for part in (part.strip() for part in text.split(",")):
+        if part in names:
+            chosen.append(part)
+        elif part.isdigit() and int(part) < len(names):
+            chosen.append(names[int(part)])
+        elif part and part.lower() != "none":
+            shown = f"{', '.join(names[:6])}, ... {names[-1]}" if len(names) > 7 else ", ".join(names)
+            raise ProjectError(
+                f"There is no camera '{part}'.{suggestion(part, names)}",
+                hint=f"Cameras are {shown}, or numbers from 0 to {len(names) - 1}.",
+            )
+    return tuple(dict.fromkeys(chosen))

@@ -1,0 +1,180 @@
+"""What `clipgstream doctor` tells: versions, cores, memory, compiled kernels, OpenGL. Changes nothing."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+
+from app.background.kernels import use_threads
+from app.project.project import data_dir
+from app.training.worker import n_cores, n_training_threads
+from engine.kernels.cache import UNWRITABLE, cache_root, cache_state
+
+PACKAGES = ("torch", "numpy", "numba", "scipy", "av", "open3d-cpu", "open3d", "pycolmap", "pyglet", "moderngl")
+PACKAGES += ("imgui-bundle", "safetensors")
+_GL_PROBE = """
+import json, sys
+import moderngl
+options = {"backend": "egl"} if sys.platform.startswith("linux") else {}
+ctx = moderngl.create_standalone_context(require=330, **options)
+print(json.dumps([ctx.info["GL_RENDERER"], ctx.info["GL_VERSION"]]))
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of the report. `is_fine` is False for what the user should look at."""
+
+    subject: str
+    text: str
+    is_fine: bool = True
+
+
+def examine() -> list[Finding]:
+    """Look at everything; takes a few seconds, because OpenGL is tried in a process of its own."""
+    return [
+        _python(),
+        *_packages(),
+        _cores(),
+        _memory(),
+        _kernels(),
+        _vectors(),
+        _threads(),
+        _gl(),
+        _display(),
+        _disk(),
+    ]
+
+
+def _python() -> Finding:
+    version = platform.python_version()
+    is_fine = (3, 11) <= sys.version_info[:2] < (3, 14)
+    return Finding("Python", f"{version} on {platform.platform()}", is_fine)
+
+
+def _packages() -> list[Finding]:
+    found, missing = [], []
+    for name in PACKAGES:
+        try:
+            found.append(f"{name} {importlib.metadata.version(name)}")
+        except importlib.metadata.PackageNotFoundError:
+            missing.append(name)
+    if len({"open3d", "open3d-cpu"} & set(missing)) == 1:  # either of the two will do
+        missing = [name for name in missing if not name.startswith("open3d")]
+    findings = [Finding("Packages", ", ".join(found))]
+    if missing:
+        findings.append(Finding("Missing", f"{', '.join(missing)}. Run `make setup`.", is_fine=False))
+    return findings
+
+
+def _cores() -> Finding:
+    cores = n_cores()
+    threads = n_training_threads(cores, is_window_open=True)
+    return Finding("Cores", f"{cores}; training beside the window uses {threads}")
+
+
+def _memory() -> Finding:
+    try:
+        n_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return Finding("Memory", "unknown")
+    return Finding("Memory", f"{n_bytes / 2**30:.1f} GB", n_bytes > 3 * 2**30)
+
+
+def _kernels() -> Finding:
+    state = cache_state()
+    place = f"{state.folder}, {state.n_bytes / 2**20:.1f} MB"
+    if state.is_fallback:
+        place += f" (a temporary folder, because {cache_root()} cannot be written)"
+    if state.is_warm:
+        return Finding("Kernels", f"compiled, in {place}", not state.is_fallback)
+    is_fine = state.reason != UNWRITABLE and not state.is_fallback
+    wait = "the first training or picture takes some seconds longer"
+    return Finding("Kernels", f"not compiled: {state.reason}; {wait}. Folder {place}", is_fine)
+
+
+def _vectors() -> Finding:
+    from engine.kernels.lanes import N_LANES
+
+    name, width, cpu = host_vectors()
+    n_registers = -(-N_LANES // width)
+    text = f"{name}, {width} numbers at once: {N_LANES} lanes of a kernel fill {n_registers} register"
+    return Finding("Vectors", f"{text}{'s' if n_registers > 1 else ''} ({cpu})")
+
+
+def host_vectors() -> tuple[str, int, str]:
+    """Widest instruction set that kernels can use here, float32 numbers it holds, and LLVM's name of the processor."""
+    from llvmlite import binding
+
+    features = {name for name, is_there in binding.get_host_cpu_features().items() if is_there}
+    return *vector_width(features, platform.machine()), binding.get_host_cpu_name()
+
+
+def vector_width(features: set[str], machine: str) -> tuple[str, int]:
+    """Name of the widest instruction set that kernels can use, and how many float32 it holds.
+
+    Args:
+        features: Names of LLVM's host features that are there.
+        machine: As platform.machine() says it.
+    """
+    for feature, name, width in (("avx512f", "AVX-512", 16), ("avx2", "AVX2", 8), ("avx", "AVX", 8)):
+        if feature in features:
+            return name, width
+    if "neon" in features or machine.lower() in ("arm64", "aarch64"):
+        return "NEON", 4
+    return ("SSE", 4) if "sse2" in features else ("no vector instructions known", 1)
+
+
+def _threads() -> Finding:
+    n_threads = use_threads(None)
+    from numba.np.ufunc.parallel import threading_layer
+
+    from engine.kernels.threads import parallel_guard
+
+    with parallel_guard():  # starts the threads, so that the layer is known
+        layer = threading_layer()
+    spin = os.environ["GOMP_SPINCOUNT"]
+    policy = os.environ.get("OMP_WAIT_POLICY")
+    waits = f"; OMP_WAIT_POLICY={policy}" if policy else ""
+    text = f"{n_threads}, layer {layer}; an idle one spins {spin} rounds (GOMP_SPINCOUNT){waits}"
+    if layer == "workqueue":
+        return Finding("Threads", f"{text}. No OpenMP (libgomp) was found, so kernels run one call at a time.", False)
+    return Finding("Threads", text)
+
+
+def _gl() -> Finding:
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _GL_PROBE],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=30,
+            check=False,
+        )
+        renderer, version = json.loads(done.stdout.splitlines()[-1])
+    except (OSError, subprocess.TimeoutExpired, ValueError, IndexError):
+        hint = "The window needs OpenGL 3.3; training, eval and render do not."
+        return Finding("OpenGL", f"not available. {hint}", is_fine=False)
+    is_software = any(word in renderer.lower() for word in ("llvmpipe", "softpipe", "swrast", "software"))
+    how = "drawn by the processor, so the window shows the rasterizer's pictures" if is_software else "graphics card"
+    return Finding("OpenGL", f"{version}, {renderer}: {how}")
+
+
+def _display() -> Finding:
+    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+        return Finding("Display", "none; `clipgstream` runs its job without a window")
+    return Finding("Display", os.environ.get("DISPLAY", "yes"))
+
+
+def _disk() -> Finding:
+    folder = data_dir()
+    place = next(parent for parent in (folder, *folder.parents) if parent.exists())
+    free = shutil.disk_usage(place).free
+    return Finding("Projects", f"in {folder / 'projects'}, {free / 2**30:.1f} GB free", free > 2**30)

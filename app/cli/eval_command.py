@@ -1,0 +1,78 @@
+"""clipgstream eval: figures of trained clips as JSON, and the means as text."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from app.cli.arguments import EXIT_OK, add_figure_choices, parse_range, path_argument
+from app.cli.progress import ProgressLine, row_progress
+from app.cli.results import check_writable, write_text
+from app.evaluation.evaluation import evaluate_project
+from app.evaluation.headless import open_trained
+from app.project.project import open_project
+from app.training.service import Launch
+from engine.storage.json_files import json_text
+
+
+def add_eval_arguments(command: argparse.ArgumentParser) -> None:
+    """Arguments of `clipgstream eval`."""
+    command.add_argument("project", type=path_argument, help="project folder")
+    command.add_argument("--json", required=True, metavar="OUT", help="file for all rows and means; - prints them")
+    command.add_argument("--clips", default=":", metavar="A:B", help="clips to measure (default: all trained)")
+    add_figure_choices(command, default="all", said="all")
+    command.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def evaluate(options: argparse.Namespace, launch: Launch) -> int:
+    """clipgstream eval: measure trained clips, into a JSON document. Returns the exit code."""
+    if options.json != "-":
+        check_writable(Path(options.json))
+    opened = open_trained(open_project(options.project, is_writable=False))
+    chosen = list(parse_range(options.clips, len(opened.clips), option="--clips", what="clips"))
+    if options.clips.strip() == ":":
+        chosen = opened.trained
+    line = ProgressLine(is_quiet=options.quiet)
+    progress = row_progress(line, "Measuring")
+    document = evaluate_project(
+        opened,
+        clip_indices=chosen,
+        metrics=options.metrics,
+        precision=options.precision,
+        on_progress=progress,
+        say=line.say,
+    )
+    line.finish()
+    text = json_text(document, indent=1)
+    if options.json == "-":
+        print(text)
+        return EXIT_OK
+    write_text(Path(options.json), text + "\n")
+    _show_evaluation(line, document)
+    line.say(f"{len(document['rows'])} rows in {options.json}")
+    return EXIT_OK
+
+
+def _show_evaluation(line: ProgressLine, document: dict[str, Any]) -> None:
+    for clip, summary in document["means"]["clips"].items():
+        for group, words in (("held_out", "held out"), ("trained_on", "trained on")):
+            found = summary[group]
+            if found:
+                line.say(
+                    f"Clip {clip}, {words}: PSNR {_figure(found['psnr'], 2)} dB, after colour fit "
+                    f"{_figure(found['psnr_fit'], 2)} dB, SSIM {_figure(found['ssim'], 4)}"
+                )
+    for seam in document["seams"]["boundaries"]:
+        line.say(
+            f"Seam at frame {seam['frame_index']}: score {_figure(seam['score'], 2)}/255, change at the boundary "
+            f"{_figure(seam['ratio_static'], 2)} times that inside the clips on static pixels, "
+            f"{_figure(seam['ratio_moving'], 2)} times on moving ones (truth: {_figure(seam['truth_ratio_moving'], 2)})"
+        )
+    missing = document["columns"]["lpips"]["why_missing"]
+    if document["metrics"] == "all" and missing:
+        line.say(f"LPIPS is left empty: {'; '.join(missing)}")
+
+
+def _figure(value: float | None, n_digits: int) -> str:
+    return "-" if value is None else f"{value:.{n_digits}f}"

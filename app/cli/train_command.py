@@ -1,0 +1,243 @@
+"""clipgstream train: a project made or opened as the arguments say, its clips trained, or only their plan printed."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from app.cli.arguments import (
+    EXIT_BAD_INPUT,
+    EXIT_FAILED,
+    EXIT_OK,
+    add_follow_links,
+    add_training_settings,
+    fail,
+    overrides_of,
+    parse_cameras,
+    parse_range,
+    path_argument,
+)
+from app.cli.progress import ProgressLine, duration_text
+from app.cli.training_lines import PlanLines, show_event, show_outcome, show_status
+from app.evaluation.headless import train_clips, train_document
+from app.plan.planning import clip_history, plan_clip, plan_document, plan_text, totals
+from app.plan.speed import known_machine_speed
+from app.project.clip_catalog import ClipCatalog
+from app.project.project import (
+    PROJECT_FILE,
+    Project,
+    ProjectSettings,
+    check_settings,
+    create_project,
+    default_settings,
+    open_project,
+    read_settings,
+)
+from app.training.service import Launch, TrainingService
+from engine.capture.capture import Capture, open_capture
+from engine.errors import CaptureError, DiskError, ProjectError
+from engine.storage.json_files import json_text
+
+BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
+"""Failures of a worker that are the input's and not the program's."""
+
+
+def add_train_arguments(command: argparse.ArgumentParser) -> None:
+    """Arguments of `clipgstream train`."""
+    command.add_argument("capture", type=path_argument, help="capture folder")
+    command.add_argument(
+        "--project", type=path_argument, required=True, help="project folder; made when it is not there"
+    )
+    command.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
+    add_follow_links(command)
+    add_training_settings(command)
+    command.add_argument("--seed", type=int, help="fixes initial values and order of pictures (default: 0)")
+    command.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
+    command.add_argument(
+        "--plan", action="store_true", help="say what would be trained, why, and what it takes; train nothing"
+    )
+    command.add_argument(
+        "--json", action="store_true", help="print the outcome, or the plan, as JSON on standard output"
+    )
+    command.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def train(options: argparse.Namespace, launch: Launch) -> int:
+    """clipgstream train: train clips, or print their plan. Returns the exit code."""
+    if options.plan:
+        return _plan(options)
+    was_folder, was_project = options.project.exists(), (options.project / PROJECT_FILE).is_file()
+    project, capture = _open_for_training(options)
+    is_refused, outcomes = False, []
+    line = ProgressLine(is_quiet=options.quiet)
+    service: TrainingService | None = None
+    try:
+        clips = project.clips(capture.n_frames)
+        chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
+        holdout = capture.camera_indices(project.settings.holdout)
+        service = TrainingService(project, clips, holdout=holdout, launch=launch, is_window_open=False)
+        names = ", ".join(project.settings.holdout) or "none"
+        line.say(
+            f"{capture.path}: {len(capture.rig)} cameras (held out: {names}), {capture.n_frames} frames, "
+            f"clips {chosen.start} to {chosen.stop - 1} of {len(clips)}"
+        )
+        for sentence in capture.warnings:
+            line.say(f"Note: {sentence}")
+        first = project.settings.reference_clip  # the others cannot begin before it
+        plans = PlanLines(
+            line,
+            project,
+            capture,
+            catalog=service.catalog,
+            measure_machine=known_machine_speed,
+            is_quiet=options.quiet,
+        )
+        outcomes = train_clips(
+            service,
+            sorted(chosen, key=lambda clip_index: clip_index != first),
+            on_begin=lambda clip_index: plans.begin(clips[clip_index]),
+            on_status=lambda status: show_status(line, status),
+            on_event=lambda event: show_event(line, event),
+            on_outcome=lambda outcome: (show_outcome(line, outcome), plans.end(outcome)),
+        )
+        is_refused = outcomes[-1].state == "failed" and outcomes[-1].kind in BAD_INPUT_KINDS
+        line.finish()
+        if options.json:
+            print(json_text(train_document(project, capture, outcomes), indent=2))
+    except (CaptureError, ProjectError) as error:
+        is_refused = not isinstance(error, DiskError)
+        raise
+    finally:
+        line.finish()
+        if service is not None:
+            service.close()
+        has_learned = project.has_progress or any(outcome.step for outcome in outcomes)
+        if is_refused and not was_project and not has_learned:  # bad input leaves nothing behind
+            project.remove_files()
+        project.close()
+        if is_refused and not was_folder:
+            with contextlib.suppress(OSError):  # not empty: something was learned
+                options.project.rmdir()
+    last = outcomes[-1]
+    if last.state == "failed":
+        code = EXIT_BAD_INPUT if last.kind in BAD_INPUT_KINDS else EXIT_FAILED
+        return fail(code, " ".join(part for part in (last.message, last.hint) if part))
+    damaged = [outcome for outcome in outcomes if outcome.state == "damaged"]
+    if damaged:
+        return fail(EXIT_FAILED, "\n".join(f"{outcome.message} {outcome.hint}" for outcome in damaged))
+    return EXIT_OK
+
+
+def _plan(options: argparse.Namespace) -> int:
+    project, capture = _project_to_plan(options)
+    clips = project.clips(capture.n_frames)
+    chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
+    catalog = ClipCatalog(project, len(clips))
+    order = [i for i in catalog.order if i in chosen]
+    trained = [i for i in order if catalog[i].state == "trained"]
+    damaged = [i for i in order if catalog[i].state == "damaged" or catalog[i].blocked_by is not None]
+    history = clip_history(project, len(clips))
+    plans = [
+        plan_clip(project, capture, clips[i], measure_machine=known_machine_speed, history=history, catalog=catalog)
+        for i in order
+        if i not in trained and i not in damaged
+    ]
+    if options.json:
+        print(json_text(plan_document(project, capture, plans, trained, damaged), indent=2))
+        return EXIT_OK
+    for plan in plans:
+        print("\n".join(plan_text(plan)))
+    if trained:
+        print(f"Trained already: clip {', '.join(str(clip_index) for clip_index in trained)}")
+    if damaged:
+        listed = ", ".join(str(clip_index) for clip_index in damaged)
+        print(f"Left alone, because they are damaged or need one that is: clip {listed}")
+    if len(plans) > 1:
+        sums = totals(plans)
+        print(
+            f"All {len(plans)} clips: about {duration_text(sums['preparation_s'] + sums['training_s'])}, "
+            f"at most {sums['memory_mb'] / 1e3:.1f} GB of memory, {sums['disk_mb']:.2g} MB stored"
+        )
+    return EXIT_OK
+
+
+def _open_for_training(options: argparse.Namespace) -> tuple[Project, Capture]:
+    """The project of the arguments, made or opened; what was given has to agree with what is there."""
+    settings, stored, capture = _chosen_settings(options)
+    if stored is None:
+        return create_project(options.project, settings), capture
+    project = open_project(options.project)
+    try:
+        _check_changes(options, project, settings)
+    except ProjectError:
+        project.close()
+        raise
+    if settings != stored:
+        project.update(settings)
+    return project, capture
+
+
+def _project_to_plan(options: argparse.Namespace) -> tuple[Project, Capture]:
+    """Likewise, for looking only: nothing is made, changed or locked."""
+    settings, stored, capture = _chosen_settings(options)
+    project = Project(options.project, settings, None)
+    if stored is not None:
+        _check_changes(options, Project(options.project, stored, None), settings)
+    return project, capture
+
+
+def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, ProjectSettings | None, Capture]:
+    """Settings that the arguments ask for, those of the project where there is one, and the capture."""
+    overrides = overrides_of(options)
+    exists = (options.project / PROJECT_FILE).is_file()
+    stored = read_settings(options.project) if exists else None
+    scale = options.scale if options.scale is not None else 1.0 if stored is None else stored.scale
+    follow_links = options.follow_links or (stored is not None and stored.follow_links)
+    capture = open_capture(options.capture, scale=scale, follow_links=follow_links)
+    holdout = None if options.holdout is None else parse_cameras(options.holdout, capture)
+    if stored is None:
+        settings = default_settings(
+            capture,
+            clip_length=options.clip_length,
+            holdout=holdout,
+            seed=options.seed or 0,
+            overrides=overrides,
+            reference_clip=options.reference_clip or 0,
+        )
+        n_clips = len(settings.clips(capture.n_frames))
+        parse_range(options.clips, n_clips, option="--clips", what="clips")  # said before the folder is made
+        return settings, None, capture
+    given = {
+        "scale": options.scale,
+        "clip_length": options.clip_length,
+        "seed": options.seed,
+        "holdout": holdout,
+        "reference_clip": options.reference_clip,
+    }
+    changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    if capture.fingerprint != stored.fingerprint:
+        raise ProjectError(
+            "The project was made for another capture.", hint="Choose another --project folder.", path=options.project
+        )
+    place = str(Path(capture.path).resolve())  # the capture may have moved
+    changes |= {"overrides": stored.overrides | overrides, "capture": place, "follow_links": follow_links}
+    settings = replace(stored, **changes)
+    check_settings(settings, capture)
+    return settings, stored, capture
+
+
+def _check_changes(options: argparse.Namespace, project: Project, settings: ProjectSettings) -> None:
+    """See that nothing was learned with other settings."""
+    stored = project.settings
+    names = ("scale", "clip_length", "seed", "holdout", "reference_clip", "overrides")
+    changed = [name for name in names if getattr(settings, name) != getattr(stored, name)]
+    if changed and project.has_progress:
+        listed = ", ".join(f"{name} {getattr(stored, name)!r}" for name in changed)
+        raise ProjectError(
+            f"The project was trained with {listed}; that cannot change any more.",
+            hint="Leave the option out, or choose another --project folder.",
+            path=options.project,
+        )

@@ -1,0 +1,285 @@
+"""What `clipgstream eval` does: every frame of the chosen clips against every camera, as one JSON-able document.
+
+Figures are kept in the project (app.evaluation.kept_figures), so that an evaluation goes on where it was interrupted, and eval,
+report and ablate measure a version of a clip once.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+from app.background.kernels import use_threads
+from app.evaluation.headless import TrainedProject
+from app.evaluation.kept_figures import EVALUATIONS, KeptFigures
+from engine.parallel import n_workers
+
+if TYPE_CHECKING:
+    from engine.metrics.clips.evaluate import Evaluation
+    from engine.metrics.clips.seams import PairRow, SeamMaps
+    from engine.metrics.clips.summary import EvalRow
+    from engine.metrics.pictures.colors import Precision
+    from engine.metrics.pictures.picture import Choice
+
+logger = logging.getLogger(__name__)
+
+EVAL_SCHEMA = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """What is measured of a project.
+
+    Attributes:
+        clips: Indices, rising; where one follows the other, the boundary between them is measured.
+        cameras: Indices of the cameras to compare with.
+        metrics, precision: See engine.metrics.pictures.picture.measure_picture.
+    """
+
+    clips: Sequence[int]
+    cameras: Sequence[int]
+    metrics: Choice
+    precision: Precision
+
+    def before(self, clip_index: int) -> int | None:
+        """The clip before, where the boundary to it is measured."""
+        return clip_index - 1 if clip_index - 1 in self.clips else None
+
+
+Frames = dict[int, tuple[list[int], list[int]]]
+"""What of a clip is not measured yet, by camera: frames of rows, and later frames of pairs."""
+
+
+class Measuring(Protocol):
+    """Measures what is not known of a clip, in any order; ClipMeasuring, or what a test brings."""
+
+    def __call__(
+        self, opened: TrainedProject, scope: Scope, clip_index: int, unknown: Frames
+    ) -> Iterator[EvalRow | PairRow]: ...
+
+
+def evaluate_project(
+    opened: TrainedProject,
+    *,
+    clip_indices: Sequence[int],
+    cameras: Sequence[int] | None = None,
+    metrics: Choice = "all",
+    precision: Precision = "float",
+    on_progress: Callable[[int, int, Any], None],
+    say: Callable[[str], None] = logger.warning,
+    measuring: Measuring | None = None,
+) -> dict[str, Any]:
+    """Compare every frame of the clips with what every camera took; what was measured before is taken up.
+
+    Args:
+        clip_indices: Rising; where one follows the other, the boundary between them is measured.
+        cameras: Indices of the cameras to compare with; all of them when None.
+        metrics, precision: See engine.metrics.pictures.picture.measure_picture.
+        on_progress: Gets rows done, rows in all, and the newest row; at first what was known before, with None.
+        say: Told of kept figures that are damaged, or that cannot be kept.
+        measuring: Measures what is not known of a clip; ClipMeasuring when None.
+    Returns:
+        JSON-able: schema, project, capture, scale, holdout (names), clips, metrics and precision (as chosen), columns
+        (engine.metrics.clips.summary.columns_of), rows (EvalRow.as_dict: one per clip, frame and camera), means with keys
+        all, held_out, trained_on, clips (the same two per clip index), cameras, frames (curves over time) and worst,
+        and seams: rows (one per neighbouring frames and camera) and what engine.metrics.clips.seams.summarize returns.
+        A mean leaves out rows without the figure; it is null where no row has it, and columns counts those rows.
+    Raises:
+        ProjectError: A clip is not trained or does not fit.
+        KeyboardInterrupt: With what is kept, in a sentence.
+    """
+    from engine.metrics.clips import seams, summary
+    from engine.metrics.clips.summary import EvalRow
+
+    project, capture = opened.project, opened.capture
+    chosen_cameras = list(range(len(capture.rig)) if cameras is None else cameras)
+    scope = Scope(list(clip_indices), chosen_cameras, metrics, precision)
+    for clip_index in {*scope.clips} - {*opened.trained}:
+        opened.load(clip_index)  # says what is trained
+    kept = {i: kept_figures(opened, scope, i, say) for i in scope.clips}
+    unknown = {i: _unknown(opened, scope, i, kept[i]) for i in scope.clips}
+    if measuring is None:
+        measuring = ClipMeasuring()
+        for clip_index in [i for i in scope.clips if unknown[i]]:  # damaged ones are found before the work
+            opened.load(clip_index)
+    n_rows = sum(opened.clips[i].n_frames for i in scope.clips) * len(scope.cameras)
+    n_done = n_rows - sum(len(frames) for todo in unknown.values() for frames, _ in todo.values())
+    on_progress(n_done, n_rows, None)
+    try:
+        for clip_index, todo in unknown.items():
+            if not todo:
+                continue
+            with kept[clip_index].writing():
+                for item in measuring(opened, scope, clip_index, todo):
+                    kept[clip_index].add(item)
+                    if isinstance(item, EvalRow):
+                        n_done += 1
+                        on_progress(n_done, n_rows, item)
+    except KeyboardInterrupt:
+        is_kept = all(kept[i].is_writable for i in scope.clips)
+        words = "kept; the same command goes on from there" if is_kept else "lost: the project cannot be written to"
+        raise KeyboardInterrupt(f"{n_done} of {n_rows} pictures were measured and are {words}.") from None
+    rows, pairs = _in_order(opened, scope, kept)
+
+    per_clip = {str(i): summary.by_group([row for row in rows if row.clip_index == i]) for i in scope.clips}
+    return {
+        "schema": EVAL_SCHEMA,
+        "project": str(project.folder),
+        "capture": str(capture.path),
+        "scale": capture.scale,
+        "holdout": list(project.settings.holdout),
+        "clips": scope.clips,
+        "metrics": metrics,
+        "precision": precision,
+        "columns": summary.columns_of(rows),
+        "rows": [row.as_dict() for row in rows],
+        "means": {
+            "all": summary.means(rows),
+            **summary.by_group(rows),
+            "clips": per_clip,
+            "cameras": summary.by_camera(rows),
+            "frames": summary.by_frame(rows),
+            "worst": summary.worst_by_group(rows),
+        },
+        "seams": {"rows": [pair.as_dict() for pair in pairs], **seams.summarize(pairs)},
+    }
+
+
+def kept_figures(opened: TrainedProject, scope: Scope, clip_index: int, say: Callable[[str], None]) -> KeptFigures:
+    """What is known of a clip.
+
+    Raises:
+        ProjectError: The clip, or the one before it, is not trained or damaged.
+    """
+    from engine.metrics.pictures import lpips
+    from engine.metrics.pictures.picture import FIGURES_VERSION
+
+    clip, config = opened.clips[clip_index], opened.project.settings.config()
+    content = {
+        "schema": EVAL_SCHEMA,
+        "version": FIGURES_VERSION,
+        "capture": opened.project.settings.fingerprint,
+        "scale": opened.capture.scale,
+        "frames": [clip.start, clip.stop, clip.clip_length],
+        "clip": _fingerprint(opened, clip_index),
+        "reference": opened.reference and opened.reference.header.get("fingerprint", ""),
+        "field": _fingerprint(opened, opened.last_trained) if config.field == "continue" else None,
+        "metrics": scope.metrics,
+        "precision": scope.precision,
+        "lpips": scope.metrics == "all" and lpips.why_missing() is None,
+    }
+    before = scope.before(clip_index)
+    path = opened.project.folder / EVALUATIONS / f"{clip_index:04d}-{scope.metrics}-{scope.precision}.jsonl"
+    return KeptFigures(path, content, None if before is None else _fingerprint(opened, before), say)
+
+
+def is_measured(opened: TrainedProject, scope: Scope) -> bool:
+    """Whether `evaluate_project` would have nothing to measure.
+
+    Raises:
+        ProjectError: A clip is not trained or damaged.
+    """
+    nothing = logger.debug
+    return not any(_unknown(opened, scope, i, kept_figures(opened, scope, i, nothing)) for i in scope.clips)
+
+
+class ClipMeasuring:
+    """Measures clips of one project and scope, cameras side by side on all cores; keeps their backgrounds in between.
+
+    Each camera is measured with one thread, so that its figures do not depend on how many cores there are.
+
+    Args:
+        n_threads: How many cameras at a time; as many as cores when None.
+    """
+
+    def __init__(self, n_threads: int | None = None) -> None:
+        self._n_threads = n_workers() if n_threads is None else n_threads
+        self._evaluation: Evaluation | None = None
+
+    def __call__(
+        self, opened: TrainedProject, scope: Scope, clip_index: int, unknown: Frames
+    ) -> Iterator[EvalRow | PairRow]:
+        """Rows and pairs that are not known.
+
+        Raises:
+            ProjectError: A clip is not trained or damaged.
+        """
+        use_threads(None)
+        from engine.metrics.clips.side_by_side import side_by_side
+
+        if self._evaluation is None:
+            self._evaluation = _evaluation(opened, metrics=scope.metrics, precision=scope.precision)
+        trained, before_index = opened.load(clip_index), scope.before(clip_index)
+        before = None if before_index is None else opened.load(before_index)
+        cameras = [
+            self._evaluation.of_camera(trained, camera, before=before, frames=frames, pairs=pairs)
+            for camera, (frames, pairs) in unknown.items()
+        ]
+        yield from side_by_side(cameras, n_threads=self._n_threads, prepare=lambda: use_threads(1))
+
+
+def _fingerprint(opened: TrainedProject, clip_index: int) -> str:
+    return str(opened.header(clip_index).get("fingerprint", ""))
+
+
+def _unknown(opened: TrainedProject, scope: Scope, clip_index: int, kept: KeptFigures) -> Frames:
+    clip, names = opened.clips[clip_index], opened.capture.rig.names
+    found: Frames = {}
+    for camera in scope.cameras:
+        name = names[camera]
+        frames = [frame for frame in clip.frame_indices() if (name, frame) not in kept.rows]
+        later = [frame for frame in _later_frames(opened, scope, clip_index) if (name, frame) not in kept.pairs]
+        if frames or later:
+            found[camera] = frames, later
+    return found
+
+
+def _later_frames(opened: TrainedProject, scope: Scope, clip_index: int) -> list[int]:
+    """Later frames of all pairs of a clip."""
+    clip = opened.clips[clip_index]
+    return [f for f in clip.frame_indices() if f > clip.start or scope.before(clip_index) is not None]
+
+
+def _in_order(
+    opened: TrainedProject, scope: Scope, kept: dict[int, KeptFigures]
+) -> tuple[list[EvalRow], list[PairRow]]:
+    """Rows and pairs by clip, camera and frame. Which cameras are held out is the project's to say, not the file's."""
+    holdout, names = set(opened.project.settings.holdout), opened.capture.rig.names
+    rows, pairs = [], []
+    for clip_index in scope.clips:
+        later = _later_frames(opened, scope, clip_index)
+        for camera in scope.cameras:
+            name, is_held_out = names[camera], names[camera] in holdout
+            found = kept[clip_index]
+            frames = opened.clips[clip_index].frame_indices()
+            rows += [replace(found.rows[name, frame], is_held_out=is_held_out) for frame in frames]
+            pairs += [replace(found.pairs[name, frame], is_held_out=is_held_out) for frame in later]
+    return rows, pairs
+
+
+def boundary_maps(opened: TrainedProject, *, clip_index: int, camera_index: int) -> SeamMaps:
+    """Maps of R, G and E of one camera at the start of a clip, for a picture; see engine.metrics.clips.seams.
+
+    Raises:
+        ProjectError: This clip or the one before it is not trained.
+        ValueError: There is no clip before this one.
+    """
+    if clip_index < 1:
+        raise ValueError(f"clip {clip_index} has no clip before it")
+    use_threads(None)
+    before, after = opened.load(clip_index - 1), opened.load(clip_index)
+    return _evaluation(opened).boundary_maps(before, after, camera_index)
+
+
+def _evaluation(opened: TrainedProject, *, metrics: Choice = "all", precision: Precision = "float") -> Evaluation:
+    from engine.metrics.clips.evaluate import Evaluation
+
+    return Evaluation(
+        opened.capture,
+        cameras=range(len(opened.capture.rig)),
+        holdout=opened.capture.camera_indices(opened.project.settings.holdout),
+        metrics=metrics,
+        precision=precision,
+    )

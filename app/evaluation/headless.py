@@ -1,0 +1,305 @@
+"""The jobs without a window: train clips, open what was trained, render a camera. Prints nothing."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from app.background.kernels import use_threads
+from app.project.opening import open_capture_of
+from app.project.project import Project
+from app.status import TrainingStatus
+from app.training.messages import ClipTrained, Event, TrainingFailed, TrainingStopped, WorkerDied
+from app.training.service import TrainingService
+from engine.capture.capture import Capture
+from engine.capture.clip import Clip
+from engine.clip_files.clip_state import ClipState, DamagedClip, look_at_clip, read_clip_state
+from engine.errors import ProjectError
+
+if TYPE_CHECKING:
+    from engine.metrics.clips.features_apart import Features
+    from engine.metrics.clips.trained_clip import TrainedClip
+
+TRAIN_SCHEMA = 1
+POLL_EVERY_S = 0.05
+STOP_TIMEOUT_S = 60.0
+"""A step that changes the phase can take some seconds, and so can writing; nothing is thrown away for impatience."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClipOutcome:
+    """How the training of one clip ended.
+
+    Attributes:
+        state: trained, skipped (it was trained before), stopped, failed, or damaged (its file cannot be read, or that
+            of a clip which it needs; it is left as it is).
+        step: Steps done.
+        held_out_psnr: dB; None when not measured.
+        seconds: Wall time of this run, preparation included.
+        message, hint, kind: Of a failure or a damage.
+    """
+
+    clip_index: int
+    state: str
+    step: int = 0
+    held_out_psnr: float | None = None
+    seconds: float = 0.0
+    message: str = ""
+    hint: str = ""
+    kind: str = ""
+
+
+def train_clips(
+    service: TrainingService,
+    clip_indices: Sequence[int],
+    *,
+    on_status: Callable[[TrainingStatus], None],
+    on_event: Callable[[Event], None],
+    on_outcome: Callable[[ClipOutcome], object],
+    on_begin: Callable[[int], None] = lambda clip_index: None,
+    sleep: Callable[[float], None] = time.sleep,
+) -> list[ClipOutcome]:
+    """Train clips one after another; a failure ends it. KeyboardInterrupt stops, keeps and is raised again.
+
+    Args:
+        service: Queue and worker of the project.
+        clip_indices: In order.
+        on_status, on_event, on_outcome: Told how it goes.
+        on_begin: Told the index of each clip before it is trained; not of those that are trained already.
+        sleep: Waits some seconds between looks.
+    Raises:
+        ProjectError: A clip cannot be trained, for instance because its reference is not.
+        KeyboardInterrupt: After the worker has ended and its checkpoint is written.
+    """
+    outcomes: list[ClipOutcome] = []
+    for clip_index in clip_indices:
+        known = service.catalog[clip_index]
+        if known.state == "trained":
+            outcome = ClipOutcome(clip_index, "skipped", known.step, known.held_out_psnr)
+        elif known.state == "damaged" or known.blocked_by is not None:
+            outcome = _left_alone(service, clip_index)
+        else:
+            on_begin(clip_index)
+            outcome = _train_clip(service, clip_index, on_status, on_event, sleep)
+        outcomes.append(outcome)
+        on_outcome(outcome)
+        if outcome.state == "failed":
+            break
+    return outcomes
+
+
+def _train_clip(
+    service: TrainingService,
+    clip_index: int,
+    on_status: Callable[[TrainingStatus], None],
+    on_event: Callable[[Event], None],
+    sleep: Callable[[float], None],
+) -> ClipOutcome:
+    started_s = time.monotonic()
+    service.enqueue(clip_index)
+    ending: Event | None = None
+    try:
+        while service.worker is not None:
+            for event in service.poll():
+                on_event(event)
+                if isinstance(event, ClipTrained | TrainingStopped | TrainingFailed | WorkerDied):
+                    ending = event
+            on_status(service.status())
+            sleep(POLL_EVERY_S)
+    except KeyboardInterrupt:
+        service.close(timeout_s=STOP_TIMEOUT_S)
+        raise
+    seconds = time.monotonic() - started_s
+    step = service.status().step
+    match ending:
+        case ClipTrained():
+            return ClipOutcome(clip_index, "trained", ending.step, ending.held_out_psnr, seconds)
+        case TrainingFailed():
+            return ClipOutcome(
+                clip_index,
+                "failed",
+                step,
+                seconds=seconds,
+                message=ending.message,
+                hint=ending.hint,
+                kind=ending.kind,
+            )
+        case WorkerDied():
+            message = f"The training process ended with code {ending.exit_code}."
+            hint = f"Train again; it goes on from what was kept. Its log is {service.project.log_path(clip_index)}."
+            return ClipOutcome(clip_index, "failed", step, seconds=seconds, message=message, hint=hint)
+        case _:
+            return ClipOutcome(clip_index, "stopped", step, seconds=seconds)
+
+
+def _left_alone(service: TrainingService, clip_index: int) -> ClipOutcome:
+    """A damaged clip is not trained again unless somebody says so: the file may be worth a rescue."""
+    record = service.catalog[clip_index]
+    damaged = clip_index if record.state == "damaged" else record.blocked_by
+    assert damaged is not None
+    message = f"Clip {clip_index} was left as it is: "
+    message += (
+        service.catalog[damaged].reason if damaged == clip_index else f"it needs clip {damaged}, which is damaged."
+    )
+    path = service.project.clip_path(damaged)
+    hint = f"Restore the file from a copy, or remove it to train clip {damaged} again - {path}"
+    return ClipOutcome(clip_index, "damaged", message=message, hint=hint, kind="ProjectError")
+
+
+# ---------------------------------------------------------------- trained clips
+
+
+@dataclass(frozen=True, slots=True)
+class TrainedProject:
+    """A project opened for reading, with its capture.
+
+    Attributes:
+        reference: The clip that others inherit from; None where clips are independent and it is not trained.
+    """
+
+    project: Project
+    capture: Capture
+    clips: list[Clip]
+    reference: ClipState | None
+
+    @property
+    def trained(self) -> list[int]:
+        """Indices of the finished clips."""
+        return [clip.clip_index for clip in self.clips if self.project.is_trained(clip.clip_index)]
+
+    @property
+    def last_trained(self) -> int:
+        """Index of the finished clip that comes last in the order of training."""
+        return next(i for i in reversed(self.project.training_order(len(self.clips))) if i in self.trained)
+
+    def header(self, clip_index: int) -> dict[str, Any]:
+        """Header of a finished clip, see engine.clip_files.clip_state.
+
+        Raises:
+            ProjectError: It is not trained or damaged.
+        """
+        header = look_at_clip(self.project.clip_path(clip_index))
+        if header is None:
+            raise ProjectError(f"Clip {clip_index} is not trained.", hint="Train it first.", path=self.project.folder)
+        if isinstance(header, DamagedClip):
+            raise header.error()
+        return header
+
+    def load(self, clip_index: int) -> TrainedClip:
+        """Load a finished clip.
+
+        Raises:
+            ProjectError: It is not trained, damaged, or was trained on another reference.
+        """
+        from engine.metrics.clips.trained_clip import TrainedClip
+        from engine.model.clip_model import load_clip_model, read_field
+
+        if clip_index not in self.trained:
+            raise ProjectError(
+                f"Clip {clip_index} is not trained; trained are {self.trained or 'none'}.",
+                hint="Train it first.",
+                path=self.project.folder,
+            )
+        state = read_clip_state(self.project.clip_path(clip_index))
+        base = state if state.is_reference or self.reference is None else self.reference
+        model = load_clip_model(state, self.reference)
+        if self.project.settings.config().field == "continue":  # one field for all clips: as the last one left it
+            last = read_clip_state(self.project.clip_path(self.last_trained))
+            if last.header["field"] and model.field is not None:
+                model.attach_field(read_field(last).requires_grad_(requires_grad=False))
+        return TrainedClip(self.clips[clip_index], model, base)
+
+
+def open_trained(project: Project) -> TrainedProject:
+    """Open what a project was trained on.
+
+    Raises:
+        CaptureError: The capture is gone or damaged.
+        ProjectError: It is another one, or nothing is trained yet.
+    """
+    settings = project.settings
+    capture = open_capture_of(settings, project.folder)
+    clips = project.clips(capture.n_frames)
+    has_reference = project.is_trained(settings.reference_clip)
+    can_do_without = settings.config().independent and any(project.is_trained(clip.clip_index) for clip in clips)
+    if not has_reference and not can_do_without:
+        raise ProjectError(
+            "Nothing is trained in this project yet.", hint="Run `clipgstream train` first.", path=project.folder
+        )
+    reference = read_clip_state(project.reference_path) if has_reference else None
+    return TrainedProject(project, capture, clips, reference)
+
+
+def _runs(ranges: Sequence[range]) -> list[tuple[int, int]]:
+    """Ranges of frames in their order, those that follow each other joined. First and beyond-last frames."""
+    runs: list[tuple[int, int]] = []
+    for frames in ranges:
+        if runs and runs[-1][1] == frames.start:
+            runs[-1] = (runs[-1][0], frames.stop)
+        else:
+            runs.append((frames.start, frames.stop))
+    return runs
+
+
+def render_frames(
+    opened: TrainedProject, *, camera_index: int, frame_indices: Sequence[int], features: Features = "both"
+) -> Iterator[tuple[int, np.ndarray]]:
+    """Frames as a capture camera would see them, in that camera's colours. Yields (frame_index, [H, W, 3] uint8).
+
+    Args:
+        features: Which features of the anchors are used, see engine.metrics.clips.features_apart.
+    Raises:
+        ProjectError: A frame lies in a clip that is not trained or damaged; said before the first picture.
+    """
+    use_threads(None)
+    from engine.metrics.clips.features_apart import with_features
+    from engine.metrics.pictures.colors import to_levels
+
+    rig = opened.capture.rig
+    clip_of = {frame: clip for clip in opened.clips for frame in clip.frame_indices()}
+    needed = list(dict.fromkeys(clip_of[frame].clip_index for frame in frame_indices))
+    missing = [clip_index for clip_index in needed if clip_index not in opened.trained]
+    if missing:
+        first = next(frame for frame in frame_indices if clip_of[frame].clip_index in missing)
+        ranges = [f"{start}:{stop}" for start, stop in _runs([opened.clips[i].frame_indices() for i in opened.trained])]
+        raise ProjectError(
+            f"Frame {first} lies in clip {clip_of[first].clip_index}, which is not trained; of the {len(needed)} clips "
+            f"asked for {len(missing)} {'is' if len(missing) == 1 else 'are'} not.",
+            hint=f"Train with `clipgstream train` first, or render what is trained: --frames {' or '.join(ranges)}.",
+            path=opened.project.folder,
+        )
+    for clip_index in needed:  # a damaged one is found before anything is written; only one at a time is kept
+        opened.load(clip_index)
+    loaded: TrainedClip | None = None
+    for frame_index in frame_indices:
+        clip = clip_of[frame_index]
+        if loaded is None or loaded.clip != clip:
+            loaded = opened.load(clip.clip_index)
+            loaded = replace(loaded, model=with_features(loaded.model, features))
+        yield frame_index, to_levels(loaded.picture(rig, camera_index, clip.clip_time(frame_index)))
+
+
+def train_document(project: Project, capture: Capture, outcomes: Sequence[ClipOutcome]) -> dict[str, Any]:
+    """What `train --json` prints: schema, project, capture, holdout, and per clip its index, state, steps, held-out
+    PSNR (dB or null) and seconds."""
+    return {
+        "schema": TRAIN_SCHEMA,
+        "project": str(project.folder),
+        "capture": str(Path(capture.path)),
+        "holdout": list(project.settings.holdout),
+        "clips": [
+            {
+                "clip_index": outcome.clip_index,
+                "state": outcome.state,
+                "steps": outcome.step,
+                "held_out_psnr": outcome.held_out_psnr,
+                "seconds": round(outcome.seconds, 2),
+            }
+            for outcome in outcomes
+        ],
+    }

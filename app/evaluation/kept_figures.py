@@ -1,0 +1,139 @@
+"""Figures of measured pictures, kept in the project they are of: nothing is measured twice, or lost by an interruption.
+
+PROJECT/evaluations holds one file per clip and choice of figures. Its first line names everything that the figures
+depend on; then each picture, and each pair of neighbouring frames, is a line of its own with a checksum, written when
+it is measured. A file of another version of the clip is replaced. What cannot be read counts as not measured.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from engine.metrics.clips.seams import PairRow
+from engine.metrics.clips.summary import EvalRow
+from engine.metrics.columns import COLUMNS
+from engine.storage.files import atomic_path
+from engine.storage.json_files import checked_line, read_checked_lines
+
+logger = logging.getLogger(__name__)
+
+EVALUATIONS = "evaluations"
+"""Folder of a project for figures that were measured."""
+MAX_BYTES = 512 << 20
+"""About 300,000 pictures of one clip."""
+Key = tuple[str, int]
+"""Name of the camera, and frame; of a pair, the later one."""
+
+
+class KeptFigures:
+    """Figures of one clip, as far as they are measured. Owns its file while `writing`.
+
+    Args:
+        path: The file; need not exist.
+        content: Everything the figures depend on, JSON-able.
+        before: Fingerprint of the clip before, which pairs at the boundary depend on too; None without one.
+        say: Told what the user should know, in sentences.
+
+    Attributes:
+        rows: By camera and frame.
+        pairs: Likewise.
+        is_writable: False once something could not be written.
+    """
+
+    def __init__(self, path: Path, content: dict[str, Any], before: str | None, say: Callable[[str], None]) -> None:
+        self.path, self._content, self._before, self._say = path, content, before, say
+        self.rows: dict[Key, EvalRow] = {}
+        self.pairs: dict[Key, PairRow] = {}
+        self._file: BinaryIO | None = None
+        self._is_of_this_clip = False
+        self.is_writable = True
+        self._read()
+
+    def add(self, item: EvalRow | PairRow) -> None:
+        """Take up a figure, and write it while `writing`."""
+        found: dict[str, Any] = {"before": self._before} if isinstance(item, PairRow) and item.is_boundary else {}
+        if isinstance(item, EvalRow):
+            self.rows[item.camera, item.frame_index] = item
+            found["row"] = asdict(item)
+        else:
+            self.pairs[item.camera, item.frame_index] = item
+            found["pair"] = asdict(item)
+        if self._file is None:
+            return
+        try:
+            self._file.write(checked_line(found).encode())
+            self._file.flush()
+        except OSError as error:
+            self._file = None
+            self._say_unkept(error)
+
+    @contextlib.contextmanager
+    def writing(self) -> Iterator[None]:
+        """Write what is added inside the block. Where that cannot be done, it is said and the work goes on."""
+        with contextlib.ExitStack() as stack:
+            try:
+                if not self._is_of_this_clip:
+                    with atomic_path(self.path) as partial:
+                        partial.write_text(checked_line(self._content), encoding="utf-8")
+                    self._is_of_this_clip = True
+                self._file = stack.enter_context(self.path.open("ab+", buffering=0))
+                self._end_last_line(self._file)
+            except OSError as error:
+                self._file = None
+                self._say_unkept(error)
+            try:
+                yield
+            finally:
+                self._file = None
+
+    @staticmethod
+    def _end_last_line(file: BinaryIO) -> None:
+        """A line that a kill cut off must not spoil the one behind it."""
+        n_bytes = file.seek(0, 2)
+        if n_bytes:
+            file.seek(n_bytes - 1)
+            is_ended = file.read(1) == b"\n"
+            file.seek(0, 2)
+            if not is_ended:
+                file.write(b"\n")
+
+    def _say_unkept(self, error: OSError) -> None:
+        self.is_writable = False
+        self._say(f"Figures are not kept ({error.strerror or error}) - {self.path}")
+
+    def _read(self) -> None:
+        try:
+            lines, n_damaged = read_checked_lines(self.path, max_bytes=MAX_BYTES)
+        except (FileNotFoundError, NotADirectoryError):
+            return
+        except OSError as error:
+            self._say(f"Kept figures cannot be read and are measured again ({error.strerror or error}) - {self.path}")
+            return
+        if not lines or lines[0] != self._content:
+            if n_damaged:
+                self._say(f"Kept figures are damaged and are measured again - {self.path}")
+            return
+        self._is_of_this_clip = True
+        for line in lines[1:]:
+            try:
+                self._take(line)
+            except (KeyError, TypeError, ValueError):
+                n_damaged += 1
+        if n_damaged:
+            self._say(f"{n_damaged} kept figures are damaged and are measured again - {self.path}")
+
+    def _take(self, line: dict[str, Any]) -> None:
+        if "row" in line:
+            row = EvalRow(**line["row"])
+            if row.figures.keys() != COLUMNS.keys() or not isinstance(row.missing, dict):
+                raise ValueError("other columns")
+            self.rows[row.camera, row.frame_index] = replace(row, figures={name: row.figures[name] for name in COLUMNS})
+            return
+        pair = PairRow(**line["pair"])
+        if not pair.is_boundary or line["before"] == self._before:
+            self.pairs[pair.camera, pair.frame_index] = pair

@@ -1,0 +1,124 @@
+"""Figures of one trained variant, kept beside it: the same settings are measured once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from app.cli.results import named_failure
+from app.evaluation.evaluation import evaluate_project
+from app.evaluation.headless import open_trained
+from app.evaluation.source_clip_means import later_figures
+from app.project.project import Project, ProjectSettings, open_project
+from app.project.project_facts import read_facts
+from engine.clip_files.clip_state import read_clip_header
+from engine.errors import ProjectError
+from engine.metrics.clips.flicker import flicker_figures
+from engine.storage.json_files import JsonError, read_checked_json, write_checked_json
+
+if TYPE_CHECKING:
+    from engine.metrics.pictures.colors import Precision
+    from engine.metrics.pictures.picture import Choice
+
+MEASURED_SCHEMA = 5
+MEASURED_FILE = "measured.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """Figures of a trained variant, None where one does not exist, and on how many frames of each camera."""
+
+    figures: dict[str, float | None]
+    n_frames: int
+
+
+@dataclass(frozen=True, slots=True)
+class Scope:
+    """What is measured of a variant.
+
+    Attributes:
+        clips: Indices of its clips.
+        borders: Frames at which a clip of "full" starts.
+        metrics, precision: See app.evaluation.evaluation.evaluate_project.
+    """
+
+    clips: Sequence[int]
+    borders: Sequence[int]
+    metrics: Choice
+    precision: Precision
+
+
+def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None]) -> Measured:
+    """Figures of a trained variant, from its file when that is of these clips and this scope.
+
+    Args:
+        place: The variant's project.
+        on_row: Gets rows measured, rows in all and the newest row.
+    Raises:
+        ProjectError, CaptureError: It cannot be measured, or the figures cannot be written.
+    """
+    project = open_project(place, is_writable=False)
+    key = _key(project, scope)
+    kept = _read(place / MEASURED_FILE, key)
+    if kept is not None:
+        return kept
+    opened = open_trained(project)
+    holdout = opened.capture.camera_indices(project.settings.holdout)
+    document = evaluate_project(
+        opened,
+        clip_indices=scope.clips,
+        metrics=scope.metrics,
+        precision=scope.precision,
+        cameras=holdout or None,
+        on_progress=on_row,
+    )
+    group = "held_out" if document["means"]["held_out"] else "trained_on"
+    means = document["means"][group]
+    figures: dict[str, float | None] = {name: value for name, value in means.items() if not isinstance(value, dict)}
+    figures |= flicker_figures(document["seams"]["rows"], scope.borders)
+    clips = [clip for clip in read_facts(place, place.name).clips if clip.clip_index in scope.clips]
+    known = [clip.wall_s for clip in clips if clip.wall_s is not None]
+    figures["minutes"] = sum(known) / 60 if len(known) == len(clips) else None
+    source_s = {clip.clip_index: clip.wall_s for clip in clips if clip.role == "source"}
+    figures |= later_figures(document["means"]["clips"], group, source_s)
+    figures["megabytes"] = sum(project.clip_path(i).stat().st_size for i in scope.clips) / 1e6
+    measured = Measured(figures, sum(opened.clips[i].n_frames for i in scope.clips))
+    with named_failure(place / MEASURED_FILE):
+        write_checked_json(place / MEASURED_FILE, {"key": key, **asdict(measured)})
+    return measured
+
+
+def kept_figures(place: Path, settings: ProjectSettings, scope: Scope) -> Measured | None:
+    """Figures that an earlier call has measured with these settings; None where there are none."""
+    try:
+        project = open_project(place, is_writable=False)
+    except ProjectError:  # damaged, or something else of that name
+        return None
+    if project.settings != settings:
+        return None
+    return _read(place / MEASURED_FILE, _key(project, scope))
+
+
+def _key(project: Project, scope: Scope) -> dict[str, Any]:
+    """Everything that the figures depend on."""
+    headers = [read_clip_header(project.clip_path(i)) for i in scope.clips]
+    return {
+        "clips": [None if header is None else header["fingerprint"] for header in headers],
+        "borders": list(scope.borders),
+        "metrics": scope.metrics,
+        "precision": scope.precision,
+        "schema": MEASURED_SCHEMA,
+    }
+
+
+def _read(path: Path, key: dict[str, Any]) -> Measured | None:
+    try:
+        content = read_checked_json(path)
+    except (OSError, JsonError):
+        return None
+    if content.get("key") != key:
+        return None
+    figures, n_frames = content.get("figures"), content.get("n_frames")
+    return Measured(figures, n_frames) if isinstance(figures, dict) and isinstance(n_frames, int) else None

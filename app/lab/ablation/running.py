@@ -1,0 +1,229 @@
+"""Trains and measures the variants of an ablation, each in a project folder of its own; goes on where it stopped.
+
+FOLDER/full-seed0/ and so on are ordinary projects, to be opened, reported or compared like any other. Variants that
+only change source clips take over the reference clip of "full" instead of training the same again.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from app.cli.results import write_text
+from app.evaluation.headless import ClipOutcome, train_clips
+from app.lab.ablation.curves import curves_of
+from app.lab.ablation.measuring import Measured, Scope, kept_figures, measure
+from app.lab.ablation.table import DEFINITION, VariantResult, as_csv, summarize
+from app.lab.ablation.variants import Variant, rank, settings_of, variant_called
+from app.project.project import PROJECT_FILE, Project, ProjectSettings, check_settings, create_project, open_project
+from app.status import TrainingStatus
+from app.training.messages import Event
+from app.training.service import Launch, TrainingService
+from engine.capture.capture import Capture
+from engine.capture.clip import Clip
+from engine.errors import ProjectError, TrainingError
+from engine.storage.files import atomic_path
+from engine.storage.json_files import json_text
+
+if TYPE_CHECKING:
+    from engine.metrics.pictures.colors import Precision
+    from engine.metrics.pictures.picture import Choice
+
+ABLATION_SCHEMA = 1
+RESULT_FILE = "ablation.json"
+TABLE_FILE = "ablation.csv"
+
+
+@dataclass(frozen=True, slots=True)
+class Callbacks:
+    """Where progress goes.
+
+    Attributes:
+        on_variant: Name, seed, how many are done, and how many there are.
+        on_status, on_event, on_outcome: Of the training, see app.evaluation.headless.train_clips.
+        on_row: Rows measured, rows in all, the newest row.
+    """
+
+    on_variant: Callable[[str, int, int, int], None]
+    on_status: Callable[[TrainingStatus], None]
+    on_event: Callable[[Event], None]
+    on_outcome: Callable[[ClipOutcome], None]
+    on_row: Callable[[int, int, Any], None]
+
+
+def run_ablation(
+    folder: Path,
+    capture: Capture,
+    settings: ProjectSettings,
+    *,
+    variants: Sequence[Variant],
+    n_clips: int,
+    seeds: Sequence[int],
+    metrics: Choice,
+    precision: Precision = "float",
+    launch: Launch,
+    callbacks: Callbacks,
+) -> dict[str, Any]:
+    """Train what is not trained yet, measure what is not measured yet, and write the table after every variant.
+
+    What an earlier call has finished in the folder with the same settings, other variants and seeds too, is in the
+    table from the start. Its lines are in the order of VARIANTS, results of a variant in that of the seeds.
+
+    Args:
+        folder: Gets one project per variant and seed, ablation.json and ablation.csv.
+        settings: Of "full"; its seed is replaced.
+        n_clips: From the first.
+        metrics, precision: See engine.metrics.pictures.picture.measure_picture.
+    Returns:
+        JSON-able: schema, capture, holdout, clip_length, n_clips, metrics, precision, seeds, words (what each variant
+        is), definition (of flicker and seam ratios), lines (`summarize`), curves (`curves_of`) and results per seed.
+    Raises:
+        ProjectError, CaptureError: Bad input.
+        TrainingError: A clip failed; what was finished is kept.
+        KeyboardInterrupt: Likewise.
+    """
+    document: dict[str, Any] = {}
+    if settings.config().field == "joint":
+        raise ProjectError("field=joint leaves no clips to compare.", hint="Take the variant field-joint.")
+    clips = settings.clips(capture.n_frames)[:n_clips]
+    todo = [_Task(capture, settings, variant, seed, clips) for seed in seeds for variant in variants]
+    borders = [clip.start for clip in clips[1:]]
+    all_clips = Scope(range(n_clips), borders, metrics, precision)
+    found = _finished(folder, capture, settings, clips, all_clips)
+    first_of: dict[tuple[str, int], Path] = {}  # what trains the reference clip of a family
+    for task in todo:
+        first_of.setdefault((task.variant.family, task.settings.seed), task.place(folder))
+    for n_done, task in enumerate(todo):
+        variant, seed = task.variant, task.settings.seed
+        callbacks.on_variant(variant.name, seed, n_done, len(todo))
+        measured = _measured(task.place(folder), task, first_of[variant.family, seed], all_clips, launch, callbacks)
+        found[variant.name, seed] = VariantResult(variant.name, seed, measured.figures, measured.n_frames)
+        results = [found[key] for key in sorted(found, key=lambda key: (rank(key[0]), key[1]))]
+        shown = list(dict.fromkeys(result.variant for result in results))
+        document = {
+            "schema": ABLATION_SCHEMA,
+            "capture": str(capture.path),
+            "holdout": list(settings.holdout),
+            "clip_length": settings.clip_length,
+            "n_clips": n_clips,
+            "metrics": metrics,
+            "precision": precision,
+            "seeds": sorted({*seeds, *(result.seed for result in results)}),
+            "words": {name: item.words for name in shown if (item := variant_called(name)) is not None},
+            "definition": DEFINITION,
+            "lines": (lines := summarize(results)),
+            "curves": curves_of(lines),
+            "results": [{"variant": r.variant, "seed": r.seed, "n_frames": r.n_frames, **r.figures} for r in results],
+        }
+        write_text(folder / RESULT_FILE, json_text(document, indent=1) + "\n")
+        write_text(folder / TABLE_FILE, as_csv(document["lines"]))
+    return document
+
+
+def project_folder(folder: Path, name: str, seed: int) -> Path:
+    """Where a variant lies."""
+    return folder / f"{name}-seed{seed}"
+
+
+def _finished(
+    folder: Path, capture: Capture, base: ProjectSettings, clips: Sequence[Clip], scope: Scope
+) -> dict[tuple[str, int], VariantResult]:
+    """What lies measured in the folder and fits the settings, by variant and seed."""
+    found = {}
+    for place in sorted(folder.glob("*-seed*")):
+        name, _, text = place.name.rpartition("-seed")
+        variant = variant_called(name)
+        if variant is None or not text.isdecimal():
+            continue
+        try:
+            task = _Task(capture, replace(base, seed=int(text)), variant, int(text), clips)
+        except ProjectError:  # the settings of this call have no such variant
+            continue
+        kept = kept_figures(place, task.settings, replace(scope, clips=task.chosen))
+        if kept is not None:
+            found[name, int(text)] = VariantResult(name, int(text), kept.figures, kept.n_frames)
+    return found
+
+
+class _Task:
+    """One variant with one seed, its settings checked: nothing is trained before all of them are right."""
+
+    def __init__(
+        self, capture: Capture, base: ProjectSettings, variant: Variant, seed: int, clips: Sequence[Clip]
+    ) -> None:
+        n_cameras = len(capture.rig) - len(base.holdout)
+        overrides, clip_length, chosen = settings_of(
+            variant, base.overrides, clips=clips, n_cameras=n_cameras, n_capture_frames=capture.n_frames
+        )
+        reference_clip = base.reference_clip if variant.cut == "clips" else 0
+        if variant.is_reference_moved:
+            reference_clip = len(clips) // 2
+        self.variant, self.chosen, self.capture = variant, chosen, capture
+        self.settings = replace(
+            base, seed=seed, overrides=overrides, clip_length=clip_length, reference_clip=reference_clip
+        )
+        check_settings(self.settings, capture)
+
+    def place(self, folder: Path) -> Path:
+        """Where its project lies."""
+        return project_folder(folder, self.variant.name, self.settings.seed)
+
+
+def _measured(place: Path, task: _Task, first: Path, scope: Scope, launch: Launch, callbacks: Callbacks) -> Measured:
+    """Train what is missing and measure. first: the project whose reference clip this one takes over."""
+    variant, settings, capture, seed = task.variant, task.settings, task.capture, task.settings.seed
+    project = _open(place, settings)
+    try:
+        if place != first:
+            _take_reference(project, first)
+        service = TrainingService(
+            project,
+            project.clips(capture.n_frames),
+            holdout=capture.camera_indices(settings.holdout),
+            launch=launch,
+            is_window_open=False,
+        )
+        try:
+            outcomes = train_clips(
+                service,
+                project.training_order(len(task.chosen)),
+                on_status=callbacks.on_status,
+                on_event=callbacks.on_event,
+                on_outcome=callbacks.on_outcome,
+            )
+        finally:
+            service.close()
+        if outcomes[-1].state == "failed":
+            raise TrainingError(f"{variant.name}, seed {seed}: {outcomes[-1].message}", hint=outcomes[-1].hint)
+    finally:
+        project.close()
+    return measure(place, replace(scope, clips=task.chosen), callbacks.on_row)
+
+
+def _open(place: Path, settings: ProjectSettings) -> Project:
+    if not (place / PROJECT_FILE).is_file():
+        return create_project(place, settings)
+    project = open_project(place)
+    if project.settings != settings:
+        project.close()
+        raise ProjectError(
+            "The folder holds this variant with other settings.", hint="Choose another --project folder.", path=place
+        )
+    return project
+
+
+def _take_reference(project: Project, first: Path) -> None:
+    """Copy the reference clip, and what clips share, of a finished project."""
+    source = open_project(first, is_writable=False)
+    if project.is_trained(project.settings.reference_clip) or not source.reference_path.is_file():
+        return
+    project.prep_dir.mkdir(parents=True, exist_ok=True)
+    for path in source.prep_dir.glob("*"):
+        with atomic_path(project.prep_dir / path.name) as partial:
+            shutil.copyfile(path, partial)
+    project.reference_path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_path(project.reference_path) as partial:
+        shutil.copyfile(source.reference_path, partial)

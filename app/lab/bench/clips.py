@@ -1,0 +1,125 @@
+"""Synthetic clips for benchmarks: anchors spread over a picture and its depth, a field, a decoder, one camera."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from engine.model.anchors import AnchorSet
+from engine.model.clip_model import ClipModel
+from engine.model.clip_view import View
+from engine.model.decode.decoding import ChosenAnchors
+from engine.model.decoder import Decoder
+from engine.training.config import TrainConfig
+from engine.training.preparation.clip_field import fit_field
+
+N_FRAMES = 10
+SPLAT_PX = 3.0
+"""Median standard deviation of a Gaussian in the picture."""
+_LEVELS_SPACING = 1 / 150
+"""Share of the scene's depth that the field takes for the distance of anchors: all seven levels are used."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClipRecipe:
+    """Sizes of a synthetic clip.
+
+    Attributes:
+        n_anchors: Anchors, all in the picture and alive in every frame.
+        gaussians_per_anchor: K.
+        width, height: Picture, pixels.
+        is_source: Heads frozen, half of the anchors static and frozen, as in a source clip; else everything learns and
+            every anchor moves.
+    """
+
+    n_anchors: int
+    gaussians_per_anchor: int = 5
+    width: int = 480
+    height: int = 360
+    is_source: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.n_anchors} anchors, k={self.gaussians_per_anchor}, {self.width}x{self.height}"
+
+
+def make_clip(recipe: ClipRecipe, *, seed: int = 0) -> ClipModel:
+    """A clip with random features, so that no head is at its start. Same seed, same clip."""
+    generator = torch.Generator().manual_seed(seed)
+    config = TrainConfig(gaussians_per_anchor=recipe.gaussians_per_anchor)
+    decoder = Decoder(
+        static_dim=config.static_feature_dim,
+        dynamic_dim=config.dynamic_feature_dim,
+        gaussians_per_anchor=config.gaussians_per_anchor,
+        hidden=config.head_hidden,
+        generator=generator,
+    )
+    n_static = recipe.n_anchors // 2 if recipe.is_source else 0
+    sets = {}
+    if n_static:
+        sets["static"] = _anchors(recipe, n_static, config, generator, is_moving=False)
+    role = "residual" if recipe.is_source else "moving"
+    sets[role] = _anchors(recipe, recipe.n_anchors - n_static, config, generator, is_moving=True)
+    if recipe.is_source:
+        decoder.requires_grad_(requires_grad=False)
+        sets["static"].requires_grad_(requires_grad=False)
+    model = ClipModel(sets=sets, decoder=decoder, field=None, clip_length=N_FRAMES, n_frames=N_FRAMES)
+    fit_field(model, spacing=8.0 * _LEVELS_SPACING, config=config, generator=generator)
+    with torch.no_grad():
+        assert model.field is not None
+        for table in model.field.tables:  # away from its start of nearly zero
+            table.mul_(300.0)
+    return model
+
+
+def make_view(recipe: ClipRecipe) -> View:
+    """The camera that sees all anchors, at the origin."""
+    focal = 0.9 * recipe.width
+    K = np.array([[focal, 0.0, recipe.width / 2], [0.0, focal, recipe.height / 2], [0.0, 0.0, 1.0]])
+    return View.from_arrays(np.eye(4), K, width=recipe.width, height=recipe.height, near_plane=0.01)
+
+
+def make_truth(recipe: ClipRecipe, *, seed: int = 1) -> np.ndarray:
+    """A soft picture to compare with. [H, W, 3] uint8"""
+    rng = np.random.default_rng(seed)
+    coarse = rng.uniform(0, 255, (-(-recipe.height // 12), -(-recipe.width // 12), 3))
+    return coarse.repeat(12, 0).repeat(12, 1)[: recipe.height, : recipe.width].astype(np.uint8)
+
+
+def chosen_anchors(model: ClipModel, *, has_field: bool = True) -> list[ChosenAnchors]:
+    """All anchors of a clip as `decode_anchors` takes them; without field for f_d = 0."""
+    field = model.field if has_field else None
+    chosen = []
+    for role in model.roles():
+        anchors = model.anchor_set(role)
+        corners = field.corners(anchors.positions) if field is not None and anchors.is_dynamic else None
+        chosen.append(ChosenAnchors(anchors=anchors, rows=torch.arange(len(anchors)), corners=corners))
+    return chosen
+
+
+def _anchors(
+    recipe: ClipRecipe, n_rows: int, config: TrainConfig, generator: torch.Generator, *, is_moving: bool
+) -> AnchorSet:
+    def uniform(low: float, high: float) -> Tensor:
+        return low + (high - low) * torch.rand(n_rows, generator=generator)
+
+    focal = 0.9 * recipe.width
+    z = uniform(2.0, 10.0)
+    x = uniform(-0.5, 0.5) * recipe.width / focal * z
+    y = uniform(-0.5, 0.5) * recipe.height / focal * z
+    log_px = (z / focal).log()[:, None].expand(n_rows, 3)
+    anchors = AnchorSet.from_cloud(
+        torch.stack([x, y, z], 1),
+        torch.rand(n_rows, 3, generator=generator),
+        spacing=1.0,
+        feature_dim=config.static_feature_dim,
+        presence=torch.ones(n_rows, N_FRAMES, dtype=torch.bool) if is_moving else None,
+    )
+    with torch.no_grad():
+        anchors.features.copy_(torch.randn(anchors.features.shape, generator=generator))
+        anchors.log_offset_scales.copy_(log_px + math.log(2 * SPLAT_PX))
+        anchors.log_base_scales.copy_(log_px + math.log(2 * SPLAT_PX))  # the shape head halves it
+    return anchors

@@ -1,0 +1,124 @@
+"""Sections that say what was measured: set-up, capture, split, settings."""
+
+from __future__ import annotations
+
+import importlib.metadata
+from collections.abc import Mapping
+from dataclasses import asdict
+from datetime import datetime
+from typing import Any
+
+from app.lab.bench.machine import Machine
+from app.lab.report.parts import Section
+from app.lab.report.tables import Table, TableColumn
+from app.project.project import ProjectSettings
+from app.project.project_facts import ProjectFacts
+from engine.training.config import TrainConfig
+
+_PAIR = (TableColumn("what", "What"), TableColumn("value", "Value"))
+
+
+def program_version() -> str:
+    """Version of this program; "unknown" where it runs without being installed."""
+    try:
+        return importlib.metadata.version("clipgstream")
+    except importlib.metadata.PackageNotFoundError:
+        return "unknown"
+
+
+def setup_section(facts: ProjectFacts, machine: Machine, now: datetime, evaluation: Mapping[str, Any]) -> Section:
+    """Where and when the page was written."""
+    choice = evaluation["metrics"]
+    rows = {
+        "Project": str(facts.project.folder),
+        "Written": now.strftime("%Y-%m-%d %H:%M"),
+        "Program": f"ClipGStream Studio {program_version()}",
+        "Processor": f"{machine.cpu}, {machine.n_cores} cores, {machine.vectors}",
+        "System": machine.system,
+        "Versions": f"Python {machine.python}, torch {machine.torch}, numba {machine.numba}",
+        "Figures": f"{choice} columns, pictures compared as {evaluation['precision']}",
+    }
+    said = "The machine is the one that wrote this page; training times are of the machine that trained."
+    return Section("setup", "Set-up", [_pairs("setup", "Machine, versions and date", rows), said])
+
+
+def capture_section(facts: ProjectFacts, capture: Mapping[str, Any]) -> Section:
+    """What was filmed. capture: see engine.capture.capture_summary.describe."""
+    sizes = sorted({(camera["working_width"], camera["working_height"]) for camera in capture["cameras"]})
+    stored = sorted({(camera["width"], camera["height"]) for camera in capture["cameras"]})
+    rows = {
+        "Folder": capture["path"],
+        "Layout": capture["format"],
+        "Cameras": capture["n_cameras"],
+        "Frames": f"{capture['n_frames']} at {capture['fps']:g} per second, {capture['duration_s']:.1f} s",
+        "Size, pixels": ", ".join(f"{w} x {h}" for w, h in sizes),
+        "Stored size, pixels": ", ".join(f"{w} x {h}" for w, h in stored),
+        "Scale": facts.settings.scale,
+        "Fingerprint": capture["fingerprint"],
+    }
+    parts: list[Any] = [_pairs("capture", "The capture", rows)]
+    parts += [f"Note: {warning}" for warning in capture["warnings"]]
+    return Section("capture", "Capture", parts)
+
+
+def split_section(facts: ProjectFacts, capture: Mapping[str, Any], n_clips: int) -> Section:
+    """Which cameras and frames were trained on."""
+    held_out = set(facts.settings.holdout)
+    names = [camera["name"] for camera in capture["cameras"]]
+    trained_on = [name for name in names if name not in held_out]
+    measured = [clip.clip_index for clip in facts.clips]
+    rows = {
+        "Held out": ", ".join(name for name in names if name in held_out) or "none",
+        "Trained on": f"{len(trained_on)}: {', '.join(trained_on)}",
+        "Clip length, frames": facts.settings.clip_length,
+        "Clips": f"{len(measured)} of {n_clips} trained: "
+        + ", ".join(f"{c.clip_index} (frames {c.start} to {c.start + c.n_frames - 1})" for c in facts.clips),
+    }
+    parts: list[Any] = [_pairs("split", "Cameras and clips", rows)]
+    covered = [{"clip": clip.clip_index, **clip.coverage} for clip in facts.clips if clip.coverage]
+    if covered:
+        columns = (
+            TableColumn("clip", "Clip"),
+            TableColumn("n_points", "Moving points"),
+            TableColumn("n_inherited", "On inherited anchors"),
+            TableColumn("n_residual", "Anchors of its own"),
+            TableColumn("n_left_out", "Beyond the budget"),
+            TableColumn("share", "Within reach of an anchor", 3),
+            TableColumn("reason", "Budget"),
+        )
+        parts.append(Table("coverage", "What moves in later clips, and the anchors that reach it", columns, covered))
+    if len(measured) < n_clips:
+        left = [index for index in range(n_clips) if index not in measured]
+        parts.append(f"Not trained, and so in no figure of this page: clip {', '.join(map(str, left))}.")
+    if not held_out:
+        parts.append("No camera was held out: every figure is of pictures that the training has seen.")
+    return Section("split", "Split", parts)
+
+
+def settings_section(facts: ProjectFacts) -> Section:
+    """Training settings that differ from the defaults."""
+    defaults = asdict(TrainConfig())
+    rows = [
+        {"setting": name, "value": value, "default": defaults[name]}
+        for name, value in facts.settings.config().difference().items()
+    ]
+    said = f"Seed {facts.settings.seed}, reference clip {facts.settings.reference_clip}."
+    columns = (TableColumn("setting", "Setting"), TableColumn("value", "Value"), TableColumn("default", "Default"))
+    if not rows:
+        return Section("settings", "Settings", [f"All training settings are the defaults. {said}"])
+    table = Table("settings", "Training settings that differ from the defaults", columns, rows)
+    return Section("settings", "Settings", [table, said])
+
+
+def all_settings(settings: ProjectSettings) -> dict[str, Any]:
+    """Everything a project was trained with, one plain value per name."""
+    names = ("scale", "clip_length", "seed", "reference_clip")
+    return {
+        **{name: getattr(settings, name) for name in names},
+        "holdout": ",".join(settings.holdout) or "none",
+        **asdict(settings.config()),
+    }
+
+
+def _pairs(name: str, caption: str, rows: Mapping[str, Any]) -> Table:
+    return Table(name, caption, _PAIR, [{"what": what, "value": value} for what, value in rows.items()])

@@ -1,0 +1,60 @@
+"""clipgstream report: one page about a project, with progress stage by stage."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import Any
+
+from app.cli.arguments import EXIT_OK, add_figure_choices, path_argument
+from app.cli.progress import ProgressLine, row_progress
+from app.cli.results import check_writable
+from app.project.project import read_settings
+from app.training.service import Launch
+
+
+def add_report_arguments(command: argparse.ArgumentParser) -> None:
+    """Arguments of `clipgstream report`."""
+    command.add_argument("project", type=path_argument, help="project folder")
+    command.add_argument(
+        "--compare",
+        type=path_argument,
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="OTHER",
+        help="project folders, or folders of projects, to set beside it",
+    )
+    command.add_argument(
+        "--out", type=path_argument, metavar="DIR", help="folder for the page (default: PROJECT/reports)"
+    )
+    add_figure_choices(command, default=None, said="all for the project, quick for the others")
+    command.add_argument("--quiet", action="store_true", help="no progress")
+
+
+def report(options: argparse.Namespace, launch: Launch) -> int:
+    """clipgstream report: write a page about a project. Returns the exit code."""
+    from app.lab.report.write import PAGE_FILE, REPORTS, write_report
+
+    read_settings(options.project)  # a folder that is no project is said first
+    check_writable((options.project / REPORTS if options.out is None else options.out) / PAGE_FILE)
+    line = ProgressLine(is_quiet=options.quiet)
+    shown: dict[str, Callable[[int, int, Any], None]] = {}
+
+    def show(stage: str, done: int, n: int) -> None:
+        shown.setdefault(stage, row_progress(line, stage))(done, n, None)
+
+    try:
+        page = write_report(
+            options.project,
+            compare=options.compare,
+            out=options.out,
+            metrics=options.metrics,
+            precision=options.precision,
+            on_stage=show,
+            say=line.say,
+        )
+    finally:
+        line.finish()
+    line.say(f"Report: {page}")
+    return EXIT_OK

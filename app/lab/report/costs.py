@@ -1,0 +1,111 @@
+"""Sections on what a project costs: bytes of its clip files, seconds of its stages."""
+
+from __future__ import annotations
+
+from app.background.kernels import COMPILING
+from app.lab.report.charts import draw_stacked
+from app.lab.report.parts import Figure, Section
+from app.lab.report.tables import Table, TableColumn
+from app.project.clip_bytes import COMPONENT_NAMES
+from app.project.project_facts import ProjectFacts
+from app.training.stage_watch import KEEPING, TRAINING
+
+
+def storage_section(facts: ProjectFacts) -> Section:
+    """Where the bytes of the clip files go."""
+    columns = (
+        TableColumn("clip", "Clip"),
+        TableColumn("role", "Role"),
+        *(TableColumn(_key(name, "bytes"), name.capitalize(), unit="bytes") for name in COMPONENT_NAMES),
+        TableColumn("total_bytes", "Total", unit="bytes"),
+    )
+    rows = [
+        {
+            "clip": str(clip.clip_index),
+            "role": clip.role,
+            **{_key(name, "bytes"): clip.storage[name] for name in COMPONENT_NAMES},
+            "total_bytes": sum(clip.storage.values()),
+        }
+        for clip in facts.clips
+    ]
+    total = {
+        column.key: sum(int(row[column.key]) for row in rows) for column in columns if column.key.endswith("bytes")
+    }
+    rows.append({"clip": "all", "role": "", **total})
+    n_frames = sum(clip.n_frames for clip in facts.clips)
+    said = f"{facts.n_bytes / 1e6:.1f} MB for {n_frames} frames, {facts.n_bytes / 1e6 / n_frames:.2f} MB per frame."
+    chart = Figure(
+        "storage",
+        draw_stacked(
+            {name: [clip.storage[name] / 1e6 for clip in facts.clips] for name in COMPONENT_NAMES},
+            [f"clip {clip.clip_index}" for clip in facts.clips],
+            "megabytes",
+        ),
+        "Bytes of each clip file by what they describe. A source clip stores what it owns, not what it inherits.",
+        f"Stacked bars of {len(facts.clips)} clip files by component; {said}",
+    )
+    return Section("storage", "Storage", [said, chart, Table("storage", "Bytes per component", columns, rows)])
+
+
+def times_section(facts: ProjectFacts) -> Section:
+    """Steps and seconds of each clip."""
+    stages = list(dict.fromkeys(stage for clip in facts.clips for stage in clip.stages_s))
+    stages = [stage for stage in stages if stage not in (TRAINING, KEEPING)] + [
+        stage for stage in (TRAINING, KEEPING) if stage in stages
+    ]
+    columns = (
+        TableColumn("clip", "Clip"),
+        TableColumn("steps", "Steps"),
+        TableColumn("steps_per_s", "Steps per second", 1),
+        TableColumn("preparation_s", "Preparation", 1, unit="s"),
+        TableColumn("training_s", "Training", 1, unit="s"),
+        TableColumn("compiling_s", "Compiling kernels", 1, unit="s"),
+        TableColumn("wall_s", "Counted", 1, unit="s"),
+    )
+    rows = []
+    for clip in facts.clips:
+        compiling_s = None if clip.wall_s is None else clip.stages_s.get(COMPILING, 0.0)
+        rows.append(
+            {
+                "clip": str(clip.clip_index),
+                "steps": clip.n_steps,
+                "steps_per_s": clip.n_steps / clip.training_s if clip.training_s else None,
+                "preparation_s": None
+                if clip.preparation_s is None or compiling_s is None
+                else clip.preparation_s - compiling_s,
+                "training_s": clip.training_s,
+                "compiling_s": compiling_s,
+                "wall_s": clip.wall_s,
+            }
+        )
+    parts: list = [
+        "Wall time, pauses left out. Kernels are compiled once on every machine, so that time is not counted; "
+        "preparation includes what a step builds when it begins a new phase."
+    ]
+    unknown = [str(clip.clip_index) for clip in facts.clips if clip.wall_s is None]
+    if unknown:
+        parts.append(f"Not recorded when it was trained: clip {', '.join(unknown)}.")
+    if stages:
+        chart = draw_stacked(
+            {stage: [clip.stages_s.get(stage, 0.0) for clip in facts.clips] for stage in stages if stage != COMPILING},
+            [f"clip {clip.clip_index}" for clip in facts.clips],
+            "seconds",
+        )
+        alt = f"Stacked bars of the seconds of {len(facts.clips)} clips in {len(stages)} stages"
+        parts.append(Figure("times", chart, "Seconds of each stage.", alt))
+    parts.append(Table("times", "Steps and wall time per clip", columns, rows))
+    if stages:
+        stage_columns = [TableColumn("stage", "Stage")]
+        stage_columns += [
+            TableColumn(f"clip_{clip.clip_index}_s", f"Clip {clip.clip_index}", 1, unit="s") for clip in facts.clips
+        ]
+        stage_rows = [
+            {"stage": stage, **{f"clip_{clip.clip_index}_s": clip.stages_s.get(stage) for clip in facts.clips}}
+            for stage in stages
+        ]
+        parts.append(Table("stages", "Seconds per stage", stage_columns, stage_rows))
+    return Section("times", "Times", parts)
+
+
+def _key(name: str, unit: str) -> str:
+    return f"{name.replace(' ', '_')}_{unit}"

@@ -1,0 +1,87 @@
+"""NextPlan: what training the next clip would take, found out on a thread while nothing trains."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, field
+
+from app.background.latest import LatestWorker
+from app.plan.planning import plan_clip, plan_status
+from app.plan.speed import known_machine_speed
+from app.project.clip_catalog import ClipCatalog
+from app.project.project import Project
+from app.status import PlanStatus
+from app.training.service import TrainingService
+from engine.capture.capture import Capture
+from engine.capture.clip import Clip
+from engine.errors import EngineError
+from engine.training.plan.forecasting import UNKNOWN_MACHINE
+from engine.training.plan.plan import TrainingPlan
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRequest:
+    """The next clip, to be planned.
+
+    Attributes:
+        basis: What the plan depends on: settings, and the revision of the catalog of clips.
+        can_measure: Whether nothing else computes, so that the machine may be timed.
+    """
+
+    clip: Clip
+    basis: tuple[str, int]
+    can_measure: bool
+    project: Project = field(compare=False)
+    capture: Capture = field(compare=False)
+    catalog: ClipCatalog = field(compare=False)
+
+
+class NextPlan:
+    """Asks for the plan of the clip that would be trained next. Methods are for one thread and do not wait."""
+
+    def __init__(self) -> None:
+        self._plans: LatestWorker[PlanRequest, TrainingPlan | None] = LatestWorker("plans", _compute)
+
+    @property
+    def newest(self) -> tuple[PlanRequest, TrainingPlan | None] | None:
+        """The plan made last."""
+        return self._plans.newest
+
+    def status(
+        self, service: TrainingService, project: Project, capture: Capture, *, can_measure: bool
+    ) -> PlanStatus | None:
+        """The plan as it is shown, its figures a moment later; None while something trains or nothing is left."""
+        clip_index = service.next_clip_index
+        if clip_index is None or service.worker is not None:
+            return None
+        clip = service.clips[clip_index]
+        basis = (repr(project.settings), service.catalog.revision)
+        request = PlanRequest(clip, basis, can_measure, project, capture, service.catalog)
+        newest, plan = self._plans.newest, None
+        if newest is None or newest[0] != request:
+            self._plans.request(request)
+        if newest is not None and (newest[0].clip, newest[0].basis) == (clip, basis):  # until the machine is timed
+            plan = newest[1]
+        can_edit = project.is_writable and not service.catalog.has_progress
+        return plan_status(project, capture, clip, plan, can_edit=can_edit)
+
+    def forget(self) -> None:
+        """Another capture was opened."""
+        self._plans.forget()
+
+    def close(self) -> None:
+        """End the thread; it may be waiting for a child process that times the machine, so not for long."""
+        self._plans.close(timeout_s=0.2)
+
+
+def _compute(request: PlanRequest) -> TrainingPlan | None:
+    measure = known_machine_speed if request.can_measure else lambda: UNKNOWN_MACHINE
+    try:
+        return plan_clip(
+            request.project, request.capture, request.clip, measure_machine=measure, catalog=request.catalog
+        )
+    except EngineError as error:  # training will say the same
+        logger.info("the next clip cannot be planned: %s", error)
+        return None

@@ -1,0 +1,232 @@
+"""Plans of a project's clips: what the settings, the capture and the clips trained before say together."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from app.background.kernels import COMPILING
+from app.cli.progress import duration_text
+from app.project.clip_catalog import ClipCatalog
+from app.project.project import Project
+from app.status import PlanStatus, SettingStatus
+from app.training.stage_watch import stages_of
+from engine.capture.capture import Capture
+from engine.capture.clip import Clip
+from engine.training.config import TrainConfig
+from engine.training.plan.expected_sizes import footage_of
+from engine.training.plan.forecasting import UNKNOWN_MACHINE, MachineSpeed, MeasuredClip, measured_clip
+from engine.training.plan.plan import TrainingPlan, make_plan, resumed_plan
+from engine.training.presets import PRESETS
+
+PLAN_SCHEMA = 1
+
+
+def clip_history(project: Project, n_clips: int) -> list[MeasuredClip]:
+    """What the finished clips of a project say about the next one."""
+    found = (_measured(project, clip_index) for clip_index in range(n_clips))
+    return [known for known in found if known is not None]
+
+
+def plan_clip(
+    project: Project,
+    capture: Capture,
+    clip: Clip,
+    *,
+    measure_machine: Callable[[], MachineSpeed] = lambda: UNKNOWN_MACHINE,
+    history: Sequence[MeasuredClip] | None = None,
+    catalog: ClipCatalog | None = None,
+) -> TrainingPlan:
+    """The plan of one clip of a project.
+
+    Args:
+        project: Its folder need not exist yet.
+        capture: At the project's scale.
+        clip: One of its clips.
+        measure_machine: Asked where no other clip of the project says how long training takes.
+        history: Of all its clips, for callers that plan many; read here when None.
+        catalog: Says whether the training was stopped and goes on; when None, the whole of it is planned.
+    Raises:
+        CaptureError, PreparationError: The capture does not fit the settings.
+    """
+    settings, config = project.settings, project.settings.config()
+    base = project.inherited_index(clip.clip_index)
+    if base is None and config.start == "previous" and clip.clip_index != settings.reference_clip:
+        base, config = project.previous_index(clip.clip_index), config.going_on()
+    if history is None:
+        history = clip_history(project, len(project.clips(capture.n_frames)))
+    history = [known for known in history if known.clip_index != clip.clip_index]
+    is_measured = any(known.training_s for known in history)
+    found = None if base is None else project.headers.read(project.clip_path(base))
+    plan = make_plan(
+        footage_of(capture, capture.camera_indices(settings.holdout)),
+        clip,
+        config,
+        is_source=base is not None,
+        reference=None if found is None or found.damage else found.header,
+        history=history,
+        machine=UNKNOWN_MACHINE if is_measured else measure_machine(),
+        is_still=base is not None and _looks_still(project, capture, clip, config),
+    )
+    record = None if catalog is None else catalog[clip.clip_index]
+    if record is None or record.resume_step is None:
+        return plan
+    return resumed_plan(plan, record.resume_step, record.resume_n_steps)
+
+
+def _looks_still(project: Project, capture: Capture, clip: Clip, config: TrainConfig) -> bool:
+    from engine.training.plan.stillness import (
+        looks_still,  # with numba, which the first picture of a window can wait for
+    )
+
+    if project.gate_regions():  # a region may make something move that no mask shows
+        return False
+    held_out = capture.camera_indices(project.settings.holdout)
+    return looks_still(capture, clip, capture.training_cameras(held_out), config, project.prep_dir)
+
+
+def _measured(project: Project, clip_index: int) -> MeasuredClip | None:
+    found = project.headers.read(project.clip_path(clip_index))
+    if found is None or found.damage:
+        return None
+    metrics = found.header.get("metrics")
+    stages_s = stages_of(metrics) if isinstance(metrics, dict) else {}
+    return measured_clip(found.header, disk_mb=found.n_bytes / 1e6, uncounted_s=stages_s.get(COMPILING, 0.0))
+
+
+# ---------------------------------------------------------------- for the window
+
+MAIN_SETTINGS = {
+    "static_steps": "Static steps",
+    "joint_steps": "Joint steps",
+    "source_steps": "Steps of later clips",
+    "gaussians_per_anchor": "Gaussians per anchor",
+    "max_static_points": "Static anchors, at most",
+    "max_moving_points": "Moving anchors, at most",
+}
+"""Name in TrainConfig to what the window calls it."""
+
+
+def plan_status(
+    project: Project, capture: Capture, clip: Clip, plan: TrainingPlan | None, *, can_edit: bool
+) -> PlanStatus:
+    """What the window shows of the next clip.
+
+    Args:
+        project, capture, clip: What would be trained.
+        plan: Its plan; None until it is made.
+        can_edit: Whether settings may still change.
+    """
+    settings, config = project.settings, project.settings.config()
+    n_cameras = len(capture.rig) - len(settings.holdout)
+    values = {name: getattr(config, name) for name in MAIN_SETTINGS} | {
+        "static_steps": config.n_static_steps(n_cameras),
+        "joint_steps": config.n_joint_steps(n_cameras * clip.n_frames),
+        "source_steps": config.n_source_steps(n_cameras * clip.n_frames),
+    }
+    lines = () if plan is None else (*plan.lines, *plan.forecast)
+    return PlanStatus(
+        clip_index=clip.clip_index,
+        summary="" if plan is None else short_text(plan),
+        lines=tuple((line.name, line.text, line.reason) for line in lines),
+        presets=tuple(PRESETS),
+        preset=closest_preset(settings.overrides),
+        settings=tuple(
+            SettingStatus(name, label, int(values[name]), name in settings.overrides)
+            for name, label in MAIN_SETTINGS.items()
+        ),
+        can_edit=can_edit,
+    )
+
+
+def closest_preset(overrides: dict[str, Any]) -> str:
+    """The preset with the most settings among those that hold all of its own."""
+    fitting = [name for name, values in PRESETS.items() if values.items() <= overrides.items()]
+    return max(fitting, key=lambda name: len(PRESETS[name]))
+
+
+# ---------------------------------------------------------------- as text and JSON
+
+
+def short_text(plan: TrainingPlan) -> str:
+    """The forecast as one line."""
+    steps = f"{plan.n_steps:,} steps" if plan.n_steps else "no steps"
+    times = f"about {duration_text(plan.seconds)} ({duration_text(plan.preparation_s.value)} preparation)"
+    if plan.steps_done:
+        steps = (
+            f"goes on at step {plan.steps_done:,}, {plan.n_steps - plan.steps_done:,} of {plan.n_steps:,} steps left"
+        )
+        times = f"about {duration_text(plan.seconds)}"
+    return f"{steps}, {times}, {plan.memory_mb.value / 1e3:.1f} GB of memory, {plan.disk_mb.text} stored"
+
+
+def plan_text(plan: TrainingPlan) -> list[str]:
+    """Every line of a plan, reasons included."""
+    head = f"Clip {plan.clip_index}, frames {plan.start} to {plan.start + plan.n_frames - 1}, {plan.role}"
+    rows = [f"  {line.name:<21} {line.text:>11}  {line.reason}" for line in plan.lines]
+    rows += [f"  {line.name:<21} {line.text:>11}  forecast: {line.reason}" for line in plan.forecast]
+    return [head, *rows]
+
+
+def begin_text(plan: TrainingPlan) -> list[str]:
+    """The few lines that a training begins with."""
+    counts = ", ".join(f"{line.text} {line.name}" for line in plan.lines if line.name.endswith(("steps", "anchors")))
+    return [f"Clip {plan.clip_index}: {short_text(plan)}", f"  {counts}", f"  Times: {plan.training_s.reason}"]
+
+
+def compared_text(plan: TrainingPlan, project: Project) -> str:
+    """The forecast of a clip that is trained now, against what it took; empty where nothing was recorded."""
+    taken = _measured(project, plan.clip_index)
+    if taken is None:
+        return ""
+    pairs = (
+        ("preparation", plan.preparation_s, taken.preparation_s, "s"),
+        ("training", plan.training_s, taken.training_s, "s"),
+        ("memory", plan.memory_mb, taken.memory_mb, "MB"),
+        ("stored", plan.disk_mb, taken.disk_mb, "MB"),
+    )
+    parts = [
+        f"{name} {line.value:.3g} against {measured:.3g} {unit}"
+        for name, line, measured, unit in pairs
+        if measured is not None
+    ]
+    return f"  Forecast against measured: {', '.join(parts)}" if parts else ""
+
+
+def plan_document(
+    project: Project,
+    capture: Capture,
+    plans: Sequence[TrainingPlan],
+    trained: Sequence[int],
+    damaged: Sequence[int] = (),
+) -> dict[str, Any]:
+    """What `train --plan --json` prints.
+
+    Args:
+        project, capture: As planned.
+        plans: Of the clips that are not trained yet.
+        trained: Indices of chosen clips that are.
+        damaged: Indices of chosen clips that are not trained because they, or what they need, cannot be read.
+    """
+    rows = [plan.as_dict() | {"state": "planned"} for plan in plans]
+    rows += [{"clip_index": clip_index, "state": "trained"} for clip_index in trained]
+    rows += [{"clip_index": clip_index, "state": "damaged"} for clip_index in damaged]
+    return {
+        "schema": PLAN_SCHEMA,
+        "project": str(project.folder),
+        "capture": str(capture.path),
+        "holdout": list(project.settings.holdout),
+        "settings": project.settings.config().difference(),
+        "clips": sorted(rows, key=lambda row: row["clip_index"]),
+        "forecast": totals(plans),
+    }
+
+
+def totals(plans: Sequence[TrainingPlan]) -> dict[str, float]:
+    """Of all planned clips: seconds and bytes add up, memory is that of the largest."""
+    return {
+        "preparation_s": round(sum(plan.preparation_s.value for plan in plans), 1),
+        "training_s": round(sum(plan.training_s.value for plan in plans), 1),
+        "memory_mb": max((plan.memory_mb.value for plan in plans), default=0.0),
+        "disk_mb": round(sum(plan.disk_mb.value for plan in plans), 3),
+    }

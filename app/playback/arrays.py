@@ -1,0 +1,132 @@
+"""What the window draws, as plain float32 numpy arrays with a key that says what they are."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GaussianArrays:
+    """Gaussians of one frame, for upload. float32, C-contiguous.
+
+    Attributes:
+        means: [N, 3] scene units.
+        quats: [N, 4] wxyz, not necessarily of unit length.
+        scales: [N, 3] standard deviations, scene units.
+        opacities: [N] in 0..1.
+        colors: [N, 3] in 0..1.
+        key: Changes when the content does.
+        near_plane: Nearest depth that should be drawn, scene units.
+        clip_index, frame_index, revision: What it shows: a frame, and the state of the clip it was decoded from.
+        step: Training steps behind that state; None when unknown.
+        is_still: Whether that state holds nothing that changes over time, as a reference clip before its motion is
+            learned.
+    """
+
+    means: np.ndarray
+    quats: np.ndarray
+    scales: np.ndarray
+    opacities: np.ndarray
+    colors: np.ndarray
+    key: Hashable
+    near_plane: float = 0.01
+    clip_index: int = 0
+    frame_index: int = 0
+    revision: str = ""
+    step: int | None = None
+    is_still: bool = False
+
+    def __len__(self) -> int:
+        return len(self.means)
+
+    @property
+    def n_bytes(self) -> int:
+        """Memory of the arrays."""
+        return sum(a.nbytes for a in (self.means, self.quats, self.scales, self.opacities, self.colors))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AnchorArrays:
+    """Anchor positions of one clip, all or those of one frame, scene units, float32.
+
+    Attributes:
+        inherited_positions: From the reference clip; empty in the reference clip itself. [A0, 3]
+        own_positions: Trained by this clip: all of the reference clip, the residual ones of a source clip. [A, 3]
+        key: Changes when the content does.
+        inherited_roles, own_roles: What each anchor is, in engine.model.roles.ROLES; None where nobody says.
+            [A0], [A] uint8
+        inherited_reasons, own_reasons: Why the gate decided so, codes of engine.gate.reasons. [A0], [A] uint8
+        clip_index, frame_index: What they are of; None for all anchors of the clip.
+    """
+
+    inherited_positions: np.ndarray
+    own_positions: np.ndarray
+    key: Hashable
+    inherited_roles: np.ndarray | None = None
+    own_roles: np.ndarray | None = None
+    inherited_reasons: np.ndarray | None = None
+    own_reasons: np.ndarray | None = None
+    clip_index: int | None = None
+    frame_index: int | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointArrays:
+    """A coloured cloud: points [P, 3] scene units and colors [P, 3] in 0..1, float32. Unpacks as points, colors, key.
+
+    Attributes:
+        kind: What it is of: "static" (what stands still in a trained reference clip), "moment" (a first rough cloud
+            of one frame) or "pictures" (captured pictures placed in space, because there is no cloud yet).
+        spacing: Usual distance between neighbours, scene units; 0 when unknown.
+    """
+
+    points: np.ndarray
+    colors: np.ndarray
+    key: Hashable
+    kind: str = "static"
+    spacing: float = 0.0
+
+    @property
+    def is_hint(self) -> bool:
+        """Whether it only hints at the scene: pictures, no cloud."""
+        return self.kind == "pictures"
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter((self.points, self.colors, self.key))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A finished picture.
+
+    Attributes:
+        image: [H, W, 3] uint8 RGB.
+        key: What it shows; equal keys mean equal pictures.
+        is_stale: It is not what was asked for now, but the newest there is. What it is says the rest:
+        duration_s: How long it took to make; 0 when unknown.
+        clip_index, frame_index, revision, step, is_still: The frame it shows, and the state of the clip, see
+            GaussianArrays; None and "" where that is not known or, for a captured picture, without meaning.
+        camera_index: The capture camera that took it, or that a rendered one looks through; None for a free view.
+        look: From where and through which lens it was rendered, whatever its size; see OrbitView.look_key.
+    """
+
+    image: np.ndarray
+    key: Hashable
+    is_stale: bool = False
+    duration_s: float = 0.0
+    clip_index: int | None = None
+    frame_index: int | None = None
+    revision: str = ""
+    step: int | None = None
+    is_still: bool = False
+    camera_index: int | None = None
+    look: Hashable = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, px."""
+        return self.image.shape[1], self.image.shape[0]

@@ -1,0 +1,104 @@
+"""CapturedPictures: decoded and downsized pictures of the capture, made on threads, kept up to a number of bytes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from PIL import Image
+
+from app.background.latest import LatestWorker
+from app.playback.arrays import Picture
+from app.playback.playback import ByteCache
+from engine.capture.capture import Capture
+
+CACHE_BYTES = 96 << 20
+THUMBNAIL_WIDTH_PX = 200
+"""Requests up to this width are thumbnails: answered exactly or not at all, on a thread of their own."""
+
+
+@dataclass(frozen=True, slots=True)
+class PictureRequest:
+    """One camera at one frame, at most this wide.
+
+    Attributes:
+        generation: Of the pictures that were asked. Two takes with the same cameras have the same fingerprint.
+    """
+
+    generation: int
+    fingerprint: str
+    camera_index: int
+    frame_index: int
+    max_width: int
+    capture: Capture = field(compare=False)
+
+
+class CapturedPictures:
+    """What the cameras took. Methods are for one thread, not those it owns."""
+
+    def __init__(self, *, cache_bytes: int = CACHE_BYTES) -> None:
+        self._cache = ByteCache(cache_bytes)
+        self._last: dict[int, Picture] = {}
+        self.viewing: LatestWorker[PictureRequest, Picture] = LatestWorker("captured picture", self._compute)
+        self.thumbnails: LatestWorker[PictureRequest, Picture] = LatestWorker("thumbnails", self._compute)
+
+    def picture(self, capture: Capture, camera_index: int, frame_index: int, max_width: int) -> Picture | None:
+        """The picture if it was decoded; otherwise it is asked for.
+
+        Meanwhile the last picture of the same camera is returned as stale, except for thumbnails: None.
+        """
+        generation = self.viewing.generation
+        request = PictureRequest(generation, capture.fingerprint, camera_index, frame_index, max_width, capture)
+        known = self._cache.get(request)
+        is_thumbnail = max_width <= THUMBNAIL_WIDTH_PX
+        if known is None:
+            (self.thumbnails if is_thumbnail else self.viewing).request(request)
+            last = None if is_thumbnail else self._last.get(camera_index)
+            return None if last is None else replace(last, is_stale=True)
+        if not is_thumbnail:
+            self._last[camera_index] = known
+        return known
+
+    def clear(self) -> None:
+        """Forget everything, as when another capture was opened; what is being decoded is dropped."""
+        self.viewing.forget()
+        self.thumbnails.forget()
+        self._cache.clear()
+        self._last.clear()
+
+    def close(self) -> None:
+        """End the threads."""
+        self.viewing.close()
+        self.thumbnails.close()
+
+    def _compute(self, request: PictureRequest) -> Picture:
+        frame = request.capture.frame(request.camera_index, request.frame_index)
+        picture = Picture(
+            downsized(frame, request.max_width),
+            request_key(request),
+            frame_index=request.frame_index,
+            camera_index=request.camera_index,
+        )
+        if request.generation == self.viewing.generation:
+            self._cache.put(request, picture, picture.image.nbytes)
+        return picture
+
+
+def request_key(request: PictureRequest) -> tuple[int, str, int, int, int]:
+    """Identity of a picture."""
+    return (
+        request.generation,
+        request.fingerprint,
+        request.camera_index,
+        request.frame_index,
+        request.max_width,
+    )
+
+
+def downsized(image: np.ndarray, max_width: int) -> np.ndarray:
+    """The picture at most this wide, area-filtered; never enlarged. [H, W, 3] uint8"""
+    height, width = image.shape[:2]
+    if width <= max_width:
+        return np.ascontiguousarray(image)
+    size = (max(max_width, 1), max(round(height * max_width / width), 1))
+    return np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BOX))

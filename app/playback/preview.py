@@ -1,0 +1,141 @@
+"""What can be seen of a capture before anything is trained: a hint at once, a first rough cloud after some seconds.
+
+The hint places every camera's picture in space. The cloud is made by the same reconstruction as the real one, from
+small pictures of a single moment, in a short process of its own: compiling and computing must not hold up a window.
+"""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+from pathlib import Path
+
+import numpy as np
+
+from app.background.children import undisturbed
+from app.background.jobs import JobContext
+from app.background.priority import lower_process
+from app.playback.arrays import PointArrays
+from app.playback.capture_pictures import downsized
+from app.playback.playback import point_spacing
+from engine.capture.capture import Capture, open_capture
+from engine.errors import EngineError, PreparationError, ProjectError
+from engine.storage.array_files import ArraysError, read_arrays, write_arrays
+
+logger = logging.getLogger(__name__)
+
+PICTURE_WIDTH_PX = 40
+DEPTH_SHARE = 0.16
+"""The pictures of the hint stand this share of the way from their camera to the focus point."""
+CLOUD_WIDTH_PX = 200
+"""Pictures for the first cloud are at most this wide."""
+MAX_CLOUD_POINTS = 20_000
+POLL_EVERY_S = 0.1
+
+
+def picture_hint(capture: Capture, frame_index: int) -> PointArrays:
+    """Small pictures of all cameras as points in front of them.
+
+    Raises:
+        CaptureError: A picture cannot be decoded.
+    """
+    rig = capture.rig
+    focus = rig.focus_point()
+    points, colors = [], []
+    for camera in range(len(rig)):
+        image = downsized(capture.frame(camera, frame_index), PICTURE_WIDTH_PX)
+        height, width = image.shape[:2]
+        ratio = rig.image_sizes[camera] / np.array([width, height])
+        u, v = np.meshgrid((np.arange(width) + 0.5) * ratio[0], (np.arange(height) + 0.5) * ratio[1])
+        pixels = np.stack([u, v, np.ones_like(u)], axis=-1).reshape(-1, 3)
+        depth = DEPTH_SHARE * float(np.linalg.norm(focus - rig.centers[camera]))
+        p_camera = depth * pixels @ np.linalg.inv(rig.Ks[camera]).T
+        rotation, shift = rig.world_to_camera[camera, :3, :3], rig.world_to_camera[camera, :3, 3]
+        points.append((p_camera - shift) @ rotation)
+        colors.append(image.reshape(-1, 3) / 255.0)
+    return PointArrays(
+        np.concatenate(points).astype(np.float32),
+        np.concatenate(colors).astype(np.float32),
+        ("hint", capture.fingerprint, frame_index),
+        kind="pictures",
+    )
+
+
+def make_cloud(
+    capture_path: Path, *, holdout: tuple[int, ...], path: Path, context: JobContext, follow_links: bool = False
+) -> Path:
+    """Build the first cloud in a process and wait for it. To be run on a job's thread.
+
+    Args:
+        capture_path: The capture.
+        holdout: Cameras to leave out, as training does.
+        path: File for the cloud.
+        context: Receives signs of life; cancelling it ends the process.
+        follow_links: As of the capture, see engine.capture.capture.
+    Raises:
+        PreparationError: There is no cloud; the log says why.
+    """
+    process = multiprocessing.get_context("spawn").Process(
+        target=write_cloud, args=(str(capture_path), holdout, str(path), follow_links), name="first cloud", daemon=True
+    )
+    with undisturbed():
+        process.start()
+    try:
+        while process.is_alive():
+            context.report(0.0, "from a single frame, at reduced size")
+            process.join(POLL_EVERY_S)
+    finally:
+        if process.is_alive():
+            process.terminate()
+            process.join(2.0)
+    if process.exitcode != 0 or not path.is_file():
+        raise PreparationError(f"The first cloud could not be built (exit code {process.exitcode}).")
+    return path
+
+
+def write_cloud(capture_path: str, holdout: tuple[int, ...], path: str, follow_links: bool) -> None:
+    """Build and write the first cloud. Runs in the child; its exit code is 1 when there is none."""
+    lower_process()
+    from engine.cloud.stereo.static_cloud import build_static_cloud
+
+    try:
+        capture = open_capture(capture_path, follow_links=follow_links)
+        widest = int(capture.rig.image_sizes[:, 0].max())
+        if widest > CLOUD_WIDTH_PX:
+            capture = open_capture(capture_path, scale=CLOUD_WIDTH_PX / widest, follow_links=follow_links)
+        cameras = capture.training_cameras(holdout)
+        pictures = np.stack([capture.frame(camera, 0) for camera in cameras])
+        cloud = build_static_cloud(
+            pictures,
+            np.ones(pictures.shape[:3], bool),
+            capture.rig.subset(cameras),
+            max_points=MAX_CLOUD_POINTS,
+            report=logger.debug,
+        )
+        arrays = {
+            "points": np.ascontiguousarray(cloud.points, np.float32),
+            "colors": np.ascontiguousarray(np.clip(cloud.colors, 0.0, 1.0), np.float32),
+        }
+        write_arrays(path, arrays, {}, what="The first cloud")
+    except (EngineError, ValueError) as error:  # ValueError: cameras of different sizes cannot be stacked
+        logger.warning("no first cloud: %s", error)
+        raise SystemExit(1) from error
+
+
+def read_cloud(path: Path) -> PointArrays:
+    """A cloud written by `write_cloud`.
+
+    Raises:
+        ProjectError: The file is missing or damaged.
+    """
+    try:
+        arrays, _ = read_arrays(path, ())
+        points, colors = arrays["points"], arrays["colors"]
+        if points.ndim != 2 or points.shape[1] != 3 or points.shape != colors.shape:
+            raise ArraysError(f"its points are {points.shape}, its colours {colors.shape}")
+        if {points.dtype, colors.dtype} != {np.dtype(np.float32)} or not np.isfinite([points, colors]).all():
+            raise ArraysError("its numbers are not finite floats")
+    except (OSError, ArraysError, KeyError) as error:
+        raise ProjectError(f"The first cloud cannot be read ({error}).", path=path) from error
+    key = ("first cloud", str(path), path.stat().st_mtime_ns)
+    return PointArrays(points, colors, key, kind="moment", spacing=point_spacing(points))

@@ -1,0 +1,121 @@
+"""Renderer: the rasterizer's picture of Gaussians from a view, made on a thread of its own; the newest request wins."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Hashable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from app.background.kernels import prepare_drawing
+from app.background.latest import LatestWorker
+from app.playback.arrays import GaussianArrays, Picture
+from app.playback.orbit_view import OrbitView
+
+BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
+"""Behind everything; the viewport takes its dark grey from here."""
+
+
+@dataclass(frozen=True, slots=True)
+class RenderRequest:
+    """Gaussians from a view at a size. Equal requests give equal pictures.
+
+    Attributes:
+        look: Of the picture, see app.playback.arrays.Picture.
+        camera_index: The capture camera looked through; None for a free view.
+    """
+
+    gaussians_key: object
+    view_bytes: bytes
+    width: int
+    height: int
+    look: Hashable
+    gaussians: GaussianArrays = field(compare=False)
+    world_to_camera: np.ndarray = field(compare=False)
+    K: np.ndarray = field(compare=False)
+    camera_index: int | None = field(compare=False, default=None)
+
+
+class Renderer:
+    """Pictures on demand. Methods are for one thread, not the one it owns."""
+
+    def __init__(self) -> None:
+        self.worker: LatestWorker[RenderRequest, Picture] = LatestWorker("renderer", render, prepare=prepare_drawing)
+        self._asked: RenderRequest | None = None
+
+    def picture(self, gaussians: GaussianArrays, view: OrbitView, width: int, height: int) -> Picture | None:
+        """The picture if it is ready; otherwise it is asked for, and the newest one is returned as stale.
+
+        Its key is that of the Gaussians, so it differs between projects as theirs does.
+        """
+        world_to_camera, K = view.world_to_camera(), view.K(width, height)
+        view_bytes = np.concatenate([world_to_camera.ravel(), K.ravel()]).astype(np.float64).tobytes()
+        request = RenderRequest(
+            gaussians.key,
+            view_bytes,
+            width,
+            height,
+            view.look_key,
+            gaussians,
+            world_to_camera,
+            K,
+            view.look_through,
+        )
+        self._asked = request
+        newest = self.worker.newest
+        if newest is not None and newest[0] == request:
+            return newest[1]
+        self.worker.request(request)
+        return None if newest is None else replace(newest[1], is_stale=True)
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether the picture asked for last could not be drawn, so that it is not on its way."""
+        return self._asked is not None and self.worker.has_failed(self._asked)
+
+    def clear(self) -> None:
+        """Forget the last picture, and the one that is being drawn."""
+        self.worker.forget()
+        self._asked = None
+
+    def close(self) -> None:
+        """End the thread."""
+        self.worker.close()
+
+
+def render(request: RenderRequest) -> Picture:
+    """Rasterize one request over BACKGROUND. Runs on the renderer's thread, or wherever no window waits."""
+    import torch
+
+    from engine.raster import Gaussians, rasterize
+
+    started_s = time.perf_counter()
+    arrays = request.gaussians
+    gaussians = Gaussians(
+        *(torch.from_numpy(a) for a in (arrays.means, arrays.quats, arrays.scales, arrays.opacities, arrays.colors))
+    )
+    with torch.no_grad():
+        rendering = rasterize(
+            gaussians,
+            torch.from_numpy(request.world_to_camera.astype(np.float32))[None],
+            torch.from_numpy(request.K.astype(np.float32))[None],
+            request.width,
+            request.height,
+            background=torch.tensor(BACKGROUND),
+            near_plane=arrays.near_plane,
+        )
+        image = (rendering.image[0].clamp(0.0, 1.0) * 255.0 + 0.5).to(torch.uint8).numpy()
+    key = (arrays.key, request.view_bytes, request.width, request.height)
+    return Picture(
+        image,
+        key,
+        duration_s=time.perf_counter() - started_s,
+        clip_index=arrays.clip_index,
+        frame_index=arrays.frame_index,
+        revision=arrays.revision,
+        step=arrays.step,
+        is_still=arrays.is_still,
+        camera_index=request.camera_index,
+        look=request.look,
+    )

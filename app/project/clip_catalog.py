@@ -1,0 +1,304 @@
+"""ClipCatalog: what the files of a project say of each clip: finished, stopped half way, out of date, damaged, nothing.
+
+Read once when a project is opened, in one pass and on any thread; kept up to date clip by clip. Knows no worker.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.project.header_cache import FoundHeader
+from app.project.project import Project
+from app.project.project_files import read_metrics
+from engine.model.roles import REFERENCE_ROLES
+
+REPORT_EVERY = 32
+"""Clips read between two reports of progress."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClipRecord:
+    """One clip as it lies on disk. A value.
+
+    Attributes:
+        state: untrained; stopped, with a checkpoint that its training goes on from; trained; stale, trained on
+            something that is not there any more; damaged, a finished clip that cannot be read.
+        step, n_steps: Of the state that is shown.
+        held_out_psnr: Newest figure, dB; None when not measured.
+        file: The state to show; None when there is none.
+        revision: Names that state; empty when there is none.
+        resume_step: The step that training this clip goes on from; None when it starts from the beginning.
+        resume_n_steps: Steps of that training.
+        reason: Why it is stale or damaged, or what became of its checkpoint; empty otherwise.
+        blocked_by: A damaged clip without which this one cannot be trained.
+        seconds: What it took when it was trained; None where not recorded.
+        n_anchors: Inherited ones, and those of the clip itself; zeros where the file does not say.
+    """
+
+    state: str = "untrained"
+    step: int = 0
+    n_steps: int = 0
+    held_out_psnr: float | None = None
+    file: Path | None = None
+    revision: str = ""
+    resume_step: int | None = None
+    resume_n_steps: int = 0
+    reason: str = ""
+    blocked_by: int | None = None
+    seconds: float | None = None
+    n_anchors: tuple[int, int] = (0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Basis:
+    """Whether what a clip was trained on still is what it was.
+
+    Attributes:
+        reason: Why not; empty when all is well.
+        blocked_by: The damaged clip that is to blame.
+    """
+
+    reason: str = ""
+    blocked_by: int | None = None
+
+
+class ClipCatalog:
+    """The records of all clips. One thread changes it.
+
+    Attributes:
+        order: Indices of the clips as they are trained.
+        revision: Grows with every change.
+
+    Args:
+        project: Whose clips.
+        n_clips: How many the capture has.
+        report: Told how many were read so far, from time to time.
+    """
+
+    def __init__(self, project: Project, n_clips: int, report: Callable[[int], None] = lambda n_read: None) -> None:
+        self._project = project
+        self.order = project.training_order(n_clips)
+        self.revision = 0
+        self._clips: list[FoundHeader | None] = [None] * n_clips
+        self._checkpoints: list[FoundHeader | None] = [None] * n_clips
+        self._curve_psnr: dict[int, float | None] = {}
+        config = project.settings.config()
+        self._inherits, self._goes_on = not config.independent, config.field == "continue" or config.start == "previous"
+        if project.has_progress:
+            for index in range(n_clips):
+                if index % REPORT_EVERY == 0:
+                    report(index)
+                self._read(index)
+        self._records = self._judged()
+
+    def __len__(self) -> int:
+        return len(self._records)
+
+    def __getitem__(self, clip_index: int) -> ClipRecord:
+        return self._records[clip_index]
+
+    @property
+    def n_trained(self) -> int:
+        """Clips that are finished, readable and up to date."""
+        return self._n_trained
+
+    @property
+    def has_progress(self) -> bool:
+        """Whether there is any clip or checkpoint."""
+        return self._has_progress
+
+    def update(self, clip_index: int) -> None:
+        """Read the files of one clip again; the others are judged anew by what was read before."""
+        self._read(clip_index)
+        self._records = self._judged()
+        self.revision += 1
+
+    def note_damage(self, path: Path | None, reason: str) -> bool:
+        """Somebody found that the arrays of a finished clip are damaged, which its header does not show.
+
+        Returns:
+            Whether the file is that of a clip which counted as good.
+        """
+        for index in range(len(self)):
+            if path is not None and self._good(index) is not None and path == self._project.clip_path(index):
+                self._clips[index] = FoundHeader({}, reason, 0)
+                self._records = self._judged()
+                self.revision += 1
+                return True
+        return False
+
+    def outdated_by(self, clip_index: int) -> list[int]:
+        """Clips that are good now and would be out of date if this one were trained again with another result."""
+        now, then = self._bases(), self._bases(replaced=clip_index)
+        return [
+            index
+            for index in range(len(self))
+            if index != clip_index and then[index].reason and not now[index].reason and self._good(index) is not None
+        ]
+
+    # ---------------------------------------------------------------- reading
+
+    def _read(self, index: int) -> None:
+        project = self._project
+        self._clips[index] = clip = project.headers.read(project.clip_path(index))
+        self._checkpoints[index] = kept = project.headers.read(project.checkpoint_path(index))
+        self._curve_psnr.pop(index, None)
+        is_measured = clip is not None and not clip.damage and _psnr(clip.header) is not None
+        if (clip is not None or kept is not None) and (kept is not None or not is_measured):
+            path = project.curve_path(index, is_finished=kept is None)
+            rows = [row["held_out_psnr"] for row in read_metrics(path) if _is_number(row.get("held_out_psnr"))]
+            self._curve_psnr[index] = rows[-1] if rows else None
+
+    # ---------------------------------------------------------------- judging
+
+    def _good(self, index: int) -> dict[str, Any] | None:
+        """Header of the finished clip, if it can be read."""
+        found = self._clips[index]
+        return None if found is None or found.damage else found.header
+
+    def _bases(self, *, replaced: int | None = None) -> list[Basis]:
+        """Whether each clip stands on what it was trained on: one pass in the order of training, so that a chain of
+        clips that go on from each other costs no more than single ones.
+
+        Args:
+            replaced: Suppose that this clip had been trained again, with another result.
+        """
+        headers = [self._good(index) for index in range(len(self._clips))]
+        fingerprints = [None if header is None else header.get("fingerprint") for header in headers]
+        if replaced is not None:
+            fingerprints[replaced] = "another"
+        first = self.order[0] if self.order else 0
+        bases = [Basis()] * len(headers)
+        before: int | None = None
+        for index in self.order:
+            bases[index] = self._basis(index, headers[index], fingerprints, bases, first=first, before=before)
+            before = index
+        return bases
+
+    def _basis(
+        self,
+        index: int,
+        header: dict[str, Any] | None,
+        fingerprints: Sequence[Any],
+        bases: Sequence[Basis],
+        *,
+        first: int,
+        before: int | None,
+    ) -> Basis:
+        if header is None:
+            needed = [first] if self._inherits and index != first else []
+            needed += [before] if self._goes_on and before is not None else []
+            blocker = next((found for other in needed if (found := self._blocker(other, bases)) is not None), None)
+            return Basis(blocked_by=blocker)
+        if header.get("role") == "source":
+            if self._is_damaged(first):
+                return Basis(f"Clip {first}, which it was trained on, is damaged.", first)
+            if fingerprints[first] is None or fingerprints[first] != header.get("reference_fingerprint"):
+                return Basis(f"Clip {first}, the reference it was trained on, was trained again or is gone.")
+        if "previous_fingerprint" not in header or before is None:
+            return Basis()
+        if self._is_damaged(before):
+            return Basis(f"Clip {before}, which it goes on from, is damaged.", before)
+        if fingerprints[before] is None or fingerprints[before] != header["previous_fingerprint"]:
+            return Basis(f"Clip {before}, which it goes on from, was trained again or is gone.")
+        if bases[before].reason:
+            return Basis(f"Clip {before}, which it goes on from, is out of date.", bases[before].blocked_by)
+        return Basis()
+
+    def _is_damaged(self, index: int) -> bool:
+        found = self._clips[index]
+        return found is not None and bool(found.damage)
+
+    def _blocker(self, index: int, bases: Sequence[Basis]) -> int | None:
+        return index if self._is_damaged(index) else bases[index].blocked_by
+
+    def _judged(self) -> list[ClipRecord]:
+        records = [self._record(index, basis) for index, basis in enumerate(self._bases())]
+        self._n_trained = sum(record.state == "trained" for record in records)
+        self._has_progress = any(found is not None for found in (*self._clips, *self._checkpoints))
+        return records
+
+    def _record(self, index: int, basis: Basis) -> ClipRecord:
+        found, kept = self._clips[index], self._checkpoints[index]
+        resume_step, resume_n_steps, reason = None, 0, ""
+        if kept is not None:
+            reason = self._lost_checkpoint(kept)
+            if not reason:
+                resume_step, resume_n_steps = kept.header["step"], kept.header["n_steps"]
+        resume = {"resume_step": resume_step, "resume_n_steps": resume_n_steps, "blocked_by": basis.blocked_by}
+        header = self._good(index)
+        if kept is not None and resume_step is not None and (found is None or (header is not None and basis.reason)):
+            return ClipRecord(
+                "stopped",
+                resume_step,
+                resume_n_steps,
+                self._curve_psnr.get(index),
+                self._project.checkpoint_path(index),
+                f"stopped-{resume_step}-{kept.header.get('fingerprint', '')}",
+                n_anchors=anchor_counts(kept.header),
+                **resume,
+            )
+        if found is None:
+            return ClipRecord(reason=reason, **resume)
+        if header is None:
+            return ClipRecord("damaged", reason=found.damage, **resume)
+        psnr = _psnr(header) if _psnr(header) is not None or kept is not None else self._curve_psnr.get(index)
+        figures = {"held_out_psnr": psnr, "seconds": _seconds(header), "n_anchors": anchor_counts(header)}
+        if basis.reason:  # it cannot be shown without what it was trained on
+            return ClipRecord("stale", header["step"], header["n_steps"], reason=basis.reason, **figures, **resume)
+        revision = f"trained-{header.get('fingerprint', '')}"
+        path = self._project.clip_path(index)
+        return ClipRecord(
+            "trained",
+            header["step"],
+            header["n_steps"],
+            file=path,
+            revision=revision,
+            reason=reason,
+            **figures,
+            **resume,
+        )
+
+    def _lost_checkpoint(self, kept: FoundHeader) -> str:
+        """Why the training cannot go on from a checkpoint; empty when it can."""
+        if kept.damage:
+            return "What was learned before the stop cannot be read; training starts from the beginning."
+        reference = None if not self.order else self._good(self.order[0])
+        known = kept.header.get("reference_fingerprint")
+        if known is not None and (reference is None or reference.get("fingerprint") != known):
+            return "The reference was trained again after the stop; training starts from the beginning."
+        return ""
+
+
+def anchor_counts(header: dict[str, Any]) -> tuple[int, int]:
+    """Anchors of a clip by its header: those it inherits, and those it holds itself. Zeros where it does not say."""
+    sets = header.get("n_anchors")
+    numbers = {role: n for role, n in sets.items() if isinstance(n, int)} if isinstance(sets, dict) else {}
+    config = header.get("config")
+    is_shared = isinstance(config, dict) and config.get("inherit") in ("trainable", "off")
+    if header.get("role") != "source" or is_shared:
+        return 0, sum(numbers.values())
+    n_inherited = sum(n for role, n in numbers.items() if role in REFERENCE_ROLES)
+    return n_inherited, sum(numbers.values()) - n_inherited
+
+
+def _psnr(header: dict[str, Any]) -> float | None:
+    metrics = header.get("metrics")
+    value = metrics.get("held_out_psnr") if isinstance(metrics, dict) else None
+    return float(value) if _is_number(value) else None  # type: ignore[arg-type]
+
+
+def _seconds(header: dict[str, Any]) -> float | None:
+    metrics = header.get("metrics")
+    if not isinstance(metrics, dict):
+        return None
+    parts = [metrics.get(name) for name in ("preparation_s", "training_s")]
+    return float(sum(parts)) if all(_is_number(part) for part in parts) else None  # type: ignore[arg-type]
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -1,0 +1,55 @@
+"""Headers of clip files, each read once for as long as its file stays as it is. Knows no project and no arrays."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from engine.clip_files.clip_state import look_at_clip
+
+
+@dataclass(frozen=True, slots=True)
+class FoundHeader:
+    """What a clip file says of itself. Shared between readers: nobody changes it.
+
+    Attributes:
+        header: See engine.clip_files.clip_state; empty when the file is damaged.
+        damage: What is wrong with the file; empty for a good one.
+        n_bytes: Size of the file.
+    """
+
+    header: dict[str, Any]
+    damage: str
+    n_bytes: int
+
+
+class HeaderCache:
+    """Headers by path, read again when time or size of a file has changed. May be used by several threads."""
+
+    def __init__(self) -> None:
+        self._known: dict[Path, tuple[tuple[int, int, int], FoundHeader]] = {}
+
+    def read(self, path: Path) -> FoundHeader | None:
+        """The header of a clip, checkpoint or snapshot; None when there is no such file."""
+        try:
+            status = os.stat(path)
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except OSError as error:
+            return FoundHeader({}, f"The file cannot be read ({error.strerror}).", 0)
+        identity = (status.st_mtime_ns, status.st_size, status.st_ino)
+        known = self._known.get(path)
+        if known is None or known[0] != identity:
+            known = (identity, _read(path, status.st_size))
+            self._known[path] = known  # one assignment: another thread sees the old entry or the new one
+        return known[1]
+
+
+def _read(path: Path, n_bytes: int) -> FoundHeader:
+    found = look_at_clip(path)
+    if isinstance(found, dict):
+        return FoundHeader(found, "", n_bytes)
+    reason = "it is not there any more" if found is None else found.reason
+    return FoundHeader({}, f"The file is damaged ({reason}).", n_bytes)

@@ -1,0 +1,369 @@
+"""Project: the folder that keeps what was learned about one capture. Paths, settings and the lock; no training.
+
+project.json                 settings, see ProjectSettings
+gate.json                    regions in which the user overrules the gate, where there are any
+clips/0000.safetensors       finished clips
+checkpoints/0000.safetensors unfinished clips: everything needed to go on
+live/                        snapshots of the running training; swept when the project is opened for writing
+prep/                        what clips share, such as backgrounds
+metrics/0000.jsonl           curves of the finished clip, one JSON object per line
+metrics/0000.unfinished.jsonl  of its training that is not finished
+logs/                        one file per clip
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from app.project.header_cache import HeaderCache
+from app.project.lock import ProcessLock, is_process_alive
+from app.project.project_files import (
+    GATE_FILE,
+    PROJECT_FILE,
+    ProjectSettings,
+    read_regions,
+    read_settings,
+    write_regions,
+    write_settings,
+)
+from engine.capture.capture import Capture
+from engine.capture.clip import Clip
+from engine.errors import ProjectError
+from engine.gate.regions import GateRegion
+from engine.storage.files import PARTIAL_PREFIX, is_left_over
+
+logger = logging.getLogger(__name__)
+
+LOCK_FILE = "lock"
+LOCK_FILES = (LOCK_FILE, f".{LOCK_FILE}")
+MIN_TRAINING_CAMERAS = 2
+DEFAULT_CLIP_LENGTH = 10
+
+
+class Project:
+    """An opened project folder. Use `create_project` or `open_project`.
+
+    Attributes:
+        headers: Of its clips and checkpoints, read once for everybody who asks.
+    """
+
+    def __init__(self, folder: Path, settings: ProjectSettings, lock: ProcessLock | None) -> None:
+        self.folder = folder
+        self.settings = settings
+        self.headers = HeaderCache()
+        self._lock = lock
+
+    @property
+    def is_writable(self) -> bool:
+        """Whether this process may train into the project."""
+        return self._lock is not None and self._lock.is_held
+
+    @property
+    def live_dir(self) -> Path:
+        """Snapshots of the running training."""
+        return self.folder / "live"
+
+    @property
+    def prep_dir(self) -> Path:
+        """What clips share."""
+        return self.folder / "prep"
+
+    @property
+    def first_cloud_path(self) -> Path:
+        """A rough cloud to look at before anything is trained."""
+        return self.prep_dir / "first_cloud.safetensors"
+
+    def clip_path(self, clip_index: int) -> Path:
+        """A finished clip."""
+        return self.folder / "clips" / f"{clip_index:04d}.safetensors"
+
+    def checkpoint_path(self, clip_index: int) -> Path:
+        """An unfinished clip."""
+        return self.folder / "checkpoints" / f"{clip_index:04d}.safetensors"
+
+    def metrics_path(self, clip_index: int) -> Path:
+        """Curves of a finished clip."""
+        return self.folder / "metrics" / f"{clip_index:04d}.jsonl"
+
+    def unfinished_metrics_path(self, clip_index: int) -> Path:
+        """Curves of a training that is not finished. Beside the others, so that those of an earlier one stand."""
+        return self.folder / "metrics" / f"{clip_index:04d}.unfinished.jsonl"
+
+    def curve_path(self, clip_index: int, *, is_finished: bool) -> Path:
+        """Curves of the finished clip, or of its training that was stopped."""
+        path = self.unfinished_metrics_path(clip_index)
+        if is_finished or (not path.is_file() and not self.is_trained(clip_index)):  # as earlier versions kept them
+            return self.metrics_path(clip_index)
+        return path
+
+    def log_path(self, clip_index: int) -> Path:
+        """Log of a clip's worker."""
+        return self.folder / "logs" / f"clip-{clip_index:04d}.log"
+
+    def is_trained(self, clip_index: int) -> bool:
+        """Whether the clip is finished."""
+        return self.clip_path(clip_index).is_file()
+
+    @property
+    def has_progress(self) -> bool:
+        """Whether anything was learned that a change of settings would make worthless."""
+        return any(any((self.folder / name).glob("*.safetensors")) for name in ("clips", "checkpoints"))
+
+    def clips(self, n_frames: int) -> list[Clip]:
+        """The clips of a capture of that many frames; a single one where one field covers everything."""
+        return self.settings.clips(n_frames)
+
+    @property
+    def reference_path(self) -> Path:
+        """The finished clip that the others inherit from."""
+        return self.clip_path(self.settings.reference_clip)
+
+    def base_index(self, clip_index: int) -> int:
+        """The clip that a clip is shown with: the reference, or itself where clips are independent."""
+        return clip_index if self.settings.config().independent else self.settings.reference_clip
+
+    def inherited_index(self, clip_index: int) -> int | None:
+        """The clip that has to be finished before this one can be trained; None for one that inherits nothing."""
+        base = self.base_index(clip_index)
+        return None if base == clip_index else base
+
+    def training_order(self, n_clips: int) -> list[int]:
+        """Indices of that many clips as they are trained: the reference, then the others from the first."""
+        first = self.settings.reference_clip
+        return [first, *(i for i in range(n_clips) if i != first)]
+
+    def previous_index(self, clip_index: int) -> int:
+        """The clip that a clip goes on from where they do: the one before, which is the reference where there is none.
+
+        Not for the reference itself, which goes on from nothing.
+        """
+        return self.training_order(clip_index)[-1]
+
+    def check_writable(self) -> None:
+        """See that this process may change the project.
+
+        Raises:
+            ProjectError: It may not.
+        """
+        if not self.is_writable:
+            raise ProjectError(
+                "The project is open for reading only, because another program trains into it.",
+                hint="Close it there first, then open it again.",
+                path=self.folder,
+            )
+
+    def update(self, settings: ProjectSettings) -> None:
+        """Replace the settings, on disk first.
+
+        Raises:
+            ProjectError: The project is read-only, or the disk refused.
+        """
+        self.check_writable()
+        write_settings(self.folder, settings)
+        self.settings = settings
+
+    def gate_regions(self) -> tuple[GateRegion, ...]:
+        """Where the user overrules the gate; later ones overrule earlier ones. Clips trained from now on heed them.
+
+        Raises:
+            ProjectError: The file is damaged or holds something that is no region.
+        """
+        return read_regions(self.folder / GATE_FILE)
+
+    def set_gate_regions(self, regions: Sequence[GateRegion]) -> None:
+        """Replace the regions, on disk.
+
+        Raises:
+            ProjectError: The project is read-only, or the disk refused.
+        """
+        self.check_writable()
+        write_regions(self.folder / GATE_FILE, regions)
+
+    def discard_progress(self, clip_index: int) -> None:
+        """Forget the unfinished training of a clip; a finished clip and its curves stay."""
+        for path in (self.checkpoint_path(clip_index), self.unfinished_metrics_path(clip_index)):
+            with suppress(OSError):
+                path.unlink()
+
+    def keep_curves(self, clip_index: int) -> None:
+        """The training of a clip is finished: its curves take the place of those of an earlier one.
+
+        Raises:
+            OSError: The disk refused; the earlier ones stand.
+        """
+        path = self.unfinished_metrics_path(clip_index)
+        if path.is_file():
+            os.replace(path, self.metrics_path(clip_index))
+
+    def close(self) -> None:
+        """Release the lock. The object can still be read from."""
+        if self._lock is not None:
+            self._lock.release()
+
+    def remove_files(self) -> None:
+        """Take back a project that has learned nothing: its own files and folders go, other things stay."""
+        for name in ("clips", "checkpoints", "live", "prep", "metrics", "logs"):
+            shutil.rmtree(self.folder / name, ignore_errors=True)
+        for name in (PROJECT_FILE, GATE_FILE):
+            (self.folder / name).unlink(missing_ok=True)
+
+
+# ---------------------------------------------------------------- opening
+
+
+def is_project(folder: Path) -> bool:
+    """Whether the folder is a project rather than a capture; a path that cannot even be looked at is none."""
+    try:
+        return (folder / PROJECT_FILE).is_file()
+    except OSError:
+        return False
+
+
+def default_settings(
+    capture: Capture,
+    *,
+    clip_length: int | None = None,
+    holdout: tuple[str, ...] | None = None,
+    seed: int = 0,
+    overrides: dict[str, Any] | None = None,
+    reference_clip: int = 0,
+) -> ProjectSettings:
+    """Settings for a capture. Without a hold-out the one that the capture suggests; clips of 10 frames, or of all.
+
+    Raises:
+        ProjectError: A value lies outside its range, a camera does not exist, or too few are left for training.
+    """
+    chosen = capture.default_holdout if holdout is None else tuple(holdout)
+    settings = ProjectSettings(
+        capture=str(Path(capture.path).resolve()),
+        fingerprint=capture.fingerprint,
+        scale=capture.scale,
+        clip_length=min(DEFAULT_CLIP_LENGTH, capture.n_frames) if clip_length is None else clip_length,
+        holdout=tuple(chosen),
+        seed=seed,
+        overrides=dict(overrides or {}),
+        reference_clip=reference_clip,
+        follow_links=capture.follow_links,
+    )
+    check_settings(settings, capture)
+    return settings
+
+
+def check_settings(settings: ProjectSettings, capture: Capture) -> None:
+    """See that the settings fit the capture.
+
+    Raises:
+        ProjectError: They do not; says which and what is allowed.
+    """
+    n_cameras = len(capture.rig)
+    if not 1 <= settings.clip_length <= capture.n_frames:
+        raise ProjectError(
+            f"The clip length is {settings.clip_length}; the capture allows 1 to {capture.n_frames} frames."
+        )
+    if not 0 <= settings.seed < 2**32:
+        raise ProjectError(f"The seed is {settings.seed}; it has to lie between 0 and {2**32 - 1}.")
+    unknown = [name for name in settings.holdout if name not in capture.rig.names]
+    if unknown:
+        raise ProjectError(
+            f"There is no camera called {', '.join(unknown)} to hold out.",
+            hint=f"Cameras are {', '.join(capture.rig.names[:8])}{' and more' if n_cameras > 8 else ''}.",
+        )
+    n_left = n_cameras - len(set(settings.holdout))
+    if n_left < MIN_TRAINING_CAMERAS:
+        raise ProjectError(
+            f"{len(set(settings.holdout))} of {n_cameras} cameras are held out, which leaves {n_left} for training; "
+            f"{MIN_TRAINING_CAMERAS} are needed.",
+            hint="Hold out fewer cameras.",
+        )
+    n_clips = len(settings.clips(capture.n_frames))
+    if not 0 <= settings.reference_clip < n_clips:
+        raise ProjectError(f"The reference clip is {settings.reference_clip}; clips are 0 to {n_clips - 1}.")
+
+
+def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
+    """Make a project folder and lock it.
+
+    Raises:
+        ProjectError: The folder holds a project or foreign files already, or cannot be written.
+    """
+    folder = Path(folder)
+    if (folder / PROJECT_FILE).exists():
+        raise ProjectError("There is a project already.", hint="Open it instead.", path=folder)
+    if folder.is_dir() and any(child.name not in LOCK_FILES for child in folder.iterdir()):
+        raise ProjectError(
+            "The project folder holds other files.", hint="Choose an empty or a new folder.", path=folder
+        )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ProjectError(
+            f"The project folder cannot be made ({error.strerror}).", hint="Choose another place.", path=folder
+        ) from error
+    lock = ProcessLock(folder / LOCK_FILE)
+    lock.acquire()
+    try:
+        if (folder / PROJECT_FILE).exists():  # made while this one looked
+            raise ProjectError("There is a project already.", hint="Open it instead.", path=folder)
+        write_settings(folder, settings)
+    except ProjectError:
+        lock.release()
+        raise
+    return Project(folder, settings, lock)
+
+
+def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
+    """Open an existing project folder; for writing it is locked, and left-over snapshots are swept.
+
+    Raises:
+        ProjectError: The folder is no project, is damaged, of a newer schema, or open for writing elsewhere.
+    """
+    folder = Path(folder)
+    settings = read_settings(folder)
+    lock = None
+    if is_writable:
+        lock = ProcessLock(folder / LOCK_FILE)
+        lock.acquire()
+    project = Project(folder, settings, lock)
+    if is_writable:
+        sweep(project)
+    return project
+
+
+def sweep(project: Project) -> None:
+    """Remove what a killed program left behind: snapshots and half-written files. Finished files stay.
+
+    What another process is writing stays too, such as the report of a project that trains.
+    """
+    partials = [path for path in project.folder.rglob(f"{PARTIAL_PREFIX}*") if is_left_over(path, is_process_alive)]
+    leftovers = [*project.live_dir.glob("*"), *partials]
+    for path in leftovers:
+        with suppress(OSError):
+            path.unlink()
+    if leftovers:
+        logger.info("removed %d left-over files from %s", len(leftovers), project.folder)
+
+
+# ---------------------------------------------------------------- where projects lie
+
+
+def data_dir() -> Path:
+    """The user's folder for data of this program; need not exist."""
+    if sys.platform == "win32":
+        root = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        root = Path.home() / "Library" / "Application Support"
+    else:
+        root = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share")
+    return root / "ClipGStream"
+
+
+def default_project_dir(capture: Capture) -> Path:
+    """Where the window keeps the project of a capture."""
+    return data_dir() / "projects" / f"{Path(capture.path).resolve().name}-{capture.fingerprint}"

@@ -1,0 +1,241 @@
+"""The JSON files of a project: settings, regions of the gate, curves. Read strictly, written with checksums.
+
+An edit by hand is accepted where the entry "checksum" was taken out; otherwise it looks like damage, and the message
+says so.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from engine.capture.clip import Clip, split_clips
+from engine.errors import ProjectError
+from engine.gate.regions import GateRegion, parse_region
+from engine.storage.files import disk_error
+from engine.storage.json_files import (
+    HAND_EDITED,
+    ChecksumError,
+    JsonError,
+    read_checked_json,
+    read_checked_lines,
+    write_checked_json,
+)
+from engine.training.config import TrainConfig
+
+logger = logging.getLogger(__name__)
+
+SCHEMA = 1
+PROJECT_FILE = "project.json"
+GATE_FILE = "gate.json"
+MAX_BYTES = 4 << 20
+"""Of settings and of regions; both take some kilobytes."""
+_MAX_COUNT = 2**31
+"""Frames and clips are fewer."""
+_DEFAULTS = TrainConfig()
+
+
+@dataclass(frozen=True, slots=True)
+class ProjectSettings:
+    """What every clip of a project has in common. A value; saved as project.json.
+
+    Attributes:
+        capture: Folder of the capture.
+        fingerprint: Of the capture, to notice another one in its place.
+        scale: Share of the original picture size, in (0, 1].
+        clip_length: M, frames per clip.
+        holdout: Names of the cameras that training never sees.
+        seed: Fixes initial values and the order of pictures.
+        overrides: Training settings that differ from the defaults.
+        reference_clip: Index of the clip that the others inherit from.
+        follow_links: Whether the user allowed the capture's files to lie outside of its folder.
+    """
+
+    capture: str
+    fingerprint: str
+    scale: float = 1.0
+    clip_length: int = 10
+    holdout: tuple[str, ...] = ()
+    seed: int = 0
+    overrides: dict[str, Any] = field(default_factory=dict)
+    reference_clip: int = 0
+    follow_links: bool = False
+    schema: int = SCHEMA
+
+    def clips(self, n_frames: int) -> list[Clip]:
+        """The clips of a capture of that many frames."""
+        return split_clips(n_frames, n_frames if self.config().field == "joint" else self.clip_length)
+
+    def config(self) -> TrainConfig:
+        """The training settings. Raises ProjectError for an unknown one or a value outside its range."""
+        unknown = sorted(set(self.overrides) - {item.name for item in fields(TrainConfig)})
+        if unknown:
+            raise ProjectError(f"There is no training setting called {', '.join(unknown)}.", hint="Take it out.")
+        for name, value in self.overrides.items():
+            expected = type(getattr(_DEFAULTS, name))
+            kinds = (float, int) if expected is float else (expected,)
+            if type(value) not in kinds:
+                raise ProjectError(f"{name} is {value!r:.60}; a value like {getattr(_DEFAULTS, name)!r} is expected.")
+        return TrainConfig(**self.overrides)
+
+
+def read_settings(folder: Path) -> ProjectSettings:
+    """Read project.json.
+
+    Raises:
+        ProjectError: It is missing, damaged, of a newer schema, or holds unknown or ill-typed values.
+    """
+    path = folder / PROJECT_FILE
+    try:
+        content = read_checked_json(path, max_bytes=MAX_BYTES)
+    except FileNotFoundError as error:
+        if not folder.exists():
+            raise ProjectError("There is no such folder.", hint="Check the path.", path=folder) from error
+        raise ProjectError(
+            f"This is not a project folder: it has no {PROJECT_FILE}.",
+            hint="Train a capture first, or open the folder that holds that file.",
+            path=folder,
+        ) from error
+    except (OSError, JsonError) as error:
+        raise _unreadable("The project file", error, "Restore it from a copy.", path) from error
+    if content.get("schema") != SCHEMA or type(content["schema"]) is not int:
+        raise ProjectError(
+            f"The project has schema {content.get('schema')!r:.60}, this version reads {SCHEMA}.",
+            hint="Use the version that wrote it, or restore the file from a copy.",
+            path=path,
+        )
+    unknown = sorted(content.keys() - {item.name for item in fields(ProjectSettings)})
+    if unknown:
+        raise ProjectError(
+            f"The project file has unknown entries: {', '.join(unknown):.200}.", hint=HAND_EDITED, path=path
+        )
+    try:
+        settings = ProjectSettings(
+            capture=_text(content["capture"]),
+            fingerprint=_text(content["fingerprint"]),
+            scale=_number(content.get("scale", 1.0)),
+            clip_length=_count(content.get("clip_length", 10)),
+            holdout=tuple(map(_text, _list(content.get("holdout", [])))),
+            seed=_count(content.get("seed", 0), 2**32),
+            overrides=_table(content.get("overrides", {})),
+            reference_clip=_count(content.get("reference_clip", 0)),
+            follow_links=_flag(content.get("follow_links", False)),
+        )
+        if not (0.0 < settings.scale <= 1.0 and settings.clip_length >= 1):
+            raise ValueError(f"scale {settings.scale:g} or clip_length {settings.clip_length} is out of range")
+        settings.config()
+    except ProjectError as error:
+        raise ProjectError(error.message, hint="Correct it or restore the file from a copy.", path=path) from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise ProjectError(
+            f"The project file has a missing or wrong entry ({error}).", hint="Restore it from a copy.", path=path
+        ) from error
+    return settings
+
+
+def write_settings(folder: Path, settings: ProjectSettings) -> None:
+    """Write project.json.
+
+    Raises:
+        DiskError: The disk refused.
+    """
+    _write(folder / PROJECT_FILE, asdict(settings))
+
+
+def read_regions(path: Path) -> tuple[GateRegion, ...]:
+    """Regions of gate.json; none where there is no such file.
+
+    Raises:
+        ProjectError: The file is damaged or holds something that is not a region.
+    """
+    hint = "Correct or remove the file."
+    try:
+        content = read_checked_json(path, max_bytes=MAX_BYTES)
+    except FileNotFoundError:
+        return ()
+    except (OSError, JsonError) as error:
+        raise _unreadable("The file of the gate's regions", error, hint, path) from error
+    if content.keys() != {"regions"} or not isinstance(content["regions"], list):
+        raise ProjectError('The file holds something else than a list "regions".', hint=hint, path=path)
+    try:
+        return tuple(parse_region(values) for values in content["regions"])
+    except ProjectError as error:
+        raise ProjectError(error.message, hint=error.hint, path=path) from error
+
+
+def write_regions(path: Path, regions: Sequence[GateRegion]) -> None:
+    """Write gate.json.
+
+    Raises:
+        DiskError: The disk refused.
+    """
+    _write(path, {"regions": [region.as_dict() for region in regions]})
+
+
+def read_metrics(path: Path) -> list[dict[str, Any]]:
+    """Rows of a metrics file, each with its step; lines that are unfinished or damaged are left out."""
+    try:
+        rows, n_damaged = read_checked_lines(path)
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        logger.warning("the curves cannot be read (%s) - %s", error.strerror, path)
+        return []
+    good = [row for row in rows if type(row.get("step")) is int and 0 <= row["step"] < _MAX_COUNT]
+    n_damaged += len(rows) - len(good)
+    if n_damaged:
+        logger.warning("%d damaged rows of curves were left out - %s", n_damaged, path)
+    return good
+
+
+def _write(path: Path, content: dict[str, Any]) -> None:
+    try:
+        write_checked_json(path, content, makes_parents=False, is_durable=True)
+    except OSError as error:
+        raise disk_error(error, what="The project", path=path) from error
+
+
+def _unreadable(what: str, error: Exception, hint: str, path: Path) -> ProjectError:
+    reason = error.strerror if isinstance(error, OSError) else str(error)
+    return ProjectError(
+        f"{what} cannot be read ({reason}).", hint=HAND_EDITED if isinstance(error, ChecksumError) else hint, path=path
+    )
+
+
+def _text(value: Any) -> str:
+    if type(value) is not str or "\0" in value:
+        raise TypeError(f"{value!r:.60} is not a text")
+    return value
+
+
+def _list(value: Any) -> list[Any]:
+    if type(value) is not list:
+        raise TypeError(f"{value!r:.60} is not a list")
+    return value
+
+
+def _table(value: Any) -> dict[str, Any]:
+    if type(value) is not dict:
+        raise TypeError(f"{value!r:.60} is not a table of settings")
+    return value
+
+
+def _count(value: Any, below: int = _MAX_COUNT) -> int:
+    if type(value) is not int or not 0 <= value < below:
+        raise TypeError(f"{value!r:.60} is not a whole number from 0 to {below - 1}")
+    return value
+
+
+def _flag(value: Any) -> bool:
+    if type(value) is not bool:
+        raise TypeError(f"{value!r:.60} is neither true nor false")
+    return value
+
+
+def _number(value: Any) -> float:
+    if type(value) not in (int, float):
+        raise TypeError(f"{value!r:.60} is not a number")
+    return float(value)

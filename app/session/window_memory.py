@@ -1,0 +1,168 @@
+"""What the window looked like when it was last used: its size, layout and scale, and for each project the frame, the
+view and what was shown. A checked JSON file beside the preferences; a project that may only be read has its place, too.
+
+Knows no window: sizes and the layout are plain values that mean something to `ui` alone.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.session.settings import config_dir
+from app.status import COMPARE_MODES, OVERLAY_NAMES
+from engine.errors import EngineError
+from engine.storage.json_files import read_checked_json, write_checked_json
+
+logger = logging.getLogger(__name__)
+
+MAX_PROJECTS = 60
+MAX_LAYOUT_CHARACTERS = 100_000
+MAX_SIDE_PX = 32_768
+SCHEMA = 1
+
+
+@dataclass
+class WindowMemory:
+    """The values, read once; `save` writes them if they are others than those on disk.
+
+    A file that is damaged counts as empty, never as a failure; so does a value in it that makes no sense.
+
+    Attributes:
+        path: The file.
+        size: Of the window, pixels of the screen; None before the first time.
+        is_maximized: Whether it filled the screen.
+        ui_scale: Chosen scale of the interface; None follows the screen.
+        layout: Where the panels are, as text of ImGui's; empty before the first time.
+        mark_size, mark_opacity: Of anchor marks; None where nobody chose.
+        views: By project folder, the one used last at the end; see `view_of` and `show_again`.
+    """
+
+    path: Path
+    size: tuple[int, int] | None = None
+    is_maximized: bool = False
+    ui_scale: float | None = None
+    layout: str = ""
+    mark_size: float | None = None
+    mark_opacity: float | None = None
+    views: dict[str, dict[str, Any]] = field(default_factory=dict)
+    _saved: dict[str, Any] = field(default_factory=dict, repr=False)
+    _has_failed: bool = False
+
+    def keep_view(self, folder: str, view: dict[str, Any]) -> None:
+        """Keep what was looked at in a project; the one that was not used for longest is forgotten."""
+        self.views.pop(folder, None)
+        self.views[folder] = view
+        for old in list(self.views)[:-MAX_PROJECTS]:
+            del self.views[old]
+
+    def save(self) -> None:
+        """Write the file if something changed. A disk that refuses costs the memory, nothing else."""
+        document = {
+            "schema": SCHEMA,
+            "size": None if self.size is None else list(self.size),
+            "is_maximized": self.is_maximized,
+            "ui_scale": self.ui_scale,
+            "layout": self.layout,
+            "mark_size": self.mark_size,
+            "mark_opacity": self.mark_opacity,
+            "views": [{"project": folder, **view} for folder, view in self.views.items()],
+        }
+        if document == self._saved:
+            return
+        try:
+            write_checked_json(self.path, document)
+        except (OSError, EngineError) as error:
+            level = logging.DEBUG if self._has_failed else logging.WARNING  # once is enough
+            logger.log(level, "the look of the window could not be kept (%s) - %s", error, self.path)
+            self._has_failed = True
+        self._saved = document
+
+
+def read_window_memory(path: Path | None = None) -> WindowMemory:
+    """The memory in a file; the platform's place when None."""
+    path = config_dir() / "window.json" if path is None else path
+    memory = WindowMemory(path)
+    try:
+        found = read_checked_json(path)
+    except FileNotFoundError:
+        return memory
+    except (OSError, ValueError, EngineError) as error:
+        logger.warning("the look of the window is forgotten, its file is damaged (%s) - %s", error, path)
+        return memory
+    size = found.get("size")
+    if isinstance(size, list) and len(size) == 2 and all(_number(side, 1, MAX_SIDE_PX) is not None for side in size):
+        memory.size = (int(size[0]), int(size[1]))
+    memory.is_maximized = found.get("is_maximized") is True
+    memory.ui_scale = _number(found.get("ui_scale"), 0.5, 4.0)
+    layout = found.get("layout")
+    memory.layout = layout if isinstance(layout, str) and len(layout) <= MAX_LAYOUT_CHARACTERS else ""
+    memory.mark_size = _number(found.get("mark_size"), 0.1, 10.0)
+    memory.mark_opacity = _number(found.get("mark_opacity"), 0.0, 1.0)
+    views = found.get("views")
+    for view in views if isinstance(views, list) else []:
+        if isinstance(view, dict) and isinstance(view.get("project"), str):
+            memory.keep_view(view["project"], {name: value for name, value in view.items() if name != "project"})
+    return memory
+
+
+def view_of(session: Any) -> dict[str, Any]:
+    """Frame, view and overlays of the open capture, as plain values."""
+    view, overlays = session.view, session.overlays
+    return {
+        "frame_index": session.timeline.frame_index,
+        "is_looping": session.timeline.is_looping,
+        "camera": None if view.look_through is None else session.rig.names[view.look_through],
+        "pivot": [float(value) for value in view.pivot],
+        "distance": float(view.distance),
+        "yaw": float(view.yaw),
+        "pitch": float(view.pitch),
+        "fov_y": float(view.fov_y),
+        "shown": [name for name in OVERLAY_NAMES if getattr(overlays, name)],
+        "compare": overlays.compare,
+        "wipe_position": float(overlays.wipe_position),
+    }
+
+
+def show_again(session: Any, kept: dict[str, Any]) -> None:
+    """Go back to what `view_of` has kept. What makes no sense for this capture stays as it is."""
+    view, overlays, timeline = session.view, session.overlays, session.timeline
+    frame_index = _number(kept.get("frame_index"), 0, timeline.last_frame)
+    if frame_index is not None:
+        timeline.seek(int(frame_index))
+    if isinstance(kept.get("is_looping"), bool):
+        timeline.is_looping = kept["is_looping"]
+    pivot = kept.get("pivot")
+    numbers = {
+        "distance": _number(kept.get("distance"), 1e-4, 1e6),
+        "yaw": _number(kept.get("yaw"), -7.0, 7.0),
+        "pitch": _number(kept.get("pitch"), -1.56, 1.56),
+        "fov_y": _number(kept.get("fov_y"), 0.02, 3.0),
+    }
+    place = [_number(value, -1e6, 1e6) for value in pivot] if isinstance(pivot, list) else []
+    if len(place) == 3 and None not in place and None not in numbers.values():
+        view.pivot = np.array(place, dtype=np.float64)
+        for name, value in numbers.items():
+            setattr(view, name, value)
+    names = list(session.rig.names)
+    view.look_through = names.index(kept["camera"]) if kept.get("camera") in names else None
+    shown = kept.get("shown")
+    if isinstance(shown, list):
+        for name in OVERLAY_NAMES:
+            setattr(overlays, name, name in shown)
+    if kept.get("compare") in COMPARE_MODES:
+        overlays.compare = kept["compare"]
+    wipe_position = _number(kept.get("wipe_position"), 0.0, 1.0)
+    if wipe_position is not None:
+        overlays.wipe_position = wipe_position
+
+
+def _number(value: Any, low: float, high: float) -> float | None:
+    """A finite number in a range, else None."""
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return value if is_number and math.isfinite(value) and low <= value <= high else None

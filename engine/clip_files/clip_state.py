@@ -1,0 +1,193 @@
+"""ClipState: a clip on disk and between processes: named arrays and a JSON header, nothing else.
+
+One format for the saved clip, the live snapshot and, with the optimiser's arrays added, the checkpoint. Files are
+safetensors; they appear under their final name only when complete. Source clips store what they own, not what they
+inherit; `reference_fingerprint` ties them to the reference they were trained on.
+
+A file holds its arrays as they are (snapshots, checkpoints) or compactly (finished clips, engine.clip_files.compact): then
+each is a run of bytes under its own name, and the metadata say how it is read. Readers of states see no difference.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from engine.clip_files.clip_header import READABLE, SCHEMA, HeaderError, check_header
+from engine.clip_files.coding import CodedArray, CodingError, decode_array
+from engine.errors import ProjectError
+from engine.storage.array_files import ArraysError, read_arrays, read_metadata, write_arrays
+from engine.storage.json_files import JsonError, parse_object
+
+_ENTRIES = ("header", "coding")
+"""Texts of a file beside its checksum."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClipState:
+    """Named arrays and a header. A value.
+
+    Header keys: schema, role ("reference" or "source"), clip_index, clip_length, n_frames, start, step, n_steps,
+    seed, config (difference from defaults), camera_names (of the gains), near_plane, spacing, moving_spacing,
+    n_anchors (per set), n_alive (most moving anchors in one frame), fingerprint, reference_fingerprint,
+    field (FieldShape or None); a kept clip adds metrics.
+    """
+
+    arrays: dict[str, np.ndarray]
+    header: dict[str, Any]
+
+    @property
+    def is_reference(self) -> bool:
+        """Whether other clips can inherit from this one."""
+        return self.header["role"] == "reference"
+
+    @property
+    def fingerprint(self) -> str:
+        """Hash of the arrays, 16 hexadecimal digits: names what a source clip was trained against."""
+        digest = hashlib.sha256()
+        for name in sorted(self.arrays):
+            array = np.ascontiguousarray(self.arrays[name])
+            digest.update(f"{name}{array.dtype}{array.shape}".encode())
+            digest.update(array.view(np.uint8).reshape(-1).data if array.size else b"")
+        return digest.hexdigest()[:16]
+
+
+def write_clip_state(path: Path | str, state: ClipState, *, is_durable: bool = False) -> None:
+    """Write atomically: a complete file appears under `path`, or none.
+
+    Args:
+        is_durable: Whether it must outlive a power cut, see engine.storage.files.atomic_path.
+    Raises:
+        DiskError: The disk refused.
+    """
+    write_arrays(path, state.arrays, {"header": json.dumps(state.header)}, what="The clip", is_durable=is_durable)
+
+
+def write_coded_arrays(path: Path | str, coded: dict[str, CodedArray], header: dict[str, Any]) -> None:
+    """Likewise, with every array in its compact form; `read_clip_state` gives the arrays that these decode to.
+
+    Raises:
+        DiskError: The disk refused.
+    """
+    specs = {name: array.spec for name, array in coded.items()}
+    metadata = {"header": json.dumps(header), "coding": json.dumps(specs, separators=(",", ":"))}
+    write_arrays(path, {name: array.payload for name, array in coded.items()}, metadata, what="The clip")
+
+
+def read_clip_state(path: Path | str) -> ClipState:
+    """Read a state written by `write_clip_state` or `write_coded_arrays`.
+
+    Raises:
+        ProjectError: The file is missing, damaged, or of a newer schema; says which, and why.
+    """
+    path = Path(path)
+    try:
+        arrays, metadata = read_arrays(path, _ENTRIES)
+        header = _header_of(metadata)
+        if "coding" in metadata:
+            arrays = _decoded(arrays, parse_object(metadata["coding"]))
+    except FileNotFoundError as error:
+        raise ProjectError("The clip file does not exist.", hint="Train the clip first.", path=path) from error
+    except _Unreadable as error:
+        hint = "Use the version that wrote it or train the clip again."
+        raise ProjectError(f"The clip file cannot be read: {error}.", hint=hint, path=path) from error
+    except _DAMAGE as error:
+        raise DamagedClip(path, reason_of(error)).error() from error
+    return ClipState(arrays, header)
+
+
+def _decoded(payloads: dict[str, np.ndarray], specs: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Arrays of a compact file.
+
+    Raises:
+        CodingError: An array is damaged, missing or not described; names it.
+    """
+    if specs.keys() != payloads.keys():
+        raise CodingError("its arrays and their description differ")
+    arrays = {}
+    for name, payload in payloads.items():
+        try:
+            arrays[name] = decode_array(payload, specs[name])
+        except CodingError as error:
+            raise CodingError(f"{name}: {error}") from error
+    return arrays
+
+
+@dataclass(frozen=True, slots=True)
+class DamagedClip:
+    """What stands in place of a header that cannot be read. A value.
+
+    Attributes:
+        path: The file.
+        reason: What is wrong with it, in words that fit into brackets.
+    """
+
+    path: Path
+    reason: str
+
+    def error(self) -> ProjectError:
+        """What to raise where the clip is needed."""
+        return ProjectError(
+            f"The clip file is damaged or not a clip file ({self.reason}).",
+            hint="Restore it from a copy, or remove it and train the clip again.",
+            path=self.path,
+        )
+
+
+def look_at_clip(path: Path) -> dict[str, Any] | DamagedClip | None:
+    """Header of a clip, checkpoint or snapshot; None when there is no such file, the reason when it cannot be read.
+
+    Damage of arrays shows when they are read: `read_clip_state`.
+    """
+    try:
+        return _header_of(read_clip_metadata(path)[0])
+    except FileNotFoundError:
+        return None
+    except _DAMAGE as error:
+        return DamagedClip(path, reason_of(error))
+
+
+def read_clip_header(path: Path) -> dict[str, Any] | None:
+    """Header of a clip, checkpoint or snapshot without its arrays; None when there is none or it is damaged."""
+    found = look_at_clip(path)
+    return found if isinstance(found, dict) else None
+
+
+def reason_of(error: BaseException) -> str:
+    """Why a file cannot be used, in words that fit into brackets."""
+    return (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
+
+
+class _Unreadable(ValueError):
+    """A file of a newer version."""
+
+
+_DAMAGE = (OSError, ArraysError, JsonError, HeaderError, CodingError, _Unreadable)
+
+
+def read_clip_metadata(path: Path) -> tuple[dict[str, str], dict[str, int]]:
+    """Texts of a clip file, and the bytes that each of its arrays takes. Raises: see engine.storage.array_files."""
+    return read_metadata(path, _ENTRIES)
+
+
+def _header_of(metadata: dict[str, str]) -> dict[str, Any]:
+    """The header among the texts of a file.
+
+    Raises:
+        HeaderError, JsonError: There is none, or not a clip's.
+        _Unreadable: It is of a newer schema.
+    """
+    if "header" not in metadata:
+        raise HeaderError("it has no header")
+    header = parse_object(metadata["header"], is_nan_allowed=True)
+    schema = header.get("schema")
+    if type(schema) is int and schema > SCHEMA:
+        raise _Unreadable(f"it has schema {schema}, this version reads 1 to {SCHEMA}")
+    if type(schema) is not int or schema not in READABLE:
+        raise HeaderError(f"its header has schema {schema!r:.60}")
+    return check_header(header)

@@ -1,0 +1,223 @@
+"""Everything that moves in one clip as points: visual hulls of all its frames on one voxel grid, with presence.
+
+Not tracked over time: a point is a place, and `presence` says in which frames something's surface was there.
+Letters: M frames of the clip, C cameras.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from engine.camera.depth_range import near_plane
+from engine.camera.projection import project, projection_matrices
+from engine.camera.rig import CameraRig
+from engine.cloud.fusion import keep_inliers
+from engine.cloud.keeping import Arrays, Keep, do_now
+from engine.cloud.motion.hull import Grid, carve, hull_colors, hull_visibility, surface_rows
+
+Report = Callable[[str], None]
+
+VOXEL_PX = 2.5
+"""Voxel edge in pixels at the median depth of the hull, unless max_points asks for coarser ones."""
+MIN_HITS_SHARE = 0.25
+"""Share of the cameras that must see a voxel inside their mask (at least MIN_HITS)."""
+MIN_HITS = 3
+MIN_VISIBLE = 1
+"""Cameras that must see a surface voxel unhidden by the hull itself. Hulls also fill the space behind what they show
+(under a shadow on the floor): half of the surface on the dome, and this removes it. Asking for 2 tears holes, because
+what only one camera sees still hides what lies behind it."""
+MISSES_FROM_CAMERAS = 8
+"""One camera may disagree in rigs of at least this many; in smaller ones every view is needed."""
+MAX_GRID_VOXELS = 400_000_000
+"""Coarse blocks are 1 / 512 of this; bounds far beyond what the cameras see only cost time."""
+MAX_CARVES = 3
+"""Times the clip is carved to meet max_points; the count is known only afterwards."""
+N_PROBE_VOXELS = 96
+"""The first, coarse hull that finds size and depth of what moves has this many voxels along the longest edge."""
+
+
+@dataclass(frozen=True, slots=True)
+class MovingCloud:
+    """Places where something moved.
+
+    Attributes:
+        points: Voxel centres, scene units. [P, 3] float32
+        colors: White-balanced display colour in 0..1, mean over the frames it is present in. [P, 3] float32
+        presence: On the hull's surface in that frame. [P, M] bool
+        spacing: Voxel edge, scene units.
+    """
+
+    points: np.ndarray
+    colors: np.ndarray
+    presence: np.ndarray
+    spacing: float
+
+
+def build_moving_cloud(
+    frames: Callable[[int, int], np.ndarray],
+    masks: np.ndarray,
+    rig: CameraRig,
+    gains: np.ndarray,
+    *,
+    bounds_min: np.ndarray,
+    bounds_max: np.ndarray,
+    max_points: int = 30_000,
+    voxel_size: float | None = None,
+    report: Report,
+    keep: Keep = do_now,
+) -> MovingCloud:
+    """Hull surfaces of every frame of a clip, fused.
+
+    Args:
+        frames: (row of the rig, frame_in_clip) -> picture [H, W, 3] uint8. Called in order from this thread.
+        masks: Motion masks. [M, C, H, W] bool
+        rig: Training cameras only, at mask size.
+        gains: camera_colour = gain * scene_colour. [C, 3]
+        bounds_min, bounds_max: Box to search, scene units. [3]
+        max_points: The voxel grows until about no more than this many points remain over the clip.
+        voxel_size: Voxel edge to use as it is, scene units; a source clip takes its reference's. None derives it.
+        report: Gets one line per step with counts and the reason.
+        keep: Keeps what took long, under names that belong to these arguments alone.
+    Returns:
+        MovingCloud; empty where nothing moves.
+    """
+    started = time.perf_counter()
+    n_frames, n_cameras = masks.shape[:2]
+    projections, near = projection_matrices(rig), 0.5 * near_plane(rig)
+    min_hits, n_misses = hull_votes(n_cameras)
+    n_hidden = 0
+
+    def surface(frame_in_clip: int, grid: Grid) -> np.ndarray:
+        nonlocal n_hidden
+        found = keep(f"hull of frame {frame_in_clip} at {grid.size!r}", lambda: carve_frame(frame_in_clip, grid))
+        n_hidden += int(found["n_hidden"][0])
+        return found["voxels"]
+
+    def carve_frame(frame_in_clip: int, grid: Grid) -> Arrays:
+        frame_masks = masks[frame_in_clip]
+        voxels = carve(frame_masks, projections, grid, near=near, n_misses=n_misses, min_hits=min_hits)
+        voxels = voxels[surface_rows(voxels, grid)]
+        _, is_visible = hull_visibility(grid.centers(voxels), grid.size, frame_masks, projections, near=near)
+        is_kept = is_visible.sum(axis=0) >= MIN_VISIBLE
+        return {"voxels": voxels[is_kept], "n_hidden": np.array([(~is_kept).sum()])}
+
+    low, high = np.asarray(bounds_min, dtype=np.float64), np.asarray(bounds_max, dtype=np.float64)
+    probe = Grid.over(low, high, float((high - low).max()) / N_PROBE_VOXELS)
+    coarse = [surface(m, probe) for m in range(n_frames)]
+    occupied = np.concatenate(coarse)
+    if len(occupied) == 0:
+        report(f"Moving cloud: nothing moves where {min_hits} of {n_cameras} cameras agree; no points")
+        return _empty(n_frames, probe.size)
+    low = np.maximum(low, probe.centers(occupied.min(0)) - 1.5 * probe.size)
+    high = np.minimum(high, probe.centers(occupied.max(0)) + 1.5 * probe.size)
+    wanted = VOXEL_PX * _median_footprint(probe.centers(np.unique(occupied, axis=0)), rig, near)
+    # start from what the probe promises: surface counts fall with the square of the voxel
+    promised = probe.size * float(np.sqrt(_n_union(coarse) / max_points))
+    size = max(wanted, promised, float((np.prod(high - low) / MAX_GRID_VOXELS) ** (1 / 3)))
+    size = voxel_size or size
+    n_hidden, grid, surfaces = 0, Grid.over(low, high, size), []
+    for attempt in range(1 if voxel_size else MAX_CARVES):
+        n_hidden, grid = 0, Grid.over(low, high, size)
+        surfaces = [surface(m, grid) for m in range(n_frames)]
+        n_union = _n_union(surfaces)
+        if voxel_size or n_union <= 1.05 * max_points or attempt == MAX_CARVES - 1:
+            break
+        size *= float(np.clip(np.sqrt(n_union / max_points), 1.03, 4.0))
+    voxels, presence = _fuse(surfaces)
+    report(
+        f"Visual hulls: {np.mean([len(s) for s in surfaces]):.0f} surface points a frame, {len(voxels)} over "
+        f"{n_frames} frames at {size:.4g} scene units (asked {wanted:.4g} = {VOXEL_PX} px, limit {max_points}); "
+        f"{min_hits} of {n_cameras} cameras must agree, {n_misses} may not; {n_hidden / n_frames:.0f} a frame dropped "
+        f"that no camera can see ({time.perf_counter() - started:.1f} s)"
+    )
+    if len(voxels) == 0:
+        return _empty(n_frames, size)
+    points = grid.centers(voxels)
+    is_kept = keep_inliers(points)
+    points, presence = points[is_kept], presence[is_kept]
+    started = time.perf_counter()
+    colors = keep(
+        "colours of what moves",
+        lambda: {"colors": _colors(points, presence, frames, masks, projections, gains, size=size, near=near)},
+    )["colors"]
+    report(
+        f"Moving cloud: {len(points)} points, {(~is_kept).sum()} statistical outliers removed; coloured by the median "
+        f"of the cameras that see them ({time.perf_counter() - started:.1f} s)"
+    )
+    return MovingCloud(points.astype(np.float32), colors, presence, float(size))
+
+
+def hull_votes(n_cameras: int) -> tuple[int, int]:
+    """Cameras that must see a place of the hull inside their mask, and how many of those that look there may not."""
+    min_hits = min(max(MIN_HITS, int(np.ceil(MIN_HITS_SHARE * n_cameras))), n_cameras)
+    return min_hits, 1 if n_cameras >= MISSES_FROM_CAMERAS else 0
+
+
+def motion_bounds(points: np.ndarray, rig: CameraRig) -> tuple[np.ndarray, np.ndarray]:
+    """A box to search for motion: the static points (1 % to 99 % per axis, plus a tenth) and the focus point.
+
+    Returns:
+        bounds_min [3], bounds_max [3].
+    """
+    low, high = np.percentile(points, [1.0, 99.0], axis=0)
+    margin = 0.1 * (high - low)
+    focus = rig.focus_point()
+    return np.minimum(low - margin, focus), np.maximum(high + margin, focus)
+
+
+def _empty(n_frames: int, size: float) -> MovingCloud:
+    nothing = np.zeros((0, 3), dtype=np.float32)
+    return MovingCloud(nothing, nothing.copy(), np.zeros((0, n_frames), dtype=bool), float(size))
+
+
+def _median_footprint(points: np.ndarray, rig: CameraRig, near: float) -> float:
+    """Scene units per pixel at the points' median depth over the cameras that see them."""
+    depths = [project(points, projection)[1] for projection in projection_matrices(rig)]
+    ratios = [d[d > near] / rig.Ks[camera, 0, 0] for camera, d in enumerate(depths)]
+    return float(np.median(np.concatenate(ratios)))
+
+
+def _n_union(surfaces: list[np.ndarray]) -> int:
+    """Different voxels over some frames, at least 1."""
+    return max(1, len(np.unique(np.concatenate(surfaces), axis=0)))
+
+
+def _fuse(surfaces: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Union of the frames' surface voxels [P, 3], sorted, and presence [P, M]."""
+    stacked = np.concatenate(surfaces)
+    voxels, rows = np.unique(stacked, axis=0, return_inverse=True)
+    presence = np.zeros((len(voxels), len(surfaces)), dtype=bool)
+    frame_of = np.repeat(np.arange(len(surfaces)), [len(s) for s in surfaces])
+    presence[rows.ravel(), frame_of] = True
+    return voxels, presence
+
+
+def _colors(
+    points: np.ndarray,
+    presence: np.ndarray,
+    frames: Callable[[int, int], np.ndarray],
+    masks: np.ndarray,
+    projections: np.ndarray,
+    gains: np.ndarray,
+    *,
+    size: float,
+    near: float,
+) -> np.ndarray:
+    """Mean over the frames of each point's median colour, 0..1. [P, 3] float32"""
+    sums, counts = np.zeros((len(points), 3)), np.zeros(len(points))
+    n_frames, n_cameras = masks.shape[:2]
+    for frame_in_clip in range(n_frames):
+        rows = np.flatnonzero(presence[:, frame_in_clip])
+        pictures = np.stack([frames(row, frame_in_clip) for row in range(n_cameras)])
+        pixel, is_visible = hull_visibility(points[rows], size, masks[frame_in_clip], projections, near=near)
+        colors = hull_colors(pictures, pixel, is_visible, gains)
+        is_known = np.isfinite(colors[:, 0])
+        sums[rows[is_known]] += colors[is_known]
+        counts[rows[is_known]] += 1
+    average = sums.sum(0) / max(counts.sum(), 1.0)  # for points whose every camera was outvoted
+    means = np.where(counts[:, None] > 0, sums / np.maximum(counts, 1.0)[:, None], average)
+    return np.clip(means / 255.0, 0.0, 1.0).astype(np.float32)

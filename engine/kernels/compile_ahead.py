@@ -1,0 +1,182 @@
+"""Compile every kernel that training and viewing use, in several processes at once.
+
+Compiling holds the interpreter lock for seconds, so it never happens in a process with a window, and on the first
+start alone. Two programs that start at once do not compile twice: the second one waits for the first.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from engine.kernels.cache import VARIABLE, current_key, kernel_folder, read_marker, write_marker
+
+if TYPE_CHECKING:
+    from filelock import BaseFileLock
+
+logger = logging.getLogger(__name__)
+
+GROUPS = (
+    ("point clouds", "engine.cloud.warm", 8.8),
+    ("decoder", "engine.model.warm", 4.1),
+    ("rasterizer", "engine.raster.cpu.warm", 4.9),
+    ("loss and optimiser", "engine.training.warm", 5.0),
+    ("figures", "engine.metrics.pictures.warm", 1.5),
+)
+"""Name, module, and about how long compiling takes, of each group. Every module has a `warm_up()` that runs each of its
+kernels once. Groups share no cached kernel but the entry of `routines.run`, or two processes would compile it at the
+same time."""
+_FOR_LATER = ("point clouds", "figures")
+"""Groups that are not part of a training step, and quick to load at their first use."""
+
+MAX_PROCESSES = 4
+TIME_LIMIT_S = 180.0
+POLL_S = 0.05
+LOCK = "compiling.lock"
+
+ReportGroups = Callable[[int, int, str], None]
+"""Groups done, groups in all, and what is compiled now. Called often; may raise to cancel."""
+
+
+def warm_up_all(report: ReportGroups | None = None) -> None:
+    """Compile what is not compiled yet, then load what a training step needs into this process.
+
+    Compiling takes about ten seconds on two cores, loading a fraction of a second. A group that fails to compile ahead
+    is logged and left to its first use.
+
+    Args:
+        report: Told about the progress; what it raises ends the compiling processes and passes on.
+    """
+    compile_all(report)
+    for name, module, _ in GROUPS:
+        if name not in _FOR_LATER:
+            import_module(module).warm_up()
+
+
+def compile_all(report: ReportGroups | None = None, *, n_processes: int | None = None) -> bool:
+    """Compile every group in other processes, unless that was done. Returns whether all of them succeeded.
+
+    Args:
+        report: See `warm_up_all`.
+        n_processes: How many at a time; as many as cores when None, MAX_PROCESSES at most.
+    """
+    folder = kernel_folder()
+    if read_marker(folder) == current_key():
+        return True
+    report = report or (lambda done, n, what: None)
+    n = len(GROUPS)
+    lock = _take(folder / LOCK)
+    while lock is not None and not lock.is_locked:
+        report(0, n, "another program compiles")
+        time.sleep(POLL_S)
+        lock = _take(folder / LOCK)
+    running: list[tuple[_Bundle, subprocess.Popen[bytes], float]] = []
+    n_done, is_fine = 0, True
+    try:
+        if read_marker(folder) == current_key():  # the program we waited for has done it
+            return True
+        for bundle in _bundles(min(n_processes or _n_cores(), MAX_PROCESSES)):
+            running.append((bundle, _start(bundle, folder), time.monotonic()))
+        while running:
+            report(n_done, n, " and ".join(_names(bundle) for bundle, _, _ in running))
+            time.sleep(POLL_S)
+            for item in list(running):
+                bundle, process, started_s = item
+                seconds = time.monotonic() - started_s
+                if process.poll() is None and seconds < TIME_LIMIT_S:
+                    continue
+                running.remove(item)
+                n_done += len(bundle)
+                is_fine &= _end(_names(bundle), process, seconds)
+        report(n_done, n, "")
+        if is_fine:
+            write_marker(folder)
+        return is_fine
+    finally:
+        for _, process, _ in running:
+            process.kill()
+            process.communicate()
+        if lock is not None:
+            with suppress(OSError):
+                lock.release()
+
+
+_Bundle = tuple[tuple[str, str, float], ...]
+"""Groups that one process compiles, one after the other."""
+
+
+def _bundles(n_processes: int) -> list[_Bundle]:
+    """Longest first, each to the process that has least to do."""
+    bundles: list[_Bundle] = [()] * min(n_processes, len(GROUPS))
+    for group in sorted(GROUPS, key=lambda group: -group[2]):
+        least = min(range(len(bundles)), key=lambda i: sum(seconds for _, _, seconds in bundles[i]))
+        bundles[least] = (*bundles[least], group)
+    return bundles
+
+
+def _names(bundle: _Bundle) -> str:
+    return ", ".join(name for name, _, _ in bundle)
+
+
+_IMPORT = "from importlib import import_module"
+_END_WITH_PARENT = "from engine.kernels.parent import end_with_parent; end_with_parent()"
+"""A compiler that nobody waits for any more takes a core for a minute all the same."""
+
+
+def _start(bundle: _Bundle, folder: Path) -> subprocess.Popen[bytes]:
+    root = str(Path(__file__).resolve().parents[2])
+    path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH", ""))))
+    calls = "; ".join(f"import_module({module!r}).warm_up()" for _, module, _ in bundle)
+    return subprocess.Popen(
+        # a compiler makes millions of objects that live on: looking for garbage among them takes a fifth of the time
+        [sys.executable, "-c", f"{_END_WITH_PARENT}; import gc; gc.disable(); {_IMPORT}; {calls}"],
+        env={**os.environ, "PYTHONPATH": path, VARIABLE: str(folder)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
+
+
+def _end(name: str, process: subprocess.Popen[bytes], seconds: float) -> bool:
+    """Collect a process that has ended or taken too long; whether it succeeded."""
+    process.kill()
+    _, said = process.communicate()
+    if process.returncode == 0:
+        logger.info("kernels of the %s compiled in %.1f s", name, seconds)
+        return True
+    logger.warning(
+        "kernels of the %s could not be compiled ahead (exit %s): %s", name, process.returncode, said[-2000:]
+    )
+    return False
+
+
+def _take(path: Path) -> BaseFileLock | None:
+    """The system's lock on a file, which ends with this process; `is_locked` says whether it is ours now.
+
+    None where no lock can be made: compiling twice is better than never.
+    """
+    from filelock import FileLock, Timeout  # only where there is something to compile
+
+    lock = FileLock(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock.acquire(blocking=False)
+    except Timeout:
+        return lock
+    except OSError:
+        return None
+    return lock
+
+
+def _n_cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

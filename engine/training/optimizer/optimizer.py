@@ -1,0 +1,150 @@
+"""Optimiser of a phase: Adam with one learning rate per kind of parameter, falling log-linearly to its end.
+
+Rates carry no scene scale and the horizon is the phase's own number of steps, so every clip sees the whole schedule.
+"""
+
+from __future__ import annotations
+
+import math
+from fnmatch import fnmatchcase
+
+import numpy as np
+from torch import Tensor, nn
+
+from engine.errors import NonFiniteLoss
+from engine.model.clip_model import ClipModel
+from engine.training.config import TrainConfig
+from engine.training.optimizer.adam import make_adam, not_finite
+
+_HEADS = ("opacity", "color", "shape", "offset")
+_OWN_RATIOS = {
+    "sets.*.features": "feature_final_ratio",
+    "sets.*.log_*_scales": "scale_final_ratio",
+    "field.*": "field_final_ratio",
+    **{f"decoder.{head}.*": f"{head}_head_final_ratio" for head in _HEADS},
+}
+"""Names of parameters to the setting that says where their rates end."""
+
+
+def named_parameters(
+    model: ClipModel, gains: nn.Parameter, config: TrainConfig
+) -> dict[str, tuple[nn.Parameter, float]]:
+    """Trainable parameters by name with their initial rate; frozen ones are left out altogether."""
+    chosen: dict[str, tuple[nn.Parameter, float]] = {}
+
+    def add(name: str, parameter: Tensor, rate: float) -> None:
+        if isinstance(parameter, nn.Parameter) and parameter.requires_grad and parameter.numel():
+            chosen[name] = (parameter, rate)
+
+    for role in model.roles():
+        anchors = model.anchor_set(role)
+        add(f"sets.{role}.features", anchors.features, config.feature_lr)
+        add(f"sets.{role}.log_offset_scales", anchors.log_offset_scales, config.scale_lr)
+        add(f"sets.{role}.log_base_scales", anchors.log_base_scales, config.scale_lr)
+    for head in _HEADS:
+        for i, parameter in enumerate(model.decoder.head_parameters(head)):
+            add(f"decoder.{head}.{i}", parameter, getattr(config, f"{head}_head_lr"))
+    if model.field is not None:
+        for i, table in enumerate(model.field.tables):
+            add(f"field.tables.{i}", table, config.table_lr)
+        add("field.hidden", model.field.hidden.weight, config.field_mlp_lr)
+        add("field.out", model.field.out.weight, config.field_mlp_lr)
+    add("gains", gains, config.gain_lr)
+    return chosen
+
+
+def final_ratio(name: str, config: TrainConfig) -> float:
+    """Where the rate of a parameter of `named_parameters` ends, as a share of its start."""
+    own = [getattr(config, setting) for pattern, setting in _OWN_RATIOS.items() if fnmatchcase(name, pattern)]
+    return next((ratio for ratio in own if ratio), config.final_lr_ratio)
+
+
+class PhaseOptimizer:
+    """Adam over the trainable parameters of one phase. Owns moments and schedule, not the parameters.
+
+    Args:
+        parameters: By name, with the rate at the start.
+        n_steps: Steps of the phase, over which rates fall.
+        config: Final ratios of the rates and the norm to clip at.
+        backend: Of `engine.training.optimizer.adam.make_adam`.
+    """
+
+    def __init__(
+        self,
+        parameters: dict[str, tuple[nn.Parameter, float]],
+        *,
+        n_steps: int,
+        config: TrainConfig,
+        backend: str = "auto",
+    ) -> None:
+        self._parameters = {name: parameter for name, (parameter, _) in parameters.items()}
+        self._rates = {name: rate for name, (_, rate) in parameters.items()}
+        self._final_ratios = {name: final_ratio(name, config) for name in parameters}
+        self._max_norm = config.max_gradient_norm
+        self.n_steps = n_steps
+        self.steps_done = 0
+        self._from_step, self._from_share = 0, 0.0
+        self._adam = make_adam(self._parameters, backend)
+
+    def step(self) -> float:
+        """Apply the gradients and clear them.
+
+        Returns:
+            Norm over all gradients before clipping.
+        Raises:
+            NonFiniteLoss: A gradient is not finite; parameters are left as they were.
+        """
+        gradients = {name: p.grad for name, p in self._parameters.items() if p.grad is not None}
+        norm = self._adam.norm(gradients)
+        if not math.isfinite(norm):
+            bad = not_finite(gradients)
+            raise NonFiniteLoss(f"The gradient of {', '.join(bad) or 'the sum'} is not finite.")
+        scale = self._max_norm / norm if self.clips(norm) else 1.0
+        share_done = self.share_done
+        rates = {name: rate * self._final_ratios[name] ** share_done for name, rate in self._rates.items()}
+        self._adam.update(gradients, rates, scale)
+        for parameter in self._parameters.values():
+            parameter.grad = None
+        self.steps_done += 1
+        return norm
+
+    @property
+    def share_done(self) -> float:
+        """How much of the fall of the rates lies behind, 0 to 1; rates are start * final_ratio ** this."""
+        share = (self.steps_done - self._from_step) / max(self.n_steps - self._from_step, 1)
+        return self._from_share + (1.0 - self._from_share) * share
+
+    def finish_within(self, n_steps: int) -> None:
+        """From here on rates fall to their end within so many more steps, from where they are."""
+        self._from_step, self._from_share = self.steps_done, self.share_done
+        self.n_steps = self.steps_done + n_steps
+
+    @property
+    def schedule(self) -> list[float]:
+        """Where the present fall of the rates began: step, and share of the fall. For a checkpoint."""
+        return [self._from_step, self._from_share]
+
+    @schedule.setter
+    def schedule(self, values: list[float]) -> None:
+        self._from_step, self._from_share = int(values[0]), float(values[1])
+
+    def clips(self, norm: float) -> bool:
+        """Whether gradients of this norm are scaled down."""
+        return 0.0 < self._max_norm < norm
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Moments and step counts, for a checkpoint. Copies."""
+        return {
+            f"optimizer.{name}.{key}": value
+            for name, state in self._adam.arrays().items()
+            for key, value in state.items()
+        }
+
+    def restore(self, arrays: dict[str, np.ndarray], steps_done: int) -> None:
+        """Inverse of `arrays`."""
+        self.steps_done = steps_done
+        for name in self._parameters:
+            prefix = f"optimizer.{name}."
+            found = {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
+            if found:
+                self._adam.restore(name, found)

@@ -1,0 +1,47 @@
+"""Whether nothing moves in a clip, looked up before it is trained: then it takes no steps and stores next to nothing.
+
+By the motion masks that training itself would find, against the backgrounds that the reference clip left behind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from engine.capture.capture import Capture
+from engine.capture.clip import Clip
+from engine.cloud.background.masks import motion_mask
+from engine.training.config import TrainConfig
+from engine.training.preparation.cloud_preparation import key_of_corrected, read_backgrounds
+
+
+def looks_still(
+    capture: Capture, clip: Clip, camera_indices: Sequence[int], config: TrainConfig, prep_dir: Path
+) -> bool:
+    """Whether no training camera sees anything move in the middle, at the end and at the beginning of a
+    source clip.
+
+    It ends at the first picture in which something moves. False where nobody knows, for there are no backgrounds yet,
+    and where a clip learns something even if nothing moves.
+
+    Args:
+        capture: At working resolution.
+        clip: A clip that inherits.
+        camera_indices: Training cameras, in capture numbering.
+        config: All settings.
+        prep_dir: Folder in which the reference clip kept its backgrounds.
+    Raises:
+        CaptureError: A picture cannot be read.
+    """
+    if config.gate != "hull" or not config.keeps_static or config.field != "per_clip":
+        return False
+    backgrounds = read_backgrounds(prep_dir, key_of_corrected(capture, camera_indices, config))
+    if backgrounds is None:
+        return False
+    last = clip.n_frames - 1
+    instants = dict.fromkeys((last // 2, last, 0))  # each once; most motion shows in the first picture or two
+    return not any(
+        motion_mask(capture.frame(camera, clip.start + instant), background).any()
+        for instant in instants
+        for camera, background in zip(camera_indices, backgrounds.images, strict=True)
+    )

@@ -1,0 +1,355 @@
+"""What a clip's training starts from: its pictures, and made of them model, gains and backgrounds.
+
+Reference clip: `static_parts` before its first phase, `with_motion` between the phases, when the static anchors have
+been trained. Source clip: `source_parts` does all of it at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import nn
+
+from engine.capture.capture import Capture
+from engine.capture.clip import Clip
+from engine.clip_files.clip_state import ClipState
+from engine.cloud.keeping import Keep
+from engine.cloud.motion.moving_cloud import MovingCloud
+from engine.cloud.stereo.static_cloud import StaticCloud
+from engine.errors import DiskError, PreparationError, ProjectError
+from engine.gate.image_gate import GateTable, measure_gate
+from engine.gate.inside import frames_inside
+from engine.gate.regions import GateRegion
+from engine.model.clip_model import ClipModel
+from engine.model.clip_view import View, render_gaussians
+from engine.progress import Progress, ReportProgress
+from engine.training.config import TrainConfig
+from engine.training.preparation.building import (
+    add_residual,
+    choose_decoder,
+    drop_inherited,
+    inheriting_model,
+    moving_anchors,
+    remove_gate,
+    static_model,
+)
+from engine.training.preparation.clip_field import continue_field, fit_field
+from engine.training.preparation.cloud_preparation import (
+    Backgrounds,
+    correct_backgrounds,
+    estimate_backgrounds,
+    key_of_corrected,
+    motion_masks,
+    moving_cloud,
+    read_backgrounds,
+    static_cloud,
+    write_backgrounds,
+)
+from engine.training.preparation.gating import decide, nothing_measured, with_inside, without_static_regions
+from engine.training.preparation.stages import Stages
+from engine.training.preparation.training_pictures import TrainingPictures
+
+
+@dataclass(frozen=True, slots=True)
+class ClipParts:
+    """A clip as it is prepared. Model and gains learn in place; the rest are values.
+
+    Attributes:
+        model: Everything that is visible in the clip.
+        gains: Of the training cameras. [C, 3] float32
+        backgrounds: What the training cameras see when nothing moves.
+        spacing: Distance between static anchors, scene units.
+        moving_spacing: Likewise of moving ones; None as long as nothing has moved.
+        reasons: Of the gate, by the name under which they are stored; empty without a decision.
+        coverage: How much of what moves in a source clip has an anchor near it; None for a reference clip.
+    """
+
+    model: ClipModel
+    gains: nn.Parameter
+    backgrounds: Backgrounds
+    spacing: float
+    moving_spacing: float | None = None
+    reasons: dict[str, np.ndarray] = field(default_factory=dict)
+    coverage: dict[str, int | float | str] | None = None
+
+
+class ClipPreparation:
+    """Prepares one clip. See the module docstring.
+
+    Args:
+        capture: The capture at working resolution.
+        clip: Frames to prepare.
+        config: All numbers.
+        camera_indices: Training cameras, in capture numbering.
+        views: Of these cameras.
+        base: What the clip inherits from; None for a reference clip.
+        previous: The clip before, finished: its field goes on with field=continue.
+        regions: Where the user overrules the gate.
+        seed: Of new decoder heads.
+        generator: Draws all other initial values.
+        prep_dir: Folder that keeps backgrounds between clips, and finished pieces of this preparation.
+        report: Receives progress.
+    """
+
+    def __init__(
+        self,
+        capture: Capture,
+        clip: Clip,
+        config: TrainConfig,
+        *,
+        camera_indices: Sequence[int],
+        views: Sequence[View],
+        base: ClipState | None,
+        previous: ClipState | None,
+        regions: Sequence[GateRegion],
+        seed: int,
+        generator: torch.Generator,
+        prep_dir: Path,
+        report: ReportProgress,
+    ) -> None:
+        self._capture, self._clip, self._config = capture, clip, config
+        self._camera_indices, self._views = list(camera_indices), list(views)
+        self._rig = capture.rig.subset(self._camera_indices)
+        self._base, self._previous, self._regions = base, previous, tuple(regions)
+        self._seed, self._generator = seed, generator
+        self._prep_dir, self._report = prep_dir, report
+        self._stages = Stages(prep_dir, clip.clip_index, self._key(), report)
+
+    def read_pictures(self) -> TrainingPictures:
+        """The clip's pictures of the training cameras.
+
+        Raises:
+            CaptureError: They cannot be read.
+        """
+        self._report(Progress("Reading pictures", 0.0))
+        pictures = TrainingPictures(self._capture, self._clip, self._camera_indices)
+        view = self._views[0]
+        size_mb = len(pictures) * view.width * view.height * 3 / 1e6
+        self._say("Reading pictures", f"{len(pictures)} pictures, {size_mb:.0f} MB")
+        return pictures
+
+    def static_parts(self) -> ClipParts:
+        """A reference clip before its motion is known: static anchors and a fresh decoder.
+
+        Raises:
+            PreparationError: No static point was found.
+        """
+        backgrounds = self._estimated()
+        cloud = self._static_cloud(backgrounds, self._stages.keep)
+        gains = nn.Parameter(torch.from_numpy(cloud.gains).float())
+        model = static_model(cloud, self._clip, self._config, self._generator)
+        self._say("Building the static cloud", f"{len(cloud.points)} static anchors, spacing {cloud.spacing:.4g}")
+        return ClipParts(model, gains, backgrounds, float(cloud.spacing))
+
+    def with_motion(self, parts: ClipParts, pictures: TrainingPictures) -> ClipParts:
+        """A reference clip whose static anchors were trained, with corrected backgrounds and what moves."""
+        keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
+        backgrounds = self._corrected(parts.backgrounds, parts.model, parts.gains, pictures, keep)
+        try:
+            self.keep_backgrounds(backgrounds)
+        except DiskError as error:  # clips after this one need them, this one does not: tried again at its end
+            self._say("Checking backgrounds", f"{error.message} Tried again when the clip is finished")
+        parts = replace(parts, backgrounds=backgrounds)
+        cloud, n_inside, moving_spacing = self._find_motion(parts, pictures)
+        if len(cloud.points):
+            parts.model.add_set("moving", moving_anchors(cloud, np.ones(len(cloud.points), bool), self._config))
+        self._say("Carving what moves", f"{len(cloud.points)} moving anchors")
+        reasons = self._make_dynamic(parts, pictures, cloud, n_inside)
+        return replace(parts, moving_spacing=moving_spacing, reasons=reasons)
+
+    def source_parts(self, reference: ClipState, pictures: TrainingPictures) -> ClipParts:
+        """A clip that takes over what another one has learned.
+
+        Raises:
+            PreparationError: It needs a static cloud of its own and no static point was found.
+            ProjectError: The reference was trained with other cameras, or the field before cannot go on.
+        """
+        gains = nn.Parameter(torch.from_numpy(reference.arrays["gains"].copy()), requires_grad=False)
+        if list(reference.header["camera_names"]) != list(self._rig.names):
+            raise ProjectError(
+                "The training cameras differ from those of the reference clip.",
+                hint="Use the same hold-out for every clip of a project.",
+            )
+        model, said = inheriting_model(reference, self._clip, self._config)
+        self._say("Taking over the reference", said)
+        backgrounds = read_backgrounds(self._prep_dir, self._key_of_corrected())
+        if backgrounds is None:
+            estimated = self._estimated()
+            keep = self._keep_after(model, gains, estimated)
+            backgrounds = self._corrected(estimated, model, gains, pictures, keep)
+        choose_decoder(model, self._config, seed=self._seed)
+        if self._config.inherit == "off":
+            own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
+            drop_inherited(model, own, self._config)
+            self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
+        parts = ClipParts(model, gains, backgrounds, reference.header["spacing"])
+        cloud, n_inside, moving_spacing = self._find_motion(parts, pictures)
+        coverage = add_residual(model, cloud, self._config)
+        self._say("Comparing with the reference", coverage.text)
+        reasons = self._make_dynamic(parts, pictures, cloud, n_inside)
+        return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage.as_dict())
+
+    def keep_backgrounds(self, backgrounds: Backgrounds) -> None:
+        """Keep a reference clip's corrected backgrounds for source clips, unless they are kept already.
+
+        Raises:
+            DiskError: The disk refused.
+        """
+        key = self._key_of_corrected()
+        kept = read_backgrounds(self._prep_dir, key)
+        if kept is None or not kept.equals(backgrounds):
+            write_backgrounds(self._prep_dir, backgrounds, key)
+
+    # ---------------------------------------------------------------- what is kept of an attempt
+
+    def _key(self) -> dict[str, Any]:
+        """What a preparation depends on, apart from what `_keep_after` adds."""
+
+        def named(state: ClipState | None) -> str | None:
+            return None if state is None else state.header["fingerprint"]
+
+        return {
+            "capture": self._capture.fingerprint,
+            "size": [int(side) for side in self._rig.image_sizes[0]],
+            "cameras": list(self._rig.names),
+            "frames": [self._clip.start, self._clip.n_frames, self._clip.clip_length],
+            "config": self._config.difference(),
+            "regions": [region.as_dict() for region in self._regions],
+            "base": named(self._base),
+            "previous": named(self._previous),
+            "seed": self._seed,
+        }
+
+    def _keep_after(self, model: ClipModel, gains: nn.Parameter, backgrounds: Backgrounds) -> Keep:
+        """Keeps what follows from a model as it is now, the gains and the backgrounds."""
+        arrays = model.own_arrays() | {"gains": gains.detach().numpy(), "backgrounds": backgrounds.images}
+        name = ClipState(arrays, {}).fingerprint
+        return lambda piece, work: self._stages.keep(f"{name} {piece}", work)
+
+    # ---------------------------------------------------------------- what does not move
+
+    def _estimated(self) -> Backgrounds:
+        keep = self._stages.keep
+        return estimate_backgrounds(self._capture, self._camera_indices, self._config, self._report, keep)
+
+    def _corrected(
+        self,
+        backgrounds: Backgrounds,
+        model: ClipModel,
+        gains: nn.Parameter,
+        pictures: TrainingPictures,
+        keep: Keep,
+    ) -> Backgrounds:
+        def render(camera_row: int) -> np.ndarray:
+            return _render_static(model, self._views[camera_row], gains[camera_row])
+
+        return correct_backgrounds(backgrounds, pictures, render, self._report, keep)
+
+    def _key_of_corrected(self) -> dict:
+        return key_of_corrected(self._capture, self._camera_indices, self._config)
+
+    def _static_cloud(self, backgrounds: Backgrounds, keep: Keep) -> StaticCloud:
+        cloud = static_cloud(backgrounds, self._rig, self._config, self._report, keep)
+        if len(cloud.points) == 0:
+            raise PreparationError(
+                "No static point was found by any two cameras.",
+                hint="Check the calibration: poses must be world to camera, in OpenCV axes.",
+                path=self._capture.path,
+            )
+        return cloud
+
+    # ---------------------------------------------------------------- what moves
+
+    def _find_motion(
+        self, parts: ClipParts, pictures: TrainingPictures
+    ) -> tuple[MovingCloud, np.ndarray, float | None]:
+        """What moves, frames of each static anchor inside a hull [A], and the spacing of moving anchors."""
+        static_points = parts.model.anchor_set("static").positions.numpy()
+        keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
+        masks = motion_masks(pictures, parts.backgrounds, self._report, keep)
+        n_inside = np.zeros(0, np.int64)
+        if self._config.gate == "images":
+            inside = keep("frames inside", lambda: {"n": frames_inside(static_points, masks, self._rig)})
+            n_inside = inside["n"]
+        gains = parts.gains.detach().numpy()
+        voxel_size = None if self._base is None else self._base.header["moving_spacing"]
+        cloud = moving_cloud(
+            pictures,
+            masks,
+            self._rig,
+            gains,
+            static_points,
+            self._config,
+            self._report,
+            voxel_size=voxel_size,
+            keep=keep,
+        )
+        moving_spacing = float(cloud.spacing) if len(cloud.points) else voxel_size
+        if self._config.gate != "off":
+            cloud = without_static_regions(cloud, self._regions)
+        return cloud, n_inside, moving_spacing
+
+    def _make_dynamic(
+        self, parts: ClipParts, pictures: TrainingPictures, cloud: MovingCloud, n_inside: np.ndarray
+    ) -> dict[str, np.ndarray]:
+        """Last step: the gate and the field. Returns the reasons of the gate."""
+        reasons = {}
+        if self._config.gate == "off":
+            remove_gate(parts.model)
+        else:
+            reasons = self._decide(parts, pictures, cloud, n_inside)
+        if self._config.gate == "static":
+            remove_gate(parts.model, in_time_only=True)
+        if self._config.field == "continue" and self._previous is not None and self._previous.header["field"]:
+            made = continue_field(parts.model, self._previous, self._clip)
+        else:
+            has_promoted = {"promoted", "replacing"} & set(parts.model.roles())
+            spacing = parts.spacing if has_promoted and len(cloud.points) == 0 else float(cloud.spacing)
+            made = fit_field(parts.model, spacing=spacing, config=self._config, generator=self._generator)
+        self._say("Sizing the field", made)
+        return reasons
+
+    def _decide(
+        self, parts: ClipParts, pictures: TrainingPictures, cloud: MovingCloud, n_inside: np.ndarray
+    ) -> dict[str, np.ndarray]:
+        """Static anchors that change in this clip get a dynamic feature; which, by config.gate and the regions."""
+        static = parts.model.anchor_set("static")
+        is_measured = self._config.gate == "images"
+        if static.is_dynamic or not (is_measured or self._regions):
+            return {}  # already, where the reference has no gate
+        table = nothing_measured(len(static))
+        if is_measured:
+            table = with_inside(self._measured(parts, pictures, cloud), n_inside, self._clip.n_frames)
+        reasons, said = decide(parts.model, table, self._regions, is_source=self._base is not None)
+        self._say("Deciding what is static", said)
+        return reasons
+
+    def _measured(self, parts: ClipParts, pictures: TrainingPictures, cloud: MovingCloud) -> GateTable:
+        return measure_gate(
+            pictures.raw,
+            self._clip.n_frames,
+            parts.backgrounds.images,
+            self._rig,
+            parts.model.anchor_set("static").positions.numpy(),
+            spacing=parts.spacing,
+            moving_points=cloud.points,
+            presence=cloud.presence,
+            moving_spacing=float(cloud.spacing),
+        )
+
+    def _say(self, stage: str, message: str) -> None:
+        self._report(Progress(stage, 1.0, message))
+
+
+def _render_static(model: ClipModel, view: View, gain: torch.Tensor) -> np.ndarray:
+    """The static anchors alone, in the camera's own colours. [H, W, 3] float32 in 0..1"""
+    rows = {role: torch.zeros(0, dtype=torch.int64) for role in model.roles()}
+    rows["static"] = torch.arange(len(model.anchor_set("static")))
+    with torch.no_grad():
+        image = render_gaussians(model.decode(0.0, rows), view).image[0]
+        return (image * gain).numpy()

@@ -1,0 +1,274 @@
+"""From pixels to clouds: what has to be known before a clip can be trained.
+
+Reference clip: backgrounds of the training cameras and a dense static cloud first; once the static part has been
+trained, its renders correct the backgrounds, and what differs from them is what moves. Source clip: the reference's
+corrected backgrounds are reused, only the clip's own motion is looked at.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from engine.camera.rig import CameraRig
+from engine.capture.capture import Capture
+from engine.cloud.background.background import estimate_background
+from engine.cloud.background.masks import motion_mask
+from engine.cloud.background.recheck import recheck_background
+from engine.cloud.keeping import Arrays, Keep, do_now
+from engine.cloud.motion.moving_cloud import MovingCloud, build_moving_cloud, motion_bounds
+from engine.cloud.stereo.sparse import triangulate
+from engine.cloud.stereo.static_cloud import StaticCloud, build_static_cloud
+from engine.progress import Progress, ReportProgress
+from engine.storage.array_files import ArraysError, read_arrays, write_arrays
+from engine.training.config import TrainConfig
+from engine.training.preparation.training_pictures import TrainingPictures
+
+logger = logging.getLogger(__name__)
+
+BACKGROUNDS_FILE = "backgrounds.safetensors"
+
+
+@dataclass(frozen=True, slots=True)
+class Backgrounds:
+    """What each training camera sees when nothing moves.
+
+    Attributes:
+        images: [C, H, W, 3] uint8
+        is_stable: Pixels whose background is trusted. [C, H, W] bool
+    """
+
+    images: np.ndarray
+    is_stable: np.ndarray
+
+    def equals(self, other: Backgrounds) -> bool:
+        """Whether both are the same in every pixel."""
+        return np.array_equal(self.images, other.images) and np.array_equal(self.is_stable, other.is_stable)
+
+
+def spread_frames(n_frames: int, at_most: int) -> list[int]:
+    """Frame indices spread evenly over a capture."""
+    count = min(n_frames, at_most)
+    return sorted({round(i * (n_frames - 1) / max(count - 1, 1)) for i in range(count)})
+
+
+def estimate_backgrounds(
+    capture: Capture,
+    camera_indices: Sequence[int],
+    config: TrainConfig,
+    report: ReportProgress,
+    keep: Keep = do_now,
+) -> Backgrounds:
+    """Backgrounds from frames spread over the whole capture."""
+    frames = spread_frames(capture.n_frames, config.background_frames)
+
+    def estimate(camera: int) -> Arrays:
+        background = estimate_background(capture.frames_of(camera, frames))
+        return {"image": background.image, "is_stable": np.packbits(background.is_stable, axis=-1)}
+
+    images, stable = [], []
+    for row, camera in enumerate(camera_indices):
+        kept = keep(f"background {row}", partial(estimate, camera))
+        images.append(kept["image"])
+        stable.append(np.unpackbits(kept["is_stable"], axis=-1, count=kept["image"].shape[1]).astype(bool))
+        report(Progress("Looking for what stands still", (row + 1) / len(camera_indices)))
+    is_stable = np.stack(stable)
+    share = 100 * is_stable.mean()
+    report(
+        Progress(
+            "Looking for what stands still",
+            1.0,
+            f"{len(frames)} frames each, {share:.0f} % of pixels stable",
+        )
+    )
+    return Backgrounds(np.stack(images), is_stable)
+
+
+def static_cloud(
+    backgrounds: Backgrounds,
+    rig: CameraRig,
+    config: TrainConfig,
+    report: ReportProgress,
+    keep: Keep = do_now,
+) -> StaticCloud:
+    """Dense points of what stands still, with white balance gains."""
+
+    def build() -> Arrays:
+        cloud = _build_static_cloud(backgrounds, rig, config, report, keep)
+        return {name: np.asarray(getattr(cloud, name)) for name in ("points", "colors", "gains", "spacing")}
+
+    arrays = keep("static cloud", build)
+    return StaticCloud(arrays["points"], arrays["colors"], arrays["gains"], float(arrays["spacing"]))
+
+
+def _build_static_cloud(
+    backgrounds: Backgrounds, rig: CameraRig, config: TrainConfig, report: ReportProgress, keep: Keep
+) -> StaticCloud:
+
+    def say(line: str) -> None:
+        report(Progress("Building the static cloud", 0.5, line))
+
+    def find_sparse() -> Arrays:
+        def alive() -> None:  # whoever wants to stop is heard here
+            report(Progress("Building the static cloud", 0.5))
+
+        return {"points": triangulate(backgrounds.images, rig, report=say, alive=alive).points}
+
+    sparse_points = keep("sparse points", find_sparse)["points"]
+    return build_static_cloud(
+        backgrounds.images,
+        backgrounds.is_stable,
+        rig,
+        max_points=config.max_static_points,
+        sparse_points=sparse_points if len(sparse_points) else None,
+        color=config.color,
+        report=say,
+        keep=keep,
+    )
+
+
+def correct_backgrounds(
+    backgrounds: Backgrounds,
+    pictures: TrainingPictures,
+    render_static: Callable[[int], np.ndarray],
+    report: ReportProgress,
+    keep: Keep = do_now,
+) -> Backgrounds:
+    """Backgrounds after a look at the trained static part, which knows what other cameras saw behind a person.
+
+    Args:
+        render_static: Camera row to the static render in that camera's colours. [H, W, 3] float
+    """
+    corrected = backgrounds.images.copy()
+
+    def correct(row: int) -> Arrays:
+        frames = np.stack([pictures.raw(row, i) for i in range(pictures.clip.n_frames)])
+        image = recheck_background(
+            backgrounds.images[row],
+            backgrounds.is_stable[row],
+            render_static(row),
+            frames,
+        )
+        return {"image": image}
+
+    for row in range(len(corrected)):
+        corrected[row] = keep(f"corrected background {row}", partial(correct, row))["image"]
+        report(Progress("Checking backgrounds", (row + 1) / len(corrected)))
+    changed = 100 * (corrected != backgrounds.images).any(-1).mean()
+    report(
+        Progress(
+            "Checking backgrounds",
+            1.0,
+            f"{changed:.1f} % of pixels taken from the static render",
+        )
+    )
+    return Backgrounds(corrected, backgrounds.is_stable)
+
+
+def motion_masks(
+    pictures: TrainingPictures, backgrounds: Backgrounds, report: ReportProgress, keep: Keep = do_now
+) -> np.ndarray:
+    """What differs from the background, per frame and camera. [M, C, H, W] bool"""
+    n_frames, n_cameras = pictures.clip.n_frames, len(pictures.camera_indices)
+    masks = np.empty((n_frames, *backgrounds.is_stable.shape), bool)
+
+    def find(row: int) -> Arrays:
+        found = [motion_mask(pictures.raw(row, frame), backgrounds.images[row]) for frame in range(n_frames)]
+        return {"masks": np.packbits(np.stack(found), axis=-1)}
+
+    for row in range(n_cameras):
+        packed = keep(f"motion masks {row}", partial(find, row))["masks"]
+        masks[:, row] = np.unpackbits(packed, axis=-1, count=masks.shape[-1])
+        report(Progress("Finding what moves", (row + 1) / n_cameras))
+    report(Progress("Finding what moves", 1.0, f"{100 * masks.mean():.1f} % of pixels move"))
+    return masks
+
+
+def moving_cloud(
+    pictures: TrainingPictures,
+    masks: np.ndarray,
+    rig: CameraRig,
+    gains: np.ndarray,
+    static_points: np.ndarray,
+    config: TrainConfig,
+    report: ReportProgress,
+    *,
+    voxel_size: float | None,
+    keep: Keep = do_now,
+) -> MovingCloud:
+    """Surface points of what moves, fused over the frames of the clip, with the frames each exists in.
+
+    Args:
+        voxel_size: The reference clip's for a source clip, so that the same place gives the same anchors; None
+            derives it from the pixel footprint.
+    """
+
+    def say(line: str) -> None:
+        report(Progress("Carving what moves", 0.5, line))
+
+    lower, upper = motion_bounds(static_points, rig)
+    return build_moving_cloud(
+        pictures.raw,
+        masks,
+        rig,
+        gains,
+        bounds_min=lower,
+        bounds_max=upper,
+        max_points=config.max_moving_points,
+        voxel_size=voxel_size,
+        report=say,
+        keep=keep,
+    )
+
+
+def key_of_corrected(capture: Capture, camera_indices: Sequence[int], config: TrainConfig) -> dict:
+    """What corrected backgrounds belong to, as `write_backgrounds` keeps it beside them."""
+    rig = capture.rig.subset(list(camera_indices))
+    return {
+        "capture": capture.fingerprint,
+        "cameras": list(rig.names),
+        "size": [int(side) for side in rig.image_sizes[0]],
+        "frames": config.background_frames,
+        "is_corrected": True,
+    }
+
+
+def write_backgrounds(prep_dir: Path, backgrounds: Backgrounds, key: dict) -> None:
+    """Keep backgrounds for source clips and resumed trainings, atomically. `key` says what they belong to.
+
+    Raises:
+        DiskError: The disk refused.
+    """
+    arrays = {
+        "images": backgrounds.images,
+        "is_stable": np.packbits(backgrounds.is_stable, axis=-1),
+    }
+    metadata = {"key": json.dumps(key, sort_keys=True)}
+    write_arrays(prep_dir / BACKGROUNDS_FILE, arrays, metadata, what="The backgrounds")
+
+
+def read_backgrounds(prep_dir: Path, key: dict) -> Backgrounds | None:
+    """Backgrounds kept earlier, or None when there are none for this key, or the file is damaged or does not fit it."""
+    path = prep_dir / BACKGROUNDS_FILE
+    try:
+        arrays, metadata = read_arrays(path, ("key",))
+        images, packed = arrays["images"], arrays["is_stable"]
+    except FileNotFoundError:
+        return None
+    except (OSError, ArraysError, KeyError) as error:
+        logger.warning("the kept backgrounds cannot be read (%s) and are made again - %s", error, path)
+        return None  # a cache: estimated again by the caller
+    if metadata.get("key") != json.dumps(key, sort_keys=True):
+        return None
+    (width, height), n_cameras = key["size"], len(key["cameras"])
+    shapes = [(n_cameras, height, width, 3), (n_cameras, height, (width + 7) // 8)]
+    if [images.shape, packed.shape] != shapes or {images.dtype, packed.dtype} != {np.dtype(np.uint8)}:
+        logger.warning("the kept backgrounds do not fit the cameras and are made again - %s", path)
+        return None
+    return Backgrounds(images, np.unpackbits(packed, axis=-1, count=width).astype(bool))

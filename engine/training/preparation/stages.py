@@ -1,0 +1,143 @@
+"""Finished pieces of a clip's preparation as files, so that one that was stopped or killed goes on behind them.
+
+prep/clip-0000-3.safetensors    some pieces of clip 0, as arrays "piece/array"
+
+The pieces depend on nothing but what the key names; a file with another key, or a damaged one, is removed with a word.
+Everything goes when the clip is finished.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from engine.cloud.keeping import Arrays
+from engine.errors import DiskError
+from engine.progress import Progress, ReportProgress
+from engine.storage.array_files import ArraysError, read_arrays, read_metadata, write_arrays
+
+VERSION = 1
+"""To be raised whenever the code of any preparation step changes what it gives."""
+WRITE_AFTER_S = 3.0
+"""Pieces are written when so much work has gathered: what takes less is done again rather than written."""
+STAGE = "Starting"
+
+
+class Stages:
+    """Keeps the pieces of one clip's preparation.
+
+    Args:
+        prep_dir: Folder for the files; need not exist.
+        clip_index: Of the clip.
+        key: What every piece depends on; JSON-able.
+        report: Is told what is taken over or removed.
+        clock: Seconds; tests bring their own.
+    """
+
+    def __init__(
+        self,
+        prep_dir: Path,
+        clip_index: int,
+        key: Mapping[str, Any],
+        report: ReportProgress,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._prep_dir, self._clip_index, self._report, self._clock = prep_dir, clip_index, report, clock
+        self._key = json.dumps({"version": VERSION, **key}, sort_keys=True)
+        self._found: dict[str, Path] | None = None
+        self._pending: Arrays = {}
+        self._pending_s = 0.0
+        self._is_refused = False
+
+    def keep(self, name: str, work: Callable[[], Arrays]) -> Arrays:
+        """The result of a piece of work: kept from an earlier attempt, or done now and kept. A `Keep`."""
+        if self._found is None:
+            self._found = self._look()
+        if name in self._found:
+            arrays = self._read(name, self._found[name])
+            if arrays is not None:
+                return arrays
+        started_s = self._clock()
+        arrays = work()
+        self._pending |= {f"{name}/{entry}": array for entry, array in arrays.items()}
+        self._pending_s += self._clock() - started_s
+        if self._pending_s >= WRITE_AFTER_S:
+            self._write()
+        return arrays
+
+    def _look(self) -> dict[str, Path]:
+        """Which file holds a piece, by the names of the pieces."""
+        found: dict[str, Path] = {}
+        n_stale = 0
+        for path in stage_files(self._prep_dir, self._clip_index):
+            try:
+                texts, sizes = read_metadata(path, ("key",))
+            except (OSError, ArraysError) as error:
+                self._drop(path, str(error))
+                continue
+            if texts.get("key") != self._key:
+                n_stale += 1
+                _remove(path)
+                continue
+            found |= {name.rpartition("/")[0]: path for name in sizes}
+        if n_stale:
+            self._say(f"{n_stale} files of an earlier preparation do not fit any more; removed")
+        if found:
+            self._say(f"{len(found)} steps of the preparation were done in an earlier attempt and are taken over")
+        return found
+
+    def _read(self, name: str, path: Path) -> Arrays | None:
+        try:
+            arrays, _ = read_arrays(path, ("key",))
+        except (OSError, ArraysError) as error:
+            self._drop(path, str(error))
+            assert self._found is not None
+            self._found = {known: other for known, other in self._found.items() if other != path}
+            return None
+        prefix = f"{name}/"
+        return {entry.removeprefix(prefix): array for entry, array in arrays.items() if entry.startswith(prefix)}
+
+    def _write(self) -> None:
+        pieces, self._pending, self._pending_s = self._pending, {}, 0.0
+        taken = {path.name for path in stage_files(self._prep_dir, self._clip_index)}
+        number = next(n for n in range(len(taken) + 1) if _file_name(self._clip_index, n) not in taken)
+        path = self._prep_dir / _file_name(self._clip_index, number)
+        try:
+            write_arrays(path, pieces, {"key": self._key}, what="A finished step of the preparation")
+            self._is_refused = False
+        except DiskError as error:  # costs time when it is stopped, and nothing else
+            if not self._is_refused:
+                self._say(f"{error.message} The preparation goes on; stopping it would cost all of it")
+            self._is_refused = True
+
+    def _drop(self, path: Path, reason: str) -> None:
+        self._say(f"{path.name} is damaged ({reason}); removed, and its part of the preparation is done again")
+        _remove(path)
+
+    def _say(self, message: str) -> None:
+        self._report(Progress(STAGE, 1.0, message))
+
+
+def stage_files(prep_dir: Path, clip_index: int) -> list[Path]:
+    """The files that a clip's preparation has kept."""
+    return sorted(prep_dir.glob(f"clip-{clip_index:04d}-*.safetensors"))
+
+
+def remove_stages(prep_dir: Path, clip_index: int) -> None:
+    """The clip is finished, or given up: forget the pieces of its preparation."""
+    for path in stage_files(prep_dir, clip_index):
+        _remove(path)
+
+
+def _file_name(clip_index: int, number: int) -> str:
+    return f"clip-{clip_index:04d}-{number}.safetensors"
+
+
+def _remove(path: Path) -> None:
+    with suppress(OSError):
+        path.unlink()

@@ -1,0 +1,147 @@
+"""Active tiles: the part of a picture that a source clip's learning Gaussians touch, and the rest as it always is.
+
+Static anchors under frozen heads never change, so what a camera sees of them alone is one picture for the whole clip.
+A tile under no learning Gaussian shows that picture whatever is learned, and nothing flows back from it; it need not be
+drawn, compared or differentiated, whether or not the truth changed there. Tiles are found anew at every step, from the
+boxes by which the rasterizer itself bins the learning Gaussians: none is ever missed, and there is nothing to keep in
+step with learning. Parameters learn bit for bit as they do with all tiles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from engine.model.clip_model import ClipModel
+from engine.model.clip_view import View, render_gaussians
+from engine.model.decode.joining import join_frozen
+from engine.raster import TileBoxes, tile_boxes
+from engine.raster.gaussians import Gaussians
+from engine.training.step.tile_squares import tile_squares
+
+MAX_BYTES = 1 << 30
+"""Memory for what is kept of cameras; those beyond it are drawn with all tiles. 27 cameras of 640 x 360: 100 MB."""
+
+
+@dataclass(frozen=True, slots=True)
+class ActivePicture:
+    """What is to be drawn and compared of one training picture.
+
+    Attributes:
+        gaussians: Those that touch an active tile, and all that learn.
+        learning: The ones that learn alone.
+        n_all: How many there would be with all tiles.
+        tile_mask: Active tiles, or None for all. [rows, columns] bool
+        rest: What the other tiles hold. [H, W, 3]
+    """
+
+    gaussians: Gaussians
+    learning: Gaussians
+    n_all: int
+    tile_mask: np.ndarray | None = None
+    rest: Tensor | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _FrozenView:
+    """What a camera sees of the constant Gaussians.
+
+    Attributes:
+        picture: All of them, scene colours over black. [H, W, 3]
+        rows: Those that are drawn, in the constant Gaussians. [n] int64
+        boxes: Of these rows.
+        n_seen: Gaussians of all anchors that the camera may see.
+    """
+
+    picture: Tensor
+    rows: np.ndarray
+    boxes: TileBoxes
+    n_seen: int
+
+    @property
+    def n_bytes(self) -> int:
+        return self.picture.nbytes + self.rows.nbytes + self.boxes.packed.nbytes
+
+
+class ActiveTiles:
+    """Splits training pictures into active tiles and the rest. Owns the frozen pictures of the cameras, made at need.
+
+    Args:
+        model: A clip in which one set is constant; see `applies`.
+        max_bytes: Memory for what is kept.
+    """
+
+    def __init__(self, model: ClipModel, *, max_bytes: int = MAX_BYTES) -> None:
+        self._model = model
+        self._constant = [role for role in model.roles() if model.is_constant(role)]
+        self._max_bytes = max_bytes
+        self._views: dict[int, _FrozenView] = {}
+        self._squares: dict[int, np.ndarray] = {}
+        self.n_bytes = 0
+        self._is_full = False
+
+    @staticmethod
+    def applies(model: ClipModel) -> bool:
+        """Whether the first set of a clip, and no other one, is constant, so that tiles can differ."""
+        return [model.is_constant(role) for role in model.roles()] == [True] + [False] * (len(model.roles()) - 1)
+
+    def split(self, camera_row: int, view: View, clip_time: float, rows: dict[str, Tensor]) -> ActivePicture:
+        """The active part of one picture.
+
+        Args:
+            rows: Rows that the camera may see, per role; those of the constant set must be the same at every call.
+        """
+        frozen_view = self._frozen_view(camera_row, view, rows)
+        (role,) = self._constant
+        if frozen_view is None:
+            gaussians = self._model.decode(clip_time, rows)
+            is_learning = slice(len(rows[role]) * self._model.decoder.gaussians_per_anchor, None)
+            return ActivePicture(gaussians, gaussians[is_learning], len(gaussians))
+        nothing = torch.zeros(0, dtype=torch.int64)
+        learning = self._model.decode(clip_time, rows | {role: nothing})
+        mask = _boxes(learning, view).mask()
+        chosen = frozen_view.boxes.meeting(mask, frozen_view.rows)
+        gaussians = join_frozen(self._model.constant_gaussians(role), chosen, learning)
+        return ActivePicture(gaussians, learning, frozen_view.n_seen + len(learning), mask, frozen_view.picture)
+
+    def square_outside(self, picture: ActivePicture, item: int, truth: np.ndarray, gain: Tensor) -> float:
+        """Mean square that tiles which are not active add to that of the whole picture.
+
+        Args:
+            item: Number of the truth, by which sums are kept.
+            truth: [H, W, 3] uint8
+            gain: Of the camera, constant. [3]
+        """
+        if picture.tile_mask is None or picture.rest is None:
+            return 0.0
+        if item not in self._squares:
+            pixels = np.ascontiguousarray(truth)
+            self._squares[item] = tile_squares(picture.rest.numpy(), pixels, gain.detach().numpy())
+        return float(self._squares[item][~picture.tile_mask].sum()) / truth.size
+
+    def _frozen_view(self, camera_row: int, view: View, rows: dict[str, Tensor]) -> _FrozenView | None:
+        known = self._views.get(camera_row)
+        if known is None and not self._is_full:
+            (role,) = self._constant
+            k = self._model.decoder.gaussians_per_anchor
+            seen = (rows[role][:, None] * k + torch.arange(k)).reshape(-1)
+            with torch.no_grad():
+                gaussians = self._model.constant_gaussians(role)[seen]
+                picture = render_gaussians(gaussians, view).image[0]
+            boxes = _boxes(gaussians, view)
+            drawn = boxes.drawn()
+            kept = TileBoxes(boxes.packed[drawn], boxes.shape)
+            known = _FrozenView(picture, seen.numpy()[drawn], kept, len(seen))
+            self._is_full = self.n_bytes + known.n_bytes > self._max_bytes
+            if self._is_full:
+                return None
+            self.n_bytes += known.n_bytes
+            self._views[camera_row] = known
+        return known
+
+
+def _boxes(gaussians: Gaussians, view: View) -> TileBoxes:
+    return tile_boxes(gaussians, view.world_to_camera, view.K, view.width, view.height, near_plane=view.near_plane)

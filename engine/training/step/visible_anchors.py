@@ -1,0 +1,53 @@
+"""What each training camera can see of a clip's anchors, so that a step decodes no others."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from engine.camera.rig import CameraRig
+from engine.model.clip_model import ClipModel
+from engine.model.clip_view import View
+
+
+def camera_views(rig: CameraRig, *, near_plane: float) -> list[View]:
+    """Views of all cameras of a rig whose pictures have one size. near_plane: nearest depth drawn, scene units"""
+    width, height = (int(side) for side in rig.image_sizes[0])
+    return [
+        View.from_arrays(pose, K, width=width, height=height, near_plane=near_plane)
+        for pose, K in zip(rig.world_to_camera, rig.Ks, strict=True)
+    ]
+
+
+class Sight:
+    """Rows to decode, camera by camera. What a camera can see of fixed anchors never changes, so it is kept.
+
+    Args:
+        model: Its sets must stay as they are; another one is needed where anchors come, go or become dynamic.
+        views: Of the training cameras.
+        reach: How far beyond its anchor a Gaussian may lie, scene units.
+    """
+
+    def __init__(self, model: ClipModel, views: Sequence[View], *, reach: float) -> None:
+        self._model, self._views, self._reach = model, list(views), reach
+        self._seen: dict[tuple[str, int], Tensor] = {}  # rows of static sets, flags of dynamic ones
+
+    def rows(self, camera_row: int, clip_time: float) -> dict[str, Tensor]:
+        """Rows of every set that a camera can see and that exist at this time. [n] int64 each"""
+        rows = {}
+        for role in self._model.roles():
+            key, anchors = (role, camera_row), self._model.anchor_set(role)
+            if key not in self._seen:
+                is_seen = self._views[camera_row].sees(anchors.positions, reach=self._reach)
+                self._seen[key] = is_seen if anchors.is_dynamic else is_seen.nonzero()[:, 0]
+            rows[role] = self._seen[key]
+            if anchors.presence is not None:
+                is_seen = np.zeros(len(anchors), bool)  # by numpy: torch would wake its threads for it
+                for knot, _ in self._model.knots(clip_time):
+                    is_seen |= anchors.presence.numpy()[:, knot]
+                is_seen &= self._seen[key].numpy()
+                rows[role] = torch.from_numpy(is_seen.nonzero()[0])
+        return rows

@@ -1,0 +1,37 @@
+"""Priorities: a thread steps back alone, and the density of a cloud that the window draws is measured right."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+from app.background.priority import lower_thread
+from app.playback.playback import point_spacing
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux has a niceness per thread")
+def test_only_the_calling_thread_steps_back() -> None:
+    before = os.getpriority(os.PRIO_PROCESS, 0)
+    wanted = min(before + 3, 19)
+    seen: list[int] = []
+
+    def work() -> None:
+        lower_thread(wanted)
+        seen.append(os.getpriority(os.PRIO_PROCESS, threading.get_native_id()))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [wanted]
+    assert os.getpriority(os.PRIO_PROCESS, threading.main_thread().native_id or 0) == before
+
+
+def test_the_spacing_of_a_grid_is_its_step() -> None:
+    axis = np.arange(12) * 0.25
+    grid = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3).astype(np.float32)
+    assert point_spacing(grid) == pytest.approx(0.25)
+    assert point_spacing(grid[:1]) == 0.0

@@ -1,0 +1,67 @@
+"""Captured pictures: two takes of one rig have the same fingerprint, and are still never mistaken for each other."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from app.playback.capture_pictures import CapturedPictures
+from engine.capture.capture import Capture, open_capture
+from tests.app.fakes import write_capture
+
+WAIT_S = 20.0
+
+
+@pytest.fixture
+def takes(tmp_path: Path) -> tuple[Capture, Capture]:
+    """The same cameras twice; the second take is black."""
+    first = write_capture(tmp_path / "a", n_cameras=2, n_frames=2)
+    second = Path(shutil.copytree(first, tmp_path / "b"))
+    for index, path in enumerate(sorted(second.rglob("*.jpg"))):  # no two files alike, as in a real capture
+        Image.fromarray(np.full((24, 32, 3), index, np.uint8)).save(path, quality=95 - index)
+    return open_capture(first), open_capture(second)
+
+
+def test_a_picture_says_what_it_is_of(takes: tuple[Capture, Capture]):
+    pictures = CapturedPictures()
+    assert pictures.picture(takes[0], 1, 1, 400) is None
+    assert pictures.viewing.wait_idle(WAIT_S)
+    picture = pictures.picture(takes[0], 1, 1, 400)
+    assert picture is not None
+    assert (picture.camera_index, picture.frame_index, picture.size) == (1, 1, (32, 24))
+    last = pictures.picture(takes[0], 1, 0, 400)
+    assert last is not None
+    assert (last.is_stale, last.frame_index) == (True, 1)
+    pictures.close()
+
+
+def test_a_picture_of_another_take_is_never_shown(takes: tuple[Capture, Capture], monkeypatch: pytest.MonkeyPatch):
+    first, second = takes
+    assert first.fingerprint == second.fingerprint
+    was_read, go_on = threading.Event(), threading.Event()
+    read = Capture.frame
+
+    def read_and_wait(capture: Capture, camera_index: int, frame_index: int) -> np.ndarray:
+        image = read(capture, camera_index, frame_index)
+        was_read.set()
+        assert go_on.wait(WAIT_S)
+        return image
+
+    monkeypatch.setattr(Capture, "frame", read_and_wait)
+    pictures = CapturedPictures()
+    assert pictures.picture(first, 0, 0, 400) is None
+    assert was_read.wait(WAIT_S)
+    pictures.clear()  # the second take is opened
+    go_on.set()
+    assert pictures.viewing.wait_idle(WAIT_S)
+    assert pictures.picture(second, 0, 0, 400) is None
+    assert pictures.viewing.wait_idle(WAIT_S)
+    picture = pictures.picture(second, 0, 0, 400)
+    assert picture is not None
+    assert picture.image.max() < 8
+    pictures.close()

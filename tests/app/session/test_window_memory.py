@@ -1,0 +1,95 @@
+"""What the window looked like: kept, read again, and never a failure."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.session.window_memory import MAX_PROJECTS, WindowMemory, read_window_memory, show_again, view_of
+from tests.ui.fake_session import FakeSession
+
+
+def test_what_was_kept_is_read_again(tmp_path: Path) -> None:
+    memory = WindowMemory(tmp_path / "folder" / "window.json", size=(900, 600), ui_scale=1.5, layout="[Window]\n")
+    memory.is_maximized, memory.mark_size, memory.mark_opacity = True, 1.5, 0.4
+    memory.keep_view("/somewhere", view_of(FakeSession()))
+    memory.save()
+    again = read_window_memory(memory.path)
+    for name in ("size", "is_maximized", "ui_scale", "layout", "mark_size", "mark_opacity", "views"):
+        assert getattr(again, name) == getattr(memory, name), name
+
+
+def test_a_session_goes_back_to_what_it_showed() -> None:
+    left, other = FakeSession(), FakeSession()
+    left.timeline.seek(17)
+    left.view.orbit(80, -30)
+    left.view.dolly(0.5)
+    left.overlays.show_inherited, left.overlays.show_frusta = True, False
+    left.overlays.compare, left.overlays.wipe_position = "side", 0.25
+    show_again(other, json.loads(json.dumps(view_of(left))))
+    np.testing.assert_array_equal(other.view.world_to_camera(), left.view.world_to_camera())
+    assert other.overlays == left.overlays
+    assert other.timeline.frame_index == 17
+    left.view.look(3)
+    show_again(other, view_of(left))
+    assert other.view.look_through == 3
+    other.rig = None  # only names are asked for; a camera that is gone is not looked through
+    other.rig = FakeSession().rig
+    show_again(other, view_of(left) | {"camera": "cam99"})
+    assert other.view.look_through is None
+
+
+NONSENSE = [None, True, -1, 10**30, 1e308, -0.5, "", "cam99", [], [1.0, "a", 2.0], [1e300] * 3, {"a": 1}]
+
+
+@pytest.mark.parametrize("value", NONSENSE, ids=repr)
+@pytest.mark.parametrize("name", [*view_of(FakeSession())])
+def test_values_that_make_no_sense_change_nothing_that_can_be_seen(name: str, value: object) -> None:
+    kept = view_of(FakeSession()) | {name: value}
+    session = FakeSession()
+    show_again(session, kept)
+    assert np.isfinite(session.view.world_to_camera()).all()
+    assert 0 <= session.timeline.frame_index < session.timeline.n_frames
+    assert 0.0 <= session.overlays.wipe_position <= 1.0
+    assert session.overlays.compare in ("off", "wipe", "side")
+
+
+@pytest.mark.parametrize(
+    "content", ["", "{", "[]", '{"size": [1e99, -4], "views": 3, "layout": 7, "ui_scale": "big"}', "\x00\xff"]
+)
+def test_a_damaged_file_counts_as_empty(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "window.json"
+    path.write_text(content)
+    memory = read_window_memory(path)
+    assert (memory.size, memory.layout, memory.ui_scale, memory.views) == (None, "", None, {})
+
+
+def test_one_changed_character_is_noticed(tmp_path: Path) -> None:
+    memory = WindowMemory(tmp_path / "window.json", layout="[Window][Viewport]\nPos=0,22\n")
+    memory.save()
+    text = memory.path.read_text()
+    memory.path.write_text(text.replace("Pos=0,22", "Pos=9,22"))
+    assert read_window_memory(memory.path).layout == ""
+
+
+def test_old_projects_are_forgotten_and_the_disk_is_written_only_when_needed(tmp_path: Path) -> None:
+    memory = WindowMemory(tmp_path / "window.json")
+    for i in range(MAX_PROJECTS + 5):
+        memory.keep_view(f"/project{i}", {"frame_index": i})
+    memory.keep_view("/project5", {"frame_index": 1})
+    assert len(memory.views) == MAX_PROJECTS
+    assert [*memory.views][-1] == "/project5"
+    memory.save()
+    written = memory.path.stat().st_mtime_ns
+    memory.save()
+    assert memory.path.stat().st_mtime_ns == written
+
+
+def test_a_disk_that_refuses_costs_no_more_than_the_memory(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    memory = WindowMemory(tmp_path / "file" / "window.json")
+    memory.keep_view("/project", {})
+    memory.save()

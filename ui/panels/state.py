@@ -1,0 +1,88 @@
+"""What the panels share for the length of a window: fonts, widget rectangles, open popups. Not the program's state.
+
+Everything the program knows lives in the Session; nothing here survives the window.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from imgui_bundle import ImVec2, imgui
+
+from ui.gl.image import Rect as PixelRect
+from ui.style.theme import Fonts
+from ui.style.ui_scale import UiScale
+from ui.viewport.region_tool import RegionTool
+
+VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
+PANELS = (CAPTURE, TRAINING, REGIONS, TIMELINE)
+"""Titles of the panels around the picture."""
+Dispatch = Callable[[object], None]
+"""Takes one command of app.session.commands."""
+
+
+@dataclass(frozen=True)
+class Rect(PixelRect):
+    """A rectangle in window coordinates: logical pixels, origin top left, y down."""
+
+    @property
+    def center(self) -> tuple[float, float]:
+        """Middle point."""
+        return (self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2
+
+    @property
+    def low(self) -> ImVec2:
+        """Top left corner for ImGui calls."""
+        return ImVec2(self.x0, self.y0)
+
+    @property
+    def high(self) -> ImVec2:
+        """Bottom right corner for ImGui calls."""
+        return ImVec2(self.x1, self.y1)
+
+    def contains(self, x: float, y: float) -> bool:
+        """Is the point inside (low edges included)?"""
+        return self.x0 <= x < self.x1 and self.y0 <= y < self.y1
+
+
+@dataclass
+class UiState:
+    """Widget state shared by the panels of one window.
+
+    Attributes:
+        fonts: Loaded faces.
+        scale: How large everything is drawn.
+        rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
+        regions: The region that is being chosen, and the one that stands out.
+        is_popup_open: Is a menu or another popup open, so that keys belong to it?
+        is_menu_wanted: Open the first menu, for the keyboard.
+        wanted_panel: Title of a panel that is to come to the front, or None.
+        redraw_in_s: Shortest wait after which some panel wants to be drawn again, or None.
+    """
+
+    fonts: Fonts = field(default_factory=Fonts)
+    scale: UiScale = field(default_factory=UiScale)
+    rects: dict[str, Rect] = field(default_factory=dict)
+    regions: RegionTool = field(default_factory=RegionTool)
+    wanted_panel: str | None = None
+    is_help_open: bool = False
+    is_popup_open: bool = False
+    is_menu_wanted: bool = False
+    is_open_requested: bool = False
+    is_layout_reset_requested: bool = False
+    redraw_in_s: float | None = None
+    quit_requested: bool = False
+
+    def mark(self, name: str) -> None:
+        """Remember the rectangle of the ImGui item drawn last."""
+        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        self.rects[name] = Rect(low.x, low.y, high.x, high.y)
+
+    def mark_rect(self, name: str, rect: Rect) -> None:
+        """Remember a rectangle that is not an ImGui item."""
+        self.rects[name] = rect
+
+    def redraw_within(self, seconds: float) -> None:
+        """Ask for another frame no later than this many seconds from now."""
+        self.redraw_in_s = seconds if self.redraw_in_s is None else min(self.redraw_in_s, seconds)

@@ -1,0 +1,88 @@
+"""Small drawing pieces that several panels share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from ui.panels.state import Rect, UiState
+from ui.style import theme
+
+
+def text_right(text: str, color: theme.Color = theme.TEXT_DIM) -> None:
+    """Text at the right end of the current line, pushed right rather than overlapping what is there."""
+    imgui.same_line()
+    free = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(free, 0.0))
+    imgui.text_colored(ImVec4(*color), text)
+
+
+def text_wrapped_dim(text: str) -> None:
+    """Secondary text, wrapped at the panel's edge."""
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_colored(ImVec4(*theme.TEXT_DIM), text)
+    imgui.pop_text_wrap_pos()
+
+
+def primary_button(label: str, size: ImVec2, ui: UiState) -> bool:
+    """The one button of a panel that the user most likely wants."""
+    imgui.push_style_color(imgui.Col_.button, ImVec4(*theme.SKY))
+    imgui.push_style_color(imgui.Col_.button_hovered, ImVec4(*theme.SKY_LIGHT))
+    imgui.push_style_color(imgui.Col_.button_active, ImVec4(*theme.SKY_DARK))
+    imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_ON_ACCENT))
+    push_bold(ui, ui.fonts.body_size)
+    is_clicked = imgui.button(label, size)
+    pop_bold(ui)
+    imgui.pop_style_color(4)
+    return is_clicked
+
+
+def push_bold(ui: UiState, size: float) -> None:
+    """Bold face at a size; the built-in face keeps its own look."""
+    imgui.push_font(ui.fonts.bold, size)
+
+
+def pop_bold(ui: UiState) -> None:
+    """Undo push_bold."""
+    imgui.pop_font()
+
+
+def chip(draw: Any, x: float, y: float, text: str, *, color: theme.Color = theme.TEXT, is_right: bool = False) -> float:
+    """Text on a dark plate over a picture; returns its right edge. With is_right, x is the right edge."""
+    width = imgui.calc_text_size(text).x + 18
+    left = x - width if is_right else x
+    plate = Rect(left, y, left + width, y + 24)
+    draw.add_rect_filled(plate.low, plate.high, theme.u32(theme.faded(theme.VOID, 0.78)), 4)
+    draw.add_text(ImVec2(left + 9, y + 4), theme.u32(color), text)
+    return plate.x1
+
+
+def elided(text: str, width: float) -> str:
+    """The text, or as much of its beginning as fits into a width, with three dots."""
+    return _longest_fit(text, width, lambda n: f"{text[:n].rstrip()}...")
+
+
+def elided_path(path: str, width: float) -> str:
+    """The path, or as much of its end as fits into a width: the last folders tell most."""
+    return _longest_fit(path, width, lambda n: f"...{path[len(path) - n :]}")
+
+
+def _longest_fit(text: str, width: float, cut: Callable[[int], str]) -> str:
+    """The text if it fits, otherwise its longest cut that does; `cut` leaves that many characters."""
+    if imgui.calc_text_size(text).x <= width:
+        return text
+    fits, too_long = 0, len(text)
+    while too_long - fits > 1:
+        middle = (fits + too_long) // 2
+        if imgui.calc_text_size(cut(middle)).x <= width:
+            fits = middle
+        else:
+            too_long = middle
+    return cut(fits)
+
+
+def format_count(number: int) -> str:
+    """A count as it is written everywhere: 4,320."""
+    return f"{number:,}"

@@ -1,0 +1,295 @@
+"""One UI frame in fixed order, and the rule that a broken panel costs a notice, not the window.
+
+Order: drain the session, tick time, decide whether anything changed, draw menus, panels, popups, toasts, then ImGui.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import moderngl
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from app.session.window_memory import WindowMemory
+from ui.gl import ImageTexture, free_dropped, n_changes
+from ui.panels.capture import CapturePanel
+from ui.panels.notices import NoticesPanel
+from ui.panels.regions import draw_regions
+from ui.panels.shortcuts import handle_shortcuts
+from ui.panels.state import CAPTURE, REGIONS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
+from ui.panels.timeline import draw_timeline
+from ui.panels.training import draw_training
+from ui.panels.viewport import ViewportPanel
+from ui.shell.dialogs import OpenFolderDialog, draw_help
+from ui.shell.imgui_backend import ImGuiBackend
+from ui.shell.layout import hold_sizes, is_laid_out, lay_out
+from ui.shell.menu_bar import draw_menu_bar
+from ui.shell.questions import QuestionDialogs
+from ui.shell.redraw import FRAMES_AFTER_INPUT, RedrawPlan
+from ui.shell.remembering import Remembering
+from ui.shell.status_bar import HEIGHT as STATUS_BAR_HEIGHT
+from ui.shell.status_bar import draw_status_bar
+from ui.style import theme
+from ui.style.ui_scale import UiScale
+from ui.viewport.scene import Scene
+
+logger = logging.getLogger(__name__)
+
+FIRST_FRAMES = 6
+"""A new layout: docked panels get their tabs, then their sizes, then they lose scrollbars that are not needed."""
+TRAINING_REFRESH_S = 0.2
+"""Often enough for numbers that nobody waits for; each frame is taken from the training where the CPU draws."""
+ATTENDED_S = 0.5
+"""For this long after an input, every picture that arrives is shown at once."""
+MAX_TICK_S = 0.25
+NOTHING = ImVec4(0, 0, 0, 0)
+SESSION = "Session"
+"""Stands for the session among the panels that failed."""
+
+
+def _recover(stack: Any) -> None:
+    """End windows, tables and groups that the failed part left open."""
+    io = imgui.get_io()
+    is_assert_on = io.config_error_recovery_enable_assert
+    io.config_error_recovery_enable_assert = False  # it would raise at the first thing left open
+    try:
+        imgui.internal.error_recovery_try_to_recover_state(stack)
+    finally:
+        io.config_error_recovery_enable_assert = is_assert_on
+
+
+class Frame:
+    """Draws the whole window; owns panels and the redraw plan.
+
+    Args:
+        window: pyglet window whose GL context is current.
+        ctx: moderngl context adopted from it.
+        session: The program's state; see app.session.session.Session.
+        fixed_delta_s: Seconds per frame as told to ImGui; tests fix it.
+        on_input: Called after each input that wants a frame, so that it need not wait for the next tick.
+        memory: What the window looked like before; None starts afresh and keeps nothing.
+        scale: How large everything is drawn.
+    """
+
+    def __init__(
+        self,
+        window: Any,
+        ctx: moderngl.Context,
+        session: Any,
+        *,
+        fixed_delta_s: float | None = None,
+        on_input: Callable[[], None] = lambda: None,
+        memory: WindowMemory | None = None,
+        scale: UiScale | None = None,
+    ) -> None:
+        self._window = window
+        self._ctx = ctx
+        self.session = session
+        self.scale = scale or UiScale()
+        self.backend = ImGuiBackend(window, on_input=self._input_came, fixed_delta_s=fixed_delta_s, scale=self.scale)
+        self._on_input = on_input
+        self.ui = UiState(fonts=theme.load_fonts(), scale=self.scale)
+        theme.apply_style()
+        self.viewport = ViewportPanel(Scene(ctx))
+        self.capture = CapturePanel(lambda: ImageTexture(ctx))
+        self.notices = NoticesPanel()
+        self.dialog = OpenFolderDialog()
+        self.questions = QuestionDialogs()
+        self._redraw = RedrawPlan()
+        self._redraw.request(FIRST_FRAMES)
+        self._shown: tuple[int, int] | None = None
+        self._drawn_s = -1e9
+        self._input_s = -1e9
+        self._has_news = False
+        self.remembering = Remembering(memory, self.ui)
+        self.remembering.restore_layout()
+        self.remembering.restore_marks(session)
+        self._failed_panels: set[str] = set()
+        self._floating_panels: set[str] = set()
+        self._dock_ids: dict[str, int] = {}
+        self._panels: tuple[tuple[str, Callable[[Any, Dispatch, UiState], None], bool], ...] = (
+            (VIEWPORT, self.viewport.draw, False),
+            (CAPTURE, self.capture.draw, True),
+            (TRAINING, draw_training, True),
+            (REGIONS, draw_regions, True),
+            (TIMELINE, draw_timeline, True),
+        )
+
+    # ---- the redraw plan -------------------------------------------------------------------------------------
+
+    def request_redraw(self, frames: int = FRAMES_AFTER_INPUT) -> None:
+        """Draw at least this many frames from now on: the user did something."""
+        self._input_s = time.perf_counter()
+        self._redraw.request(frames)
+
+    def forget_shown(self) -> None:
+        """What was drawn is on the screen no more, as after a resize; draw it again even if it is the same."""
+        self._shown = None
+        self.request_redraw()
+
+    def _input_came(self) -> None:
+        self.request_redraw()
+        self._on_input()
+
+    def update(self, dt_s: float) -> bool:
+        """Drain the session and move time on. True when a frame has to be drawn."""
+        session = self.session
+        has_news = self._drain()
+        self.remembering.follow(session)
+        has_news |= session.timeline.tick(min(dt_s, MAX_TICK_S), is_shown=self.viewport.shows_playhead(session))
+        self._has_news |= has_news or self.viewport.has_news(session)
+        if not self._redraw.is_due and (self.backend.needs_follow_up or self._is_news_due()):
+            self._redraw.request(1)
+        return self._redraw.is_due
+
+    def _drain(self) -> bool:
+        """Let the session take in what was finished; a fault there becomes a notice and never ends the loop."""
+        try:
+            has_news = self.session.poll()
+        except Exception as error:  # the loop's edge: the window has to survive it, and what trains goes on
+            if SESSION not in self._failed_panels:
+                self._failed_panels.add(SESSION)
+                logger.exception("The session could not take in what was finished")
+                self.session.notices.add(
+                    "error",
+                    "Something that was finished could not be taken in",
+                    f"{type(error).__name__}: {error}",
+                    "The window goes on. This is a fault of the program; the log has more.",
+                )
+            return True
+        self._failed_panels.discard(SESSION)
+        return has_news
+
+    def _is_news_due(self) -> bool:
+        """Is it time to show what came without input?"""
+        session = self.session
+        since_s = time.perf_counter() - self._drawn_s
+        if self.ui.redraw_in_s is not None and since_s >= self.ui.redraw_in_s:
+            return True
+        # Drawing takes cores that the training needs too: news wait a little unless the user is looking for them.
+        is_attended = session.timeline.is_playing or time.perf_counter() - self._input_s < ATTENDED_S
+        is_busy = session.training.state not in ("idle", "failed", "paused") or bool(session.jobs)
+        if self._has_news and (is_attended or not is_busy):
+            return True
+        return (self._has_news or is_busy) and since_s >= TRAINING_REFRESH_S
+
+    # ---- one frame -------------------------------------------------------------------------------------------
+
+    def draw(self) -> bool:
+        """Draw one frame into the window's framebuffer. False when it already holds just that."""
+        self._has_news = False
+        self.ui.redraw_in_s = None
+        self.ui.rects.clear()
+        self.backend.new_frame()
+        self.ui.is_popup_open = self.backend.is_popup_open
+        self.ui.is_menu_wanted |= self.backend.take_alt_tap() and not self.ui.is_popup_open
+        self._guard("Window", self._compose)
+        drawn = (self.backend.end_frame(), n_changes())
+        is_new, self._shown = drawn != self._shown, drawn
+        self._redraw.note_drawn(drawn[0], has_more_input=self.backend.needs_follow_up)
+        if is_new:
+            self._ctx.screen.use()
+            self._ctx.viewport = (0, 0, *self._window.get_framebuffer_size())
+            self._ctx.clear(*theme.PANEL)
+            self.backend.present()
+        free_dropped(self._ctx)
+        self._drawn_s = time.perf_counter()
+        return is_new
+
+    def _compose(self) -> None:
+        session, ui, dispatch = self.session, self.ui, self.dispatch
+        self._guard("Keys", lambda: handle_shortcuts(session, dispatch, ui))
+        self._guard("Menu", lambda: draw_menu_bar(session, dispatch, ui))
+        is_software = self.viewport.scene.is_software
+        self._guard("Status bar", lambda: draw_status_bar(session, ui, is_software=is_software))
+        imgui.push_style_color(imgui.Col_.window_bg, NOTHING)  # the frame is cleared to the panels' colour
+        dock_id = imgui.dock_space_over_viewport(0, imgui.get_main_viewport(), imgui.DockNodeFlags_.none)
+        imgui.pop_style_color()
+        if ui.is_layout_reset_requested or not is_laid_out(dock_id):
+            ui.is_layout_reset_requested = False
+            ui.wanted_panel = TRAINING  # of the two that lie over each other
+            lay_out(dock_id)
+            self._redraw.request(FIRST_FRAMES)
+        self._dock_ids.clear()
+        for title, draw_panel, has_padding in self._panels:
+            self._draw_panel(title, draw_panel, has_padding)
+        hold_sizes(self._dock_ids)
+        if ui.is_open_requested:
+            ui.is_open_requested = False
+            self.dialog.open()
+        self._guard("Open dialog", lambda: self.dialog.draw(dispatch, ui))
+        self._guard("Help", lambda: draw_help(ui))
+        self._guard("Question", lambda: self.questions.draw(session, dispatch, ui))
+        size = imgui.get_main_viewport().size
+        whole = Rect(0.0, 0.0, size.x, size.y - STATUS_BAR_HEIGHT)
+        toast_area = ui.rects.get("viewport.free", whole)
+        self._guard("Notices", lambda: self.notices.draw(session, dispatch, ui, toast_area))
+
+    def dispatch(self, command: object) -> None:
+        """Hand a command to the session and plan a redraw."""
+        self.session.dispatch(command)
+        self.request_redraw()
+
+    def open_path(self, path: Path) -> None:
+        """Open a capture or project folder, or the folder of a file that was dropped."""
+        from app.session.commands import OpenCapture  # here to keep the module's imports about drawing
+
+        self.dispatch(OpenCapture(path if path.is_dir() or not path.exists() else path.parent))
+
+    def _draw_panel(self, title: str, draw_panel: Callable[..., None], has_padding: bool) -> None:
+        if title == self.ui.wanted_panel:
+            self.ui.wanted_panel = None
+            imgui.set_next_window_focus()
+        if not has_padding:
+            imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
+        flags = imgui.WindowFlags_.no_collapse
+        if title in (VIEWPORT, TIMELINE):
+            flags |= imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
+        if title == VIEWPORT:  # its picture and toolbar cover all of it
+            flags |= imgui.WindowFlags_.no_background
+        # A docked panel lies on the cleared frame. Filling it again is what costs most where the CPU draws.
+        is_bare = title not in self._floating_panels
+        if is_bare:
+            imgui.push_style_color(imgui.Col_.window_bg, NOTHING)
+        is_visible, _ = imgui.begin(title, None, flags)
+        if is_bare:
+            imgui.pop_style_color()
+        (self._floating_panels.discard if imgui.is_window_docked() else self._floating_panels.add)(title)
+        if imgui.is_window_docked():
+            self._dock_ids[title] = imgui.get_window_dock_id()
+        if not has_padding:
+            imgui.pop_style_var()
+        if is_visible:
+            self._guard(title, lambda: draw_panel(self.session, self.dispatch, self.ui))
+        imgui.end()
+
+    def _guard(self, title: str, draw_part: Callable[[], None]) -> None:
+        """Run one part of the frame; a failure becomes a notice, told once until the part works again."""
+        stack = imgui.internal.ErrorRecoveryState()
+        imgui.internal.error_recovery_store_state(stack)
+        try:
+            draw_part()
+        except Exception as error:  # the frame loop's edge: the window has to survive a broken panel
+            _recover(stack)
+            if title not in self._failed_panels:
+                self._failed_panels.add(title)
+                logger.exception("The panel %s could not be drawn", title)
+                self.session.notices.add(
+                    "error",
+                    f"The {title.lower()} could not be drawn",
+                    f"{type(error).__name__}: {error}",
+                    "The rest of the window goes on. Copy this and report it.",
+                )
+                self.request_redraw()
+        else:
+            self._failed_panels.discard(title)
+
+    def close(self) -> None:
+        """Release GL objects and ImGui. The GL context must still be current."""
+        self.viewport.release()
+        self.capture.release()
+        self.backend.close()

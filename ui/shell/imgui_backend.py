@@ -1,0 +1,391 @@
+"""Joins a pyglet window to Dear ImGui: events in, draw lists out.
+
+Input is forwarded by this module, because the backend shipped with imgui-bundle gets time, y, multi-button drags and
+shifted keys wrong. Drawing uses ImGui's own C++ OpenGL 3 renderer. It does not own the window, nor decide when to draw.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pyglet
+from imgui_bundle import ImVec2, imgui, implot
+from pyglet.event import EVENT_HANDLED
+from pyglet.window import key, mouse
+
+from ui.shell.redraw import fingerprint
+from ui.style.ui_scale import UiScale
+
+FRAMES_BETWEEN_MENUS = 3
+_FAR = -3.4e38  # ImGui's "no pointer here"
+
+_NAMED_KEYS: dict[str, str] = {
+    "TAB": "tab",
+    "BACKSPACE": "backspace",
+    "RETURN": "enter",
+    "ESCAPE": "escape",
+    "INSERT": "insert",
+    "DELETE": "delete",
+    "SPACE": "space",
+    "LEFT": "left_arrow",
+    "RIGHT": "right_arrow",
+    "UP": "up_arrow",
+    "DOWN": "down_arrow",
+    "PAGEUP": "page_up",
+    "PAGEDOWN": "page_down",
+    "HOME": "home",
+    "END": "end",
+    "GRAVE": "grave_accent",
+    "MINUS": "minus",
+    "EQUAL": "equal",
+    "BRACKETLEFT": "left_bracket",
+    "BRACKETRIGHT": "right_bracket",
+    "BACKSLASH": "backslash",
+    "SEMICOLON": "semicolon",
+    "APOSTROPHE": "apostrophe",
+    "COMMA": "comma",
+    "PERIOD": "period",
+    "SLASH": "slash",
+    "LSHIFT": "left_shift",
+    "RSHIFT": "right_shift",
+    "LCTRL": "left_ctrl",
+    "RCTRL": "right_ctrl",
+    "LALT": "left_alt",
+    "RALT": "right_alt",
+    "LCOMMAND": "left_super",
+    "RCOMMAND": "right_super",
+    "LWINDOWS": "left_super",
+    "RWINDOWS": "right_super",
+    "NUM_ENTER": "keypad_enter",
+    "NUM_DECIMAL": "keypad_decimal",
+    "NUM_DIVIDE": "keypad_divide",
+    "NUM_MULTIPLY": "keypad_multiply",
+    "NUM_SUBTRACT": "keypad_subtract",
+    "NUM_ADD": "keypad_add",
+}
+# X11 reports the shifted symbol; ImGui wants the physical key, or a key released while Shift is down stays stuck.
+_SHIFTED: dict[str, str] = {
+    "EXCLAMATION": "_1",
+    "AT": "_2",
+    "HASH": "_3",
+    "DOLLAR": "_4",
+    "PERCENT": "_5",
+    "ASCIICIRCUM": "_6",
+    "AMPERSAND": "_7",
+    "ASTERISK": "_8",
+    "PARENLEFT": "_9",
+    "PARENRIGHT": "_0",
+    "UNDERSCORE": "minus",
+    "PLUS": "equal",
+    "BRACELEFT": "left_bracket",
+    "BRACERIGHT": "right_bracket",
+    "BAR": "backslash",
+    "COLON": "semicolon",
+    "DOUBLEQUOTE": "apostrophe",
+    "LESS": "comma",
+    "GREATER": "period",
+    "QUESTION": "slash",
+    "ASCIITILDE": "grave_accent",
+}
+_MODIFIERS: dict[str, str] = {
+    "left_ctrl": "mod_ctrl",
+    "right_ctrl": "mod_ctrl",
+    "left_shift": "mod_shift",
+    "right_shift": "mod_shift",
+    "left_alt": "mod_alt",
+    "right_alt": "mod_alt",
+    "left_super": "mod_super",
+    "right_super": "mod_super",
+}
+
+
+def _build_key_map() -> dict[int, Any]:
+    names = {**_NAMED_KEYS, **_SHIFTED}
+    names |= {letter.upper(): letter for letter in "abcdefghijklmnopqrstuvwxyz"}
+    names |= {f"_{digit}": f"_{digit}" for digit in range(10)}
+    names |= {f"NUM_{digit}": f"keypad{digit}" for digit in range(10)}
+    names |= {f"F{n}": f"f{n}" for n in range(1, 13)}
+    return {getattr(key, ours): getattr(imgui.Key, theirs) for ours, theirs in names.items() if hasattr(key, ours)}
+
+
+_KEY_MAP = _build_key_map()
+_TYPING = frozenset(
+    int(getattr(imgui.Key, name))
+    for name in (
+        *"abcdefghijklmnopqrstuvwxyz",
+        *(f"_{digit}" for digit in range(10)),
+        *_SHIFTED.values(),
+        *("comma", "period", "slash", "space"),
+    )
+)
+"""Keys that do nothing in a text field but type."""
+_MODIFIER_OF: dict[int, Any] = {
+    int(getattr(imgui.Key, side)): getattr(imgui.Key, modifier) for side, modifier in _MODIFIERS.items()
+}
+_ALT = frozenset({key.LALT, key.RALT})
+_SHIFT = frozenset({int(imgui.Key.mod_shift)})
+_BUTTONS = {mouse.LEFT: 0, mouse.RIGHT: 1, mouse.MIDDLE: 2, 8: 3, 16: 4}
+
+
+class _ClipboardText(str):
+    """Text whose len() counts UTF-8 bytes: pyglet's X11 clipboard cuts the text at len() bytes otherwise."""
+
+    def __len__(self) -> int:
+        return len(self.encode("utf-8"))
+
+
+class ImGuiBackend:
+    """Owns the ImGui and ImPlot contexts of one window.
+
+    Args:
+        window: A pyglet window whose GL context is current.
+        on_input: Called after each event that was forwarded, so that the owner can plan a redraw.
+        fixed_delta_s: Seconds per frame as told to ImGui; None measures real time. Tests fix it.
+        scale: How large everything is drawn.
+
+    Attributes:
+        pixels_per_unit: Of the newest frame. Everything that ImGui is told and tells is in units (ui.style.ui_scale).
+        is_popup_open: Was a menu or another popup open when the newest frame began, or just before?
+    """
+
+    def __init__(
+        self,
+        window: Any,
+        *,
+        on_input: Callable[[], None] = lambda: None,
+        fixed_delta_s: float | None = None,
+        scale: UiScale | None = None,
+    ) -> None:
+        self._window = window
+        self.scale = scale or UiScale()
+        self.pixels_per_unit = 1.0
+        self.is_popup_open = False
+        self._menu_frames = 0
+        self._held_modifiers: set[int] = set()
+        self._is_alt_alone = False
+        self._was_alt_tapped = False
+        self._on_input = on_input
+        self._fixed_delta_s = fixed_delta_s
+        self._last_frame_s = time.perf_counter()
+        self._keys_pressed_since_frame = False
+        self._held_releases: list[Any] = []
+        self._shown_cursor = -2
+        # On X11 and headless, rows count 0..height-1 upwards; Win32 and Cocoa report height - y.
+        self._row_offset = 1.0 if (pyglet.options.headless or sys.platform.startswith("linux")) else 0.0
+
+        self.context = imgui.create_context()
+        self.plot_context = implot.create_context()
+        io = imgui.get_io()
+        io.set_ini_filename("")
+        io.set_log_filename("")
+        io.config_flags |= imgui.ConfigFlags_.docking_enable
+        io.config_windows_move_from_title_bar_only = True
+        io.backend_flags |= imgui.BackendFlags_.has_mouse_cursors
+        imgui.backends.opengl3_init("#version 330")
+        self._connect_clipboard()
+        self._handlers: dict[str, Callable[..., Any]] = {
+            "on_mouse_motion": self._mouse_motion,
+            "on_mouse_drag": self._mouse_drag,
+            "on_mouse_press": self._mouse_press,
+            "on_mouse_release": self._mouse_release,
+            "on_mouse_scroll": self._mouse_scroll,
+            "on_mouse_enter": self._mouse_enter,
+            "on_mouse_leave": self._mouse_leave,
+            "on_key_press": self._key_press,
+            "on_key_release": self._key_release,
+            "on_text": self._text,
+            "on_activate": self._activate,
+            "on_deactivate": self._deactivate,
+        }
+        window.push_handlers(**self._handlers)
+
+    # ---- one frame -------------------------------------------------------------------------------------------
+
+    @property
+    def needs_follow_up(self) -> bool:
+        """True while input waits for the next frame: ImGui takes in what came at once one after the other."""
+        return bool(self._held_releases) or len(self.context.input_events_queue) > 0
+
+    def take_alt_tap(self) -> bool:
+        """Was Alt pressed and released with nothing between since this was last asked?"""
+        was_tapped, self._was_alt_tapped = self._was_alt_tapped, False
+        return was_tapped
+
+    def new_frame(self) -> None:
+        """Begin an ImGui frame sized to the window."""
+        io = imgui.get_io()
+        pixel_width, pixel_height = self._window.get_framebuffer_size()
+        self.pixels_per_unit = self.scale.fitting(pixel_width, pixel_height)
+        io.display_size = ImVec2(
+            max(pixel_width, 1) / self.pixels_per_unit, max(pixel_height, 1) / self.pixels_per_unit
+        )
+        io.display_framebuffer_scale = ImVec2(self.pixels_per_unit, self.pixels_per_unit)
+        self._offer_menu_keys()
+        now_s = time.perf_counter()
+        measured_s = now_s - self._last_frame_s
+        self._last_frame_s = now_s
+        io.delta_time = max(self._fixed_delta_s if self._fixed_delta_s is not None else measured_s, 1e-5)
+        imgui.backends.opengl3_new_frame()
+        imgui.new_frame()
+
+    def _offer_menu_keys(self) -> None:
+        """Arrow keys, Enter and Escape belong to a menu or popup while one is open, and to the shortcuts otherwise."""
+        io = imgui.get_io()
+        context = self.context
+        is_in_bar = context.nav_layer == imgui.internal.NavLayer.menu and context.nav_cursor_visible
+        is_open = is_in_bar or len(context.open_popup_stack) > 0
+        # From one menu to the next by arrow key there are frames without any.
+        self._menu_frames = FRAMES_BETWEEN_MENUS if is_open else max(self._menu_frames - 1, 0)
+        self.is_popup_open = self._menu_frames > 0
+        if self.is_popup_open:
+            io.config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
+        elif io.config_flags & imgui.ConfigFlags_.nav_enable_keyboard:
+            io.config_flags &= ~imgui.ConfigFlags_.nav_enable_keyboard
+            imgui.set_nav_cursor_visible(False)
+
+    def end_frame(self) -> int:
+        """Finish the frame; returns the fingerprint of what it draws (ui.shell.redraw)."""
+        imgui.render()
+        self._after_frame()
+        return fingerprint(imgui.get_draw_data())
+
+    def present(self) -> None:
+        """Draw the finished frame into the bound framebuffer."""
+        imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
+
+    def _after_frame(self) -> None:
+        self._keys_pressed_since_frame = False
+        releases, self._held_releases = self._held_releases, []
+        for imgui_key in releases:
+            self._add_key(imgui_key, False)
+        self._show_cursor()
+
+    def close(self) -> None:
+        """Take the handlers off the window and destroy both contexts. The GL context must still be current."""
+        self._window.remove_handlers(**self._handlers)
+        imgui.backends.opengl3_shutdown()
+        implot.destroy_context(self.plot_context)
+        imgui.destroy_context(self.context)
+
+    # ---- events ----------------------------------------------------------------------------------------------
+
+    def _move_to(self, x: float, y: float) -> None:
+        width, height = self._window.get_size()
+        units = self._window.get_framebuffer_size()[0] / max(width, 1) / self.pixels_per_unit
+        imgui.get_io().add_mouse_pos_event(float(x) * units, float(height - self._row_offset - y) * units)
+
+    def _mouse_motion(self, x: float, y: float, dx: float, dy: float) -> None:
+        self._move_to(x, y)
+        self._on_input()
+
+    def _mouse_drag(self, x: float, y: float, dx: float, dy: float, buttons: int, modifiers: int) -> None:
+        self._move_to(x, y)
+        self._on_input()
+
+    def _mouse_press(self, x: float, y: float, button: int, modifiers: int) -> None:
+        self._click(x, y, button, True)
+
+    def _mouse_release(self, x: float, y: float, button: int, modifiers: int) -> None:
+        self._click(x, y, button, False)
+
+    def _click(self, x: float, y: float, button: int, is_down: bool) -> None:
+        self._is_alt_alone = False
+        self._move_to(x, y)
+        if button in _BUTTONS:
+            imgui.get_io().add_mouse_button_event(_BUTTONS[button], is_down)
+        self._on_input()
+
+    def _mouse_scroll(self, x: float, y: float, scroll_x: float, scroll_y: float) -> None:
+        self._move_to(x, y)
+        imgui.get_io().add_mouse_wheel_event(float(scroll_x), float(scroll_y))
+        self._on_input()
+
+    def _mouse_enter(self, x: float, y: float) -> None:
+        self._move_to(x, y)
+        self._on_input()
+
+    def _mouse_leave(self, x: float, y: float) -> None:
+        imgui.get_io().add_mouse_pos_event(_FAR, _FAR)
+        self._on_input()
+
+    def _activate(self) -> None:
+        imgui.get_io().add_focus_event(True)
+        self._on_input()
+
+    def _deactivate(self) -> None:
+        self._held_modifiers.clear()
+        self._is_alt_alone = False
+        imgui.get_io().add_focus_event(False)
+        self._on_input()
+
+    def _key_press(self, symbol: int, modifiers: int) -> bool | None:
+        imgui_key = _KEY_MAP.get(symbol)
+        self._is_alt_alone = symbol in _ALT and not self._held_modifiers
+        if imgui_key is not None and not self._is_only_text(imgui_key):
+            if int(imgui_key) not in _MODIFIER_OF:
+                self._keys_pressed_since_frame = True
+            self._add_key(imgui_key, True)
+            self._on_input()
+        # pyglet's own handler closes the window on Escape; this one comes first and keeps it open.
+        return EVENT_HANDLED if symbol == key.ESCAPE else None
+
+    def _key_release(self, symbol: int, modifiers: int) -> None:
+        self._was_alt_tapped |= symbol in _ALT and self._is_alt_alone
+        imgui_key = _KEY_MAP.get(symbol)
+        if imgui_key is None:
+            return
+        if int(imgui_key) in _MODIFIER_OF and self._keys_pressed_since_frame:
+            # Ctrl+A pressed and released between two slow frames must still read as Ctrl+A.
+            self._held_releases.append(imgui_key)
+        else:
+            self._add_key(imgui_key, False)
+        self._on_input()
+
+    def _is_only_text(self, imgui_key: Any) -> bool:
+        """Is this key of interest only for the character it types? ImGui takes in one key per frame but any number of
+        characters: without this what is typed fast would appear slowly."""
+        is_chord = bool(self._held_modifiers - _SHIFT)
+        return imgui.get_io().want_text_input and not is_chord and int(imgui_key) in _TYPING
+
+    def _add_key(self, imgui_key: Any, is_down: bool) -> None:
+        io = imgui.get_io()
+        modifier = _MODIFIER_OF.get(int(imgui_key))
+        if modifier is not None:
+            (self._held_modifiers.add if is_down else self._held_modifiers.discard)(int(modifier))
+            io.add_key_event(modifier, is_down)
+        io.add_key_event(imgui_key, is_down)
+
+    def _text(self, text: str) -> None:
+        printable = "".join(character for character in text if character.isprintable())
+        if printable:
+            imgui.get_io().add_input_characters_utf8(printable)
+            self._on_input()
+
+    # ---- platform services -----------------------------------------------------------------------------------
+
+    def _connect_clipboard(self) -> None:
+        platform = imgui.get_platform_io()
+        platform.platform_get_clipboard_text_fn = lambda _context: self._window.get_clipboard_text()
+        platform.platform_set_clipboard_text_fn = lambda _context, text: self._window.set_clipboard_text(
+            _ClipboardText(text)
+        )
+
+    def _show_cursor(self) -> None:
+        wanted = int(imgui.get_mouse_cursor())
+        if wanted == self._shown_cursor or pyglet.options.headless:
+            return
+        self._shown_cursor = wanted
+        window = self._window
+        names = {
+            int(imgui.MouseCursor_.text_input): window.CURSOR_TEXT,
+            int(imgui.MouseCursor_.resize_all): window.CURSOR_SIZE,
+            int(imgui.MouseCursor_.resize_ns): window.CURSOR_SIZE_UP_DOWN,
+            int(imgui.MouseCursor_.resize_ew): window.CURSOR_SIZE_LEFT_RIGHT,
+            int(imgui.MouseCursor_.resize_nesw): window.CURSOR_SIZE_DOWN_LEFT,
+            int(imgui.MouseCursor_.resize_nwse): window.CURSOR_SIZE_DOWN_RIGHT,
+            int(imgui.MouseCursor_.hand): window.CURSOR_HAND,
+        }
+        window.set_mouse_cursor(window.get_system_mouse_cursor(names.get(wanted, window.CURSOR_DEFAULT)))

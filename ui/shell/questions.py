@@ -1,0 +1,190 @@
+"""Questions of the session as dialogs: train a finished clip again, and which project of a capture to open.
+
+A dialog is up as long as the session has the question. Enter says yes, Escape no.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from imgui_bundle import ImVec2, imgui
+
+from app.session.commands import CloseQuestion, OpenCapture, OpenProject, TrainClip
+from app.session.questions import ProjectQuestion, RetrainQuestion
+from ui.panels.state import Dispatch, UiState
+from ui.panels.training import duration_text
+from ui.panels.widgets import elided, format_count, primary_button, text_wrapped_dim
+from ui.style import theme
+from ui.style.theme import Icon
+
+WIDTH = 560.0
+BUTTON = ImVec2(170, 34)
+ROW_HEIGHT = 44.0
+MAX_LISTED = 12
+
+
+class QuestionDialogs:
+    """Owns which row is chosen; the question itself is the session's."""
+
+    def __init__(self) -> None:
+        self._asked: Any = None
+        self._chosen = 0
+
+    def draw(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+        """Draw the dialog of the session's question, if there is one."""
+        question = session.question
+        is_new, self._asked = question is not self._asked, question
+        if question is None:
+            return
+        title = _title(question)
+        if is_new:
+            self._chosen = 0
+            imgui.open_popup(title)
+        viewport = imgui.get_main_viewport()
+        imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.always, ImVec2(0.5, 0.5))
+        imgui.set_next_window_size(ImVec2(min(WIDTH, viewport.work_size.x - 40), 0))
+        flags = imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize
+        flags |= imgui.WindowFlags_.no_nav_inputs  # Enter, Escape and the arrows mean what is said here
+        is_open, is_kept = imgui.begin_popup_modal(title, True, flags)
+        if not is_open:
+            if not is_new:  # closed by its cross
+                dispatch(CloseQuestion())
+            return
+        imgui.push_text_wrap_pos(0.0)
+        # the key that led to the question is still pressed in its first frame, and is no answer to it
+        is_agreed = not is_new and imgui.is_key_pressed(imgui.Key.enter, False)
+        if isinstance(question, RetrainQuestion):
+            answer = _draw_retrain(question, ui, is_agreed)
+        else:
+            answer = self._draw_projects(question, ui, is_agreed)
+        imgui.pop_text_wrap_pos()
+        if answer is None and (not is_kept or (not is_new and imgui.is_key_pressed(imgui.Key.escape, False))):
+            answer = CloseQuestion()
+        if answer is not None:
+            imgui.close_current_popup()
+        imgui.end_popup()
+        if answer is not None:
+            dispatch(answer)
+
+    def _draw_projects(self, question: ProjectQuestion, ui: UiState, is_agreed: bool) -> object | None:
+        imgui.text_wrapped(f"This capture has {len(question.choices)} projects. Which one do you want to open?")
+        text_wrapped_dim(question.capture)
+        imgui.spacing()
+        n_rows = len(question.choices) + 1
+        self._chosen += imgui.is_key_pressed(imgui.Key.down_arrow) - imgui.is_key_pressed(imgui.Key.up_arrow)
+        self._chosen %= n_rows
+        answer: object | None = None
+        width = imgui.get_content_region_avail().x
+        for index, choice in enumerate(question.choices):
+            if self._draw_row(index, f"{Icon.FOLDER}  {choice.name}", choice.trained_text, choice.project, width):
+                answer = OpenProject(Path(choice.project))
+            ui.mark(f"question.choice{index}")
+        new = OpenCapture(Path(question.capture), is_new_project=True, follow_links=question.follow_links)
+        words = "nothing is trained in it yet"
+        if self._draw_row(n_rows - 1, f"{Icon.ADD}  New project", words, "The others stay as they are", width):
+            answer = new
+        ui.mark("question.new")
+        imgui.spacing()
+        if _button_row(ui, "Open") or is_agreed:
+            chosen = self._chosen
+            answer = OpenProject(Path(question.choices[chosen].project)) if chosen < n_rows - 1 else new
+        return answer or (CloseQuestion() if _cancelled(ui) else None)
+
+    def _draw_row(self, index: int, title: str, right: str, path: str, width: float) -> bool:
+        """Name and state in one line, the path below. True when it is chosen by a double click."""
+        start = imgui.get_cursor_pos()
+        flags = imgui.SelectableFlags_.allow_double_click | imgui.SelectableFlags_.no_auto_close_popups
+        is_clicked = imgui.selectable(f"##row{index}", index == self._chosen, flags, ImVec2(width, ROW_HEIGHT))[0]
+        end = imgui.get_cursor_pos()
+        if is_clicked:
+            self._chosen = index
+        is_taken = is_clicked and imgui.is_mouse_double_clicked(imgui.MouseButton_.left)
+        right_x = start.x + width - imgui.calc_text_size(right).x - 10
+        imgui.set_cursor_pos(ImVec2(start.x + 10, start.y + 3))
+        imgui.text(elided(title, right_x - start.x - 20))
+        imgui.set_cursor_pos(ImVec2(right_x, start.y + 3))
+        imgui.text_disabled(right)
+        imgui.set_cursor_pos(ImVec2(start.x + 10, start.y + 23))
+        imgui.text_disabled(elided(path, width - 20))
+        imgui.set_cursor_pos(end)
+        imgui.dummy(ImVec2(0, 0))
+        return is_taken
+
+
+def _title(question: Any) -> str:
+    if isinstance(question, RetrainQuestion):
+        return f"Train clip {question.clip_index} again?###question"
+    return "Several projects###question"
+
+
+def _draw_retrain(question: RetrainQuestion, ui: UiState, is_agreed: bool) -> object | None:
+    for text in retrain_texts(question):
+        imgui.text_wrapped(text)
+        imgui.spacing()
+    if question.outdated:
+        imgui.text_colored(theme.ORANGE, Icon.WARNING)
+        imgui.same_line()
+        imgui.text_wrapped(outdated_text(question))
+        ui.mark("question.outdated")
+        imgui.spacing()
+    if _button_row(ui, "Train again") or is_agreed:
+        return TrainClip(question.clip_index, is_confirmed=True)
+    return CloseQuestion() if _cancelled(ui) else None
+
+
+def _button_row(ui: UiState, yes: str) -> bool:
+    imgui.separator()
+    imgui.spacing()
+    imgui.set_cursor_pos_x(imgui.get_window_width() - 2 * BUTTON.x - 20)
+    is_clicked = primary_button(yes, BUTTON, ui)
+    ui.mark("question.yes")
+    imgui.same_line()
+    return is_clicked
+
+
+def _cancelled(ui: UiState) -> bool:
+    is_clicked = imgui.button("Cancel", BUTTON)
+    ui.mark("question.no")
+    return is_clicked
+
+
+# ---- words -----------------------------------------------------------------------------------------------------
+
+
+def retrain_texts(question: RetrainQuestion) -> list[str]:
+    """What the dialog says of the clip itself, paragraph by paragraph."""
+    clip = f"Clip {question.clip_index}"
+    if question.is_damaged:
+        texts = [
+            f"{clip} was finished, but cannot be read. {question.reason}",
+            "Training it again replaces the file for good. If you have a copy of it, restore that instead.",
+        ]
+    else:
+        figure = "" if question.held_out_psnr is None else f" with a held-out PSNR of {question.held_out_psnr:.1f} dB"
+        texts = [
+            f"{clip} is finished{figure}. It stays as it is, with its figures and curves, until the new training is "
+            "finished."
+        ]
+    if question.resume_step is not None:
+        texts.append(
+            f"The training goes on at step {format_count(question.resume_step)}, where an earlier one was stopped."
+        )
+    if question.seconds is not None:
+        basis = "clips of this project took on average" if question.is_average else "it took the last time"
+        texts.append(f"This takes about {duration_text(question.seconds)}, going by what {basis}.")
+    return texts
+
+
+def outdated_text(question: RetrainQuestion) -> str:
+    """What the dialog says of the clips that depend on it."""
+    n = len(question.outdated)
+    listed = ", ".join(str(index) for index in question.outdated[:MAX_LISTED])
+    more = f" and {n - MAX_LISTED} more" if n > MAX_LISTED else ""
+    cost = ""
+    if question.outdated_seconds is not None:
+        cost = f", about {duration_text(question.outdated_seconds)}"
+    if n == 1:
+        return f"Clip {listed} was trained on it. It will be out of date and has to be trained again, too{cost}."
+    every = f"{n} clips were trained on it: {listed}{more}."
+    return f"{every} They will be out of date and have to be trained again, too{cost}."

@@ -1,0 +1,75 @@
+"""Brings back what the window looked like, and keeps it: layout, scale, marks, and each project's frame and view.
+
+Written a while after something changed and when the window closes, so that a killed program has lost seconds of it.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from imgui_bundle import imgui
+
+from app.session.window_memory import WindowMemory, show_again, view_of
+from ui.panels.state import UiState
+
+SAVE_AFTER_S = 5.0
+LAYOUT_VERSION = "; panels of ClipGStream Studio, version 1\n"
+"""Comes first in the kept layout; another version has other panels and is not taken."""
+
+
+class Remembering:
+    """Follows one session in one window. memory: None keeps nothing, as in most tests."""
+
+    def __init__(self, memory: WindowMemory | None, ui: UiState) -> None:
+        self._memory, self._ui = memory, ui
+        self._folder: str | None = None
+        self._saved_s = time.perf_counter()
+
+    def restore_layout(self) -> None:
+        """Give ImGui its panels back, before the first frame."""
+        if self._memory is not None and self._memory.layout.startswith(LAYOUT_VERSION):
+            imgui.load_ini_settings_from_memory(self._memory.layout)
+
+    def restore_marks(self, session: Any) -> None:
+        """Size and opacity of anchor marks, which are the same in all projects."""
+        if self._memory is None:
+            return
+        if self._memory.mark_size is not None:
+            session.overlays.mark_size = self._memory.mark_size
+        if self._memory.mark_opacity is not None:
+            session.overlays.mark_opacity = self._memory.mark_opacity
+
+    def follow(self, session: Any) -> None:
+        """Once per turn of the loop: shows a project that was just opened as it was left, and keeps what changes."""
+        memory = self._memory
+        if memory is None:
+            return
+        folder = _folder_of(session)
+        if folder != self._folder:
+            self._folder = folder
+            if folder in memory.views:
+                show_again(session, memory.views[folder])
+        if time.perf_counter() - self._saved_s >= SAVE_AFTER_S:
+            self.save(session)
+        elif folder is not None:
+            memory.keep_view(folder, view_of(session))
+
+    def save(self, session: Any) -> None:
+        """Keep everything now."""
+        memory = self._memory
+        if memory is None:
+            return
+        self._saved_s = time.perf_counter()
+        if self._folder is not None and self._folder == _folder_of(session):
+            memory.keep_view(self._folder, view_of(session))
+        memory.ui_scale = self._ui.scale.chosen
+        memory.layout = LAYOUT_VERSION + imgui.save_ini_settings_to_memory()
+        memory.mark_size, memory.mark_opacity = session.overlays.mark_size, session.overlays.mark_opacity
+        memory.save()
+
+
+def _folder_of(session: Any) -> str | None:
+    if session.capture is None:
+        return None
+    return str(session.capture.path if session.project is None else session.project.folder)

@@ -1,0 +1,59 @@
+"""The line at the bottom of the window: what the program does at the moment, and how it draws."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from ui.panels.state import UiState
+from ui.panels.training import duration_text
+from ui.panels.widgets import elided, format_count
+from ui.style import theme
+from ui.style.progress_words import stage_words
+from ui.style.theme import Icon
+
+HEIGHT = 28.0
+
+
+def draw_status_bar(session: Any, ui: UiState, *, is_software: bool) -> None:
+    """Work and its progress on the left; notices and the kind of drawing on the right."""
+    flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_docking
+    imgui.push_style_color(imgui.Col_.window_bg, ImVec4(*theme.BACKDROP))
+    imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_DIM))
+    imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(14, 5))
+    viewport = imgui.get_main_viewport()
+    if imgui.internal.begin_viewport_side_bar("##status", viewport, imgui.Dir.down, HEIGHT, flags):
+        right = _right_text(session, is_software=is_software)
+        right_x = imgui.get_window_width() - imgui.calc_text_size(right).x - 14
+        imgui.text(elided(status_text(session), right_x - 28))
+        ui.mark("status.text")
+        imgui.same_line(max(right_x, 0))
+        imgui.text(right)
+    imgui.end()
+    imgui.pop_style_var()
+    imgui.pop_style_color(2)
+
+
+def status_text(session: Any) -> str:
+    """What goes on, in one line."""
+    if session.jobs:
+        job = session.jobs[0]
+        share = f"{job.done * 100:.0f} %" if job.done > 0 else ""
+        return "  ".join(part for part in (job.name, share, job.message) if part)
+    status = session.training
+    if status.state == "running":
+        steps = f"step {format_count(status.step)} of {format_count(status.n_steps)}"
+        return f"Training clip {status.clip_index}: {steps}, {duration_text(status.eta_s)} left"
+    if status.state in ("starting", "preparing", "stopping", "paused"):
+        words = {"starting": "Starting", "preparing": "Preparing", "stopping": "Stopping", "paused": "Paused:"}
+        return f"{words[status.state]} clip {status.clip_index}  {stage_words(status)}  {status.message or ''}"
+    if session.capture is None:
+        return "Open a capture or a project to begin"
+    return "" if session.opened is None else session.opened.trained_text
+
+
+def _right_text(session: Any, *, is_software: bool) -> str:
+    worst = [notice for notice in session.notices if notice.kind != "info"]
+    notices = f"{Icon.WARNING} {len(worst)}    " if worst else ""
+    return f"{notices}{'software drawing' if is_software else 'graphics card'}"

@@ -1,0 +1,51 @@
+"""Cameras as pyramids in the picture: how large they are drawn, and which one lies under the pointer. No GL."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine.camera.rig import CameraRig
+from ui.gl.lines import LINES_PER_FRUSTUM, frusta_lines
+from ui.viewport.region_tool import rig_radius
+
+FRUSTUM_SHARE = 0.09
+"""Length of a camera's pyramid as a share of the rig's radius."""
+
+
+def frustum_size(rig: CameraRig) -> float:
+    """Length of a pyramid, scene units."""
+    return FRUSTUM_SHARE * rig_radius(rig)
+
+
+def camera_under(
+    rig: CameraRig,
+    world_to_camera: np.ndarray,
+    K: np.ndarray,
+    x: float,
+    y: float,
+    *,
+    near: float,
+    reach_px: float = 6.0,
+) -> int | None:
+    """The camera whose pyramid lies under a pixel; of several the one whose lines are nearest to it there.
+
+    Args:
+        world_to_camera: Of the view. [4, 4]
+        K: Of the picture in which x and y are pixels. [3, 3]
+        near: What is nearer than this is not drawn, scene units.
+        reach_px: How near to a line the pointer has to be.
+    """
+    corners = frusta_lines(rig, frustum_size(rig))[0].astype(np.float64)  # two per line
+    points = corners @ world_to_camera[:3, :3].T + world_to_camera[:3, 3]
+    is_before = (points[:, 2] > near).reshape(-1, 2).all(axis=1)
+    depths = np.maximum(points[:, 2], 1e-9)
+    pixels = np.stack([K[0, 0] * points[:, 0] / depths + K[0, 2], K[1, 1] * points[:, 1] / depths + K[1, 2]], axis=-1)
+    starts, ends = pixels.reshape(-1, 2, 2).swapaxes(0, 1)  # [L, 2] each
+    along = ends - starts
+    lengths_squared = np.maximum((along * along).sum(axis=1), 1e-12)
+    pointer = np.array([x, y])
+    shares = np.clip(((pointer - starts) * along).sum(axis=1) / lengths_squared, 0.0, 1.0)
+    away = np.linalg.norm(starts + shares[:, None] * along - pointer, axis=1)
+    away = np.where(is_before, away, np.inf).reshape(len(rig), LINES_PER_FRUSTUM).min(axis=1)
+    nearest = int(np.argmin(away))
+    return nearest if away[nearest] <= reach_px else None

@@ -1,0 +1,226 @@
+"""What the viewport says of its picture: what it is of, what is on its way, and what is missing from it. Plain text.
+
+The label is always that of the picture on screen, never that of the playhead; where they differ it says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+
+from app.status import WantedFrame
+from ui.panels.widgets import format_count
+from ui.viewport.picture_rate import ShownRate
+
+RENDERED, CLOUD, FIRST_CLOUD, HINT, CAPTURED, MARKS = (
+    "Rendered",
+    "Point cloud",
+    "First point cloud",
+    "Captured pictures in space",
+    "Captured picture",
+    "Cameras only",
+)
+_STANDS_IN = {
+    CLOUD: "point cloud of what stands still",
+    FIRST_CLOUD: "rough point cloud of frame 0",
+    HINT: "captured pictures placed in space",
+    CAPTURED: "captured picture",
+    MARKS: "cameras only",
+}
+"""What is seen where there is no rendered picture."""
+
+
+@dataclass(frozen=True)
+class ShownPicture:
+    """What the picture on screen is of.
+
+    Attributes:
+        kind: One of the words above.
+        clip_index, frame_index, revision, step: Of what it shows; None and "" for what belongs to no frame.
+        is_still: Whether nothing that moves is in it yet.
+        camera_index: The capture camera looked through, or that took it; None for a free view.
+        look: From where and through which lens it was rendered; see OrbitView.look_key.
+        size, full_size: Width and height it has, and will have when nothing moves, px.
+        is_on_its_way: Whether a newer one is being made.
+        is_cloud_chosen: Whether the cloud is shown because the user asked for it, although there is a trained picture.
+    """
+
+    kind: str = MARKS
+    clip_index: int | None = None
+    frame_index: int | None = None
+    revision: str = ""
+    step: int | None = None
+    is_still: bool = False
+    camera_index: int | None = None
+    look: Hashable = None
+    size: tuple[int, int] = (0, 0)
+    full_size: tuple[int, int] = (0, 0)
+    is_on_its_way: bool = False
+    is_cloud_chosen: bool = False
+
+    def is_of(self, wanted: WantedFrame) -> bool:
+        """Whether nothing better is to come for the frame under the playhead, at whatever size and from wherever."""
+        if wanted.has_failed or self.is_cloud_chosen:
+            return True
+        if self.kind == RENDERED:
+            return (self.clip_index, self.frame_index) == (wanted.clip_index, wanted.frame_index)
+        return not wanted.revision and self.frame_index in (None, wanted.frame_index)
+
+
+@dataclass(frozen=True)
+class HudText:
+    """What stands over the picture, one plate each; empty ones are left out.
+
+    Attributes:
+        label: What is on screen.
+        pending: What is on its way.
+        failure: What could not be made.
+        note: Why it is not the trained result, or how far the training is.
+        rate: Pictures per second while playing.
+    """
+
+    label: str
+    pending: str = ""
+    failure: str = ""
+    note: str = ""
+    rate: str = ""
+
+
+def hud_text(
+    shown: ShownPicture,
+    wanted: WantedFrame,
+    *,
+    fps: float,
+    state: str,
+    state_words: str,
+    camera_name: Callable[[int | None], str],
+    rate: ShownRate | None = None,
+) -> HudText:
+    """Everything that is said of the picture.
+
+    Args:
+        fps: Frames per second of the capture.
+        state, state_words: Of the clip under the playhead, see ClipStatus; and as users read it.
+        camera_name: Of an index; None is the free view.
+        rate: While playing.
+    """
+    pending = "" if wanted.has_failed else _pending_text(shown, wanted, camera_name, is_playing=rate is not None)
+    failure = (
+        f"frame {wanted.frame_index} could not be drawn" if wanted.has_failed and not _is_right(shown, wanted) else ""
+    )
+    return HudText(
+        label=_label(shown, wanted, fps, camera_name, is_playing=rate is not None),
+        pending=pending,
+        failure=failure,
+        note=_note(shown, wanted, state, state_words),
+        rate="" if rate is None else rate_text(rate, fps),
+    )
+
+
+def rate_text(rate: ShownRate, fps: float) -> str:
+    """How fast pictures really follow each other, and whether all frames are among them."""
+    words = f"{'–' if rate.per_s is None else f'{rate.per_s:.1f}'} of {fps:g} fps"
+    if rate.is_every_frame:
+        return f"{words}, every frame"
+    return f"{words}, frames skipped" if rate.has_skipped else words
+
+
+def pane_text(kind: str, frame_index: int | None, other_frame_index: int | None) -> str:
+    """The label of one of two pictures that are compared. It warns where they are not of the same frame."""
+    if frame_index is None:
+        return kind
+    if other_frame_index is None or other_frame_index == frame_index:
+        return f"{kind}, frame {frame_index}"
+    return f"{kind}, frame {frame_index} (not the same frame)"
+
+
+def count_text(n_alive: int, n_all: int, words: str, frame_index: int | None) -> str:
+    """A number of anchors, which says whether it is that of a frame or that of the clip."""
+    if n_all < n_alive:  # how many the clip has is not known
+        where = "" if frame_index is None else f" in frame {frame_index}"
+        return f"{format_count(n_alive)} {words}{where}"
+    if n_alive == n_all:
+        return f"{format_count(n_all)} {words}"
+    return f"{format_count(n_alive)} of {format_count(n_all)} {words} alive in frame {frame_index}"
+
+
+def _is_right(shown: ShownPicture, wanted: WantedFrame) -> bool:
+    """Whether the picture is what it should be but for its size."""
+    is_frame = (shown.clip_index, shown.frame_index, shown.revision) == (
+        wanted.clip_index,
+        wanted.frame_index,
+        wanted.revision,
+    )
+    return is_frame and shown.look == wanted.look
+
+
+def _label(
+    shown: ShownPicture, wanted: WantedFrame, fps: float, camera_name: Callable[[int | None], str], *, is_playing: bool
+) -> str:
+    clip_index = wanted.clip_index if shown.clip_index is None else shown.clip_index
+    frame_index = wanted.frame_index if shown.frame_index is None else shown.frame_index
+    frame = f"frame {frame_index}"
+    if is_playing and frame_index != wanted.frame_index:
+        frame += f" (playhead {wanted.frame_index})"
+    width, height = shown.size
+    size = f"{width} x {height}"
+    if width < shown.full_size[0]:
+        size += f" of {shown.full_size[0]} x {shown.full_size[1]}"
+    camera = camera_name(shown.camera_index)
+    return "   ".join((f"clip {clip_index}", frame, f"{frame_index / max(fps, 1e-6):.2f} s", camera, size))
+
+
+def _pending_text(
+    shown: ShownPicture, wanted: WantedFrame, camera_name: Callable[[int | None], str], *, is_playing: bool
+) -> str:
+    if shown.is_cloud_chosen:
+        return ""
+    if shown.kind != RENDERED:
+        return _pending_beside(shown, wanted)
+    if not shown.is_on_its_way:
+        return ""
+    if shown.clip_index != wanted.clip_index and not wanted.is_loaded:
+        return f"showing frame {shown.frame_index} of clip {shown.clip_index}, clip {wanted.clip_index} is being loaded"
+    if shown.frame_index != wanted.frame_index:
+        if is_playing:
+            return ""  # the label names both, and changes with every picture
+        return f"showing frame {shown.frame_index}, frame {wanted.frame_index} is being drawn"
+    if shown.camera_index != wanted.camera_index:
+        return f"showing {camera_name(shown.camera_index)}, {camera_name(wanted.camera_index)} is being drawn"
+    if shown.look != wanted.look:
+        return "being redrawn from here"
+    if shown.revision != wanted.revision:
+        return f"a newer state of clip {wanted.clip_index} is being drawn"
+    return "full resolution follows"
+
+
+def _pending_beside(shown: ShownPicture, wanted: WantedFrame) -> str:
+    """What is on its way while no rendered picture is there."""
+    if wanted.revision and not wanted.is_loaded:
+        return f"loading clip {wanted.clip_index}"
+    if wanted.revision:
+        return f"frame {wanted.frame_index} is being drawn"
+    if shown.kind == CAPTURED and shown.frame_index != wanted.frame_index:
+        return f"showing frame {shown.frame_index}, frame {wanted.frame_index} is being read"
+    return "the point cloud is being read" if shown.is_on_its_way else ""
+
+
+def _note(shown: ShownPicture, wanted: WantedFrame, state: str, state_words: str) -> str:
+    if shown.is_cloud_chosen:
+        return "point cloud, not the trained result (4 switches)"
+    if shown.kind == RENDERED:
+        if state == "trained" or shown.clip_index != wanted.clip_index:
+            return ""
+        step = "" if shown.step is None else f", picture of step {format_count(shown.step)}"
+        still = ", moving objects are missing until they are learned" if shown.is_still else ""
+        return f"clip {wanted.clip_index} {state_words}{step}{still}"
+    what = _STANDS_IN[shown.kind]
+    if wanted.has_failed:
+        return f"{what}, not the trained result"
+    if wanted.revision:
+        missing = ": moving objects are missing until then" if shown.kind == CLOUD else ""
+        return f"{what}, not the trained result{missing}"
+    if shown.kind == CLOUD:
+        what += ", moving objects are missing"
+    verb = "is " if state in ("untrained", "stale", "queued") else ""
+    return f"{what}: clip {wanted.clip_index} {verb}{state_words}"

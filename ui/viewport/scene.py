@@ -1,0 +1,342 @@
+"""What the viewport shows, drawn off screen into one texture: splats, or the CPU rasterizer's picture, or the cloud,
+with camera frusta and anchors on top.
+
+On a graphics card the Gaussians are drawn as splats. On software GL the session's own rasterizer is several times
+faster, so its picture is uploaded instead. Redrawn only when the key of what it shows changes. Knows no ImGui.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import moderngl
+import numpy as np
+
+from app.playback.pointing import pixel_ray, seen_point
+from app.playback.render import BACKGROUND
+from ui.gl import (
+    NEAR,
+    ImageTexture,
+    PointRenderer,
+    SplatRenderer,
+    Target,
+    is_software,
+)
+from ui.viewport.anchor_marks import nearest_under
+from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
+from ui.viewport.mark_layer import AnchorCounts, MarkLayer
+from ui.viewport.picture_size import MAX_PICTURE_WIDTH, MOVING_SHARES, moving_share, picture_size
+from ui.viewport.region_layer import RegionLayer, ShownRegions
+
+CLOUD_OVERLAP = 1.5
+"""Diameter of a cloud's points, in distances between neighbours."""
+HINT_NEAR_SHARE = 0.4
+"""Pictures in space nearer than this share of the way to the pivot are left out."""
+_CLOUD_KINDS = {"static": CLOUD, "moment": FIRST_CLOUD, "pictures": HINT}
+NO_REGIONS = ShownRegions()
+
+
+@dataclass(frozen=True)
+class SceneView:
+    """From where, through which lens, at which size.
+
+    Attributes:
+        world_to_camera: Rigid map, OpenCV axes. [4, 4]
+        K: Intrinsics in pixels of width x height. [3, 3]
+        is_moving: The view changes just now; a coarser picture that comes sooner is better.
+    """
+
+    world_to_camera: np.ndarray
+    K: np.ndarray
+    width: int
+    height: int
+    is_moving: bool
+
+    @property
+    def eye(self) -> np.ndarray:
+        """Where from, scene units. [3]"""
+        return -self.world_to_camera[:3, :3].T @ self.world_to_camera[:3, 3]
+
+    @property
+    def key(self) -> Hashable:
+        """Differs whenever the picture would."""
+        matrices = (np.asarray(m, dtype=np.float64).tobytes() for m in (self.world_to_camera, self.K))
+        return (*matrices, self.width, self.height)
+
+
+@dataclass(frozen=True)
+class Composed:
+    """The finished picture, and what it is of."""
+
+    texture: moderngl.Texture
+    shown: ShownPicture
+
+
+@dataclass(frozen=True)
+class CapturedPicture:
+    """A captured picture on the GPU.
+
+    Attributes:
+        frame_index: The frame it was taken at, which need not be that of the playhead yet.
+    """
+
+    texture: moderngl.Texture
+    frame_index: int | None
+    is_stale: bool
+
+
+class Scene:
+    """Owns the target, the renderers and the captured picture's texture. GL thread only."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self.is_software = is_software(ctx)
+        self.shown = ShownPicture()
+        self._target = Target(ctx, precision="f1" if self.is_software else "f2")
+        self._picture = ImageTexture(ctx)
+        self._captured = ImageTexture(ctx)
+        self._splats = SplatRenderer(ctx)
+        self._cloud = PointRenderer(ctx)
+        self.marks = MarkLayer(ctx)
+        self.regions = RegionLayer(ctx)
+        self._drawn_key: Hashable = None
+        self._asked_size: tuple[int, int] | None = None
+        self._asked_capture: tuple[int, int, int] | None = None
+        self._near = NEAR
+        self._moving_share = MOVING_SHARES[1]
+        self._cloud_kind = CLOUD
+        self._point_size = 0.0
+        self._picture_key: Hashable = None
+        self._captured_key: Hashable = None
+
+    def release(self) -> None:
+        """Free every GL object."""
+        owned = (
+            self._target,
+            self._picture,
+            self._captured,
+            self._splats,
+            self._cloud,
+            self.marks,
+            self.regions,
+        )
+        for thing in owned:
+            thing.release()
+
+    @property
+    def counts(self) -> AnchorCounts:
+        """Anchors of the shown frame."""
+        return self.marks.counts
+
+    @property
+    def shows(self) -> str:
+        """The kind of picture on screen; one of the words of ui.viewport.hud_text."""
+        return self.shown.kind
+
+    # ---- what arrived ----------------------------------------------------------------------------------------
+
+    def has_news(self, session: Any) -> bool:
+        """Did a picture arrive since the last compose? Asks again for what was asked last."""
+        if self._asked_size is not None:
+            picture = session.request_render(*self._asked_size)
+            if picture is not None and picture.key != self._picture_key:
+                return True
+        if self._asked_capture is not None:
+            captured = session.ground_truth(*self._asked_capture)
+            if captured is not None and captured.key != self._captured_key:
+                return True
+        return False
+
+    # ---- the picture -----------------------------------------------------------------------------------------
+
+    def compose(self, session: Any, view: SceneView, regions: ShownRegions = NO_REGIONS) -> Composed:
+        """Draw what belongs to the session's frame from this view, unless it is drawn already."""
+        self._target.resize(view.width, view.height)
+        is_cloud_chosen = bool(session.overlays.show_cloud)
+        points_key = self._take_points(session) if is_cloud_chosen else None
+        is_cloud_chosen = points_key is not None
+        self._asked_size = None
+        shown = ShownPicture(
+            camera_index=session.view.look_through,
+            look=session.view.look_key,
+            size=(view.width, view.height),
+            full_size=(view.width, view.height),
+            is_cloud_chosen=is_cloud_chosen,
+        )
+        base_key = None
+        if not is_cloud_chosen:
+            take = self._take_picture if self.is_software else self._take_gaussians
+            base_key, shown = take(session, view, shown)
+            points_key = self._take_points(session) if base_key is None and session.overlays.show_points else None
+        needs_capture = base_key is None and points_key is None and session.view.look_through is not None
+        captured = self.captured(session, view.width) if needs_capture else None
+        captured_key = None if captured is None else self._captured_key
+        if base_key is None:
+            shown = self._without_render(shown, points_key, captured)
+        is_rendered = base_key is not None
+        marks_key = self.marks.take(session, view, session.shown_gaussians() if is_rendered else None)
+        regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
+        self.shown = shown
+        if self.is_software and base_key is not None and regions.is_empty and self.marks.is_empty(session):
+            # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
+            self._drawn_key = None
+            return Composed(self._picture.texture, shown)
+        key = (view.key, base_key, points_key, captured_key, marks_key, regions_key)
+        if key != self._drawn_key or self._splats.is_order_stale:
+            self._drawn_key = key
+            self._draw(view, base_key, points_key, captured_key, session)
+        if self._splats.is_order_stale:
+            self.shown = shown = replace(shown, is_on_its_way=True)
+        return Composed(self._target.texture, shown)
+
+    def captured(self, session: Any, width_px: int) -> CapturedPicture | None:
+        """What the camera looked through took at the playhead's frame, or at another one until that was decoded; None
+        until anything was."""
+        camera_index = session.view.look_through
+        if camera_index is None:
+            self._asked_capture = None
+            return None
+        own_width = int(session.rig.image_sizes[camera_index, 0])
+        self._asked_capture = (camera_index, session.timeline.frame_index, min(width_px, own_width))
+        picture = session.ground_truth(*self._asked_capture)
+        if picture is None:
+            return None
+        self._captured.set(picture.image, key=picture.key)
+        self._captured_key = picture.key
+        return CapturedPicture(self._captured.texture, picture.frame_index, bool(picture.is_stale))
+
+    def _without_render(
+        self, shown: ShownPicture, points_key: Hashable, captured: CapturedPicture | None
+    ) -> ShownPicture:
+        if points_key is not None:
+            return replace(shown, kind=self._cloud_kind)
+        if captured is not None:
+            return replace(
+                shown,
+                kind=CAPTURED,
+                frame_index=captured.frame_index,
+                size=captured.texture.size,
+                full_size=captured.texture.size,
+                is_on_its_way=captured.is_stale,
+            )
+        return shown
+
+    def _take_picture(self, session: Any, view: SceneView, shown: ShownPicture) -> tuple[Hashable, ShownPicture]:
+        full = min(MAX_PICTURE_WIDTH / view.width, 1.0)
+        share = full * (self._moving_share if view.is_moving else 1.0)
+        self._asked_size = picture_size(view.width, view.height, share)
+        picture = session.request_render(*self._asked_size)
+        if picture is None:
+            self._picture_key = None
+            return None, shown
+        if self._picture.set(picture.image, key=picture.key) and picture.duration_s > 0:
+            drawn_share = picture.image.shape[1] / (view.width * full)
+            self._moving_share = moving_share(drawn_share, picture.duration_s * 1e3)
+        self._picture_key = picture.key
+        return picture.key, replace(
+            shown,
+            kind=RENDERED,
+            clip_index=picture.clip_index,
+            frame_index=picture.frame_index,
+            revision=picture.revision,
+            step=picture.step,
+            is_still=picture.is_still,
+            camera_index=picture.camera_index,
+            look=picture.look,
+            size=picture.size,
+            full_size=picture_size(view.width, view.height, full),
+            is_on_its_way=bool(picture.is_stale) or (view.is_moving and share < full),
+        )
+
+    def _take_gaussians(self, session: Any, view: SceneView, shown: ShownPicture) -> tuple[Hashable, ShownPicture]:
+        gaussians, wanted = session.shown_gaussians(), session.wanted_frame()
+        if gaussians is None:
+            return None, shown
+        self._splats.upload(gaussians)
+        self._near = gaussians.near_plane
+        shown = replace(
+            shown,
+            kind=RENDERED,
+            clip_index=gaussians.clip_index,
+            frame_index=gaussians.frame_index,
+            revision=gaussians.revision,
+            step=gaussians.step,
+            is_still=gaussians.is_still,
+        )
+        is_current = wanted is None or (shown.is_of(wanted) and shown.revision == wanted.revision)
+        return gaussians.key, replace(shown, is_on_its_way=not is_current)
+
+    def _take_points(self, session: Any) -> Hashable:
+        cloud = session.shown_points()
+        if cloud is None:
+            return None
+        points, colors, key = cloud
+        if len(points) == 0:
+            return None
+        self._cloud.set(points, colors, key=key)
+        self._cloud_kind = _CLOUD_KINDS[cloud.kind]
+        if cloud.is_hint and len(points) > 1:  # pictures as grids: as large as the gap between neighbours
+            self._point_size = 1.8 * float(np.linalg.norm(points[1] - points[0]))
+        else:
+            self._point_size = CLOUD_OVERLAP * cloud.spacing
+        return key
+
+    def anchor_text(self, session: Any, view: SceneView, x: float, y: float) -> str:
+        """What the anchor under a pixel of the view is and why; empty where none is shown or nobody says. It stands
+        out from the next frame on."""
+        found = self.marks.anchor_under(session, view, x, y, self._near)
+        text = "" if found is None else found[0].text(found[1], session.regions.regions)
+        self.marks.pointed_anchor = found[0].positions[found[1]] if found is not None and text else None
+        return text
+
+    def point_under(self, session: Any, view: SceneView, x: float, y: float, depth: float) -> np.ndarray:
+        """The place under a pixel of the view: of the anchor there if anchors are shown, else of what one sees there.
+
+        Args:
+            depth: From the eye, scene units; taken where nothing is to be seen.
+        Returns:
+            Scene units. [3]
+        """
+        found = self.marks.anchor_under(session, view, x, y, self._near)
+        if found is not None:
+            return found[0].positions[found[1]].astype(np.float64)
+        origin, direction = pixel_ray(view.world_to_camera, view.K, x, y)
+        gaussians = session.shown_gaussians()
+        if gaussians is not None:
+            seen = seen_point(gaussians, origin, direction)
+            return origin + depth * direction if seen is None else seen
+        cloud = session.shown_points() if session.overlays.show_points else None
+        if cloud is not None and not cloud.is_hint:
+            row = nearest_under(cloud.points, view.world_to_camera, view.K, x, y, near=self._near)
+            if row is not None:
+                return cloud.points[row].astype(np.float64)
+        return origin + depth * direction
+
+    def _draw(
+        self, view: SceneView, base_key: Hashable, points_key: Hashable, captured_key: Hashable, session: Any
+    ) -> None:
+        camera = (view.world_to_camera, view.K, view.width, view.height)
+        target = self._target
+        target.clear(BACKGROUND)
+        if base_key is not None:
+            if self.is_software:
+                target.draw_image(self._picture)
+            else:
+                self._splats.draw(target, *camera, self._near)
+        elif points_key is not None:
+            unit: Literal["px", "world"]
+            size, unit = (self._point_size, "world") if self._point_size > 0 else (self._cloud_point_px(view), "px")
+            # A picture that stands right before the eye would hide all the others.
+            near = HINT_NEAR_SHARE * session.view.distance if self._cloud_kind == HINT else NEAR
+            self._cloud.draw(target, *camera, near, shape="circle", size=size, unit=unit, is_depth_tested=True)
+        elif captured_key is not None:
+            target.draw_image(self._captured)
+        self.marks.draw(target, view, session)
+        self.regions.draw(target, camera)
+        target.resolve(BACKGROUND)
+
+    def _cloud_point_px(self, view: SceneView) -> float:
+        """Fewer points are drawn larger, so that a thin cloud still reads as surfaces."""
+        per_point_px2 = view.width * view.height / max(len(self._cloud), 1)
+        return float(np.clip(0.45 * np.sqrt(per_point_px2), 2.0, 5.0))
