@@ -1,6 +1,7 @@
 """The compiled kernels, as the program uses them: compiling them where no window waits, and threads to run them on.
 
-Compiling holds the interpreter lock for seconds, so it happens in processes of its own (`engine.kernels.compile_ahead`).
+Compiling holds the interpreter lock for seconds, so it happens in processes of its own
+(`engine.kernels.compile_ahead`).
 """
 
 from __future__ import annotations

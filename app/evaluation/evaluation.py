@@ -1,7 +1,7 @@
 """What `clipgstream eval` does: every frame of the chosen clips against every camera, as one JSON-able document.
 
-Figures are kept in the project (app.evaluation.kept_figures), so that an evaluation goes on where it was interrupted, and eval,
-report and ablate measure a version of a clip once.
+Figures are kept in the project (app.evaluation.kept_figures), so that an evaluation goes on where it was interrupted,
+and eval, report and ablate measure a version of a clip once.
 """
 
 from __future__ import annotations
@@ -82,7 +82,8 @@ def evaluate_project(
         measuring: Measures what is not known of a clip; ClipMeasuring when None.
     Returns:
         JSON-able: schema, project, capture, scale, holdout (names), clips, metrics and precision (as chosen), columns
-        (engine.metrics.clips.summary.columns_of), rows (EvalRow.as_dict: one per clip, frame and camera), means with keys
+        (engine.metrics.clips.summary.columns_of), rows (EvalRow.as_dict: one per clip, frame and camera), means with
+        keys
         all, held_out, trained_on, clips (the same two per clip index), cameras, frames (curves over time) and worst,
         and seams: rows (one per neighbouring frames and camera) and what engine.metrics.clips.seams.summarize returns.
         A mean leaves out rows without the figure; it is null where no row has it, and columns counts those rows.

@@ -21,8 +21,8 @@ def describe_project(folder: Path) -> dict[str, Any]:
     Returns:
         schema; kind "project"; path; capture; fps (None when the capture is not there); clips, each with clip_index,
         role, start, n_frames, components (name to bytes), n_bytes and coverage (what moves and how much of it has an
-        anchor near it, see engine.training.preparation.building.Coverage; None where not known); damaged, files of clips that
-        cannot be read, each with path and reason; components and n_bytes of all clips;
+        anchor near it, see engine.training.preparation.building.Coverage; None where not known); damaged, files of
+        clips that cannot be read, each with path and reason; components and n_bytes of all clips;
         reference_bytes and reference_share, of the clip that others inherit from; bytes_per_frame and mb_per_minute,
         of all others: what video costs once the reference is there. None where there are none, or where the frame
         rate is not known.

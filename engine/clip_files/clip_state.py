@@ -4,7 +4,8 @@ One format for the saved clip, the live snapshot and, with the optimiser's array
 safetensors; they appear under their final name only when complete. Source clips store what they own, not what they
 inherit; `reference_fingerprint` ties them to the reference they were trained on.
 
-A file holds its arrays as they are (snapshots, checkpoints) or compactly (finished clips, engine.clip_files.compact): then
+A file holds its arrays as they are (snapshots, checkpoints) or compactly (finished clips, engine.clip_files.compact):
+then
 each is a run of bytes under its own name, and the metadata say how it is read. Readers of states see no difference.
 """
 

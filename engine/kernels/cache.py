@@ -3,7 +3,8 @@
 numba looks at a kernel's own file only; a change in a helper that it imports leaves stale machine code behind. So the
 folder's name is a hash of every source that ends up in a kernel, of the versions of numba, llvmlite and Python, and of
 the processor. Machine code itself is still checked by numba against the exact processor, so a folder can never hold
-code that does not run. A completed warm-up leaves a marker that says what was compiled (`engine.kernels.compile_ahead`).
+code that does not run. A completed warm-up leaves a marker that says what was compiled
+(`engine.kernels.compile_ahead`).
 
 Who owns a process calls `use_kernel_cache` once, before any decorator of a kernel runs: the command line, the window
 and the worker do so first of all. Importing `engine` changes nothing, so kernels of other programs stay where those

@@ -78,7 +78,8 @@ class TrainConfig:
     max_moving_points: int = 32_000
     """Anchors of the moving part over the whole clip. In a reference clip the voxel grows until they fit. A source clip
     keeps that voxel; where its own anchors and the inherited ones in use would be more, some points are left to the
-    anchors beside them (engine.cloud.motion.budget). Basketball, clip 3, validation cameras, 1500 steps, one seed: 42,960
+    anchors beside them (engine.cloud.motion.budget). Basketball, clip 3, validation cameras, 1500 steps, one seed:
+    42,960
     residual anchors gave 29.04 dB and 25.35 on moving pixels in 1.20 MB, 30,139 of them, as by this number, 29.05 and
     25.35 in 1.00 MB, 20,000 gave 28.94 and 25.04 in 0.83 MB."""
     background_frames: int = 50
@@ -86,7 +87,8 @@ class TrainConfig:
 
     # colours of the cameras
     color: str = "auto"
-    """What a training camera's colours are against the scene's: `engine.cloud.background.gains` estimates it, the reference clip
+    """What a training camera's colours are against the scene's: `engine.cloud.background.gains` estimates it, the
+    reference clip
     trains it, later clips keep it. auto: a gain per channel where the cameras differ, nothing where they do not.
     gain: always a gain per channel. off: never; every camera shows the scene's own colours.
 
@@ -175,8 +177,8 @@ class TrainConfig:
     What is learned is the same, bit for bit. Basketball, 640 x 360, a fifth of the tiles active, two shared cores:
     kernels of a step 9 ms instead of 14, the fastest tenth of the steps 13 ms instead of 19."""
     decode_backend: str = "auto"
-    """What decodes the anchors of a training step, see engine.model.decode.decoding. auto: fused kernels where they can.
-    reference: plain torch, several times slower, to compare with; what is learned is the same but for rounding."""
+    """What decodes the anchors of a training step, see engine.model.decode.decoding. auto: fused kernels where they
+    can. reference: plain torch, several times slower, to compare with; what is learned is the same but for rounding."""
     sampling: str = "even"
     """even: every picture once a pass. error: half of the draws go to pictures by their loss, and a picture's loss
     weighs the less the more often it is drawn, so that on average the gradient is that of even passes. It gives nothing

@@ -35,7 +35,7 @@ def tree_of(text: str) -> set[str]:
 
 def shortcut_rows() -> list[tuple[str, str]]:
     """(key, text) of every row of the table in ui/panels/shortcuts.py, read without importing ImGui."""
-    tree = ast.parse((ROOT / "ui" / "shortcuts.py").read_text("utf-8"))
+    tree = ast.parse((ROOT / "ui" / "panels" / "shortcuts.py").read_text("utf-8"))
     rows = []
     for node in ast.walk(tree):
         match node:

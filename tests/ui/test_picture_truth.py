@@ -67,14 +67,14 @@ class Reader:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.may_go_on = threading.Event()
         self.may_go_on.set()
-        read = app.playback.read_clip_state
+        read = app.playback.playback.read_clip_state
 
         def read_and_wait(path: Path) -> ClipState:
             state = read(path)
             assert self.may_go_on.wait(WAIT_S)
             return state
 
-        monkeypatch.setattr(app.playback, "read_clip_state", read_and_wait)
+        monkeypatch.setattr(app.playback.playback, "read_clip_state", read_and_wait)
 
 
 @pytest.fixture

@@ -1,6 +1,7 @@
 """The viewport: the scene at the user's time and view, compared with the captured picture, with overlays and a HUD.
 
-Turns pointer input over the picture into view changes. What is drawn off screen, and when, is ui.viewport.scene's business.
+Turns pointer input over the picture into view changes. What is drawn off screen, and when, is ui.viewport.scene's
+business.
 """
 
 from __future__ import annotations

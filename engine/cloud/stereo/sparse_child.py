@@ -1,4 +1,5 @@
-"""The child process of engine.cloud.stereo.sparse: `python -m engine.cloud.stereo.sparse_child JOB.npz RESULT.npz BEAT`.
+"""The child process of engine.cloud.stereo.sparse: `python -m engine.cloud.stereo.sparse_child JOB.npz RESULT.npz
+BEAT`.
 
 Never imported by the program: pycolmap must stay out of its processes.
 """

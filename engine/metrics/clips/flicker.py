@@ -1,7 +1,7 @@
 """Flicker and seam ratios of one result as single numbers, defined once for every table that sets results side by side.
 
-Flicker is the mean over pairs of neighbouring frames of R on static pixels (engine.metrics.clips.seams): how much the render
-changes where the truth does not. Cameras are the held-out ones, all of them where none was held out.
+Flicker is the mean over pairs of neighbouring frames of R on static pixels (engine.metrics.clips.seams): how much the
+render changes where the truth does not. Cameras are the held-out ones, all of them where none was held out.
 """
 
 from __future__ import annotations

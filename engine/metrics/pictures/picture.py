@@ -55,7 +55,8 @@ def measure_picture(
         pixels: What the camera took. [H, W, 3] uint8
         is_moving: Which pixels move. [H, W] bool
         metrics: "quick" is PSNR, SSIM and DSSIM1; "all" is every column, at about twice the time.
-        precision: See engine.metrics.pictures.colors.as_shown. The colour fit starts from that picture and is not rounded again.
+        precision: See engine.metrics.pictures.colors.as_shown. The colour fit starts from that picture and is not
+        rounded again.
     """
     if not np.isfinite(image).all():
         return _filled({}, "the picture has values that are not finite", metrics, is_moving, image.shape)

@@ -1,8 +1,9 @@
 """Anchors to Gaussians: grid -> field network -> four heads -> activations, one op for all sets of a clip.
 
-"reference" is plain torch in any dtype and differentiable in everything (engine.model.decode.reference). "cpu" is fused numba
-for float32 (engine.model.decode.cpu), without gradient for positions and colour logits, which never learn. "auto" picks cpu
-where it applies.
+"reference" is plain torch in any dtype and differentiable in everything (engine.model.decode.reference). "cpu" is
+fused numba
+for float32 (engine.model.decode.cpu), without gradient for positions and colour logits, which never learn. "auto"
+picks cpu where it applies.
 """
 
 from __future__ import annotations

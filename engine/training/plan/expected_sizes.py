@@ -1,7 +1,7 @@
 """Sizes of a clip before it is trained: counted where a trained clip of the project says so, else expected.
 
-What nothing is known of is expected as it came out on the two captures of `engine.training.plan.cost`: clouds grow with the
-pixels of a picture until they reach their limits. Good for a forecast, no promise. No torch.
+What nothing is known of is expected as it came out on the two captures of `engine.training.plan.cost`: clouds grow
+with the pixels of a picture until they reach their limits. Good for a forecast, no promise. No torch.
 """
 
 from __future__ import annotations

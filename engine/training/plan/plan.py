@@ -1,8 +1,8 @@
 """TrainingPlan: all that is known of a clip's training before it begins, each number with its reason, and a forecast.
 
 Sizes that are fixed by settings or derived from the footage are exact. Those that follow from the clouds are expected,
-and say so. Times come from `engine.training.plan.cost`, corrected by what earlier clips of the project took, or else by how
-fast this machine computes a step of known size. No torch, no clock, no files.
+and say so. Times come from `engine.training.plan.cost`, corrected by what earlier clips of the project took, or else
+by how fast this machine computes a step of known size. No torch, no clock, no files.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from app.cli.doctor import vector_width
 from engine.kernels.cache import UNWRITABLE, CacheState, kernel_folder
 from engine.progress import Progress
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 FOLDER = Path("somewhere") / "kernels-0"
 
 
@@ -99,7 +99,7 @@ main.main({arguments})
 @pytest.mark.parametrize(
     "start",
     [
-        "from app import cli; cli.main(['inspect', 'nowhere']); tell()",
+        "from app.cli import cli; cli.main(['inspect', 'nowhere']); tell()",
         WINDOW.format(display=True, arguments=[]),
         WINDOW.format(display=False, arguments=[]),
         WINDOW.format(display=True, arguments=["demo"]),

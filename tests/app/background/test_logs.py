@@ -13,11 +13,11 @@ import pytest
 from app.background.logs import N_OLD, PrintableFormatter, SharedLogHandler, start_logging
 from engine.text import printable
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 WRITER = """
 import logging, sys
 from pathlib import Path
-from app import logs
+from app.background import logs
 handler = logs.SharedLogHandler(Path(sys.argv[1]), max_bytes=20_000)
 handler.setFormatter(logs.PrintableFormatter(logs.FORMAT))
 logger = logging.getLogger("app")

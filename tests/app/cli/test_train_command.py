@@ -14,7 +14,7 @@ from app.project.project import open_project
 from engine.clip_files.clip_state import read_clip_state
 from tests.app.fakes import N_STEPS, make_crashing, make_fake, write_capture
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_training_writes_clips_and_a_document(run, capture_folder, tmp_path):

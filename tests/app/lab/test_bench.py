@@ -39,7 +39,7 @@ from engine.training.optimizer import adam
 from engine.training.optimizer.adam import FusedAdam
 from engine.training.step import losses
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 TINY = Recipe(100, 32, 24, 3.0)
 TINY_CLIP = ClipRecipe(60, 2, 32, 24)
 

@@ -18,7 +18,7 @@ from app.project.lock import ProcessLock, boot_id, is_process_alive, machine_id,
 from app.project.project import ProjectSettings, create_project, open_project
 from engine.errors import ProjectError
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 HOLDER = """
 import sys, time

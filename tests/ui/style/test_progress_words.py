@@ -36,5 +36,5 @@ def test_stages_are_counted_from_one_and_what_is_not_always_there_is_not_counted
 
 def test_every_counted_stage_is_one_that_a_preparation_reports() -> None:
     folder = Path(engine.training.__file__).parent
-    told = "".join(path.read_text() for path in folder.glob("*.py"))
+    told = "".join(path.read_text() for path in folder.rglob("*.py"))
     assert [stage for stage in (*REFERENCE_STAGES, *SOURCE_STAGES) if f'"{stage}"' not in told] == []

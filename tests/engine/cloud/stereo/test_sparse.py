@@ -98,7 +98,7 @@ def test_an_orphan_ends_by_itself_and_clears_up(scratch) -> None:
     np.savez(folder / "job.npz", images=np.zeros((1, 8, 8, 3), np.uint8))
     names = [str(folder / name) for name in ("missing.npz", "result.npz", "beat")]
     child = subprocess.Popen(
-        [sys.executable, "-c", WAITING_CHILD, *names], stdin=subprocess.PIPE, cwd=Path(__file__).parents[3]
+        [sys.executable, "-c", WAITING_CHILD, *names], stdin=subprocess.PIPE, cwd=Path(__file__).parents[4]
     )
     assert child.stdin is not None
     child.stdin.close()  # as when the process that held it was killed
