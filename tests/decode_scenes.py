@@ -8,8 +8,8 @@ from typing import Any
 import torch
 
 from engine.model.anchors import AnchorSet
-from engine.model.decode.decoding import ChosenAnchors, decode_anchors
 from engine.model.decoder import Decoder
+from engine.model.decoding import ChosenAnchors, decode_anchors
 from engine.model.field import FieldShape, SpatioTemporalField
 from engine.raster.gaussians import Gaussians
 

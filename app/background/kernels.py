@@ -60,7 +60,7 @@ def prepare_drawing() -> None:
     warm_cache()
     use_threads(1)
     if is_cache_warm():
-        from engine.raster.cpu.warm import warm_up
+        from engine.backends.cpu.raster.warm import warm_up
 
         warm_up()
 

@@ -16,6 +16,7 @@ from app.project.project import Project
 from app.status import TrainingStatus
 from app.training.messages import ClipTrained, Event, TrainingFailed, TrainingStopped, WorkerDied
 from app.training.service import TrainingService
+from engine.backends.table import backend_called
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, DamagedClip, look_at_clip, read_clip_state
@@ -207,7 +208,7 @@ class TrainedProject:
             )
         state = read_clip_state(self.project.clip_path(clip_index))
         base = state if state.is_reference or self.reference is None else self.reference
-        model = load_clip_model(state, self.reference)
+        model = load_clip_model(state, self.reference, backend=backend_called())
         if self.project.settings.config().field == "continue":  # one field for all clips: as the last one left it
             last = read_clip_state(self.project.clip_path(self.last_trained))
             if last.header["field"] and model.field is not None:

@@ -19,6 +19,7 @@ from scipy.spatial import KDTree
 from app.background.kernels import prepare_decoding
 from app.background.latest import LatestWorker
 from app.playback.arrays import AnchorArrays, GaussianArrays, PointArrays
+from engine.backends.table import backend_called
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, read_clip_state
 
@@ -193,13 +194,15 @@ class Playback:
     def _compute(self, request: FrameRequest) -> ShownFrame:
         import torch
 
+        from engine.model.host_array import host_array
+
         loaded = self._load(request)
         clip_time = request.clip.clip_time(request.frame_index)
         with torch.no_grad():
             gaussians = loaded.model.decode(clip_time)
         anchors = _anchor_arrays(loaded.model.anchors(clip_time), request.key)
         anchors = replace(anchors, clip_index=request.clip_index, frame_index=request.frame_index)
-        values = [np.ascontiguousarray(tensor.numpy(), np.float32) for tensor in gaussians.tensors()]
+        values = [np.ascontiguousarray(host_array(tensor)) for tensor in gaussians.tensors()]
         arrays = GaussianArrays(
             *values,
             key=request.key,
@@ -226,7 +229,7 @@ class Playback:
 
         state = read_clip_state(request.path)
         reference = None if state.is_reference else self._read_reference(request.reference_path)
-        model = load_clip_model(state, reference)
+        model = load_clip_model(state, reference, backend=backend_called())
         anchors = _anchor_arrays(model.anchors(), identity)
         loaded = LoadedClip(model, anchors, float(state.header["near_plane"]), state.header.get("step"))
         if request.generation != self.worker.generation:

@@ -12,6 +12,7 @@ from app.background.kernels import prepare_drawing
 from app.background.latest import LatestWorker
 from app.playback.arrays import GaussianArrays, Picture
 from app.playback.orbit_view import OrbitView
+from engine.backends.table import backend_called
 
 BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
 """Behind everything; the viewport takes its dark grey from here."""
@@ -102,6 +103,7 @@ def render(request: RenderRequest) -> Picture:
             torch.from_numpy(request.K.astype(np.float32))[None],
             request.width,
             request.height,
+            backend=backend_called(),
             background=torch.tensor(BACKGROUND),
             near_plane=arrays.near_plane,
         )

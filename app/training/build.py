@@ -8,6 +8,7 @@ from app.background.kernels import warm_up_reporting
 from app.project.project import Project, open_project
 from app.training.interface import Training
 from app.training.messages import TrainJob
+from engine.backends.table import backend_called
 from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.errors import ProjectError
@@ -47,6 +48,7 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
         capture,
         clips[job.clip_index],
         config=config,
+        backend=backend_called(config.backend),
         holdout=job.holdout,
         reference=reference,
         seed=job.seed,

@@ -1,6 +1,6 @@
 """SSIM in lanes: the 11 x 11 Gaussian window along rows and columns, the formula, and its derivatives.
 
-Vector code for `engine.training.step.fused_loss`, sixteen values of interleaved RGB rows at a time, so that a
+Vector code for `engine.backends.cpu.step.fused_loss`, sixteen values of interleaved RGB rows at a time, so that a
 neighbouring pixel lies 3 values away. Four rows are blurred down together: 14 loads serve 44 multiplications.
 A ring is a block of 16 rows; row y of the picture lies in slot y mod 16. All arguments are byte addresses and counts.
 """

@@ -26,9 +26,9 @@ logger = logging.getLogger(__name__)
 
 GROUPS = (
     ("point clouds", "engine.cloud.warm", 8.8),
-    ("decoder", "engine.model.warm", 4.1),
-    ("rasterizer", "engine.raster.cpu.warm", 4.9),
-    ("loss and optimiser", "engine.training.warm", 5.0),
+    ("decoder", "engine.backends.cpu.decode.warm", 4.1),
+    ("rasterizer", "engine.backends.cpu.raster.warm", 4.9),
+    ("loss and optimiser", "engine.backends.cpu.step.warm", 5.0),
     ("figures", "engine.metrics.pictures.warm", 1.5),
 )
 """Name, module, and about how long compiling takes, of each group. Every module has a `warm_up()` that runs each of its

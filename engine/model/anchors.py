@@ -39,12 +39,12 @@ class AnchorSet(nn.Module):
         rows = {len(t) for t in (positions, color_logits, features, log_offset_scales, log_base_scales)}
         if len(rows | ({len(presence)} if presence is not None else set())) != 1:
             raise ValueError(f"an anchor set's tensors have different numbers of rows: {sorted(rows)}")
-        self.register_buffer("positions", positions.float().contiguous())
-        self.register_buffer("color_logits", color_logits.float().contiguous())
+        self.register_buffer("positions", positions.contiguous())
+        self.register_buffer("color_logits", color_logits.contiguous())
         self.register_buffer("presence", presence)
-        self.features = nn.Parameter(features.float().contiguous(), requires_grad=is_trainable)
-        self.log_offset_scales = nn.Parameter(log_offset_scales.float().contiguous(), requires_grad=is_trainable)
-        self.log_base_scales = nn.Parameter(log_base_scales.float().contiguous(), requires_grad=is_trainable)
+        self.features = nn.Parameter(features.contiguous(), requires_grad=is_trainable)
+        self.log_offset_scales = nn.Parameter(log_offset_scales.contiguous(), requires_grad=is_trainable)
+        self.log_base_scales = nn.Parameter(log_base_scales.contiguous(), requires_grad=is_trainable)
         self.is_trainable = is_trainable
 
     def __len__(self) -> int:
@@ -76,7 +76,7 @@ class AnchorSet(nn.Module):
         """
         log_scales = torch.full((len(points), 3), float(torch.log(torch.tensor(spacing))))
         return cls(
-            positions=points,
+            positions=points.float(),
             color_logits=torch.logit(colors.float().clamp(_COLOR_EDGE, 1 - _COLOR_EDGE)),
             features=torch.zeros(len(points), feature_dim),
             log_offset_scales=log_scales,

@@ -20,10 +20,12 @@ from engine.clip_files.clip_state import ClipState
 from engine.errors import ProjectError
 from engine.gate.reasons import NO_REASON
 from engine.model.anchors import AnchorSet
-from engine.model.decode.decoding import ChosenAnchors, decode_anchors
 from engine.model.decoder import Decoder
+from engine.model.decoding import ChosenAnchors, decode_anchors
 from engine.model.field import FieldShape, SpatioTemporalField
 from engine.model.grid import CornerTable
+from engine.model.host_array import host_array
+from engine.model.model_backend import ModelBackend
 from engine.model.roles import ROLES
 from engine.raster.gaussians import Gaussians
 
@@ -72,6 +74,7 @@ class ClipModel(nn.Module):
         field: Field of this clip; None while only static anchors exist.
         clip_length: M, the divisor of clip_time.
         n_frames: Frames of this clip.
+        backend: What decodes and draws the clip; anchors, decoder and field are moved to its device and dtype.
         hidden: Rows of the reference clip's sets that this clip leaves out; the sets given are without them already.
             By role, [A of the reference] bool
     """
@@ -84,18 +87,20 @@ class ClipModel(nn.Module):
         field: SpatioTemporalField | None,
         clip_length: int,
         n_frames: int,
+        backend: ModelBackend,
         hidden: dict[str, Tensor] | None = None,
     ) -> None:
         super().__init__()
+        self.backend = backend
         self.sets = nn.ModuleDict(sets)
         self.hidden = dict(hidden or {})
         self.reasons: dict[str, np.ndarray] = {}  # what the gate said of the anchors of a role, for display
         self.decoder = decoder
-        self.decode_backend = "auto"  # of `decode_anchors`, where a call names none
         self.clip_length, self.n_frames = clip_length, n_frames
         self._corners: dict[str, CornerTable] = {}
         self._frozen: dict[str, Gaussians] = {}
         self.field: SpatioTemporalField | None = None
+        self.to(backend.device, backend.dtype)
         if field is not None:
             self.attach_field(field)
 
@@ -111,11 +116,11 @@ class ClipModel(nn.Module):
 
     def add_set(self, role: str, anchors: AnchorSet) -> None:
         """Add anchors of a new role; a field attached later covers them."""
-        self.sets[role] = anchors
+        self.sets[role] = anchors.to(self.backend.device, self.backend.dtype)
 
     def replace_sets(self, sets: dict[str, AnchorSet]) -> None:
         """These sets take the place of all others; a field attached later covers them."""
-        self.sets = nn.ModuleDict(sets)
+        self.sets = nn.ModuleDict(sets).to(self.backend.device, self.backend.dtype)
         self._corners, self._frozen, self.hidden = {}, {}, {}
 
     def take_out(self, role: str, is_taken: Tensor) -> AnchorSet:
@@ -138,7 +143,7 @@ class ClipModel(nn.Module):
 
     def attach_field(self, field: SpatioTemporalField) -> None:
         """Set the field and compute the interpolation constants of every dynamic set."""
-        self.field = field
+        self.field = field.to(self.backend.device, self.backend.dtype)
         dynamic = (role for role in self.roles() if self.anchor_set(role).is_dynamic)
         self._corners = {role: field.corners(self.anchor_set(role).positions) for role in dynamic}
 
@@ -158,44 +163,40 @@ class ClipModel(nn.Module):
         """Rows of a set that exist at this time: at a frame of its knots. [n] int64"""
         anchors = self.anchor_set(role)
         if anchors.presence is None:
-            return torch.arange(len(anchors))
+            return self._all_rows(role)
         frames = [knot for knot, _ in self.knots(clip_time)]
         return anchors.presence[:, frames].any(1).nonzero()[:, 0]
 
-    def decode(
-        self, clip_time: float, rows: dict[str, Tensor] | None = None, *, backend: str | None = None
-    ) -> Gaussians:
+    def _all_rows(self, role: str) -> Tensor:
+        return torch.arange(len(self.anchor_set(role)), device=self.backend.device)
+
+    def decode(self, clip_time: float, rows: dict[str, Tensor] | None = None) -> Gaussians:
         """Gaussians at a time of the clip, in [0, 1).
 
         Args:
             clip_time: frame_in_clip / clip_length; times between frames are interpolated.
             rows: Rows per role to decode, for instance those a camera can see; None decodes all that exist. Rows of
                 dynamic sets should exist at this time, others are decoded all the same.
-            backend: Of `decode_anchors`; None for `decode_backend`. What never changes is kept as the first call
-                decoded it.
         Returns:
             K Gaussians per row; sets follow each other in the order of `roles`.
         """
-        knots, backend = self.knots(clip_time), backend or self.decode_backend
         chosen = [
             ChosenAnchors(
                 anchors=self.anchor_set(role),
                 rows=self.alive(role, clip_time) if rows is None else rows[role],
                 corners=self._corners.get(role),
-                decoded=self.constant_gaussians(role, backend=backend) if self.is_constant(role) else None,
+                decoded=self.constant_gaussians(role) if self.is_constant(role) else None,
             )
             for role in self.roles()
         ]
-        return decode_anchors(chosen, self.decoder, self.field, knots, backend=backend)
+        return decode_anchors(chosen, self.decoder, self.field, self.knots(clip_time), backend=self.backend)
 
-    def constant_gaussians(self, role: str, *, backend: str | None = None) -> Gaussians:
+    def constant_gaussians(self, role: str) -> Gaussians:
         """Gaussians of a whole set that `is_constant`, K per anchor, decoded at the first call."""
         if role not in self._frozen:
-            backend = backend or self.decode_backend
-            anchors = self.anchor_set(role)
-            everything = ChosenAnchors(anchors=anchors, rows=torch.arange(len(anchors)))
+            everything = ChosenAnchors(anchors=self.anchor_set(role), rows=self._all_rows(role))
             with torch.no_grad():
-                self._frozen[role] = decode_anchors([everything], self.decoder, None, [(0, 1.0)], backend=backend)
+                self._frozen[role] = decode_anchors([everything], self.decoder, None, [(0, 1.0)], backend=self.backend)
         return self._frozen[role]
 
     def anchors(self, clip_time: float | None = None) -> AnchorView:
@@ -204,10 +205,10 @@ class ClipModel(nn.Module):
         inherited, own = [nothing], [nothing]
         for role in self.roles():
             anchors = self.anchor_set(role)
-            rows = np.arange(len(anchors)) if clip_time is None else self.alive(role, clip_time).numpy()
+            rows = np.arange(len(anchors)) if clip_time is None else host_array(self.alive(role, clip_time))
             reasons = self.reasons.get(role)
             shown = (
-                anchors.positions.numpy()[rows],
+                host_array(anchors.positions)[rows],
                 np.full(len(rows), anchors.is_dynamic),
                 np.full(len(rows), ROLES.index(role), np.uint8),
                 np.full(len(rows), NO_REASON, np.uint8) if reasons is None else reasons[rows],
@@ -238,8 +239,10 @@ class ClipModel(nn.Module):
         for role, corners in self._corners.items():
             presence = self.anchor_set(role).presence
             assert presence is not None  # only dynamic sets have corners
-            for knot, is_alive in enumerate(presence.numpy().T):
-                indices = corners.indices[is_alive] ^ self.field.keys[knot][:, None]  # [n, L, 8]
+            for knot, is_alive in enumerate(host_array(presence).T):
+                indices = (
+                    host_array(corners.indices)[is_alive] ^ host_array(self.field.keys[knot])[:, None]
+                )  # [n, L, 8]
                 used[0 if shape.is_shared else knot][levels, indices] = True
         return used
 
@@ -250,18 +253,18 @@ class ClipModel(nn.Module):
             anchors = self.anchor_set(role)
             if not anchors.is_trainable:
                 if anchors.presence is not None:
-                    arrays[f"inherited.{role}.presence"] = anchors.presence.numpy().copy()
+                    arrays[f"inherited.{role}.presence"] = host_array(anchors.presence).copy()
                 continue
             for name in _ANCHOR_ARRAYS:
                 value = getattr(anchors, name)
                 if value is not None:
-                    arrays[f"sets.{role}.{name}"] = value.detach().numpy().copy()
+                    arrays[f"sets.{role}.{name}"] = host_array(value).copy()
         for role, is_hidden in self.hidden.items():
-            arrays[f"inherited.{role}{_HIDDEN}"] = is_hidden.numpy().copy()
+            arrays[f"inherited.{role}{_HIDDEN}"] = host_array(is_hidden).copy()
         if any(p.requires_grad for p in self.decoder.parameters()):
-            arrays |= {f"decoder.{k}": v.detach().numpy().copy() for k, v in self.decoder.state_dict().items()}
+            arrays |= {f"decoder.{k}": host_array(v).copy() for k, v in self.decoder.state_dict().items()}
         if self.field is not None:
-            arrays |= {f"field.{k}": v.detach().numpy().copy() for k, v in self.field.state_dict().items()}
+            arrays |= {f"field.{k}": host_array(v).copy() for k, v in self.field.state_dict().items()}
         return arrays
 
 
@@ -305,12 +308,15 @@ def inherit(
     return sets, decoder
 
 
-def load_clip_model(state: ClipState, reference: ClipState | None, *, is_learning: bool = False) -> ClipModel:
+def load_clip_model(
+    state: ClipState, reference: ClipState | None, *, backend: ModelBackend, is_learning: bool = False
+) -> ClipModel:
     """Rebuild a clip for viewing or for going on.
 
     Args:
         state: The clip.
         reference: What it inherits from; not used for a reference clip.
+        backend: What decodes and draws it.
         is_learning: Keep the clip's own parameters trainable. Otherwise nothing is, and what never changes over time
             is decoded only once.
     Raises:
@@ -318,7 +324,7 @@ def load_clip_model(state: ClipState, reference: ClipState | None, *, is_learnin
             missing or do not fit together.
     """
     try:
-        model = _rebuild(state, reference)
+        model = _rebuild(state, reference, backend)
     except (KeyError, TypeError, AttributeError, RuntimeError, ValueError) as error:  # arrays that do not fit together
         raise ProjectError(
             f"The state of clip {state.header.get('clip_index')} is incomplete or inconsistent ({error}).",
@@ -334,7 +340,7 @@ def read_field(state: ClipState) -> SpatioTemporalField:
     return field
 
 
-def _rebuild(state: ClipState, reference: ClipState | None) -> ClipModel:
+def _rebuild(state: ClipState, reference: ClipState | None, backend: ModelBackend) -> ClipModel:
     header = state.header
     hidden: dict[str, Tensor] = {}
     if state.is_reference:
@@ -363,6 +369,7 @@ def _rebuild(state: ClipState, reference: ClipState | None) -> ClipModel:
         field=field,
         clip_length=header["clip_length"],
         n_frames=header["n_frames"],
+        backend=backend,
         hidden=hidden,
     )
     model.reasons = _reasons(state, reference, model)
@@ -377,8 +384,8 @@ def _reasons(state: ClipState, reference: ClipState | None, model: ClipModel) ->
     is_hidden = model.hidden.get("static")
     if is_hidden is not None and "static" in reasons:  # the clip was asked about all rows of the reference
         if "replacing" in model.roles() and len(model.anchor_set("replacing")) == int(is_hidden.sum()):
-            reasons["replacing"] = reasons["static"][is_hidden.numpy()]
-        reasons["static"] = reasons["static"][~is_hidden.numpy()]
+            reasons["replacing"] = reasons["static"][host_array(is_hidden)]
+        reasons["static"] = reasons["static"][~host_array(is_hidden)]
     return {role: codes for role, codes in reasons.items() if len(codes) == len(model.anchor_set(role))}
 
 

@@ -15,7 +15,7 @@ from torch import Tensor
 from engine.model.clip_model import ClipModel
 from engine.raster import Rendering, rasterize
 from engine.raster.gaussians import Gaussians
-from engine.raster.rasterize import BackendName
+from engine.raster.rasterizer import Rasterizer
 
 REACH_SPACINGS = 4.0
 """Gaussians are expected within this many static anchor spacings of their anchor when anchors are culled."""
@@ -60,10 +60,11 @@ class View:
 
     def sees(self, positions: Tensor, *, reach: float) -> Tensor:
         """Whether something within `reach` scene units of each position may touch a pixel. [A] bool"""
-        p_camera = positions @ self.world_to_camera[:3, :3].T + self.world_to_camera[:3, 3]
+        world_to_camera, K = self.world_to_camera.to(positions), self.K.to(positions)
+        p_camera = positions @ world_to_camera[:3, :3].T + world_to_camera[:3, 3]
         x, y, z = p_camera.unbind(1)
         depth = z.clamp_min(self.near_plane)
-        fx, fy, cx, cy = self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]
+        fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
         u, v = fx * x / depth + cx, fy * y / depth + cy
         reach_x, reach_y = (
             fx * reach / depth + 2.0,
@@ -87,15 +88,15 @@ def render_gaussians(
     gaussians: Gaussians,
     view: View,
     *,
+    backend: Rasterizer,
     background: Tensor | None = None,
-    tile_mask: np.ndarray | None = None,
-    backend: BackendName = "auto",
+    tile_mask: Tensor | None = None,
 ) -> Rendering:
     """Rasterize through one view; tensors of the rendering have a leading camera axis of 1.
 
     Args:
+        backend: What draws.
         tile_mask: Tiles that are wanted, None for all. [rows, columns] bool
-        backend: Of `rasterize`.
     """
     return rasterize(
         gaussians,
@@ -103,10 +104,10 @@ def render_gaussians(
         view.K[None],
         view.width,
         view.height,
+        backend=backend,
         background=background,
         near_plane=view.near_plane,
-        backend=backend,
-        tile_mask=None if tile_mask is None else torch.from_numpy(tile_mask),
+        tile_mask=tile_mask,
     )
 
 
@@ -114,4 +115,4 @@ def render_model(model: ClipModel, view: View, clip_time: float, *, reach: float
     """Picture of a clip at a time, scene colours over black, without gradient. [H, W, 3]"""
     with torch.no_grad():
         rows = visible_rows(model, view, clip_time, reach=reach)
-        return render_gaussians(model.decode(clip_time, rows), view).image[0]
+        return render_gaussians(model.decode(clip_time, rows), view, backend=model.backend).image[0]

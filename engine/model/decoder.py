@@ -19,7 +19,7 @@ N_OUT = sum(HEADS.values())
 
 
 class Decoder(nn.Module):
-    """The heads: [f_s; f_d] of anchors to raw values of K Gaussians per anchor. `engine.model.decode.decoding` runs
+    """The heads: [f_s; f_d] of anchors to raw values of K Gaussians per anchor. `engine.model.decoding` runs
     them.
 
     The four first layers are one matrix and the four second layers a block each; each head has parameters of its own

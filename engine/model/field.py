@@ -16,6 +16,7 @@ import torch
 from torch import Tensor, nn
 
 from engine.model.grid import CornerTable, corner_table, encode, time_keys
+from engine.model.host_array import host_array
 
 _TABLE_INIT = 1e-3  # uniform half-width of the start; small enough that the field starts at zero look
 
@@ -69,6 +70,8 @@ class SpatioTemporalField(nn.Module):
         keys: Per knot and level what entries are combined with; zeros where every knot has a table. [n_knots, L] int32
     """
 
+    keys: Tensor
+
     def __init__(self, shape: FieldShape, generator: torch.Generator | None = None) -> None:
         super().__init__()
         self.shape = shape
@@ -78,8 +81,10 @@ class SpatioTemporalField(nn.Module):
             nn.Parameter((torch.rand(size, generator=generator) * 2 - 1) * _TABLE_INIT)
             for _ in range(1 if shape.is_shared else shape.n_knots)
         )
-        keys = np.zeros((shape.n_knots, len(shape.cells)), np.int32)
-        self.keys = time_keys(shape.cells, shape.n_entries, shape.n_knots) if shape.is_shared else keys
+        keys = torch.zeros(shape.n_knots, len(shape.cells), dtype=torch.int32)
+        if shape.is_shared:
+            keys = time_keys(shape.cells, shape.n_entries, shape.n_knots)
+        self.register_buffer("keys", keys, persistent=False)
         n_in = len(shape.cells) * shape.channels
         self.hidden = nn.Linear(n_in, shape.hidden, bias=False)
         self.out = nn.Linear(shape.hidden, shape.feature_dim, bias=False)
@@ -93,10 +98,10 @@ class SpatioTemporalField(nn.Module):
         return self.tables[0 if self.shape.is_shared else knot]
 
     def corners(self, positions: Tensor) -> CornerTable:
-        """Interpolation constants of fixed positions, scene units. [A, 3]"""
+        """Interpolation constants of fixed positions, scene units, on their device. [A, 3]"""
         lower = np.asarray(self.shape.bounds_min)
-        unit = (positions.detach().cpu().numpy().astype(np.float64) - lower) / self.shape.side
-        return corner_table(unit, self.shape.cells, self.shape.n_entries)
+        unit = (host_array(positions).astype(np.float64) - lower) / self.shape.side
+        return corner_table(unit, self.shape.cells, self.shape.n_entries).to(positions.device)
 
     def knots(self, clip_time: float, clip_length: int) -> list[tuple[int, float]]:
         """Knots around a clip time and their weights; one knot when the time is a frame's, the last one beyond it."""

@@ -6,13 +6,12 @@ of the clip, so a picture of a frame touches the eight spatial corners of one kn
 its own, or all knots share one table, as in the published 4D hash: the hash is the XOR of the coordinates' products, so
 the entry at a knot is that of space XOR a key of that knot and level (`time_keys`), and the corners stay constants.
 
-Letters: n rows, L levels, T entries per level, C channels. `encode` is plain torch; the fused decode has it as a kernel
-(engine.model.decode.cpu.grid_kernels).
+Letters: n rows, L levels, T entries per level, C channels. `encode` is plain torch.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -32,9 +31,13 @@ class CornerTable:
         n_entries: Table entries per level; indices are below it.
     """
 
-    indices: np.ndarray
-    weights: np.ndarray
+    indices: Tensor
+    weights: Tensor
     n_entries: int
+
+    def to(self, device: torch.device) -> CornerTable:
+        """The same on another device."""
+        return replace(self, indices=self.indices.to(device), weights=self.weights.to(device))
 
 
 def corner_table(unit_positions: np.ndarray, cells: tuple[int, ...], n_entries: int) -> CornerTable:
@@ -69,10 +72,10 @@ def corner_table(unit_positions: np.ndarray, cells: tuple[int, ...], n_entries: 
                 index = mixed & np.uint64(n_entries - 1)
             indices[:, level, bits] = index.astype(np.int32)
             weights[:, level, bits] = np.where(offset, fraction, 1.0 - fraction).prod(axis=1)
-    return CornerTable(indices, weights, n_entries)
+    return CornerTable(torch.from_numpy(indices), torch.from_numpy(weights), n_entries)
 
 
-def time_keys(cells: tuple[int, ...], n_entries: int, n_knots: int) -> np.ndarray:
+def time_keys(cells: tuple[int, ...], n_entries: int, n_knots: int) -> Tensor:
     """What the entries of each knot and level are combined with by XOR, where all knots share a table.
 
     Knots of a level that fits the table n_knots times lie side by side; otherwise they are spread by the hash.
@@ -89,11 +92,11 @@ def time_keys(cells: tuple[int, ...], n_entries: int, n_knots: int) -> np.ndarra
         block = 1 << ((n_cells + 1) ** 3 - 1).bit_length()  # entries of one knot, rounded up to a power of two
         step = block if block * n_knots <= n_entries else _PRIMES[3]
         keys[:, level] = (knots * np.uint64(step) & np.uint64(n_entries - 1)).astype(np.int32)
-    return keys
+    return torch.from_numpy(keys)
 
 
-def encode(table: Tensor, rows: Tensor, corners: CornerTable, keys: np.ndarray | None = None) -> Tensor:
-    """Interpolate one knot at the chosen anchors, by torch indexing: the slow truth, any dtype.
+def encode(table: Tensor, rows: Tensor, corners: CornerTable, keys: Tensor | None = None) -> Tensor:
+    """Interpolate one knot at the chosen anchors, by torch indexing: the slow truth, any dtype and device.
 
     Args:
         table: [L, T, C]
@@ -103,9 +106,10 @@ def encode(table: Tensor, rows: Tensor, corners: CornerTable, keys: np.ndarray |
     Returns:
         [n, L * C], levels first. Differentiable in `table`.
     """
-    entries = corners.indices[rows.numpy()].astype(np.int64)  # [n, L, 8]
-    indices = torch.from_numpy(entries if keys is None else entries ^ keys[:, None])
-    weights = torch.from_numpy(corners.weights[rows.numpy()]).to(table.dtype)
-    levels = torch.arange(table.shape[0])[None, :, None]
-    values = table[levels, indices]  # [n, L, 8, C]
+    indices = corners.indices[rows]  # [n, L, 8]
+    if keys is not None:
+        indices = indices ^ keys[:, None]
+    weights = corners.weights[rows].to(table.dtype)
+    levels = torch.arange(table.shape[0], device=table.device)[None, :, None]
+    values = table[levels, indices.long()]  # [n, L, 8, C]
     return (values * weights[..., None]).sum(2).flatten(1)

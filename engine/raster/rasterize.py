@@ -1,40 +1,21 @@
-"""`rasterize`: Gaussians to pictures, differentiable. Checks arguments and picks a back end; computes nothing."""
+"""`rasterize` and `tile_boxes`: Gaussians to pictures, and to the tiles they touch, by any back end.
+
+Checks arguments and hands them on; computes nothing.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Literal, Protocol
 
 import torch
 from torch import Tensor
 
 from engine.argument_checks import require_tensor
-from engine.raster.cpu.backend import rasterize_cpu
 from engine.raster.gaussians import Gaussians
 from engine.raster.pinhole_view import PinholeView, n_tiles, pinhole_views
-from engine.raster.reference import rasterize_reference
+from engine.raster.rasterizer import Rasterizer
 from engine.raster.rendering import Rendering
-
-BackendName = Literal["auto", "cpu", "reference"]
-
-
-class Backend(Protocol):
-    """A rasterizer: gets checked Gaussians and views, a background [3] and a tile mask [C, rows, columns] or None."""
-
-    def __call__(
-        self,
-        gaussians: Gaussians,
-        views: list[PinholeView],
-        background: Tensor,
-        *,
-        tile_mask: Tensor | None,
-        want_means2d: bool,
-        want_depth: bool,
-    ) -> Rendering: ...
-
-
-BACKENDS: dict[str, Backend] = {"cpu": rasterize_cpu, "reference": rasterize_reference}
-"""Name to implementation."""
+from engine.raster.tile_boxes import TileBoxes
 
 
 def rasterize(
@@ -44,9 +25,9 @@ def rasterize(
     width: int,
     height: int,
     *,
+    backend: Rasterizer,
     background: Tensor | None = None,
     near_plane: float = 0.01,
-    backend: BackendName = "auto",
     tile_mask: Tensor | None = None,
     want_means2d: bool = False,
     want_depth: bool = False,
@@ -63,9 +44,9 @@ def rasterize(
         viewmats: World to camera, OpenCV axes. [C, 4, 4]
         Ks: Pinhole intrinsics for `width` x `height`, no skew. [C, 3, 3]
         width, height: Image size, pixels.
+        backend: What draws, from engine.backends.
         background: Colour behind everything; black if None. [3]
         near_plane: Centres at or before this depth are dropped, scene units.
-        backend: "cpu" (float32 tensors in main memory), "reference" (anything, slowly), or "auto": cpu if it can.
         tile_mask: Tiles of TILE_PX x TILE_PX pixels that are wanted; None for all. Pixels of others hold the background
             and alpha 0, and pass no gradient to anything. [C, rows, columns] or, for all cameras, [rows, columns] bool
         want_means2d: Also return projected centres that receive a gradient, for densification.
@@ -87,26 +68,46 @@ def rasterize(
             raise ValueError(f"background must be [3], got {list(background.shape)}")
         if not all(map(math.isfinite, background.tolist())):
             raise ValueError(f"background must be finite, got {background.tolist()}")
-    background = background.to(means)
-    is_fast = means.dtype == torch.float32 and means.device.type == "cpu"
-    if backend == "auto":
-        backend = "cpu" if is_fast else "reference"
-    if backend not in BACKENDS:
-        raise ValueError(f"backend must be auto or one of {', '.join(sorted(BACKENDS))}, got {backend!r}")
-    if backend == "cpu" and not is_fast:
-        raise TypeError(f"backend 'cpu' needs float32 tensors on the cpu, got means {means.dtype} on {means.device}")
-    return BACKENDS[backend](
+    return backend.rasterize(
         gaussians,
         views,
-        background,
-        tile_mask=None if tile_mask is None else _checked_mask(tile_mask, views),
+        background.to(means),
+        tile_mask=None if tile_mask is None else _checked_mask(tile_mask, views, means.device),
         want_means2d=want_means2d,
         want_depth=want_depth,
     )
 
 
-def _checked_mask(tile_mask: Tensor, views: list[PinholeView]) -> Tensor:
-    """The mask on the cpu. [C, rows, columns] bool"""
+def tile_boxes(
+    gaussians: Gaussians,
+    viewmat: Tensor,
+    K: Tensor,
+    width: int,
+    height: int,
+    *,
+    backend: Rasterizer,
+    near_plane: float = 0.01,
+) -> TileBoxes:
+    """Tiles that Gaussians may touch in one picture, without drawing it. Arguments as in `rasterize`, of one camera.
+
+    The boxes are those of the rasterizer, so a tile outside of one holds no trace of its Gaussian: not in the image and
+    not in a gradient.
+
+    Args:
+        viewmat: [4, 4]
+        K: [3, 3]
+    Raises:
+        TypeError, ValueError: An argument does not fit; the message names it.
+    """
+    check_gaussians(gaussians)
+    for name, matrix in (("viewmat", viewmat), ("K", K)):
+        require_tensor(name, matrix)
+    (view,) = pinhole_views(viewmat[None], K[None], width, height, near_plane)
+    return backend.tile_boxes(gaussians, view)
+
+
+def _checked_mask(tile_mask: Tensor, views: list[PinholeView], device: torch.device) -> Tensor:
+    """[C, rows, columns] bool"""
     require_tensor("tile_mask", tile_mask)
     n_views, width, height = len(views), views[0].width, views[0].height
     shape = n_tiles(width, height)
@@ -117,7 +118,7 @@ def _checked_mask(tile_mask: Tensor, views: list[PinholeView]) -> Tensor:
         )
     if tile_mask.dtype != torch.bool:
         raise TypeError(f"tile_mask must be bool, got {tile_mask.dtype}")
-    return tile_mask.cpu().expand(n_views, *shape)
+    return tile_mask.to(device).expand(n_views, *shape)
 
 
 def check_gaussians(gaussians: Gaussians) -> None:

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from torch import nn
+from torch import Tensor, nn
 
+from engine.backends.backend import Backend
 from engine.camera.depth_range import near_plane
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -26,6 +27,7 @@ from engine.gate.regions import GateRegion
 from engine.images.psnr import psnr
 from engine.model.clip_model import ClipModel, decoder_sizes, load_clip_model
 from engine.model.clip_view import REACH_SPACINGS, View, render_gaussians, render_model
+from engine.model.host_array import host_array
 from engine.progress import Progress, ReportProgress, StepStats
 from engine.training.checkpoint import Checkpoint, Place, damaged_checkpoint, read_checkpoint, write_checkpoint
 from engine.training.config import TrainConfig
@@ -38,13 +40,11 @@ from engine.training.preparation.training_pictures import shared_image_size
 from engine.training.step.active_tiles import ActivePicture, ActiveTiles
 from engine.training.step.demotion import demote
 from engine.training.step.early_stopping import MEASURE_EVERY, Patience, held_in_items, steps_to_finish
-from engine.training.step.fused_loss import LossWorkspace
 from engine.training.step.half_size import HalfSize
 from engine.training.step.losses import photometric_loss
 from engine.training.step.nonfinite import gradient_not_finite, loss_not_finite
 from engine.training.step.order import ErrorOrder, Order, ShuffledOrder
 from engine.training.step.visible_anchors import Sight, camera_views
-from engine.training.step.volume import volume_sum
 
 
 class ClipTraining:
@@ -54,6 +54,7 @@ class ClipTraining:
         capture: The capture at working resolution.
         clip: Frames to train on.
         config: All numbers.
+        backend: What it is computed with.
         holdout: Camera indices never looked at in training.
         reference: Finished reference clip for a source clip, None to train the reference clip itself, or a clip that
             shares nothing.
@@ -70,6 +71,7 @@ class ClipTraining:
         clip: Clip,
         *,
         config: TrainConfig,
+        backend: Backend,
         holdout: Sequence[int],
         reference: ClipState | None,
         seed: int,
@@ -78,6 +80,7 @@ class ClipTraining:
         previous: ClipState | None = None,
         regions: Sequence[GateRegion] = (),
     ) -> None:
+        self.backend = backend
         self.previous = previous
         is_streaming = reference is None and previous is not None and config.start == "previous"
         # what a clip begins with: the reference it inherits from, or the clip before when it goes on from there
@@ -109,6 +112,7 @@ class ClipTraining:
             capture,
             clip,
             config,
+            backend=backend,
             camera_indices=self.camera_indices,
             views=self._training_views,
             base=self._base,
@@ -119,7 +123,6 @@ class ClipTraining:
             prep_dir=self.prep_dir,
             report=report,
         )
-        self._workspace = LossWorkspace(self.height, self.width)
         self._tiles: ActiveTiles | None = None
         self._held_in = held_in_items(n_cameras, clip.n_frames, seed) if config.patience else []
         self._trained: tuple[ClipModel, dict[str, np.ndarray]] | None = None
@@ -171,11 +174,10 @@ class ClipTraining:
 
     def _start_phase(self, index: int, steps_in_phase: int) -> None:
         name, n_steps = self.phases[index]
-        self.model.decode_backend = self.config.decode_backend
         has_gains = bool((self.gains != 1.0).any())  # all 1 where the cameras do not differ: nothing to learn
         self.gains.requires_grad_(self.reference is None and has_gains)
         parameters = named_parameters(self.model, self.gains, self.config)
-        self._optimizer = PhaseOptimizer(parameters, n_steps=n_steps, config=self.config)
+        self._optimizer = PhaseOptimizer(parameters, n_steps=n_steps, config=self.config, backend=self.backend)
         self._optimizer.steps_done = steps_in_phase
         is_static = name == "static"
         kept_out = set() if is_static else set(self._held_in)
@@ -196,7 +198,9 @@ class ClipTraining:
         self._half = HalfSize(self.capture.rig, near_plane=self.near_plane) if is_half else None
         is_source = self.phases[self._phase_index][0] == "source"
         has_rest = is_source and self.config.tiles == "active" and not self.gains.requires_grad
-        self._tiles = ActiveTiles(self.model) if has_rest and ActiveTiles.applies(self.model) else None
+        self._tiles = (
+            ActiveTiles(self.model, backend=self.backend) if has_rest and ActiveTiles.applies(self.model) else None
+        )
 
     def step(self) -> StepStats:
         """Draw a picture, render it, compare, update.
@@ -220,28 +224,33 @@ class ClipTraining:
             camera_row, frame = divmod(item, self.clip.n_frames)
             clip_time = frame / self.clip.clip_length
             truth, is_counted = self.pictures.raw(camera_row, frame), None
-        views, workspace = self._views, self._workspace
+        views = self._views
         if self._half is not None:
-            views, workspace = self._half.views, self._half.workspace
+            views = self._half.views
             truth, is_counted = self._half.truth(item, truth, is_counted)
         view = views[self.camera_indices[camera_row]]
         active = self._active_picture(camera_row, view, clip_time)
-        image = render_gaussians(active.gaussians, view, tile_mask=active.tile_mask).image[0]
+        image = render_gaussians(active.gaussians, view, backend=self.backend, tile_mask=active.tile_mask).image[0]
+        pixels = self._tensor(truth)
         compared = photometric_loss(
             image,
-            truth,
+            pixels,
+            backend=self.backend,
             ssim_weight=self.config.ssim_weight,
             gain=self.gains[camera_row],
-            is_counted=is_counted,  # unstable pixels of a background do not
+            is_counted=None
+            if is_counted is None
+            else self._tensor(is_counted),  # unstable pixels of a background do not
             tile_mask=active.tile_mask,
             rest=active.rest,
-            workspace=workspace,
         )
-        loss, mean_square, volume = compared.loss, compared.mean_square, torch.zeros(())
+        loss, mean_square, volume = compared.loss, compared.mean_square, compared.loss.new_zeros(())
         if self._tiles is not None:
-            mean_square += self._tiles.square_outside(active, item, truth, self.gains[camera_row])
+            mean_square += self._tiles.square_outside(active, item, pixels, self.gains[camera_row])
         if self.config.volume_weight and active.n_all:
-            volume = (self.config.volume_weight / active.n_all) * volume_sum(active.learning.scales, self.spacing)
+            volume = (self.config.volume_weight / active.n_all) * self.backend.volume_sum(
+                active.learning.scales, self.spacing
+            )
             loss = loss + volume
         value = float(loss.detach())
         where = f"step {self.steps_done + 1}, camera {self.rig.names[camera_row]}"
@@ -256,7 +265,8 @@ class ClipTraining:
         except NonFiniteLoss as error:
             raise gradient_not_finite(error, where=where, config=self.config) from error
         if self.gains.requires_grad:  # a step moves all cameras a little together; what is unseen stays at gain 1
-            self.gains.detach().numpy()[:] = in_gauge(self.gains.detach().numpy())
+            with torch.no_grad():
+                self.gains.copy_(self._tensor(in_gauge(host_array(self.gains))))
         self.steps_done += 1
         self._look_for_stall()
         return StepStats(
@@ -269,6 +279,9 @@ class ClipTraining:
             gradient_norm=gradient_norm,
             is_clipped=self._optimizer.clips(gradient_norm),
         )
+
+    def _tensor(self, array: np.ndarray) -> Tensor:
+        return torch.from_numpy(array).to(self.backend.device)
 
     def _look_for_stall(self) -> None:
         """Now and then, see whether the pictures kept out of training still gain; else cut the phase short."""
@@ -294,8 +307,8 @@ class ClipTraining:
             view = self._training_views[camera_row]
             with torch.no_grad():
                 gaussians = self.model.decode(clip_time, self._sight.rows(camera_row, clip_time))
-                image = render_gaussians(gaussians, view).image[0] * self.gains[camera_row]
-            values.append(psnr(image.numpy(), self.pictures.raw(camera_row, frame) / 255.0))
+                image = render_gaussians(gaussians, view, backend=self.backend).image[0] * self.gains[camera_row]
+            values.append(psnr(host_array(image), self.pictures.raw(camera_row, frame) / 255.0))
         return float(np.mean(values)) if values else float("nan")
 
     def _active_picture(self, camera_row: int, view: View, clip_time: float) -> ActivePicture:
@@ -317,7 +330,7 @@ class ClipTraining:
         for i, camera in enumerate(self.holdout[:n_pictures]):
             frame = self.clip.start + (i * self.clip.n_frames) // max(len(self.holdout[:n_pictures]), 1)
             image = render_model(self.model, self._views[camera], self.clip.clip_time(frame), reach=self._reach)
-            values.append(psnr(image.numpy(), self.capture.frame(camera, frame) / 255.0))
+            values.append(psnr(host_array(image), self.capture.frame(camera, frame) / 255.0))
         return float(np.mean(values)) if values else float("nan")
 
     def state(self) -> ClipState:
@@ -348,7 +361,7 @@ class ClipTraining:
             "field": None if model.field is None else model.field.shape.as_dict(),
         }
         if self.reference is None:
-            arrays["gains"] = self.gains.detach().numpy().copy()
+            arrays["gains"] = host_array(self.gains).copy()
         else:
             header["reference_fingerprint"] = self.reference.header["fingerprint"]
         if self.previous is not None:
@@ -372,14 +385,14 @@ class ClipTraining:
         self._trained = self.model, self._reasons
         # another clip's field may show this one where fields go on: what it would show nobody knows yet
         if self.config.gate == "images" and self.config.field != "continue":
-            state, said = demote(state, self.reference, self._training_views, reach=self._reach)
+            state, said = demote(state, self.reference, self._training_views, backend=self.backend, reach=self._reach)
             self._say("Leaving out what is not needed", said)
             self._reasons = {name: array for name, array in state.arrays.items() if name.startswith("gate.")}
-            self.model = load_clip_model(state, self.reference, is_learning=True)
+            self.model = load_clip_model(state, self.reference, backend=self.backend, is_learning=True)
         # a field that goes on in the next clip, and may show this one then, keeps entries that only others read
         entries = None if self.config.field == "continue" else self.model.entries_in_use()
         compact = compact_clip(state, entries)
-        self.model = load_clip_model(compact.state, self.reference, is_learning=True)
+        self.model = load_clip_model(compact.state, self.reference, backend=self.backend, is_learning=True)
         self._sight = Sight(self.model, self._training_views, reach=self._reach)
         return compact
 
@@ -393,11 +406,11 @@ class ClipTraining:
             order=self._order.state(),
             schedule=self._optimizer.schedule,
             patience=None if self._patience is None else self._patience.state(),
-            generator=self._generator.get_state().numpy().tolist(),
+            generator=self._generator.get_state().tolist(),
         )
         state = self._state_of(*(self._trained or (self.model, self._reasons)))
         state = ClipState(state.arrays | self._optimizer.arrays(), state.header)
-        write_checkpoint(path, Checkpoint(state, self.gains.detach().numpy().copy(), self.backgrounds, place))
+        write_checkpoint(path, Checkpoint(state, host_array(self.gains).copy(), self.backgrounds, place))
 
     def restore_checkpoint(self, path: Path | str) -> None:
         """Go on from a checkpoint instead of `prepare`.
@@ -430,8 +443,8 @@ class ClipTraining:
             raise ValueError(f"backgrounds and gains are {found}, not of {len(self.rig)} cameras of {width}x{height}")
         header, arrays, place = kept.state.header, kept.state.arrays, kept.place
         parts = ClipParts(
-            load_clip_model(kept.state, self.reference, is_learning=True),
-            nn.Parameter(torch.from_numpy(kept.gains)),
+            load_clip_model(kept.state, self.reference, backend=self.backend, is_learning=True),
+            nn.Parameter(torch.from_numpy(kept.gains).to(self.backend.device, self.backend.dtype)),
             kept.backgrounds,
             header["spacing"],
             moving_spacing=header["moving_spacing"],

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields, replace
 from typing import Any, NamedTuple
 
+from engine.backends.table import BACKENDS, DEFAULT
 from engine.errors import ProjectError
 
 
@@ -176,9 +177,9 @@ class TrainConfig:
     """active: only tiles that a learning Gaussian touches are drawn, compared and differentiated. all: whole pictures.
     What is learned is the same, bit for bit. Basketball, 640 x 360, a fifth of the tiles active, two shared cores:
     kernels of a step 9 ms instead of 14, the fastest tenth of the steps 13 ms instead of 19."""
-    decode_backend: str = "auto"
-    """What decodes the anchors of a training step, see engine.model.decode.decoding. auto: fused kernels where they
-    can. reference: plain torch, several times slower, to compare with; what is learned is the same but for rounding."""
+    backend: str = DEFAULT
+    """What a clip is trained with. cpu: compiled kernels. reference: plain torch, a hundred times slower and for very
+    small pictures only, to compare with; what is learned is the same but for rounding."""
     sampling: str = "even"
     """even: every picture once a pass. error: half of the draws go to pictures by their loss, and a picture's loss
     weighs the less the more often it is drawn, so that on average the gradient is that of even passes. It gives nothing
@@ -326,7 +327,7 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "field": ("per_clip", "continue", "joint"),
     "start": ("scratch", "previous"),
     "tiles": ("active", "all"),
-    "decode_backend": ("auto", "reference"),
+    "backend": tuple(BACKENDS),
     "sampling": ("even", "error"),
 }
 _SHARING = ("decoder", "residual", "inherit")

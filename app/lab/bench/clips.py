@@ -12,8 +12,9 @@ from torch import Tensor
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View
-from engine.model.decode.decoding import ChosenAnchors
 from engine.model.decoder import Decoder
+from engine.model.decoding import ChosenAnchors
+from engine.model.model_backend import ModelBackend
 from engine.training.config import TrainConfig
 from engine.training.preparation.clip_field import fit_field
 
@@ -46,8 +47,8 @@ class ClipRecipe:
         return f"{self.n_anchors} anchors, k={self.gaussians_per_anchor}, {self.width}x{self.height}"
 
 
-def make_clip(recipe: ClipRecipe, *, seed: int = 0) -> ClipModel:
-    """A clip with random features, so that no head is at its start. Same seed, same clip."""
+def make_clip(recipe: ClipRecipe, *, backend: ModelBackend, seed: int = 0) -> ClipModel:
+    """A clip with random features, so that no head is at its start. Same seed, same clip but for its dtype."""
     generator = torch.Generator().manual_seed(seed)
     config = TrainConfig(gaussians_per_anchor=recipe.gaussians_per_anchor)
     decoder = Decoder(
@@ -66,7 +67,7 @@ def make_clip(recipe: ClipRecipe, *, seed: int = 0) -> ClipModel:
     if recipe.is_source:
         decoder.requires_grad_(requires_grad=False)
         sets["static"].requires_grad_(requires_grad=False)
-    model = ClipModel(sets=sets, decoder=decoder, field=None, clip_length=N_FRAMES, n_frames=N_FRAMES)
+    model = ClipModel(sets=sets, decoder=decoder, field=None, clip_length=N_FRAMES, n_frames=N_FRAMES, backend=backend)
     fit_field(model, spacing=8.0 * _LEVELS_SPACING, config=config, generator=generator)
     with torch.no_grad():
         assert model.field is not None

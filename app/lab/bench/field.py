@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -12,11 +11,13 @@ import torch
 from torch import Tensor
 
 from app.lab.bench.clips import ClipRecipe, chosen_anchors, make_clip
+from app.lab.bench.compared import COMPARED, EXACT, FAST
 from app.lab.bench.raster import relative_errors
 from app.lab.bench.rows import KernelRow, SpeedError, kernel_row
 from app.lab.bench.timing import interleaved, peak_extra_mb
+from engine.backends.backend import Backend
 from engine.model.clip_model import ClipModel
-from engine.model.decode.decoding import decode_anchors
+from engine.model.decoding import decode_anchors
 from engine.raster.gaussians import Gaussians
 
 FRAME = 4
@@ -51,14 +52,11 @@ SCENES = {
 class DecodeRun:
     """One back end on one scene: a model with leaves of its own and a fixed upstream gradient."""
 
-    def __init__(self, scene: DecodeScene, dtype: torch.dtype, backend: str) -> None:
-        model: ClipModel = make_clip(scene.recipe)
-        self.model = copy.deepcopy(model).to(dtype) if dtype != torch.float32 else model
+    def __init__(self, scene: DecodeScene, backend: Backend) -> None:
+        self.model: ClipModel = make_clip(scene.recipe, backend=backend)
         self._chosen = chosen_anchors(self.model, has_field=scene.has_field)
         self._field = self.model.field if scene.has_field else None
-        self._backend = backend
         self._upstream: list[Tensor] | None = None
-        self._dtype = dtype
 
     def __call__(self) -> tuple[float, float]:
         """One pass; milliseconds forward and backward."""
@@ -69,7 +67,9 @@ class DecodeRun:
         if self._upstream is None:
             generator = torch.Generator().manual_seed(0)
             shapes = [tensor.shape for tensor in gaussians.tensors()]
-            self._upstream = [torch.randn(s, generator=generator, dtype=torch.float64).to(self._dtype) for s in shapes]
+            self._upstream = [
+                torch.randn(s, generator=generator, dtype=torch.float64).to(self.model.backend.dtype) for s in shapes
+            ]
         pairs = zip(gaussians.tensors(), self._upstream, strict=True)
         learning = [(tensor, upstream) for tensor, upstream in pairs if tensor.requires_grad]
         begun = time.perf_counter()
@@ -79,7 +79,7 @@ class DecodeRun:
     def decode(self) -> Gaussians:
         """Gaussians of one frame."""
         return decode_anchors(
-            self._chosen, self.model.decoder, self._field, self.model.knots(FRAME / 10), backend=self._backend
+            self._chosen, self.model.decoder, self._field, self.model.knots(FRAME / 10), backend=self.model.backend
         )
 
     def gradients(self) -> dict[str, Tensor]:
@@ -102,21 +102,21 @@ def measure_decode(
     """
     scene = scene or SCENES[name]
     size = f"{scene.recipe.n_anchors} anchors, k={scene.recipe.gaussians_per_anchor}"
-    runs = {backend: DecodeRun(scene, torch.float32, backend) for backend in ("cpu", "reference")}
+    runs = {path: DecodeRun(scene, backend) for path, backend in COMPARED.items()}
     timings = interleaved(runs, n_runs)
-    exact = DecodeRun(scene, torch.float64, "reference")
+    exact = DecodeRun(scene, EXACT)
     exact()
     expected, truth = exact.decode(), exact.gradients()
     marks = {}
-    for backend, run in runs.items():
+    for path, run in runs.items():
         run()
         gradients = run.gradients()
-        marks[backend] = SpeedError(
+        marks[path] = SpeedError(
             operation="decode",
             scene=name,
             size=size,
-            backend=backend,
-            total_ms=sum(stage.median_ms for stage in timings[backend]),
+            backend=path,
+            total_ms=sum(stage.median_ms for stage in timings[path]),
             value_error=_value_error(run.decode(), expected),
             gradient_error=relative_errors([gradients[key] for key in truth], list(truth.values())),
         )
@@ -130,8 +130,8 @@ def prepare_memory(scene: DecodeScene) -> Callable[[], object]:
     from engine.kernels.threads import configure_threads
 
     configure_threads()
-    DecodeRun(replace(scene, recipe=replace(scene.recipe, n_anchors=64)), torch.float32, "cpu")()
-    run = DecodeRun(scene, torch.float32, "cpu")
+    DecodeRun(replace(scene, recipe=replace(scene.recipe, n_anchors=64)), FAST)()
+    run = DecodeRun(scene, FAST)
     return partial(run.__call__)
 
 

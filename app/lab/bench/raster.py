@@ -16,11 +16,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from app.lab.bench.compared import COMPARED, EXACT, FAST
 from app.lab.bench.rows import KernelRow, SpeedError, kernel_row
 from app.lab.bench.scenes import RECIPES, Recipe, Scene
 from app.lab.bench.timing import interleaved, peak_extra_mb
 from engine.raster import Gaussians, Rendering, rasterize
-from engine.raster.rasterize import BackendName
+from engine.raster.rasterizer import Rasterizer
 
 FORWARD_OPERATIONS, BACKWARD_OPERATIONS = 20, 43
 """Instructions on the multiply-add ports per block of sixteen pairs, counted in the two inner loops: exponent 3,
@@ -38,7 +39,7 @@ class Pass:
     backward_ms: float
 
 
-def run_pass(scene: Scene, dtype: torch.dtype, backend: BackendName) -> Pass:
+def run_pass(scene: Scene, dtype: torch.dtype, backend: Rasterizer) -> Pass:
     """Draw a scene and differentiate everything, 2D means included, against a fixed random upstream gradient."""
     leaves = Gaussians(*(tensor.to(dtype).clone().requires_grad_() for tensor in scene.gaussians.tensors()))
     background = scene.background.to(dtype)
@@ -55,7 +56,7 @@ def run_pass(scene: Scene, dtype: torch.dtype, backend: BackendName) -> Pass:
 def evaluated_pairs(scene: Scene) -> int:
     """(pixel, Gaussian) evaluations of a scene: sixteen for every 4x4 block that a Gaussian of a tile changes."""
     leaves = Gaussians(*(tensor.float().requires_grad_() for tensor in scene.gaussians.tensors()))
-    image = rasterize(leaves, *scene.arguments, backend="cpu").image
+    image = rasterize(leaves, *scene.arguments, backend=FAST).image
     waiting: list[Any] = [image.grad_fn]
     while waiting:
         node = waiting.pop()
@@ -87,7 +88,7 @@ def measure_raster(
     """
     recipe = recipe or RECIPES[name]
     scene = recipe.scene()
-    (forward, backward), *_ = interleaved({"cpu": lambda: _stages(scene, "cpu")}, n_runs).values()
+    (forward, backward), *_ = interleaved({"cpu": lambda: _stages(scene, FAST)}, n_runs).values()
     checked = recipe.reduced()
     checked_at = f"{checked.n_rows} in {checked.width}x{checked.height}"
     marks = _check(name, checked_at, checked.scene())
@@ -117,8 +118,8 @@ def limit_shares(row: KernelRow, fma_per_s: float) -> tuple[float, float] | None
 
 def prepare_memory(recipe: Recipe) -> Callable[[], object]:
     """For `peak_extra_mb`: kernels loaded, tensors made; the call is one forward and backward pass."""
+    from engine.backends.cpu.raster.warm import warm_up
     from engine.kernels.threads import configure_threads
-    from engine.raster.cpu.warm import warm_up
 
     configure_threads()
     warm_up()
@@ -128,7 +129,7 @@ def prepare_memory(recipe: Recipe) -> Callable[[], object]:
         upstream = torch.ones(1, scene.height, scene.width, 3)
 
         def call() -> object:
-            image = rasterize(leaves, *scene.arguments, backend="cpu", want_means2d=True).image
+            image = rasterize(leaves, *scene.arguments, backend=FAST, want_means2d=True).image
             image.backward(upstream)
             return image
 
@@ -138,26 +139,25 @@ def prepare_memory(recipe: Recipe) -> Callable[[], object]:
     return ready(recipe.scene())
 
 
-def _stages(scene: Scene, backend: BackendName) -> tuple[float, float]:
+def _stages(scene: Scene, backend: Rasterizer) -> tuple[float, float]:
     done = run_pass(scene, torch.float32, backend)
     return done.forward_ms, done.backward_ms
 
 
 def _check(name: str, size: str, scene: Scene) -> dict[str, SpeedError]:
     """Both back ends in float32 beside float64 brute force."""
-    exact = run_pass(scene, torch.float64, "reference")
-    backends: tuple[BackendName, ...] = ("cpu", "reference")
-    candidates = {backend: partial(_stages, scene, backend) for backend in backends}
+    exact = run_pass(scene, torch.float64, EXACT)
+    candidates = {path: partial(_stages, scene, backend) for path, backend in COMPARED.items()}
     timings = interleaved(candidates, N_CHECK_RUNS, n_warm=1)
     marks = {}
-    for backend in backends:
+    for path, backend in COMPARED.items():
         done = run_pass(scene, torch.float32, backend)
-        marks[backend] = SpeedError(
+        marks[path] = SpeedError(
             operation="raster",
             scene=name,
             size=size,
-            backend=backend,
-            total_ms=sum(stage.median_ms for stage in timings[backend]),
+            backend=path,
+            total_ms=sum(stage.median_ms for stage in timings[path]),
             value_error=(done.rendering.image - exact.rendering.image).abs().max().item(),
             gradient_error=relative_errors(_gradients(done), _gradients(exact)),
         )

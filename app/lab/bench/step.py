@@ -15,32 +15,15 @@ import torch
 from torch import Tensor, nn
 
 from app.lab.bench.clips import N_FRAMES, ClipRecipe, make_clip, make_truth, make_view
+from app.lab.bench.compared import FAST
+from engine.backends.backend import Backend
 from engine.model.clip_view import View, render_gaussians
 from engine.raster.gaussians import Gaussians
-from engine.raster.rasterize import BackendName
 from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters
-from engine.training.step.losses import LossWorkspace, photometric_loss
+from engine.training.step.losses import photometric_loss
 
 STAGES = ("decode forward", "raster forward", "loss", "raster backward", "decode backward", "optimiser")
-
-
-@dataclass(frozen=True, slots=True)
-class StepPath:
-    """What a step is computed with, from the decode to Adam: a dtype, and a back end for each of the four ops."""
-
-    dtype: torch.dtype
-    decode: str
-    raster: BackendName
-    loss: str
-    adam: str
-
-
-FAST = StepPath(torch.float32, "cpu", "cpu", "fused", "fused")
-"""What a training uses."""
-PLAIN = StepPath(torch.float32, "reference", "reference", "reference", "reference")
-EXACT = replace(PLAIN, dtype=torch.float64)
-"""The slow truth of all four."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,24 +58,23 @@ class StepRun:
 
     Args:
         recipe: Sizes of the clip; the same recipe makes the same clip.
-        path: What to compute with.
+        backend: What to compute with.
         window: Part of the picture that is drawn and compared, by the same camera; None for all of it.
     """
 
-    def __init__(self, recipe: ClipRecipe, *, path: StepPath = FAST, window: Window | None = None) -> None:
+    def __init__(self, recipe: ClipRecipe, *, backend: Backend = FAST, window: Window | None = None) -> None:
         self._config = TrainConfig(gaussians_per_anchor=recipe.gaussians_per_anchor)
         window = window or Window(0, 0, recipe.width, recipe.height)
-        self._path = path
-        self._model = make_clip(recipe).to(path.dtype)
+        self._backend = backend
+        self._model = make_clip(recipe, backend=backend)
         self._view = _seen_through(make_view(recipe), window)
-        gain = torch.ones(3, dtype=path.dtype)
+        gain = torch.ones(3, dtype=backend.dtype)
         self._gain = nn.Parameter(gain, requires_grad=not recipe.is_source)
         rows, columns = slice(window.top, window.top + window.height), slice(window.left, window.left + window.width)
-        self._truth = make_truth(recipe)[rows, columns].copy()
-        self._workspace = LossWorkspace(window.height, window.width)
+        self._truth = torch.from_numpy(make_truth(recipe)[rows, columns].copy())
         parameters = named_parameters(self._model, self._gain, self._config)
         self._parameters = {name: parameter for name, (parameter, _) in parameters.items()}
-        self._optimizer = PhaseOptimizer(parameters, n_steps=10_000, config=self._config, backend=path.adam)
+        self._optimizer = PhaseOptimizer(parameters, n_steps=10_000, config=self._config, backend=backend)
         self._frame = 0
         self.n_gaussians = 0
 
@@ -151,21 +133,20 @@ class StepRun:
 
     def _decode(self) -> Gaussians:
         self._frame = (self._frame + 1) % N_FRAMES
-        gaussians = self._model.decode(self._frame / N_FRAMES, backend=self._path.decode)
+        gaussians = self._model.decode(self._frame / N_FRAMES)
         self.n_gaussians = len(gaussians)
         return gaussians
 
     def _draw(self, gaussians: Gaussians) -> Tensor:
-        return render_gaussians(gaussians, self._view, backend=self._path.raster).image[0]
+        return render_gaussians(gaussians, self._view, backend=self._backend).image[0]
 
     def _loss(self, image: Tensor, gaussians: Gaussians) -> Tensor:
         found = photometric_loss(
             image,
             self._truth,
+            backend=self._backend,
             ssim_weight=self._config.ssim_weight,
             gain=self._gain,
-            workspace=self._workspace,
-            backend=self._path.loss,
         )
         return found.loss + self._config.volume_weight * gaussians.scales.prod(1).mean()
 

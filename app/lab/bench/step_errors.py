@@ -9,9 +9,10 @@ from __future__ import annotations
 from torch import Tensor
 
 from app.lab.bench.clips import ClipRecipe
+from app.lab.bench.compared import COMPARED, EXACT, FAST
 from app.lab.bench.raster import relative_errors
 from app.lab.bench.rows import SpeedError, StepErrors
-from app.lab.bench.step import EXACT, FAST, PLAIN, StepRun, Window
+from app.lab.bench.step import StepRun, Window
 from app.lab.bench.timing import interleaved
 
 WINDOW_PX = 64, 48
@@ -34,11 +35,8 @@ def measure_errors(recipe: ClipRecipe, *, scene: str) -> tuple[StepErrors, dict[
     checked_at = f"{window.width}x{window.height} of {recipe.width}x{recipe.height}"
     if (window.width, window.height) == (recipe.width, recipe.height):
         checked_at = f"{recipe.width}x{recipe.height}"
-    truth = StepRun(recipe, path=EXACT, window=window).kept()
-    runs = {
-        "cpu": StepRun(recipe, path=FAST, window=window),
-        "reference": StepRun(recipe, path=PLAIN, window=window),
-    }
+    truth = StepRun(recipe, backend=EXACT, window=window).kept()
+    runs = {name: StepRun(recipe, backend=backend, window=window) for name, backend in COMPARED.items()}
     first = {backend: run.kept() for backend, run in runs.items()}  # parameters still are those of the truth
     timings = interleaved({backend: run.whole for backend, run in runs.items()}, N_CHECK_RUNS, n_warm=0)
     marks = {}
@@ -81,7 +79,7 @@ def _update_error(recipe: ClipRecipe, window: Window) -> float:
     From gradients of its own float64 would differ without meaning: the first step of Adam is the sign of a gradient,
     and there are entries whose gradient is all rounding.
     """
-    run, exact = StepRun(recipe, path=FAST, window=window), StepRun(recipe, path=EXACT, window=window)
+    run, exact = StepRun(recipe, backend=FAST, window=window), StepRun(recipe, backend=EXACT, window=window)
     worst = 0.0
     for _ in range(N_UPDATES):
         outcome = run.kept()

@@ -41,4 +41,5 @@ def with_features(model: ClipModel, features: Features) -> ClipModel:
         field=None if features == "static" else model.field,
         clip_length=model.clip_length,
         n_frames=model.n_frames,
+        backend=model.backend,
     )

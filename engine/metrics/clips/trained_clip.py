@@ -11,6 +11,7 @@ from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import REACH_SPACINGS, View, render_model
+from engine.model.host_array import host_array
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,8 +36,8 @@ class TrainedClip:
         view = View.from_arrays(
             rig.world_to_camera[camera], rig.Ks[camera], width=width, height=height, near_plane=header["near_plane"]
         )
-        image = render_model(self.model, view, clip_time, reach=REACH_SPACINGS * header["spacing"]).numpy()
-        return image * camera_gain(self.base, rig.names[camera])
+        image = render_model(self.model, view, clip_time, reach=REACH_SPACINGS * header["spacing"])
+        return host_array(image) * camera_gain(self.base, rig.names[camera])
 
 
 def camera_gain(base: ClipState, camera_name: str) -> np.ndarray:

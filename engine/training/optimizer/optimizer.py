@@ -9,12 +9,14 @@ import math
 from fnmatch import fnmatchcase
 
 import numpy as np
+import torch
 from torch import Tensor, nn
 
+from engine.backends.backend import Backend
 from engine.errors import NonFiniteLoss
 from engine.model.clip_model import ClipModel
+from engine.model.host_array import host_array
 from engine.training.config import TrainConfig
-from engine.training.optimizer.adam import make_adam, not_finite
 
 _HEADS = ("opacity", "color", "shape", "offset")
 _OWN_RATIOS = {
@@ -66,7 +68,7 @@ class PhaseOptimizer:
         parameters: By name, with the rate at the start.
         n_steps: Steps of the phase, over which rates fall.
         config: Final ratios of the rates and the norm to clip at.
-        backend: Of `engine.training.optimizer.adam.make_adam`.
+        backend: What Adam is computed with.
     """
 
     def __init__(
@@ -75,7 +77,7 @@ class PhaseOptimizer:
         *,
         n_steps: int,
         config: TrainConfig,
-        backend: str = "auto",
+        backend: Backend,
     ) -> None:
         self._parameters = {name: parameter for name, (parameter, _) in parameters.items()}
         self._rates = {name: rate for name, (_, rate) in parameters.items()}
@@ -84,7 +86,7 @@ class PhaseOptimizer:
         self.n_steps = n_steps
         self.steps_done = 0
         self._from_step, self._from_share = 0, 0.0
-        self._adam = make_adam(self._parameters, backend)
+        self._adam = backend.adam(self._parameters)
 
     def step(self) -> float:
         """Apply the gradients and clear them.
@@ -97,7 +99,7 @@ class PhaseOptimizer:
         gradients = {name: p.grad for name, p in self._parameters.items() if p.grad is not None}
         norm = self._adam.norm(gradients)
         if not math.isfinite(norm):
-            bad = not_finite(gradients)
+            bad = [name for name, gradient in gradients.items() if not torch.isfinite(gradient).all()]
             raise NonFiniteLoss(f"The gradient of {', '.join(bad) or 'the sum'} is not finite.")
         scale = self._max_norm / norm if self.clips(norm) else 1.0
         share_done = self.share_done
@@ -135,8 +137,8 @@ class PhaseOptimizer:
     def arrays(self) -> dict[str, np.ndarray]:
         """Moments and step counts, for a checkpoint. Copies."""
         return {
-            f"optimizer.{name}.{key}": value
-            for name, state in self._adam.arrays().items()
+            f"optimizer.{name}.{key}": host_array(value)
+            for name, state in self._adam.state().items()
             for key, value in state.items()
         }
 
@@ -145,6 +147,8 @@ class PhaseOptimizer:
         self.steps_done = steps_done
         for name in self._parameters:
             prefix = f"optimizer.{name}."
-            found = {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
+            found = {
+                k.removeprefix(prefix): torch.from_numpy(v.copy()) for k, v in arrays.items() if k.startswith(prefix)
+            }
             if found:
                 self._adam.restore(name, found)

@@ -20,13 +20,17 @@ from engine.cloud.stereo.static_cloud import StaticCloud
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel, decoder_sizes, inherit
 from engine.model.decoder import Decoder
+from engine.model.host_array import host_array
+from engine.model.model_backend import ModelBackend
 from engine.training.config import TrainConfig
 
 _REACH_SPACINGS = 1.05
 """How far an anchor stands in for points that did not become anchors: the voxels that share a face with its own."""
 
 
-def static_model(cloud: StaticCloud, clip: Clip, config: TrainConfig, generator: torch.Generator) -> ClipModel:
+def static_model(
+    cloud: StaticCloud, clip: Clip, config: TrainConfig, backend: ModelBackend, generator: torch.Generator
+) -> ClipModel:
     """A reference clip before its motion is known: static anchors and a fresh decoder."""
     decoder = Decoder(
         static_dim=config.static_feature_dim,
@@ -36,7 +40,18 @@ def static_model(cloud: StaticCloud, clip: Clip, config: TrainConfig, generator:
         generator=generator,
     )
     sets = {"static": static_anchors(cloud, config)}
-    return ClipModel(sets=sets, decoder=decoder, field=None, clip_length=clip.clip_length, n_frames=clip.n_frames)
+    return _without_field(sets, decoder, clip, backend)
+
+
+def _without_field(sets: dict[str, AnchorSet], decoder: Decoder, clip: Clip, backend: ModelBackend) -> ClipModel:
+    return ClipModel(
+        sets=sets,
+        decoder=decoder,
+        field=None,
+        clip_length=clip.clip_length,
+        n_frames=clip.n_frames,
+        backend=backend,
+    )
 
 
 def static_anchors(cloud: StaticCloud, config: TrainConfig) -> AnchorSet:
@@ -50,7 +65,9 @@ def static_anchors(cloud: StaticCloud, config: TrainConfig) -> AnchorSet:
     )
 
 
-def inheriting_model(reference: ClipState, clip: Clip, config: TrainConfig) -> tuple[ClipModel, str]:
+def inheriting_model(
+    reference: ClipState, clip: Clip, config: TrainConfig, backend: ModelBackend
+) -> tuple[ClipModel, str]:
     """A source clip before its motion is known: what it inherits, and no moving anchor alive yet; says what learns.
 
     `config.inherit` says whether anchors may learn. The decoder is the reference's and with inherit=off the anchors
@@ -64,7 +81,7 @@ def inheriting_model(reference: ClipState, clip: Clip, config: TrainConfig) -> t
         if f"sets.{role}.presence" in reference.arrays
     }
     sets, decoder = inherit(reference, presence, is_trainable=config.inherit == "trainable")
-    model = ClipModel(sets=sets, decoder=decoder, field=None, clip_length=clip.clip_length, n_frames=clip.n_frames)
+    model = _without_field(sets, decoder, clip, backend)
     words = {
         "frozen": "kept as they are",
         "moving": "kept as they are if static, learning on if moving",
@@ -82,7 +99,8 @@ def choose_decoder(model: ClipModel, config: TrainConfig, *, seed: int) -> None:
         seed: Of new heads, which have a generator of their own: what else starts at random is the same for any choice.
     """
     if config.decoder == "new":
-        model.decoder = Decoder(**decoder_sizes(model.decoder), generator=torch.Generator().manual_seed(seed))
+        decoder = Decoder(**decoder_sizes(model.decoder), generator=torch.Generator().manual_seed(seed))
+        model.decoder = decoder.to(model.backend.device, model.backend.dtype)
     model.decoder.requires_grad_(config.decoder != "frozen")
 
 
@@ -165,12 +183,12 @@ def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> C
     moving = model.anchor_set("moving") if "moving" in model.roles() else None
     n_used = 0
     if moving is not None and len(cloud.points):
-        centers = moving.positions.numpy()
+        centers = host_array(moving.positions)
         is_new = residual_rows(cloud.points, centers, mean_neighbor_distance(centers, k=3))
         _, nearest = KDTree(centers).query(cloud.points[~is_new])
         presence = np.zeros((len(centers), cloud.presence.shape[1]), bool)
         np.logical_or.at(presence, nearest, cloud.presence[~is_new])
-        moving.presence = torch.from_numpy(presence)
+        moving.presence = torch.from_numpy(presence).to(model.backend.device)
         n_used = int(presence.any(1).sum())
     chosen, presence, is_reached, reason = is_new, cloud.presence, np.ones(len(cloud.points), bool), "all of them"
     if config.residual == "none":
@@ -203,7 +221,7 @@ def _adapt(model: ClipModel, moving: AnchorSet, config: TrainConfig) -> None:
     """inherit=moving: inherited moving anchors that exist in this clip become its own, as they are; others go."""
     assert moving.presence is not None
     has_gate_in_time = config.gate not in ("off", "static")
-    is_used = moving.presence.any(1) if has_gate_in_time else torch.ones(len(moving), dtype=torch.bool)
+    is_used = moving.presence.any(1) if has_gate_in_time else torch.ones_like(moving.presence[:, 0])
     model.replace_sets({role: model.anchor_set(role) for role in model.roles() if role != "moving"})
     if is_used.any():
         model.add_set("adapted", moving.subset(is_used, is_trainable=True))
@@ -239,7 +257,7 @@ def _within_budget(cloud: MovingCloud, is_new: np.ndarray, budget: int) -> tuple
 
 def _start_like_neighbors(residual: AnchorSet, moving: AnchorSet) -> None:
     """Residual anchors begin with the look of the nearest inherited moving anchor: frozen heads know it."""
-    _, nearest = KDTree(moving.positions.numpy()).query(residual.positions.numpy())
+    _, nearest = KDTree(host_array(moving.positions)).query(host_array(residual.positions))
     rows = torch.from_numpy(nearest)
     with torch.no_grad():
         residual.features.copy_(moving.features[rows])
@@ -256,4 +274,4 @@ def remove_gate(model: ClipModel, *, in_time_only: bool = False) -> None:
     for role in model.roles():
         anchors = model.anchor_set(role)
         if anchors.is_dynamic or not in_time_only:
-            anchors.presence = torch.ones(len(anchors), model.n_frames, dtype=torch.bool)
+            anchors.presence = torch.ones(len(anchors), model.n_frames, dtype=torch.bool, device=model.backend.device)

@@ -80,10 +80,10 @@ def n_alive(model: ClipModel) -> int:
 
 
 def _alive_positions(model: ClipModel) -> Tensor:
-    """Positions of dynamic anchors that exist in some frame. [n, 3]"""
+    """Positions of dynamic anchors that exist in some frame, in main memory. [n, 3] float32"""
     parts = [torch.zeros(0, 3)]
     for role in model.roles():
         anchors = model.anchor_set(role)
         if anchors.presence is not None and len(anchors):
-            parts.append(anchors.positions[anchors.presence.any(1)])
+            parts.append(anchors.positions[anchors.presence.any(1)].float().cpu())
     return torch.cat(parts)

@@ -15,6 +15,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from engine.backends.backend import Backend
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState
@@ -27,6 +28,7 @@ from engine.gate.inside import frames_inside
 from engine.gate.regions import GateRegion
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, render_gaussians
+from engine.model.host_array import host_array
 from engine.progress import Progress, ReportProgress
 from engine.training.config import TrainConfig
 from engine.training.preparation.building import (
@@ -85,6 +87,7 @@ class ClipPreparation:
         capture: The capture at working resolution.
         clip: Frames to prepare.
         config: All numbers.
+        backend: What the model is made for and drawn with.
         camera_indices: Training cameras, in capture numbering.
         views: Of these cameras.
         base: What the clip inherits from; None for a reference clip.
@@ -102,6 +105,7 @@ class ClipPreparation:
         clip: Clip,
         config: TrainConfig,
         *,
+        backend: Backend,
         camera_indices: Sequence[int],
         views: Sequence[View],
         base: ClipState | None,
@@ -117,7 +121,7 @@ class ClipPreparation:
         self._rig = capture.rig.subset(self._camera_indices)
         self._base, self._previous, self._regions = base, previous, tuple(regions)
         self._seed, self._generator = seed, generator
-        self._prep_dir, self._report = prep_dir, report
+        self._backend, self._prep_dir, self._report = backend, prep_dir, report
         self._stages = Stages(prep_dir, clip.clip_index, self._key(), report)
 
     def read_pictures(self) -> TrainingPictures:
@@ -141,8 +145,8 @@ class ClipPreparation:
         """
         backgrounds = self._estimated()
         cloud = self._static_cloud(backgrounds, self._stages.keep)
-        gains = nn.Parameter(torch.from_numpy(cloud.gains).float())
-        model = static_model(cloud, self._clip, self._config, self._generator)
+        gains = self._gains(cloud.gains)
+        model = static_model(cloud, self._clip, self._config, self._backend, self._generator)
         self._say("Building the static cloud", f"{len(cloud.points)} static anchors, spacing {cloud.spacing:.4g}")
         return ClipParts(model, gains, backgrounds, float(cloud.spacing))
 
@@ -169,13 +173,13 @@ class ClipPreparation:
             PreparationError: It needs a static cloud of its own and no static point was found.
             ProjectError: The reference was trained with other cameras, or the field before cannot go on.
         """
-        gains = nn.Parameter(torch.from_numpy(reference.arrays["gains"].copy()), requires_grad=False)
+        gains = self._gains(reference.arrays["gains"].copy(), is_learning=False)
         if list(reference.header["camera_names"]) != list(self._rig.names):
             raise ProjectError(
                 "The training cameras differ from those of the reference clip.",
                 hint="Use the same hold-out for every clip of a project.",
             )
-        model, said = inheriting_model(reference, self._clip, self._config)
+        model, said = inheriting_model(reference, self._clip, self._config, self._backend)
         self._say("Taking over the reference", said)
         backgrounds = read_backgrounds(self._prep_dir, self._key_of_corrected())
         if backgrounds is None:
@@ -227,9 +231,13 @@ class ClipPreparation:
 
     def _keep_after(self, model: ClipModel, gains: nn.Parameter, backgrounds: Backgrounds) -> Keep:
         """Keeps what follows from a model as it is now, the gains and the backgrounds."""
-        arrays = model.own_arrays() | {"gains": gains.detach().numpy(), "backgrounds": backgrounds.images}
+        arrays = model.own_arrays() | {"gains": host_array(gains), "backgrounds": backgrounds.images}
         name = ClipState(arrays, {}).fingerprint
         return lambda piece, work: self._stages.keep(f"{name} {piece}", work)
+
+    def _gains(self, values: np.ndarray, *, is_learning: bool = True) -> nn.Parameter:
+        tensor = torch.from_numpy(values).to(self._backend.device, self._backend.dtype)
+        return nn.Parameter(tensor, requires_grad=is_learning)
 
     # ---------------------------------------------------------------- what does not move
 
@@ -269,14 +277,14 @@ class ClipPreparation:
         self, parts: ClipParts, pictures: TrainingPictures
     ) -> tuple[MovingCloud, np.ndarray, float | None]:
         """What moves, frames of each static anchor inside a hull [A], and the spacing of moving anchors."""
-        static_points = parts.model.anchor_set("static").positions.numpy()
+        static_points = host_array(parts.model.anchor_set("static").positions)
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
         masks = motion_masks(pictures, parts.backgrounds, self._report, keep)
         n_inside = np.zeros(0, np.int64)
         if self._config.gate == "images":
             inside = keep("frames inside", lambda: {"n": frames_inside(static_points, masks, self._rig)})
             n_inside = inside["n"]
-        gains = parts.gains.detach().numpy()
+        gains = host_array(parts.gains)
         voxel_size = None if self._base is None else self._base.header["moving_spacing"]
         cloud = moving_cloud(
             pictures,
@@ -335,7 +343,7 @@ class ClipPreparation:
             self._clip.n_frames,
             parts.backgrounds.images,
             self._rig,
-            parts.model.anchor_set("static").positions.numpy(),
+            host_array(parts.model.anchor_set("static").positions),
             spacing=parts.spacing,
             moving_points=cloud.points,
             presence=cloud.presence,
@@ -348,8 +356,8 @@ class ClipPreparation:
 
 def _render_static(model: ClipModel, view: View, gain: torch.Tensor) -> np.ndarray:
     """The static anchors alone, in the camera's own colours. [H, W, 3] float32 in 0..1"""
-    rows = {role: torch.zeros(0, dtype=torch.int64) for role in model.roles()}
-    rows["static"] = torch.arange(len(model.anchor_set("static")))
+    rows = {role: torch.zeros(0, dtype=torch.int64, device=model.backend.device) for role in model.roles()}
+    rows["static"] = torch.arange(len(model.anchor_set("static")), device=model.backend.device)
     with torch.no_grad():
-        image = render_gaussians(model.decode(0.0, rows), view).image[0]
-        return (image * gain).numpy()
+        image = render_gaussians(model.decode(0.0, rows), view, backend=model.backend).image[0]
+        return host_array(image * gain)

@@ -20,6 +20,7 @@ from engine.gate.image_gate import MIN_FRAMES, GateTable
 from engine.gate.reasons import INSIDE, STILL, USER_DYNAMIC, USER_STATIC
 from engine.gate.regions import GateRegion, marked
 from engine.model.clip_model import ClipModel
+from engine.model.host_array import host_array
 
 
 def nothing_measured(n_anchors: int) -> GateTable:
@@ -70,7 +71,7 @@ def decide(
         Reasons by the name under which the clip stores them, and the decision in one line.
     """
     static = model.anchor_set("static")
-    table = with_regions(table, static.positions.numpy(), regions)
+    table = with_regions(table, host_array(static.positions), regions)
     reasons = {"gate.static": table.reasons}
     if not is_source or static.is_trainable:  # otherwise the inherited set keeps its rows, of which some are hidden
         role = "replacing" if is_source else "promoted"

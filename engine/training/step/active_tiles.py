@@ -11,16 +11,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 from torch import Tensor
 
+from engine.backends.backend import Backend
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, render_gaussians
-from engine.model.decode.joining import join_frozen
+from engine.model.joining import join_frozen
 from engine.raster import TileBoxes, tile_boxes
 from engine.raster.gaussians import Gaussians
-from engine.training.step.tile_squares import tile_squares
 
 MAX_BYTES = 1 << 30
 """Memory for what is kept of cameras; those beyond it are drawn with all tiles. 27 cameras of 640 x 360: 100 MB."""
@@ -41,7 +40,7 @@ class ActivePicture:
     gaussians: Gaussians
     learning: Gaussians
     n_all: int
-    tile_mask: np.ndarray | None = None
+    tile_mask: Tensor | None = None
     rest: Tensor | None = None
 
 
@@ -57,7 +56,7 @@ class _FrozenView:
     """
 
     picture: Tensor
-    rows: np.ndarray
+    rows: Tensor
     boxes: TileBoxes
     n_seen: int
 
@@ -71,15 +70,16 @@ class ActiveTiles:
 
     Args:
         model: A clip in which one set is constant; see `applies`.
+        backend: What it is trained with.
         max_bytes: Memory for what is kept.
     """
 
-    def __init__(self, model: ClipModel, *, max_bytes: int = MAX_BYTES) -> None:
-        self._model = model
+    def __init__(self, model: ClipModel, *, backend: Backend, max_bytes: int = MAX_BYTES) -> None:
+        self._model, self._backend = model, backend
         self._constant = [role for role in model.roles() if model.is_constant(role)]
         self._max_bytes = max_bytes
         self._views: dict[int, _FrozenView] = {}
-        self._squares: dict[int, np.ndarray] = {}
+        self._squares: dict[int, Tensor] = {}
         self.n_bytes = 0
         self._is_full = False
 
@@ -100,14 +100,14 @@ class ActiveTiles:
             gaussians = self._model.decode(clip_time, rows)
             is_learning = slice(len(rows[role]) * self._model.decoder.gaussians_per_anchor, None)
             return ActivePicture(gaussians, gaussians[is_learning], len(gaussians))
-        nothing = torch.zeros(0, dtype=torch.int64)
+        nothing = rows[role][:0]
         learning = self._model.decode(clip_time, rows | {role: nothing})
-        mask = _boxes(learning, view).mask()
+        mask = self._boxes(learning, view).mask()
         chosen = frozen_view.boxes.meeting(mask, frozen_view.rows)
-        gaussians = join_frozen(self._model.constant_gaussians(role), chosen, learning)
+        gaussians = join_frozen(self._model.constant_gaussians(role), chosen, learning, backend=self._backend)
         return ActivePicture(gaussians, learning, frozen_view.n_seen + len(learning), mask, frozen_view.picture)
 
-    def square_outside(self, picture: ActivePicture, item: int, truth: np.ndarray, gain: Tensor) -> float:
+    def square_outside(self, picture: ActivePicture, item: int, truth: Tensor, gain: Tensor) -> float:
         """Mean square that tiles which are not active add to that of the whole picture.
 
         Args:
@@ -118,23 +118,21 @@ class ActiveTiles:
         if picture.tile_mask is None or picture.rest is None:
             return 0.0
         if item not in self._squares:
-            pixels = np.ascontiguousarray(truth)
-            self._squares[item] = tile_squares(picture.rest.numpy(), pixels, gain.detach().numpy())
-        return float(self._squares[item][~picture.tile_mask].sum()) / truth.size
+            self._squares[item] = self._backend.tile_squares(picture.rest, truth, gain.detach())
+        return float(self._squares[item][~picture.tile_mask].sum()) / truth.numel()
 
     def _frozen_view(self, camera_row: int, view: View, rows: dict[str, Tensor]) -> _FrozenView | None:
         known = self._views.get(camera_row)
         if known is None and not self._is_full:
             (role,) = self._constant
             k = self._model.decoder.gaussians_per_anchor
-            seen = (rows[role][:, None] * k + torch.arange(k)).reshape(-1)
+            seen = (rows[role][:, None] * k + torch.arange(k, device=rows[role].device)).reshape(-1)
             with torch.no_grad():
                 gaussians = self._model.constant_gaussians(role)[seen]
-                picture = render_gaussians(gaussians, view).image[0]
-            boxes = _boxes(gaussians, view)
+                picture = render_gaussians(gaussians, view, backend=self._backend).image[0]
+            boxes = self._boxes(gaussians, view)
             drawn = boxes.drawn()
-            kept = TileBoxes(boxes.packed[drawn], boxes.shape)
-            known = _FrozenView(picture, seen.numpy()[drawn], kept, len(seen))
+            known = _FrozenView(picture, seen[drawn], boxes[drawn], len(seen))
             self._is_full = self.n_bytes + known.n_bytes > self._max_bytes
             if self._is_full:
                 return None
@@ -142,6 +140,6 @@ class ActiveTiles:
             self._views[camera_row] = known
         return known
 
-
-def _boxes(gaussians: Gaussians, view: View) -> TileBoxes:
-    return tile_boxes(gaussians, view.world_to_camera, view.K, view.width, view.height, near_plane=view.near_plane)
+    def _boxes(self, gaussians: Gaussians, view: View) -> TileBoxes:
+        pose, K, size = view.world_to_camera, view.K, (view.width, view.height)
+        return tile_boxes(gaussians, pose, K, *size, backend=self._backend, near_plane=view.near_plane)

@@ -15,11 +15,12 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 
+from engine.backends.backend import Backend
 from engine.clip_files.clip_state import ClipState
 from engine.gate.reasons import LEARNED_NOTHING
 from engine.model.clip_model import ClipModel, inherit, load_clip_model
 from engine.model.clip_view import View, render_model
-from engine.model.decode.decoding import ChosenAnchors, decode_anchors
+from engine.model.decoding import ChosenAnchors, decode_anchors
 from engine.raster.gaussians import Gaussians
 
 MIN_OPACITY = 1.0 / 255.0
@@ -33,7 +34,7 @@ _ANGLE_TOLERANCE = 1e-5  # 1 - |cosine| of half the angle: half a degree
 
 
 def demote(
-    state: ClipState, reference: ClipState | None, views: Sequence[View], *, reach: float
+    state: ClipState, reference: ClipState | None, views: Sequence[View], *, backend: Backend, reach: float
 ) -> tuple[ClipState, str]:
     """Leave out what a trained clip does not need; says what.
 
@@ -41,20 +42,21 @@ def demote(
         state: As trained; its arrays stay as they are.
         reference: What it inherits from; None for a clip that inherits nothing.
         views: Training cameras, of which at most N_CAMERAS are looked through.
+        backend: What decodes and draws.
         reach: Of the anchors' Gaussians, scene units, for culling.
     """
-    model = load_clip_model(state, reference)
+    model = load_clip_model(state, reference, backend=backend)
     times = [half / (2 * model.clip_length) for half in range(2 * model.n_frames - 1)]
     with torch.no_grad():
         arrays, n_dropped, n_cleared = _without_unseen(dict(state.arrays), model, times)
         seen = ClipState(arrays, state.header)
-        model = load_clip_model(seen, reference)
+        model = load_clip_model(seen, reference, backend=backend)
         arrays, n_still = _without_unchanging(dict(arrays), model, reference, times)
     said = f"{n_dropped} own anchors are never visible and go, {n_cleared} inherited ones rest in this clip"
     if not n_still:
         return seen, f"{said}; 0 learned no change"
     still = ClipState(arrays, state.header)
-    change = _largest_change(model, load_clip_model(still, reference), views, reach=reach)
+    change = _largest_change(model, load_clip_model(still, reference, backend=backend), views, reach=reach)
     if not change <= MAX_CHANGE:
         return seen, f"{said}; {n_still} learned little, but pixels would change by {255 * change:.2g} levels"
     return still, f"{said}; {n_still} learned no change and are static, pixels change by {255 * change:.2g} levels"
@@ -104,7 +106,7 @@ def _without_unchanging(
     replaced = np.array([index[position.tobytes()] for position in own.positions.numpy()], dtype=np.int64)
     static_set = inherit(reference, {})[0]["static"]
     chosen = ChosenAnchors(anchors=static_set, rows=torch.from_numpy(replaced))
-    static = decode_anchors([chosen], model.decoder, None, [(0, 1.0)])
+    static = decode_anchors([chosen], model.decoder, None, [(0, 1.0)], backend=model.backend)
     is_still = _looks_like(model, "replacing", times, static)
     if is_still.any():
         arrays["inherited.static.is_hidden"] = is_hidden.copy()
@@ -122,7 +124,7 @@ def _become_static(arrays: dict[str, np.ndarray], model: ClipModel, role: str, t
     if static is None or static.is_dynamic or anchors.presence is None:
         return 0
     everything = ChosenAnchors(anchors=anchors, rows=torch.arange(len(anchors)))
-    without = decode_anchors([everything], model.decoder, None, [(0, 1.0)])
+    without = decode_anchors([everything], model.decoder, None, [(0, 1.0)], backend=model.backend)
     is_still = _looks_like(model, role, times, without) & anchors.presence.all(dim=1).numpy()
     if is_still.any():
         n_static = len(arrays["sets.static.positions"])

@@ -13,7 +13,6 @@ import numpy as np
 
 from engine.camera.rig import CameraRig
 from engine.images.image_filters import block_mean
-from engine.training.step.fused_loss import LossWorkspace
 from engine.training.step.visible_anchors import camera_views
 
 
@@ -26,15 +25,12 @@ class HalfSize:
 
     Attributes:
         views: Of all cameras.
-        workspace: Scratch of the loss at this size.
     """
 
     def __init__(self, rig: CameraRig, *, near_plane: float) -> None:
         even = replace(rig, image_sizes=rig.image_sizes // 2 * 2)
         half = even.resized(even.image_sizes // 2)
-        width, height = (int(side) for side in half.image_sizes[0])
         self.views = camera_views(half, near_plane=near_plane)
-        self.workspace = LossWorkspace(height, width)
         self._truths: dict[int, tuple[np.ndarray, np.ndarray | None]] = {}
 
     def truth(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import torch
 from torch import Tensor
 
@@ -34,6 +33,7 @@ class Sight:
     def __init__(self, model: ClipModel, views: Sequence[View], *, reach: float) -> None:
         self._model, self._views, self._reach = model, list(views), reach
         self._seen: dict[tuple[str, int], Tensor] = {}  # rows of static sets, flags of dynamic ones
+        self._present: dict[str, Tensor] = {}  # of dynamic sets, a row a frame; [M, A]
 
     def rows(self, camera_row: int, clip_time: float) -> dict[str, Tensor]:
         """Rows of every set that a camera can see and that exist at this time. [n] int64 each"""
@@ -45,9 +45,9 @@ class Sight:
                 self._seen[key] = is_seen if anchors.is_dynamic else is_seen.nonzero()[:, 0]
             rows[role] = self._seen[key]
             if anchors.presence is not None:
-                is_seen = np.zeros(len(anchors), bool)  # by numpy: torch would wake its threads for it
-                for knot, _ in self._model.knots(clip_time):
-                    is_seen |= anchors.presence.numpy()[:, knot]
-                is_seen &= self._seen[key].numpy()
-                rows[role] = torch.from_numpy(is_seen.nonzero()[0])
+                if role not in self._present:
+                    self._present[role] = anchors.presence.T.contiguous()
+                frames = [self._present[role][knot] for knot, _ in self._model.knots(clip_time)]
+                is_present = frames[0] if len(frames) == 1 else torch.logical_or(*frames)
+                rows[role] = (is_present & self._seen[key]).nonzero()[:, 0]
         return rows

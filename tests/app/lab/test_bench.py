@@ -32,11 +32,11 @@ from app.lab.bench.step_errors import measure_errors, middle
 from app.lab.bench.suite import FULL, QUICK, Plan, document
 from app.lab.bench.table import report_text
 from app.lab.bench.timing import Timing, interleaved, peak_extra_mb
-from engine.model.decode import decoding
+from engine.backends.cpu.step.adam import FusedAdam
+from engine.model import decoding
 from engine.raster import Rendering
 from engine.raster.rasterize import BACKENDS as RASTERIZERS
 from engine.training.optimizer import adam
-from engine.training.optimizer.adam import FusedAdam
 from engine.training.step import losses
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -21,17 +21,17 @@ from tests.guarded_memory import SEGMENTATION_FAULT, GuardedMemory, run_child
 Say = Callable[[str], None]
 MODULES = (
     "engine.kernels.arrays",
-    "engine.model.decode.cpu.backend",
-    "engine.model.decode.cpu.layout",
-    "engine.model.decode.joining",
-    "engine.raster.cpu.backend",
-    "engine.raster.cpu.binning",
-    "engine.raster.cpu.camera_row",
-    "engine.raster.cpu.tile_boxes",
-    "engine.training.optimizer.adam",
-    "engine.training.step.fused_loss",
+    "engine.backends.cpu.decode.decode",
+    "engine.backends.cpu.decode.layout",
+    "engine.backends.cpu.decode.joining",
+    "engine.backends.cpu.raster.rasterize",
+    "engine.backends.cpu.raster.binning",
+    "engine.backends.cpu.raster.camera_row",
+    "engine.backends.cpu.raster.tile_boxes",
+    "engine.backends.cpu.step.adam",
+    "engine.backends.cpu.step.fused_loss",
     "engine.training.step.losses",
-    "engine.training.step.tile_squares",
+    "engine.backends.cpu.step.tile_squares",
 )
 """Modules that make arrays for kernels."""
 FUNCTIONS = ("camera_row", "mask_sums", "_bands")
@@ -42,8 +42,8 @@ def rasterize_cases(memory: GuardedMemory) -> Iterator[str]:
     """Forward and backward, masks, frozen rows, depth, and without gradients."""
     import torch
 
+    from engine.backends.cpu.raster import rasterize as backend
     from engine.raster import Gaussians, rasterize, tile_boxes
-    from engine.raster.cpu import backend
     from tests.raster_scenes import layered_scene
 
     sizes = ((0, 40, 33), (1, 1, 1), (15, 31, 65), (16, 64, 32), (17, 33, 5), (161, 70, 50))
@@ -81,7 +81,7 @@ def decode_cases(memory: GuardedMemory) -> Iterator[str]:
     """Forward and backward of three sets with a field, one set decoded before, one knot and two."""
     import torch
 
-    from engine.model.decode.decoding import ChosenAnchors, decode_anchors
+    from engine.model.decoding import ChosenAnchors, decode_anchors
     from engine.raster import Gaussians
     from tests.decode_scenes import ODD, PRESET, SINGLE, Scene
 
@@ -126,7 +126,7 @@ def join_cases(memory: GuardedMemory) -> Iterator[str]:
     """Chosen rows of frozen Gaussians in front of learning ones."""
     import torch
 
-    from engine.model.decode.joining import join_frozen
+    from engine.backends.cpu.decode.joining import join_frozen
     from engine.raster import Gaussians
 
     def some(n: int) -> Gaussians:
@@ -144,9 +144,9 @@ def loss_cases(memory: GuardedMemory) -> Iterator[str]:
     """Value and gradients with every argument in every combination; squares of tiles."""
     import torch
 
-    from engine.training.step import fused_loss
+    from engine.backends.cpu.step import fused_loss
+    from engine.backends.cpu.step.tile_squares import tile_squares
     from engine.training.step.losses import photometric_loss
-    from engine.training.step.tile_squares import tile_squares
 
     # without its slack for alignment, which would hide a stray access: the rows are whole cache lines
     fused_loss._aligned_zeros = lambda shape: memory.bytes(4 * int(np.prod(shape))).view(np.float32).reshape(shape)
@@ -178,7 +178,7 @@ def adam_cases(memory: GuardedMemory) -> Iterator[str]:
     """Sizes around the edges of blocks and chunks."""
     import torch
 
-    from engine.training.optimizer.adam import make_adam
+    from engine.backends.cpu.step.adam import make_adam
 
     sizes = (1, 63, 64, 65, (1 << 14) - 1, (1 << 14) + 1, 40_000)
     yield f"Adam of {sizes}"
@@ -193,8 +193,8 @@ def adam_cases(memory: GuardedMemory) -> Iterator[str]:
 
 
 def _run_beside_forbidden_pages(say: Say) -> None:
+    from engine.backends.cpu.decode import decode as backend
     from engine.kernels.compile_ahead import warm_up_all
-    from engine.model.decode.cpu import backend
 
     warm_up_all()
     for is_behind in (True, False):

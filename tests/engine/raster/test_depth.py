@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
+from engine.backends.cpu.raster import rasterize as cpu_backend
 from engine.raster import Gaussians, Rendering, rasterize
-from engine.raster.cpu import backend as cpu_backend
 from engine.raster.rasterize import BackendName
 from tests.raster_scenes import Scene, gaussians_of, gradients, layered_scene, simple_scene
 

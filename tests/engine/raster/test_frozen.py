@@ -7,8 +7,8 @@ import dataclasses
 import pytest
 import torch
 
+from engine.backends.cpu.raster import blend_backward
 from engine.raster import Gaussians, Rendering, rasterize
-from engine.raster.cpu import blend_backward
 from engine.raster.rasterize import BackendName
 from tests.raster_scenes import Scene, gradient, gradients, layered_scene
 

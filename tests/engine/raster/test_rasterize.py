@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import torch
 
+from engine.backends.cpu.raster import rasterize as cpu_backend
 from engine.raster import Gaussians, Rendering, rasterize
-from engine.raster.cpu import backend as cpu_backend
 from engine.raster.rasterize import BackendName
 from tests.raster_scenes import Scene, camera, gradient, gradients, layered_scene, simple_scene
 

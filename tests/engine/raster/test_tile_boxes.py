@@ -8,7 +8,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import engine.raster.cpu.tile_boxes as kernels
+import engine.backends.cpu.raster.tile_boxes as kernels
 from engine.raster import TILE_PX, Gaussians, TileBoxes, rasterize, tile_boxes
 from engine.raster.pinhole_view import n_tiles
 from tests.raster_scenes import Scene, layered_scene

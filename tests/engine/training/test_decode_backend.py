@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from engine.model.decode import decoding
 
 from engine.errors import ProjectError
-from engine.model.decode import decoding
 from engine.training.config import TrainConfig
 
 SETTINGS = {"gate": "off", "tiles": "all"}

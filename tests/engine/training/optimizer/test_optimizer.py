@@ -8,9 +8,9 @@ import pytest
 import torch
 from torch import nn
 
+from engine.backends.cpu.step.adam import make_adam
 from engine.errors import NonFiniteLoss
 from engine.training.config import TrainConfig
-from engine.training.optimizer.adam import make_adam
 from engine.training.optimizer.optimizer import PhaseOptimizer
 
 SHAPES = {"one": (1,), "row": (63,), "block": (4, 16), "odd": (5, 1000, 7), "table": (2, 10_000, 4)}

@@ -10,7 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from skimage.metrics import structural_similarity
 
-from engine.training.step.fused_loss import TILE_PX, LossWorkspace, tile_grid
+from engine.backends.cpu.step.fused_loss import TILE_PX, LossWorkspace, tile_grid
 from engine.training.step.losses import PhotometricLoss, photometric_loss, ssim_map
 
 SIZES = [(1, 1), (1, 40), (40, 1), (3, 40), (37, 50), (100, 70), (70, 700)]

@@ -1,0 +1,1 @@
+"""The default back end: numba kernels for float32 in main memory."""

@@ -1,0 +1,117 @@
+"""CpuBackend: the compiled kernels, behind the operations of a back end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import torch
+from torch import Tensor
+
+from engine.backends.backend import PhotometricLoss
+from engine.backends.cpu.decode.decode import decode_cpu
+from engine.backends.cpu.decode.joining import join_cpu
+from engine.backends.cpu.raster.rasterize import rasterize_cpu
+from engine.backends.cpu.raster.tile_boxes import CpuTileBoxes, tile_boxes_cpu
+from engine.backends.cpu.step.adam import CpuAdam
+from engine.backends.cpu.step.photometric import photometric_loss_cpu
+from engine.backends.cpu.step.tile_squares import tile_squares_cpu
+from engine.backends.cpu.step.volume import volume_sum_cpu
+from engine.model.decoder import Decoder
+from engine.model.field import SpatioTemporalField
+from engine.raster.gaussians import Gaussians
+from engine.raster.pinhole_view import PinholeView
+from engine.raster.rendering import Rendering
+
+if TYPE_CHECKING:
+    from engine.model.decoding import ChosenAnchors
+
+
+class CpuBackend:
+    """float32 in main memory. See engine.backends.backend.Backend."""
+
+    name = "cpu"
+    device = torch.device("cpu")
+    dtype = torch.float32
+
+    def rasterize(
+        self,
+        gaussians: Gaussians,
+        views: list[PinholeView],
+        background: Tensor,
+        *,
+        tile_mask: Tensor | None,
+        want_means2d: bool,
+        want_depth: bool,
+    ) -> Rendering:
+        """See Backend."""
+        _require_float32("means", gaussians.means)
+        return rasterize_cpu(
+            gaussians, views, background, tile_mask=tile_mask, want_means2d=want_means2d, want_depth=want_depth
+        )
+
+    def tile_boxes(self, gaussians: Gaussians, view: PinholeView) -> CpuTileBoxes:
+        """See Backend."""
+        _require_float32("means", gaussians.means)
+        return tile_boxes_cpu(gaussians, view)
+
+    def decode(
+        self,
+        chosen: Sequence[ChosenAnchors],
+        decoder: Decoder,
+        field: SpatioTemporalField | None,
+        knots: Sequence[tuple[int, float]],
+    ) -> Gaussians:
+        """See Backend. Without gradient for positions and colour logits, which never learn."""
+        return decode_cpu(chosen, decoder, field, knots)
+
+    def join(self, frozen: Gaussians, rows: Tensor, learning: Gaussians) -> Gaussians:
+        """See Backend."""
+        return join_cpu(frozen, rows, learning)
+
+    def photometric_loss(
+        self,
+        image: Tensor,
+        truth: Tensor,
+        *,
+        ssim_weight: float,
+        gain: Tensor | None,
+        is_counted: Tensor | None,
+        tile_mask: Tensor | None,
+        rest: Tensor | None,
+    ) -> PhotometricLoss:
+        """See Backend."""
+        _require_float32("image", image)
+        return photometric_loss_cpu(
+            image,
+            truth,
+            ssim_weight=ssim_weight,
+            gain=gain,
+            is_counted=is_counted,
+            tile_mask=tile_mask,
+            rest=rest,
+        )
+
+    def tile_squares(self, image: Tensor, truth: Tensor, gain: Tensor) -> Tensor:
+        """See Backend."""
+        _require_float32("image", image)
+        return tile_squares_cpu(image, truth, gain)
+
+    def volume_sum(self, scales: Tensor, unit: float) -> Tensor:
+        """See Backend."""
+        return volume_sum_cpu(scales, unit)
+
+    def adam(self, parameters: Mapping[str, Tensor]) -> CpuAdam:
+        """See Backend.
+
+        Raises:
+            TypeError: A parameter is not contiguous float32 on the cpu.
+        """
+        return CpuAdam(parameters)
+
+
+def _require_float32(name: str, tensor: Tensor) -> None:
+    if tensor.dtype != torch.float32 or tensor.device.type != "cpu":
+        raise TypeError(
+            f"back end 'cpu' needs float32 tensors on the cpu, got {name} {tensor.dtype} on {tensor.device}"
+        )

@@ -1,0 +1,1 @@
+"""The fused decode: from the grid to Gaussians in blocks of 64 anchors."""
