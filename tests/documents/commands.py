@@ -28,7 +28,7 @@ def _section(parser: argparse.ArgumentParser) -> str:
 
 
 def _name(action: argparse.Action) -> str:
-    """An argument as it is written: an option with its value, or a place in capitals, bracketed if it may be left out."""
+    """An argument as it is written: an option and its value, or a place in capitals, bracketed if optional."""
     if not action.option_strings:
         name = str(action.metavar or action.dest).upper()
         return name if action.required else f"[{name}]"
