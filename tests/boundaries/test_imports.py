@@ -57,6 +57,12 @@ def test_import_contracts_hold() -> None:
         ("app/seeded.py", "import moderngl", "app and engine know no window"),
         ("engine/seeded.py", "from pyglet import window", "app and engine know no window"),
         ("ui/seeded.py", "import torch", "ui imports no torch"),
+        ("engine/capture/seeded.py", "import engine.training.config", "Layers of engine:"),
+        ("app/project/seeded.py", "import app.session.session", "Layers of app:"),
+        ("app/session/seeded.py", "import app.lab.report.tables", "Layers of app:"),
+        ("ui/gl/seeded.py", "import ui.panels.state", "Layers of ui:"),
+        ("engine/cloud/background/seeded.py", "import engine.cloud.stereo.sweep", "Layers of engine.cloud:"),
+        ("engine/training/step/seeded.py", "import engine.training.preparation.stages", "Layers of engine.training:"),
     ],
 )
 def test_contracts_refuse_a_seeded_bad_import(

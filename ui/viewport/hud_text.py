@@ -9,7 +9,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
 from app.status import WantedFrame
-from ui.panels.widgets import format_count
+from ui.style.numbers import format_count
 from ui.viewport.picture_rate import ShownRate
 
 RENDERED, CLOUD, FIRST_CLOUD, HINT, CAPTURED, MARKS = (

@@ -7,7 +7,7 @@ import itertools
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui.panels.widgets import format_count
+from ui.style.numbers import format_count
 from ui.style.axis import ticks_that_fit, whole_ticks
 
 
