@@ -7,6 +7,7 @@ from typing import Any
 
 import torch
 
+from engine.backends.table import backend_called
 from engine.model.anchors import AnchorSet
 from engine.model.decoder import Decoder
 from engine.model.decoding import ChosenAnchors, decode_anchors
@@ -97,7 +98,7 @@ class Scene:
             )
             for role, anchors in self.sets.items()
         ]
-        return decode_anchors(chosen, self.decoder, self.field, knots, backend=backend)
+        return decode_anchors(chosen, self.decoder, self.field, knots, backend=backend_called(backend))
 
 
 def backward(gaussians: Gaussians) -> None:

@@ -27,12 +27,12 @@ from torchmetrics.functional.image import multiscale_structural_similarity_index
 
 from app.background.kernels import use_threads
 from engine.assets import asset_path
+from engine.backends.reference.loss import ssim_map
 from engine.capture.capture import open_capture
 from engine.images.psnr import psnr
 from engine.metrics.pictures.flip import flip_map
 from engine.metrics.pictures.picture import CHOICES, measure_picture
 from engine.metrics.pictures.similarity import dssim_ms, ssim
-from engine.training.step.losses import ssim_map
 
 
 class Compared(NamedTuple):

@@ -22,6 +22,7 @@ import numpy as np
 import torch
 from PIL import Image
 
+from engine.backends.table import backend_called
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips
 from engine.clip_files.clip_state import ClipState
@@ -75,6 +76,7 @@ def train(
         seed=0,
         prep_dir=prep_dir,
         report=report,
+        backend=backend_called("cpu"),
     )
     training.prepare()
     preparation_s = time.perf_counter() - started
@@ -107,7 +109,7 @@ def write_pictures(
     folder: Path, capture: Capture, clip: Clip, state: ClipState, reference: ClipState, cameras: list[int]
 ) -> None:
     """Truth, render and four times the error, one row per camera."""
-    model = load_clip_model(state, reference)
+    model = load_clip_model(state, reference, backend=backend_called("cpu"))
     frame = clip.start + clip.n_frames // 2
     reach = REACH_SPACINGS * reference.header["spacing"]
     rows = []
@@ -132,7 +134,7 @@ def new_object_psnr(
     is_sample = capture.rig.names == scene.rig.names and np.allclose(capture.rig.Ks, scene.rig.Ks)
     if not is_sample or clip.clip_index == 0:
         return None
-    model = load_clip_model(state, reference)
+    model = load_clip_model(state, reference, backend=backend_called("cpu"))
     values = []
     for camera in cameras:
         view = _view(capture, camera, reference)
@@ -185,7 +187,7 @@ def main() -> None:
             rows = evaluate_clip(
                 capture,
                 clip,
-                load_clip_model(state, reference),
+                load_clip_model(state, reference, backend=backend_called("cpu")),
                 reference=reference,
                 cameras=holdout,
                 holdout=holdout,

@@ -25,8 +25,12 @@ from app.background.kernels import use_threads
 from app.lab.ablation.variants import variant_called
 from app.lab.bench.timing import Timing, interleaved
 from engine.assets import asset_path
+from engine.backends.cpu.backend import CpuBackend
+from engine.backends.reference.decode import decode_reference
+from engine.backends.table import backend_called
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips
+from engine.raster.gaussians import Gaussians
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from tests.benchmarks.options import ending_on_bad_input
@@ -46,6 +50,16 @@ REFERENCE_STEPS: dict[str, Any] = {"static_steps": 150, "joint_steps": 150}
 N_WARM = 5
 
 
+class DecodeInTorch(CpuBackend):
+    """The kernels, but the decode in plain torch."""
+
+    def decode(self, *arguments: Any, **options: Any) -> Gaussians:
+        return decode_reference(*arguments, **options)
+
+
+IN_TORCH_BACKEND = DecodeInTorch()
+
+
 @dataclass(frozen=True, slots=True)
 class Part:
     """One scheme: its step, and the number of Gaussians in the last one."""
@@ -62,6 +76,7 @@ def make_source(capture: Capture, clips: list[Clip], holdout: list[int], overrid
             ClipTraining,
             capture,
             config=TrainConfig(**(overrides | REFERENCE_STEPS)),
+            backend=backend_called(),
             holdout=holdout,
             seed=0,
             prep_dir=Path(folder),
@@ -89,7 +104,7 @@ def measure(capture: Capture, *, holdout: list[int], clip_length: int, n_runs: i
 
     def step(name: str) -> tuple[float]:
         source = sources[SCHEMES[name]]
-        source.model.decode_backend = "reference" if name == IN_TORCH else "auto"
+        source.model.backend = IN_TORCH_BACKEND if name == IN_TORCH else source.backend
         started = time.perf_counter()
         n_gaussians[name] = source.step().n_gaussians
         return ((time.perf_counter() - started) * 1e3,)

@@ -21,6 +21,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from engine.backends.table import backend_called
 from engine.conventions import SPIN_COUNT
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -58,7 +59,7 @@ def measure_here(seconds: float) -> list[float]:
     while time.perf_counter() < until_s:
         started_s = time.perf_counter()
         hidden = torch.relu(features @ weights[0]) @ weights[1]
-        image = rasterize(leaves, *scene.arguments, backend="cpu").image
+        image = rasterize(leaves, *scene.arguments, backend=backend_called("cpu")).image
         image.backward(image.detach() + float(hidden[0, 0]) * 1e-9)
         for tensor in leaves.tensors():
             tensor.grad = None

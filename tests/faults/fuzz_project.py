@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from engine.backends.table import backend_called
 from tests.faults.mutate import damaged_bytes, damaged_json, put_odd_file
 from tests.faults.tally import Case, Outcome, fuzz_main, judge, start_memory, take_outside, watch_files
 
@@ -147,7 +148,7 @@ def _read_clip(project: Path, path: Path) -> Any:
     look_at_clip(path)
     state = read_clip_state(path)
     reference = None if state.is_reference else read_clip_state(project / "clips" / "0000.safetensors")
-    load_clip_model(state, reference)
+    load_clip_model(state, reference, backend=backend_called("cpu"))
     return state
 
 

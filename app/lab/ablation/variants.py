@@ -133,12 +133,6 @@ VARIANTS = (
         )
         for name, words, changed, reference_of in (
             ("published", "every anchor at every time, all tiles", {"gate": "off", "tiles": "all"}, ""),
-            (
-                "published-torch",
-                "every anchor at every time, all tiles, decode in plain torch",
-                {"gate": "off", "tiles": "all", "decode_backend": "reference"},
-                "published",
-            ),
             ("published-static", "static anchors decoded once", {"gate": "static", "tiles": "all"}, ""),
             ("published-gate", "moving anchors only where they can be", {"tiles": "all"}, ""),
             ("published-tiles", "gate, and only active tiles", {}, "published-gate"),

@@ -14,6 +14,7 @@ from app.lab.bench.raster import relative_errors
 from app.lab.bench.rows import SpeedError, StepErrors
 from app.lab.bench.step import StepRun, Window
 from app.lab.bench.timing import interleaved
+from engine.backends.backend import Backend
 
 WINDOW_PX = 64, 48
 """Width and height of the part that is compared; smaller pictures are compared whole."""
@@ -22,12 +23,13 @@ N_UPDATES = 3
 """Steps of Adam that are compared: the first one alone would not show what it remembers."""
 
 
-def measure_errors(recipe: ClipRecipe, *, scene: str) -> tuple[StepErrors, dict[str, SpeedError]]:
+def measure_errors(recipe: ClipRecipe, *, scene: str, fast: Backend = FAST) -> tuple[StepErrors, dict[str, SpeedError]]:
     """One size and kind.
 
     Args:
         recipe: Of the step that is timed.
         scene: Name for the chart.
+        fast: What is compared with the slow truth.
     Returns:
         Errors of the fast path, and the marks of the chart: "cpu" and, for plain torch in float32, "reference".
     """
@@ -36,7 +38,9 @@ def measure_errors(recipe: ClipRecipe, *, scene: str) -> tuple[StepErrors, dict[
     if (window.width, window.height) == (recipe.width, recipe.height):
         checked_at = f"{recipe.width}x{recipe.height}"
     truth = StepRun(recipe, backend=EXACT, window=window).kept()
-    runs = {name: StepRun(recipe, backend=backend, window=window) for name, backend in COMPARED.items()}
+    runs = {
+        name: StepRun(recipe, backend=backend, window=window) for name, backend in (COMPARED | {"cpu": fast}).items()
+    }
     first = {backend: run.kept() for backend, run in runs.items()}  # parameters still are those of the truth
     timings = interleaved({backend: run.whole for backend, run in runs.items()}, N_CHECK_RUNS, n_warm=0)
     marks = {}
@@ -57,7 +61,7 @@ def measure_errors(recipe: ClipRecipe, *, scene: str) -> tuple[StepErrors, dict[
         loss_error=abs(first["cpu"].loss - truth.loss) / abs(truth.loss),
         gradient_error=marks["cpu"].gradient_error,
         worst_gradient=max(by_name, key=by_name.__getitem__),
-        update_error=_update_error(recipe, window),
+        update_error=_update_error(recipe, window, fast),
     )
     return errors, marks
 
@@ -73,13 +77,13 @@ def _by_name(actual: dict[str, Tensor], expected: dict[str, Tensor]) -> dict[str
     return {name: relative_errors([actual[name]], [truth]) for name, truth in expected.items() if truth.norm() > 0}
 
 
-def _update_error(recipe: ClipRecipe, window: Window) -> float:
+def _update_error(recipe: ClipRecipe, window: Window, fast: Backend) -> float:
     """Adam of the fast path beside float64 given the very same gradients.
 
     From gradients of its own float64 would differ without meaning: the first step of Adam is the sign of a gradient,
     and there are entries whose gradient is all rounding.
     """
-    run, exact = StepRun(recipe, backend=FAST, window=window), StepRun(recipe, backend=EXACT, window=window)
+    run, exact = StepRun(recipe, backend=fast, window=window), StepRun(recipe, backend=EXACT, window=window)
     worst = 0.0
     for _ in range(N_UPDATES):
         outcome = run.kept()

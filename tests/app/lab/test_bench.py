@@ -6,6 +6,7 @@ import json
 import math
 import subprocess
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from app.lab.bench import chart, raster, suite
 from app.lab.bench.chart import draw_speed_error
 from app.lab.bench.clips import ClipRecipe
 from app.lab.bench.command import CHART_FILE, DEFAULT_OUT
+from app.lab.bench.compared import EXACT
 from app.lab.bench.field import SCENES, DecodeScene, measure_decode
 from app.lab.bench.fma_limit import measure_fma_limit
 from app.lab.bench.iteration import SIZES, measure_iteration
@@ -27,17 +29,15 @@ from app.lab.bench.machine import describe_machine
 from app.lab.bench.raster import evaluated_pairs, limit_shares, measure_raster
 from app.lab.bench.rows import SpeedError
 from app.lab.bench.scenes import RECIPES, Recipe
-from app.lab.bench.step import EXACT, STAGES, StepRun, Window
+from app.lab.bench.step import STAGES, StepRun, Window
 from app.lab.bench.step_errors import measure_errors, middle
 from app.lab.bench.suite import FULL, QUICK, Plan, document
 from app.lab.bench.table import report_text
 from app.lab.bench.timing import Timing, interleaved, peak_extra_mb
-from engine.backends.cpu.step.adam import FusedAdam
-from engine.model import decoding
-from engine.raster import Rendering
-from engine.raster.rasterize import BACKENDS as RASTERIZERS
-from engine.training.optimizer import adam
-from engine.training.step import losses
+from engine.backends.backend import PhotometricLoss
+from engine.backends.cpu.backend import CpuBackend
+from engine.backends.cpu.step.adam import CpuAdam
+from engine.raster import Gaussians, Rendering
 
 ROOT = Path(__file__).resolve().parents[3]
 TINY = Recipe(100, 32, 24, 3.0)
@@ -186,7 +186,7 @@ def test_the_steps_row_has_speed_and_error(is_source):
 
 def test_a_step_in_a_window_draws_that_part_of_the_picture():
     window = Window(8, 5, 16, 12)
-    whole, part = StepRun(TINY_CLIP, path=EXACT).kept(), StepRun(TINY_CLIP, path=EXACT, window=window).kept()
+    whole, part = StepRun(TINY_CLIP, backend=EXACT).kept(), StepRun(TINY_CLIP, backend=EXACT, window=window).kept()
     expected, shifted = whole.image[5:17, 8:24], whole.image[6:18, 8:24]
     assert (part.image - expected).abs().mean() < 0.005  # not zero: footprints beyond a border are held at its slope
     assert (part.image - shifted).abs().mean() > 0.01
@@ -211,35 +211,51 @@ def skewed(tensor: torch.Tensor) -> torch.Tensor:
     return _Skewed.apply(tensor)  # pyright: ignore[reportReturnType] - apply is untyped
 
 
-def wrong_picture(found: Rendering) -> Rendering:
-    return replace(found, image=found.image + 0.01)
-
-
-class HastyAdam(FusedAdam):
+class HastyAdam(CpuAdam):
     """Learns one percent too fast."""
 
     def update(self, gradients: Any, rates: Any, scale: float) -> None:
         super().update(gradients, {name: 1.01 * rate for name, rate in rates.items()}, scale)
 
 
+class WrongBackend(CpuBackend):
+    """The cpu back end with one wrong operation."""
+
+    def __init__(self, operation: str) -> None:
+        self.operation = operation
+
+    def rasterize(self, *arguments: Any, **options: Any) -> Rendering:
+        found = super().rasterize(*arguments, **options)
+        if self.operation == "picture":
+            return replace(found, image=found.image + 0.01)
+        return replace(found, image=skewed(found.image)) if self.operation == "rasterizer" else found
+
+    def decode(self, *arguments: Any, **options: Any) -> Gaussians:
+        found = super().decode(*arguments, **options)
+        return replace(found, scales=skewed(found.scales)) if self.operation == "decode" else found
+
+    def photometric_loss(self, *arguments: Any, **options: Any) -> PhotometricLoss:
+        found = super().photometric_loss(*arguments, **options)
+        return replace(found, loss=skewed(found.loss)) if self.operation == "loss" else found
+
+    def adam(self, parameters: Mapping[str, torch.Tensor]) -> CpuAdam:
+        return (HastyAdam if self.operation == "adam" else CpuAdam)(parameters)
+
+
 FAULTS = {
-    "picture": (RASTERIZERS, "cpu", wrong_picture, {"value_error", "loss_error", "gradient_error"}),
-    "rasterizer": (RASTERIZERS, "cpu", lambda f: replace(f, image=skewed(f.image)), {"gradient_error"}),
-    "decode": (decoding._BACKENDS, "cpu", lambda f: replace(f, scales=skewed(f.scales)), {"gradient_error"}),
-    "loss": (losses._BACKENDS, "fused", lambda f: replace(f, loss=skewed(f.loss)), {"gradient_error"}),
-    "adam": (adam.BACKENDS, "fused", None, {"update_error"}),
+    "picture": {"value_error", "loss_error", "gradient_error"},
+    "rasterizer": {"gradient_error"},
+    "decode": {"gradient_error"},
+    "loss": {"gradient_error"},
+    "adam": {"update_error"},
 }
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_wrong_back_end_shows_in_its_column_and_in_no_other(fault, monkeypatch):
-    table, name, spoil, expected = FAULTS[fault]
-    right = table[name]
-    wrong = HastyAdam if spoil is None else lambda *arguments, **options: spoil(right(*arguments, **options))
-    monkeypatch.setitem(table, name, wrong)
-    errors, _ = measure_errors(TINY_CLIP, scene="tiny")
+def test_a_wrong_back_end_shows_in_its_column_and_in_no_other(fault):
+    errors, _ = measure_errors(TINY_CLIP, scene="tiny", fast=WrongBackend(fault))
     columns = ("value_error", "loss_error", "gradient_error", "update_error")
-    assert {column for column in columns if getattr(errors, column) > 2e-3} == expected
+    assert {column for column in columns if getattr(errors, column) > 2e-3} == FAULTS[fault]
 
 
 def test_the_limit_is_a_plausible_number_of_operations(monkeypatch):

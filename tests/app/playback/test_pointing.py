@@ -8,6 +8,7 @@ import torch
 
 from app.playback.arrays import GaussianArrays
 from app.playback.pointing import pixel_ray, seen_point
+from engine.backends.table import backend_called
 from engine.raster import Gaussians, rasterize
 
 FORWARD = np.array([0.0, 0.0, 1.0])
@@ -97,7 +98,7 @@ def test_on_a_closed_surface_it_is_the_depth_that_the_rasterizer_draws():
     K = np.array([[60.0, 0.0, 32.0], [0.0, 60.0, 24.0], [0.0, 0.0, 1.0]])
     values = [torch.from_numpy(getattr(arrays, name)) for name in ("means", "quats", "scales", "opacities", "colors")]
     viewmat, intrinsics = torch.eye(4)[None], torch.from_numpy(K).float()[None]
-    drawn = rasterize(Gaussians(*values), viewmat, intrinsics, 64, 48, want_depth=True)
+    drawn = rasterize(Gaussians(*values), viewmat, intrinsics, 64, 48, want_depth=True, backend=backend_called("cpu"))
     assert drawn.expected_depth is not None
     for x, y in ((32, 24), (25, 20), (40, 28), (32, 15)):
         origin, direction = pixel_ray(np.eye(4), K, x + 0.5, y + 0.5)

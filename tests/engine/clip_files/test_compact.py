@@ -10,6 +10,7 @@ import torch
 from safetensors import safe_open
 from safetensors.numpy import save_file
 
+from engine.backends.table import backend_called
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.clip_files.compact import compact_clip, write_compact_clip
 from engine.errors import NonFiniteLoss, ProjectError
@@ -66,17 +67,17 @@ def test_what_is_read_is_what_was_promised(reference, tmp_path):
 def test_a_source_clip_takes_a_fraction_and_looks_the_same(reference):
     stored = compact_clip(reference).state
     source = make_source(stored)
-    model = load_clip_model(source, stored)
+    model = load_clip_model(source, stored, backend=backend_called("cpu"))
     clip = compact_clip(source, model.entries_in_use())
     assert clip.n_bytes < 0.2 * sum(array.nbytes for array in source.arrays.values())
-    before, after = model.decode(0.5), load_clip_model(clip.state, stored).decode(0.5)
+    before, after = model.decode(0.5), load_clip_model(clip.state, stored, backend=backend_called("cpu")).decode(0.5)
     assert torch.allclose(before.means, after.means, atol=0.02)  # anchors are 0.1 apart
     assert torch.allclose(before.colors, after.colors, atol=0.1)
 
 
 def test_entries_nobody_reads_are_left_out_and_change_nothing(reference):
     source = make_source(reference, n=3)
-    model = load_clip_model(source, reference)
+    model = load_clip_model(source, reference, backend=backend_called("cpu"))
     used = model.entries_in_use()
     assert 0 < sum(table.sum() for table in used) < 0.3 * sum(table.size for table in used)
     clip, whole = compact_clip(source, used), compact_clip(source)
@@ -89,7 +90,9 @@ def test_entries_nobody_reads_are_left_out_and_change_nothing(reference):
     }
     for frame in range(N_FRAMES):
         before = model.decode(frame / N_FRAMES)
-        after = load_clip_model(ClipState(source.arrays | emptied, source.header), reference).decode(frame / N_FRAMES)
+        after = load_clip_model(
+            ClipState(source.arrays | emptied, source.header), reference, backend=backend_called("cpu")
+        ).decode(frame / N_FRAMES)
         assert torch.equal(before.means, after.means)
 
 
@@ -97,10 +100,10 @@ def test_a_source_clip_knows_the_stored_reference_and_no_other(reference, tmp_pa
     clip = compact_clip(reference)
     write_compact_clip(tmp_path / "0000.safetensors", clip)
     stored = read_clip_state(tmp_path / "0000.safetensors")
-    load_clip_model(make_source(stored), stored)
+    load_clip_model(make_source(stored), stored, backend=backend_called("cpu"))
     assert stored.header["fingerprint"] != reference.header["fingerprint"]
     with pytest.raises(ProjectError, match="was trained on reference"):
-        load_clip_model(make_source(reference), stored)
+        load_clip_model(make_source(reference), stored, backend=backend_called("cpu"))
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
@@ -125,7 +128,7 @@ def test_files_of_the_first_schema_are_read(reference, tmp_path):
     write_clip_state(tmp_path / "old.safetensors", ClipState(reference.arrays, reference.header | {"schema": 1}))
     found = read_clip_state(tmp_path / "old.safetensors")
     assert found.fingerprint == reference.fingerprint
-    load_clip_model(found, None)
+    load_clip_model(found, None, backend=backend_called("cpu"))
 
 
 def test_truncated_files_are_named_as_damaged(reference, tmp_path):

@@ -30,7 +30,7 @@ MODULES = (
     "engine.backends.cpu.raster.tile_boxes",
     "engine.backends.cpu.step.adam",
     "engine.backends.cpu.step.fused_loss",
-    "engine.training.step.losses",
+    "engine.backends.cpu.step.photometric",
     "engine.backends.cpu.step.tile_squares",
 )
 """Modules that make arrays for kernels."""
@@ -42,7 +42,8 @@ def rasterize_cases(memory: GuardedMemory) -> Iterator[str]:
     """Forward and backward, masks, frozen rows, depth, and without gradients."""
     import torch
 
-    from engine.backends.cpu.raster import rasterize as backend
+    from engine.backends.cpu.raster.rasterize import POOL
+    from engine.backends.table import backend_called
     from engine.raster import Gaussians, rasterize, tile_boxes
     from engine.synthetic.gaussian_scenes import layered_scene
 
@@ -56,31 +57,34 @@ def rasterize_cases(memory: GuardedMemory) -> Iterator[str]:
             for mask, share in ((None, 0), (None, 2), (some, 2))[0 if size_px > 1 else 2 :]:
                 masked = "all" if mask is None else "some"
                 yield f"rasterize {n_rows} of {size_px} px in {width} x {height}, {share} of 3 frozen, {masked} tiles"
-                backend.POOL.clear()
+                POOL.clear()
                 leaves = Gaussians(
                     *(memory.tensor(tensor.float()).requires_grad_() for tensor in scene.gaussians.tensors()),
                     is_frozen=memory.tensor(torch.arange(n_rows) % 3 < share),
                 )
                 options = {"tile_mask": mask, "want_depth": True, "background": background}
-                rendering = rasterize(leaves, *scene.arguments, **options, want_means2d=True, backend="cpu")
+                rendering = rasterize(
+                    leaves, *scene.arguments, **options, want_means2d=True, backend=backend_called("cpu")
+                )
                 assert rendering.depth is not None
                 gradients = [memory.tensor(torch.ones_like(t)) for t in (rendering.image, rendering.alpha)]
                 torch.autograd.backward([rendering.image, rendering.alpha], gradients, retain_graph=True)
                 rendering.depth.sum().backward()
                 with torch.no_grad():
-                    rasterize(leaves, *scene.arguments, **options, backend="cpu")
+                    rasterize(leaves, *scene.arguments, **options, backend=backend_called("cpu"))
             yield f"tile_boxes {n_rows} of {size_px} px in {width} x {height}"
             viewmats, Ks, *_ = scene.arguments
             floats = Gaussians(*(memory.tensor(tensor.float()) for tensor in scene.gaussians.tensors()))
-            boxes = tile_boxes(floats, viewmats[0], Ks[0], width, height, backend="cpu")
+            boxes = tile_boxes(floats, viewmats[0], Ks[0], width, height, backend=backend_called("cpu"))
             boxes.mask()
-            boxes.meeting(memory.array(some.numpy()), memory.array(np.arange(n_rows)))
+            boxes.meeting(some, memory.tensor(torch.arange(n_rows)))
 
 
 def decode_cases(memory: GuardedMemory) -> Iterator[str]:
     """Forward and backward of three sets with a field, one set decoded before, one knot and two."""
     import torch
 
+    from engine.backends.table import backend_called
     from engine.model.decoding import ChosenAnchors, decode_anchors
     from engine.raster import Gaussians
     from tests.decode_scenes import ODD, PRESET, SINGLE, Scene
@@ -90,7 +94,6 @@ def decode_cases(memory: GuardedMemory) -> Iterator[str]:
         for module in scene.modules():
             for tensor in (*module.parameters(), *module.buffers()):
                 tensor.data = memory.tensor(tensor)
-        scene.field.keys = memory.array(scene.field.keys)
         rows = scene.rows()
         k = scene.decoder.gaussians_per_anchor
         n_static = len(scene.sets["static"])
@@ -100,16 +103,16 @@ def decode_cases(memory: GuardedMemory) -> Iterator[str]:
             for role, anchors in scene.sets.items():
                 corners = scene.field.corners(anchors.positions) if anchors.is_dynamic else None
                 if corners is not None:
-                    indices, weights = memory.array(corners.indices), memory.array(corners.weights)
+                    indices, weights = memory.tensor(corners.indices), memory.tensor(corners.weights)
                     corners = dataclasses.replace(corners, indices=indices, weights=weights)
                 before = Gaussians(*decoded) if is_decoded and role == "static" else None
                 chosen.append(ChosenAnchors(anchors, memory.tensor(rows[role]), corners, before))
-            gaussians = decode_anchors(chosen, scene.decoder, scene.field, knots, backend="cpu")
+            gaussians = decode_anchors(chosen, scene.decoder, scene.field, knots, backend=backend_called("cpu"))
             learning = [tensor for tensor in gaussians.tensors() if tensor.requires_grad]
             if learning:
                 torch.autograd.backward(learning, [memory.tensor(torch.randn(t.shape)) for t in learning])
             with torch.no_grad():
-                decode_anchors(chosen, scene.decoder, scene.field, knots, backend="cpu")
+                decode_anchors(chosen, scene.decoder, scene.field, knots, backend=backend_called("cpu"))
 
     for n in (0, 1, 17, 200):
         yield f"decode_anchors of {n}"
@@ -126,7 +129,8 @@ def join_cases(memory: GuardedMemory) -> Iterator[str]:
     """Chosen rows of frozen Gaussians in front of learning ones."""
     import torch
 
-    from engine.backends.cpu.decode.joining import join_frozen
+    from engine.backends.table import backend_called
+    from engine.model.joining import join_frozen
     from engine.raster import Gaussians
 
     def some(n: int) -> Gaussians:
@@ -136,7 +140,8 @@ def join_cases(memory: GuardedMemory) -> Iterator[str]:
         for step in (1, 3):
             yield f"join_frozen {n_frozen} and {n_learning}, one of {step}"
             learning = Gaussians(*(tensor.requires_grad_() for tensor in some(n_learning).tensors()))
-            joined = join_frozen(some(n_frozen), memory.array(np.arange(n_frozen - 1, -1, -step)), learning)
+            rows = memory.tensor(torch.arange(0, n_frozen, step).flip(0))
+            joined = join_frozen(some(n_frozen), rows, learning, backend=backend_called("cpu"))
             torch.stack([tensor.sum() for tensor in joined.tensors()]).sum().backward()
 
 
@@ -145,50 +150,53 @@ def loss_cases(memory: GuardedMemory) -> Iterator[str]:
     import torch
 
     from engine.backends.cpu.step import fused_loss
-    from engine.backends.cpu.step.tile_squares import tile_squares
+    from engine.backends.table import backend_called
+    from engine.raster.pinhole_view import n_tiles
     from engine.training.step.losses import photometric_loss
 
     # without its slack for alignment, which would hide a stray access: the rows are whole cache lines
     fused_loss._aligned_zeros = lambda shape: memory.bytes(4 * int(np.prod(shape))).view(np.float32).reshape(shape)
-    random = np.random.default_rng(0)
+    random, cpu = np.random.default_rng(0), backend_called("cpu")
     for height, width in ((1, 1), (40, 1), (3, 5), (50, 65), (26, 700)):
         for bits in range(16):
             has_gain, has_counted, has_tiles, is_float = (bool(bits >> i & 1) for i in range(4))
             yield f"photometric_loss of {width} x {height}: {has_gain=}, {has_counted=}, {has_tiles=}, {is_float=}"
             truth = random.integers(0, 256, (height, width, 3), dtype=np.uint8)
             image = memory.tensor(torch.from_numpy(random.random((height, width, 3), np.float32))).requires_grad_()
-            tiles = random.random(fused_loss.tile_grid(height, width)) < 0.5
+            tiles = random.random(n_tiles(width, height)) < 0.5
             rest = memory.tensor(torch.from_numpy(random.random((height, width, 3), np.float32)))
             gain = memory.tensor(torch.ones(3)).requires_grad_()
             result = photometric_loss(
                 image,
-                memory.array(truth / np.float32(255) if is_float else truth),
+                memory.tensor(torch.from_numpy(truth / np.float32(255) if is_float else truth)),
+                backend=cpu,
                 ssim_weight=0.2,
                 gain=gain if has_gain else None,
-                is_counted=memory.array(random.random((height, width)) < 0.7) if has_counted else None,
-                tile_mask=memory.array(tiles) if has_tiles else None,
+                is_counted=memory.tensor(torch.from_numpy(random.random((height, width)) < 0.7))
+                if has_counted
+                else None,
+                tile_mask=memory.tensor(torch.from_numpy(tiles)) if has_tiles else None,
                 rest=rest if has_tiles and has_gain else None,
-                backend="fused",
             )
             result.loss.backward()
-            tile_squares(image.detach().numpy(), memory.array(truth), gain.detach().numpy())
+            cpu.tile_squares(image.detach(), memory.tensor(torch.from_numpy(truth)), gain.detach())
 
 
 def adam_cases(memory: GuardedMemory) -> Iterator[str]:
     """Sizes around the edges of blocks and chunks."""
     import torch
 
-    from engine.backends.cpu.step.adam import make_adam
+    from engine.backends.table import backend_called
 
     sizes = (1, 63, 64, 65, (1 << 14) - 1, (1 << 14) + 1, 40_000)
     yield f"Adam of {sizes}"
     parameters = {str(n): memory.tensor(torch.rand(n)) for n in sizes}
-    adam = make_adam(parameters, "fused")
+    adam = backend_called("cpu").adam(parameters)
     for kept in (parameters, dict.fromkeys(("1", "65"))):
         gradients = {name: memory.tensor(torch.rand(int(name))) for name in kept}
         adam.norm(gradients)
         adam.update(gradients, dict.fromkeys(parameters, 0.1), 0.5)
-    for name, arrays in adam.arrays().items():
+    for name, arrays in adam.state().items():
         adam.restore(name, arrays)
 
 

@@ -117,7 +117,7 @@ def real_kernel_files() -> list[str]:
     held = {
         path for path in engine.rglob("*.py") if any(f"\n@{name}" in path.read_text("utf-8") for name in decorators)
     }
-    for folder in ("kernels", "raster/cpu", "model/cpu"):
+    for folder in ("kernels", "backends/cpu/raster", "backends/cpu/decode", "backends/cpu/step"):
         held.update((engine / folder).glob("*.py"))
     return sorted(path.relative_to(engine).as_posix() for path in held)
 
@@ -133,10 +133,15 @@ def test_a_change_of_any_real_kernel_file_changes_the_key(monkeypatch):
     monkeypatch.setattr(cache, "_python_texts", texts)
     before = sources_hash(ROOT / "engine")
     names = real_kernel_files()
-    assert {"kernels/lanes.py", "model/cpu/forward.py", "model/cpu/backward.py", "cloud/hull.py"} <= set(names)
-    assert {"training/fused_loss.py", "training/ssim_lanes.py", "training/adam.py"} <= set(names)
+    assert {
+        "kernels/lanes.py",
+        "backends/cpu/decode/forward.py",
+        "backends/cpu/raster/blend.py",
+        "cloud/motion/hull.py",
+    } <= set(names)
+    assert {"backends/cpu/step/fused_loss.py", "backends/cpu/step/adam.py", "images/ssim_lanes.py"} <= set(names)
     unnoticed = []
-    for changed in [*names, "conventions.py", "model/warm.py"]:
+    for changed in [*names, "conventions.py", "backends/cpu/decode/warm.py"]:
         if sources_hash(ROOT / "engine") == before:
             unnoticed.append(changed)
     assert not unnoticed

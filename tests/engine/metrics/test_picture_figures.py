@@ -16,6 +16,7 @@ from torchmetrics.functional.image import (
     structural_similarity_index_measure,
 )
 
+from engine.backends.reference.loss import ssim_map
 from engine.images.psnr import MAX_PSNR_DB, psnr
 from engine.metrics.columns import COLUMNS
 from engine.metrics.pictures import lpips
@@ -23,7 +24,6 @@ from engine.metrics.pictures.colors import as_shown, fit_colors
 from engine.metrics.pictures.flip import flip
 from engine.metrics.pictures.picture import measure_picture
 from engine.metrics.pictures.similarity import Similarity, dssim1, dssim_ms, dssim_range2, ssim
-from engine.training.step.losses import ssim_map
 from tests.engine.metrics.pictures import disturbed, scene
 
 SIZES = ((41, 60), (180, 240), (181, 333))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
+from engine.backends.table import backend_called
 from engine.capture.clip import Clip, split_clips
 from engine.clip_files.clip_state import ClipState
 from engine.model.anchors import AnchorSet
@@ -84,5 +85,10 @@ def make_model(*, has_motion: bool, seed: int = 0, color: float = 0.5, n_frames:
     decoder_seed = torch.Generator().manual_seed(7)
     decoder = Decoder(static_dim=4, dynamic_dim=4, gaussians_per_anchor=2, hidden=8, generator=decoder_seed)
     return ClipModel(
-        sets=sets, decoder=decoder, field=spatio_temporal, clip_length=CLIP_LENGTH, n_frames=n_frames
+        sets=sets,
+        decoder=decoder,
+        field=spatio_temporal,
+        clip_length=CLIP_LENGTH,
+        n_frames=n_frames,
+        backend=backend_called("cpu"),
     ).requires_grad_(requires_grad=False)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from engine.backends.table import backend_called
 from engine.clip_files.clip_header import SCHEMA
 from engine.clip_files.clip_state import ClipState
 from engine.errors import ProjectError
@@ -54,7 +55,14 @@ def make_reference() -> ClipModel:
     decoder = Decoder(
         static_dim=8, dynamic_dim=6, gaussians_per_anchor=K, hidden=16, generator=torch.Generator().manual_seed(2)
     )
-    return ClipModel(sets=sets, decoder=decoder, field=make_field(3), clip_length=N_FRAMES, n_frames=N_FRAMES)
+    return ClipModel(
+        sets=sets,
+        decoder=decoder,
+        field=make_field(3),
+        clip_length=N_FRAMES,
+        n_frames=N_FRAMES,
+        backend=backend_called("cpu"),
+    )
 
 
 def state_of(model: ClipModel, *, role: str, clip_index: int = 0, reference: ClipState | None = None) -> ClipState:
@@ -81,7 +89,14 @@ def make_source(reference: ClipState) -> ClipModel:
     inherited = torch.ones(10, N_FRAMES, dtype=torch.bool)
     sets, decoder = inherit(reference, {"moving": inherited})
     sets["residual"] = make_anchors(5, seed=7, presence=torch.ones(5, N_FRAMES, dtype=torch.bool))
-    return ClipModel(sets=sets, decoder=decoder, field=make_field(8), clip_length=N_FRAMES, n_frames=N_FRAMES)
+    return ClipModel(
+        sets=sets,
+        decoder=decoder,
+        field=make_field(8),
+        clip_length=N_FRAMES,
+        n_frames=N_FRAMES,
+        backend=backend_called("cpu"),
+    )
 
 
 def test_only_anchors_that_exist_are_decoded():
@@ -121,7 +136,7 @@ def test_times_between_frames_interpolate_the_field():
 
 def test_reference_round_trip_gives_the_same_gaussians():
     model = make_reference()
-    again = load_clip_model(state_of(model, role="reference"), None)
+    again = load_clip_model(state_of(model, role="reference"), None, backend=backend_called("cpu"))
     for ours, theirs in zip(model.decode(0.25).tensors(), again.decode(0.25).tensors(), strict=True):
         assert torch.equal(ours, theirs)
 
@@ -133,7 +148,9 @@ def test_source_clip_freezes_everything_it_inherits_and_stores_only_its_own():
     assert trainable
     assert all(name.startswith(("sets.residual.", "field.")) for name in trainable)
     assert not any(name.startswith(("decoder.", "sets.static", "sets.moving")) for name in source.own_arrays())
-    again = load_clip_model(state_of(source, role="source", clip_index=1, reference=reference), reference)
+    again = load_clip_model(
+        state_of(source, role="source", clip_index=1, reference=reference), reference, backend=backend_called("cpu")
+    )
     for ours, theirs in zip(source.decode(0.5).tensors(), again.decode(0.5).tensors(), strict=True):
         assert torch.equal(ours, theirs)
 
@@ -146,9 +163,9 @@ def test_constant_sets_are_decoded_once_and_equal_the_plain_decode():
     rows = {"static": torch.tensor([3, 1]), "moving": torch.zeros(0, dtype=torch.int64)}
     rows["residual"] = rows["moving"]
     cached = source.decode(0.0, rows)
-    viewed = load_clip_model(reference, None)
+    viewed = load_clip_model(reference, None, backend=backend_called("cpu"))
     assert viewed.is_constant("static")  # nothing learns in a clip that is only viewed
-    learning = load_clip_model(reference, None, is_learning=True)
+    learning = load_clip_model(reference, None, is_learning=True, backend=backend_called("cpu"))
     assert not learning.is_constant("static")
     plain = learning.decode(0.0, {"static": rows["static"], "moving": rows["moving"]})
     assert torch.allclose(cached.means, plain.means, atol=1e-6)  # the same sums in another order
@@ -158,10 +175,10 @@ def test_a_source_clip_refuses_a_missing_or_another_reference():
     reference = state_of(make_reference(), role="reference")
     state = state_of(make_source(reference), role="source", clip_index=1, reference=reference)
     with pytest.raises(ProjectError, match="not there"):
-        load_clip_model(state, None)
+        load_clip_model(state, None, backend=backend_called("cpu"))
     other = ClipState(reference.arrays, reference.header | {"fingerprint": "0" * 16})
     with pytest.raises(ProjectError, match="0000"):
-        load_clip_model(state, other)
+        load_clip_model(state, other, backend=backend_called("cpu"))
 
 
 @pytest.mark.parametrize("name", ["sets.static.features", "decoder.first.color", "field.hidden.weight"])
@@ -174,7 +191,7 @@ def test_incomplete_states_are_named_and_not_a_fault_of_the_program(name, damage
     else:
         arrays[name] = arrays[name][:1, :1].copy()
     with pytest.raises(ProjectError, match="clip 0 is incomplete"):
-        load_clip_model(ClipState(arrays, state.header), None).decode(0.0)
+        load_clip_model(ClipState(arrays, state.header), None, backend=backend_called("cpu")).decode(0.0)
 
 
 def test_anchor_view_separates_inherited_from_own():
@@ -200,12 +217,14 @@ def test_anchors_say_what_the_gate_said_of_them():
     state = state_of(source, role="source", reference=reference)
     reasons = np.full(20, STILL, np.uint8)
     reasons[[2, 5]] = LIGHT
-    loaded = load_clip_model(ClipState(state.arrays | {"gate.static": reasons}, state.header), reference)
+    loaded = load_clip_model(
+        ClipState(state.arrays | {"gate.static": reasons}, state.header), reference, backend=backend_called("cpu")
+    )
     view = loaded.anchors()
     assert (view.own_reasons[view.own_roles == ROLES.index("replacing")] == LIGHT).all()
     assert (view.inherited_reasons[view.inherited_roles == ROLES.index("static")] == STILL).all()
     assert (view.inherited_roles == ROLES.index("static")).sum() == 18
-    whole = load_clip_model(reference, None).constant_gaussians("static")
+    whole = load_clip_model(reference, None, backend=backend_called("cpu")).constant_gaussians("static")
     kept = np.repeat(~is_hidden.numpy(), K)
     for ours, theirs in zip(loaded.constant_gaussians("static").tensors(), whole.tensors(), strict=True):
         assert torch.equal(ours, theirs[torch.from_numpy(kept)])

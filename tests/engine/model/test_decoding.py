@@ -11,6 +11,7 @@ from numba import cfunc, get_num_threads, set_num_threads, types
 
 from engine.backends.cpu.decode import activation
 from engine.backends.cpu.decode.warm import warm_up
+from engine.backends.table import backend_called
 from engine.kernels import routines
 from engine.kernels.memory import RecycledMemory
 from engine.model.decoding import ChosenAnchors, decode_anchors
@@ -173,7 +174,7 @@ def test_sets_that_never_change_are_copied_and_frozen():
     scene.decoder.requires_grad_(False)
     scene.sets["static"].requires_grad_(False)
     everything = ChosenAnchors(anchors=scene.sets["static"], rows=torch.arange(len(scene.sets["static"])))
-    decoded = decode_anchors([everything], scene.decoder, None, [(0, 1.0)], backend="cpu")
+    decoded = decode_anchors([everything], scene.decoder, None, [(0, 1.0)], backend=backend_called("cpu"))
     assert not decoded.means.requires_grad
     assert decoded.is_frozen is None
     rows = scene.rows()
@@ -217,29 +218,21 @@ def test_rows_that_cannot_be_decoded_are_named(message):
     error, rows = BAD_ROWS[message]
     scene = Scene()
     with pytest.raises(error, match=message):
-        decode_anchors([ChosenAnchors(scene.sets["static"], rows)], scene.decoder, None, ONE_KNOT)
+        decode_anchors(
+            [ChosenAnchors(scene.sets["static"], rows)], scene.decoder, None, ONE_KNOT, backend=backend_called("cpu")
+        )
 
 
 def test_tensors_that_do_not_fit_are_named():
     scene, other = Scene(features=5), Scene(features=6)
     static, moving, rows = scene.sets["static"], scene.sets["moving"], torch.arange(3)
 
-    def refuses(
-        error: type[Exception], message: str, chosen: ChosenAnchors, decoder: Any, field: Any, **options
-    ) -> None:
+    def refuses(error: type[Exception], message: str, chosen: ChosenAnchors, decoder: Any, field: Any) -> None:
         with pytest.raises(error, match=message):
-            decode_anchors([chosen], decoder, field, ONE_KNOT, **options)
+            decode_anchors([chosen], decoder, field, ONE_KNOT, backend=backend_called("cpu"))
 
     plain = ChosenAnchors(static, rows)
     refuses(ValueError, r"features must be \[70, 6\] for this decoder, got \[70, 5\]", plain, other.decoder, None)
-    refuses(
-        ValueError,
-        "backend must be auto or one of cpu, reference, got 'gpu'",
-        plain,
-        scene.decoder,
-        None,
-        backend="gpu",
-    )
     corners = scene.field.corners(moving.positions)
     wrong = ChosenAnchors(static, rows, corners)
     message = r"indices of corners must be \[70, 3, 8\] .* got \[71, 3, 8\]"
@@ -252,12 +245,12 @@ def test_tensors_that_do_not_fit_are_named():
     message = r"the field gives \[n, 6\], the decoder takes \[n, 5\]"
     refuses(ValueError, message, right, scene.decoder, other.field)
     with torch.no_grad():
-        decoded = decode_anchors([plain], scene.decoder, None, ONE_KNOT)
+        decoded = decode_anchors([plain], scene.decoder, None, ONE_KNOT, backend=backend_called("cpu"))
     message = r"means of decoded must be \[350, 3\] for 70 anchors, got \[15, 3\]"
     refuses(ValueError, message, ChosenAnchors(static, rows, decoded=decoded), scene.decoder, None)
     message = "float32 tensors on the cpu; features is torch.float64"
     static.features.data = static.features.data.double()
-    refuses(TypeError, message, plain, scene.decoder, None, backend="cpu")
+    refuses(TypeError, message, plain, scene.decoder, None)
     static.features = torch.nn.Parameter(torch.zeros(70, 5, device="meta"))
     refuses(TypeError, "features must hold numbers", plain, scene.decoder, None)
 
@@ -297,6 +290,6 @@ def test_recycled_memory_is_used_again_only_when_nobody_holds_it():
 def test_warm_up_runs_and_leaves_random_numbers_alone():
     before = torch.get_rng_state()
     warm_up()
-    defined = {name for name in routines._defined if name.startswith("engine.model.")}
+    defined = {name for name in routines._defined if name.startswith("engine.backends.cpu.decode.")}
     assert defined <= set(routines._compiled)
     assert torch.equal(torch.get_rng_state(), before)

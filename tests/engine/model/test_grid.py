@@ -14,7 +14,7 @@ def test_corners_stay_inside_the_table_for_any_position(position):
     corners = corner_table(np.array([position], np.float64), (8, 100), 256)
     assert corners.indices.min() >= 0
     assert corners.indices.max() < 256
-    assert np.allclose(corners.weights.sum(-1), 1.0, atol=1e-6)
+    assert torch.allclose(corners.weights.sum(-1), torch.ones(()), atol=1e-6)
 
 
 def test_dense_levels_interpolate_a_linear_function_exactly():

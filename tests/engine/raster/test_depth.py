@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from engine.backends.cpu.raster import rasterize as cpu_backend
+from engine.backends.table import backend_called
 from engine.raster import Gaussians, Rendering, rasterize
-from engine.raster.rasterize import BackendName
 from engine.synthetic.gaussian_scenes import Scene, gaussians_of, layered_scene, simple_scene
 from tests.engine.raster.gradients import gradients
 
@@ -26,7 +26,7 @@ def test_two_walls(backend):
     walls = gaussians_of(np.array([[0.0, 0, 2], [0, 0, 5]]), np.full((2, 3), 1e3), opacities=np.array([0.25, 0.5]))
     walls = Gaussians(*(tensor.float() for tensor in walls.tensors()))
     scene = simple_scene(walls, width=10, height=8)
-    depth, expected = maps_of(rasterize(walls, *scene.arguments, backend=backend, want_depth=True))
+    depth, expected = maps_of(rasterize(walls, *scene.arguments, backend=backend_called(backend), want_depth=True))
     weights = (0.25, 0.75 * 0.5)
     want = weights[0] * 2 + weights[1] * 5
     assert depth.shape == (1, 8, 10, 1)
@@ -38,7 +38,7 @@ def test_two_walls(backend):
 def test_nothing_is_at_no_depth(backend):
     scene = layered_scene(1, 100, 80, 1.0)
     leaves = Gaussians(*(tensor.float().requires_grad_() for tensor in scene.gaussians.tensors()))
-    rendering = rasterize(leaves, *scene.arguments, backend=backend, want_depth=True)
+    rendering = rasterize(leaves, *scene.arguments, backend=backend_called(backend), want_depth=True)
     depth, expected = maps_of(rendering)
     is_empty = rendering.alpha == 0
     assert is_empty.any()
@@ -49,10 +49,10 @@ def test_nothing_is_at_no_depth(backend):
     assert all(grad.isfinite().all() for grad in gradients(leaves))
 
 
-def outcome(scene: Scene, backend: BackendName, dtype: torch.dtype) -> tuple[list[torch.Tensor], list[torch.Tensor]]:
+def outcome(scene: Scene, backend: str, dtype: torch.dtype) -> tuple[list[torch.Tensor], list[torch.Tensor]]:
     """Image, depth and expected depth, and the gradients under a loss of all three."""
     leaves = Gaussians(*(tensor.to(dtype).clone().requires_grad_() for tensor in scene.gaussians.tensors()))
-    rendering = rasterize(leaves, *scene.arguments, backend=backend, want_depth=True)
+    rendering = rasterize(leaves, *scene.arguments, backend=backend_called(backend), want_depth=True)
     pictures = [rendering.image, *maps_of(rendering)]
     generator = torch.Generator().manual_seed(3)
     loss = leaves.means.new_zeros(())
@@ -79,10 +79,18 @@ def test_several_cameras_and_no_gradient():
     gaussians = Gaussians(*(tensor.float() for tensor in scene.gaussians.tensors()))
     viewmats, Ks = scene.viewmats.repeat(2, 1, 1), scene.Ks.repeat(2, 1, 1)
     viewmats[1, 2, 3] += 1.0
-    both = maps_of(rasterize(gaussians, viewmats, Ks, 64, 40, want_depth=True))[0]
+    both = maps_of(rasterize(gaussians, viewmats, Ks, 64, 40, want_depth=True, backend=backend_called("cpu")))[0]
     for index in range(2):
         leaves = Gaussians(*(tensor.clone().requires_grad_() for tensor in gaussians.tensors()))
-        one = rasterize(leaves, viewmats[index : index + 1], Ks[index : index + 1], 64, 40, want_depth=True)
+        one = rasterize(
+            leaves,
+            viewmats[index : index + 1],
+            Ks[index : index + 1],
+            64,
+            40,
+            want_depth=True,
+            backend=backend_called("cpu"),
+        )
         assert torch.equal(maps_of(one)[0][0], both[index])
 
 
@@ -91,11 +99,11 @@ def test_depth_is_made_only_when_asked_for_and_gives_its_buffers_back():
     pool = cpu_backend.POOL
     pool.clear()
     leaves = Gaussians(*(tensor.float().requires_grad_() for tensor in scene.gaussians.tensors()))
-    plain = rasterize(leaves, *scene.arguments)
+    plain = rasterize(leaves, *scene.arguments, backend=backend_called("cpu"))
     assert plain.depth is None
     assert plain.expected_depth is None
     del plain
-    rendering = rasterize(leaves, *scene.arguments, want_depth=True)
+    rendering = rasterize(leaves, *scene.arguments, want_depth=True, backend=backend_called("cpu"))
     assert len(pool) == 0, "the first workspace is in use again, by both maps"
     (rendering.image.sum() + maps_of(rendering)[0].sum()).backward()
     assert len(pool) == 1

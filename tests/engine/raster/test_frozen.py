@@ -8,19 +8,19 @@ import pytest
 import torch
 
 from engine.backends.cpu.raster import blend_backward
+from engine.backends.table import backend_called
 from engine.raster import Gaussians, Rendering, rasterize
-from engine.raster.rasterize import BackendName
 from engine.synthetic.gaussian_scenes import Scene, layered_scene
 from tests.engine.raster.gradients import gradient, gradients
 
 BACKENDS = ("cpu", "reference")
 
 
-def outcome(scene: Scene, is_frozen: torch.Tensor | None, backend: BackendName) -> tuple[Rendering, list[torch.Tensor]]:
+def outcome(scene: Scene, is_frozen: torch.Tensor | None, backend: str) -> tuple[Rendering, list[torch.Tensor]]:
     """The rendering and the gradients of the five parameters and the 2D centres."""
     tensors = (tensor.float().requires_grad_() for tensor in scene.gaussians.tensors())
     gaussians = Gaussians(*tensors, is_frozen=is_frozen)
-    rendering = rasterize(gaussians, *scene.arguments, backend=backend, want_means2d=True)
+    rendering = rasterize(gaussians, *scene.arguments, backend=backend_called(backend), want_means2d=True)
     (rendering.image.square().sum() + rendering.alpha.cos().sum()).backward()
     return rendering, [*gradients(gaussians), gradient(rendering.means2d)[0]]
 
@@ -53,11 +53,11 @@ def test_nothing_is_replayed_where_nothing_is_trained(monkeypatch):
     scene = layered_scene(30, 40, 40, 3.0)
     gaussians = Gaussians(*(tensor.float() for tensor in scene.gaussians.tensors()))
     background = torch.tensor([0.1, 0.2, 0.3], requires_grad=True)
-    rendering = rasterize(gaussians, *scene.arguments, background=background, backend="cpu")
+    rendering = rasterize(gaussians, *scene.arguments, background=background, backend=backend_called("cpu"))
     frozen = dataclasses.replace(
         gaussians, means=gaussians.means.clone().requires_grad_(), is_frozen=torch.ones(30) > 0
     )
-    frozen_rendering = rasterize(frozen, *scene.arguments, backend="cpu")
+    frozen_rendering = rasterize(frozen, *scene.arguments, backend=backend_called("cpu"))
     monkeypatch.setattr(blend_backward, "replay_tiles", None)
     rendering.image.sum().backward()
     torch.testing.assert_close(gradient(background), (1 - rendering.alpha).sum().expand(3))
@@ -88,4 +88,4 @@ def test_the_mask_follows_its_rows():
 def test_a_wrong_mask_is_named(mask, error):
     scene = layered_scene(6, 16, 16, 2.0)
     with pytest.raises(error, match="is_frozen"):
-        rasterize(dataclasses.replace(scene.gaussians, is_frozen=mask), *scene.arguments)
+        rasterize(dataclasses.replace(scene.gaussians, is_frozen=mask), *scene.arguments, backend=backend_called("cpu"))

@@ -11,8 +11,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from engine.backends.table import backend_called
 from engine.raster import TILE_PX, Gaussians, rasterize
-from engine.raster.rasterize import BackendName
 from engine.synthetic.gaussian_scenes import Scene, camera, gaussians_of, layered_scene, simple_scene
 from tests.engine.raster.gradients import gradients
 
@@ -141,7 +141,7 @@ CASES = {
 def _outcome(
     scene: Scene,
     gaussians: Gaussians,
-    backend: BackendName,
+    backend: str,
     *,
     tile_mask: torch.Tensor | None = None,
     pixels: torch.Tensor | None = None,
@@ -156,7 +156,7 @@ def _outcome(
         *scene.arguments,
         background=scene.background.to(dtype),
         near_plane=scene.near_plane,
-        backend=backend,
+        backend=backend_called(backend),
         tile_mask=tile_mask,
     )
     generator = torch.Generator().manual_seed(0)
@@ -270,7 +270,7 @@ def test_equal_depths_keep_their_order(backend):
 
 
 def _image(scene: Scene, gaussians: Gaussians) -> tuple[torch.Tensor, torch.Tensor]:
-    rendering = rasterize(gaussians, *scene.arguments, backend="cpu")
+    rendering = rasterize(gaussians, *scene.arguments, backend=backend_called("cpu"))
     return rendering.image, rendering.alpha
 
 

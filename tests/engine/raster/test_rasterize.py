@@ -11,8 +11,8 @@ import pytest
 import torch
 
 from engine.backends.cpu.raster import rasterize as cpu_backend
+from engine.backends.table import backend_called
 from engine.raster import Gaussians, Rendering, rasterize
-from engine.raster.rasterize import BackendName
 from engine.synthetic.gaussian_scenes import Scene, camera, layered_scene, simple_scene
 from tests.engine.raster.gradients import gradient, gradients
 
@@ -27,14 +27,14 @@ def leaves(gaussians: Gaussians, dtype: torch.dtype) -> Gaussians:
     return Gaussians(*(tensor.detach().to(dtype).clone().requires_grad_() for tensor in gaussians.tensors()))
 
 
-def render(scene: Scene, gaussians: Gaussians, backend: BackendName, **options: Any) -> Rendering:
+def render(scene: Scene, gaussians: Gaussians, backend: str, **options: Any) -> Rendering:
     background = scene.background.to(gaussians.means)
     return rasterize(
         gaussians,
         *scene.arguments,
         background=background,
         near_plane=scene.near_plane,
-        backend=backend,
+        backend=backend_called(backend),
         **options,
     )
 
@@ -117,8 +117,8 @@ def test_background_shows_through_and_gets_its_gradient(backend):
     scene = layered_scene(40, 33, 17, 2.0)
     background = torch.tensor([0.3, 0.5, 0.9], requires_grad=True)
     gaussians = Gaussians(*(t.float() for t in scene.gaussians.tensors()))
-    rendering = rasterize(gaussians, *scene.arguments, background=background, backend=backend)
-    black = rasterize(gaussians, *scene.arguments, backend=backend)
+    rendering = rasterize(gaussians, *scene.arguments, background=background, backend=backend_called(backend))
+    black = rasterize(gaussians, *scene.arguments, backend=backend_called(backend))
     left_over = 1 - rendering.alpha
     torch.testing.assert_close(rendering.image, black.image + left_over * background, rtol=0, atol=1e-6)
     rendering.image.sum().backward()
@@ -132,11 +132,13 @@ def test_several_cameras_equal_single_ones_and_add_their_gradients(backend):
     moved[0, 0, 3] += 0.3
     viewmats, Ks = torch.cat([scene.viewmats, moved]), torch.cat([scene.Ks, camera(48, 40, focal=60.0)])
     together = leaves(scene.gaussians, torch.float32)
-    both = rasterize(together, viewmats, Ks, 48, 40, backend=backend, want_means2d=True)
+    both = rasterize(together, viewmats, Ks, 48, 40, backend=backend_called(backend), want_means2d=True)
     both.image.square().sum().backward()
     apart = leaves(scene.gaussians, torch.float32)
     for i in range(2):
-        one = rasterize(apart, viewmats[i : i + 1], Ks[i : i + 1], 48, 40, backend=backend, want_means2d=True)
+        one = rasterize(
+            apart, viewmats[i : i + 1], Ks[i : i + 1], 48, 40, backend=backend_called(backend), want_means2d=True
+        )
         one.image.square().sum().backward()
         assert torch.equal(one.image[0], both.image[i])
         torch.testing.assert_close(gradient(one.means2d)[0], gradient(both.means2d)[i], rtol=1e-5, atol=1e-7)
@@ -336,14 +338,16 @@ def test_a_wrong_argument_is_named(name):
     values |= {"viewmats": torch.eye(4)[None], "Ks": torch.eye(3)[None], "width": 8, "height": 8} | changes
     gaussians = Gaussians(*(values.pop(key) for key in shapes))
     with pytest.raises(error, match=name):
-        rasterize(gaussians, **values)
+        rasterize(gaussians, **values, backend=backend_called("cpu"))
 
 
 def test_whole_numbers_of_any_kind_are_sizes():
     scene = layered_scene(5, 16, 12, 2.0)
-    expected = rasterize(scene.gaussians, scene.viewmats, scene.Ks, 16, 12).image
+    expected = rasterize(scene.gaussians, scene.viewmats, scene.Ks, 16, 12, backend=backend_called("cpu")).image
     sizes: dict[str, Any] = {"width": np.int64(16), "height": np.int32(12), "near_plane": np.float32(0.01)}
-    assert torch.equal(rasterize(scene.gaussians, scene.viewmats, scene.Ks, **sizes).image, expected)
+    assert torch.equal(
+        rasterize(scene.gaussians, scene.viewmats, scene.Ks, **sizes, backend=backend_called("cpu")).image, expected
+    )
 
 
 def test_cpu_refuses_float64():

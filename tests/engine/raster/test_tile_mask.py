@@ -10,8 +10,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from engine.backends.table import backend_called
 from engine.raster import TILE_PX, Gaussians, Rendering, rasterize
-from engine.raster.rasterize import BackendName
 from engine.synthetic.gaussian_scenes import Scene, layered_scene
 from tests.engine.raster.gradients import gradient, gradients
 
@@ -25,7 +25,7 @@ def pixels_of(mask: torch.Tensor, scene: Scene) -> torch.Tensor:
 
 
 def outcome(
-    scene: Scene, backend: BackendName, weights: torch.Tensor, dtype: torch.dtype = torch.float32, **options: Any
+    scene: Scene, backend: str, weights: torch.Tensor, dtype: torch.dtype = torch.float32, **options: Any
 ) -> tuple[Rendering, list[torch.Tensor]]:
     """The rendering, and the gradients of five parameters, 2D centres and background under weights [C, H, W, 4]."""
     gaussians = Gaussians(
@@ -34,7 +34,12 @@ def outcome(
     )
     background = scene.background.to(dtype).clone().requires_grad_()
     rendering = rasterize(
-        gaussians, *scene.arguments, background=background, backend=backend, want_means2d=True, **options
+        gaussians,
+        *scene.arguments,
+        background=background,
+        backend=backend_called(backend),
+        want_means2d=True,
+        **options,
     )
     weights = weights.to(dtype)
     ((rendering.image * weights[..., :3]).sum() + (rendering.alpha * weights[..., 3:]).sum()).backward()
@@ -103,8 +108,8 @@ def test_wanted_tiles_are_bit_for_bit_those_of_the_full_image(n_rows, size, seed
     scene = layered_scene(n_rows, 90, 47, size, seed=seed)
     mask = torch.tensor(tiles).view(2, 3)
     gaussians = Gaussians(*(tensor.float() for tensor in scene.gaussians.tensors()))
-    full = rasterize(gaussians, *scene.arguments, want_depth=True)
-    part = rasterize(gaussians, *scene.arguments, want_depth=True, tile_mask=mask)
+    full = rasterize(gaussians, *scene.arguments, want_depth=True, backend=backend_called("cpu"))
+    part = rasterize(gaussians, *scene.arguments, want_depth=True, tile_mask=mask, backend=backend_called("cpu"))
     pixels = pixels_of(mask, scene)
     assert part.depth is not None
     assert full.depth is not None
@@ -124,4 +129,4 @@ def test_wanted_tiles_are_bit_for_bit_those_of_the_full_image(n_rows, size, seed
 def test_a_wrong_mask_is_named(mask, error, message):
     scene = layered_scene(6, 80, 50, 2.0)
     with pytest.raises(error, match=message):
-        rasterize(scene.gaussians, *scene.arguments, tile_mask=mask)
+        rasterize(scene.gaussians, *scene.arguments, tile_mask=mask, backend=backend_called("cpu"))

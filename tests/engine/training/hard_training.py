@@ -12,6 +12,7 @@ import numba
 import numpy as np
 import torch
 
+from engine.backends.table import backend_called
 from engine.capture.capture import Capture
 from engine.capture.clip import split_clips
 from engine.clip_files.clip_state import ClipState, read_clip_state
@@ -75,6 +76,7 @@ class Trained:
             seed=0,
             prep_dir=self.folder,
             report=note,
+            backend=backend_called("cpu"),
         )
 
     def train(self, clip_index: int, **settings: Any) -> ClipState:
@@ -131,12 +133,12 @@ class Trained:
         )
         rows = {role: torch.zeros(0, dtype=torch.int64) for role in clip.model.roles()}
         rows["static"] = torch.arange(len(clip.model.anchor_set("static")))
-        image = render_gaussians(clip.model.decode(0.0, rows), view).image[0].numpy()
+        image = render_gaussians(clip.model.decode(0.0, rows), view, backend=backend_called("cpu")).image[0].numpy()
         return image * camera_gain(clip.base, rig.names[camera])
 
     def _clip(self, clip_index: int) -> TrainedClip:
         if clip_index not in self._clips:
-            model = load_clip_model(self.states[clip_index], self.states[0])
+            model = load_clip_model(self.states[clip_index], self.states[0], backend=backend_called("cpu"))
             clip = split_clips(self.scene.n_frames, self.scene.clip_length)[clip_index]
             self._clips[clip_index] = TrainedClip(clip, model, self.states[0])
         return self._clips[clip_index]

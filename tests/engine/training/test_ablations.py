@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from engine.backends.table import backend_called
 from engine.capture.clip import split_clips
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.errors import ProjectError
@@ -185,7 +186,7 @@ def test_moving_anchors_that_learn_on_are_those_that_the_clip_uses(tiny, source_
     learned = source_clips["moving"].arrays
     assert np.array_equal(learned["sets.adapted.positions"], adapted.positions.numpy())
     assert not np.array_equal(learned["sets.adapted.features"], adapted.features.detach().numpy())
-    shown = load_clip_model(source_clips["moving"], tiny.reference)
+    shown = load_clip_model(source_clips["moving"], tiny.reference, backend=backend_called("cpu"))
     assert shown.roles() == ["static", "residual", "adapted"]
     assert np.array_equal(
         shown.anchors().inherited_positions, tiny.reference.arrays["sets.static.positions"]
@@ -201,7 +202,7 @@ def test_without_a_gate_in_time_all_moving_anchors_learn_on(tiny, gate):
 
 
 def test_without_inheritance_no_anchor_of_the_reference_is_shown(tiny, source_clips):
-    model = load_clip_model(source_clips["off"], tiny.reference)
+    model = load_clip_model(source_clips["off"], tiny.reference, backend=backend_called("cpu"))
     assert model.roles() == ["static", "residual"]
     assert len(model.anchors().inherited_positions) == 0
     inherited = tiny.reference.arrays["sets.static.positions"]
@@ -290,7 +291,7 @@ def test_a_streamed_frame_needs_no_other_to_be_shown(streamed):
     for state in streamed:
         assert state.is_reference
         assert state.header["config"]["start"] == "previous"  # as the project says, not as it is carried out
-        assert load_clip_model(state, None).n_frames == 1
+        assert load_clip_model(state, None, backend=backend_called("cpu")).n_frames == 1
 
 
 def test_merging_makes_residual_anchors_moving_ones(streamed):
@@ -341,7 +342,7 @@ def test_any_clip_can_be_the_reference(tiny, tmp_path):
             assert states.setdefault(i, state).fingerprint == state.fingerprint  # the star holds: order is nothing
             assert np.isfinite(picture(tiny, state, reference)).all()
     with pytest.raises(ProjectError, match="was trained on reference"):
-        load_clip_model(states[0], tiny.reference)
+        load_clip_model(states[0], tiny.reference, backend=backend_called("cpu"))
 
 
 @pytest.mark.parametrize("name", ["full", "trainable", "off", "continue"])
@@ -351,7 +352,7 @@ def test_a_partial_last_clip_has_the_times_of_its_frames(tiny, name):
     state = tiny.trained(7, **arguments_of(tiny, name))
     presence = state.arrays.get("sets.residual.presence", state.arrays.get("inherited.moving.presence"))
     assert presence.shape[1] == 2
-    model = load_clip_model(state, tiny.reference)
+    model = load_clip_model(state, tiny.reference, backend=backend_called("cpu"))
     assert model.knots(clip.clip_time(29)) == [(1, 1.0)]
     pictures = [picture(tiny, state, tiny.reference, frame=frame) for frame in (0, 1)]
     assert all(np.isfinite(image).all() for image in pictures)
@@ -361,7 +362,7 @@ def test_switches_need_no_gate(tiny, tmp_path):
     ungated = tiny.trained(0, is_source=False, gate="off", prep_dir=tmp_path)
     for settings in ({}, {"inherit": "off", "decoder": "new"}):
         state = tiny.trained(1, reference=ungated, gate="off", prep_dir=tmp_path, source_steps=2, **settings)
-        model = load_clip_model(state, ungated)
+        model = load_clip_model(state, ungated, backend=backend_called("cpu"))
         n_anchors = sum(len(model.anchor_set(role)) for role in model.roles())
         assert len(model.decode(0.25)) == n_anchors * 5
         assert np.isfinite(picture(tiny, state, ungated)).all()

@@ -28,6 +28,7 @@ import pytest
 import torch
 from PIL import Image
 
+from engine.backends.table import backend_called
 from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture, open_capture
 from engine.clip_files.clip_state import read_clip_state, write_clip_state
@@ -80,7 +81,14 @@ def model_and_cloud(points: np.ndarray) -> tuple[ClipModel, MovingCloud]:
     moving = AnchorSet.from_cloud(
         torch.from_numpy(corners), torch.full((len(corners), 3), 0.5), spacing=0.3, feature_dim=16, presence=nobody
     )
-    model = ClipModel(sets={"moving": moving}, decoder=torch.nn.Module(), field=None, clip_length=2, n_frames=2)  # type: ignore[arg-type]
+    model = ClipModel(
+        sets={"moving": moving},
+        decoder=torch.nn.Module(),  # type: ignore[arg-type]
+        field=None,
+        clip_length=2,
+        n_frames=2,
+        backend=backend_called("cpu"),
+    )
     points = (corners if points.size == 0 else corners + points).astype(np.float32)
     presence = np.tile([True, False], (len(points), 1))
     return model, MovingCloud(points, np.full_like(points, 0.5), presence, 0.3)
@@ -153,7 +161,7 @@ def flicker_of_still_clips(tiny: Tiny, prep_dir, **settings) -> list[PairRow]:
         training.prepare()
         state = finish(training)
         reference = reference or state
-        trained = TrainedClip(clip, load_clip_model(state, reference), reference)
+        trained = TrainedClip(clip, load_clip_model(state, reference, backend=backend_called("cpu")), reference)
         evaluation.measure(trained, before=before, on_pair=pairs.append)
         before = trained
     return pairs
@@ -267,10 +275,10 @@ def test_8_a_reference_clip_shows_the_same_pixels_after_a_trip_to_the_disk(tiny,
 @pytest.mark.parametrize("clip_index", [0, 1])
 def test_10_gaussians_of_a_frame_taken_out_once_are_what_every_camera_sees(tiny, clip_index):
     state = tiny.reference if clip_index == 0 else tiny.trained(1)
-    model = load_clip_model(state, tiny.reference)
+    model = load_clip_model(state, tiny.reference, backend=backend_called("cpu"))
     reach = REACH_SPACINGS * tiny.reference.header["spacing"]
     baked = model.decode(0.5)
     for camera in (0, 7, 13):
         view = first_view(tiny, camera)
         live = render_model(model, view, 0.5, reach=reach)
-        assert (render_gaussians(baked, view).image[0] - live).abs().max() < 1e-6
+        assert (render_gaussians(baked, view, backend=backend_called("cpu")).image[0] - live).abs().max() < 1e-6

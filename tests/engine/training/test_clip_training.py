@@ -10,6 +10,7 @@ import pytest
 import torch
 
 from engine.assets import asset_path
+from engine.backends.table import backend_called
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import split_clips
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
@@ -51,7 +52,7 @@ def start(capture: Capture, clip_index: int, prep_dir: Path, **changes) -> ClipT
         "report": lambda _: None,
     }
     clip = split_clips(capture.n_frames, CLIP_LENGTH)[clip_index]
-    return ClipTraining(capture, clip, **(arguments | changes))
+    return ClipTraining(capture, clip, **(arguments | changes), backend=backend_called("cpu"))
 
 
 def finish(training: ClipTraining) -> ClipState:
@@ -87,7 +88,7 @@ def test_training_learns_cameras_it_never_saw(setting):
 
 
 def test_the_reference_has_static_and_moving_anchors(setting):
-    model = load_clip_model(setting.reference, None)
+    model = load_clip_model(setting.reference, None, backend=backend_called("cpu"))
     assert set(model.roles()) == {"static", "moving"}
     presence = model.anchor_set("moving").presence
     assert presence is not None
@@ -134,7 +135,7 @@ def test_a_source_clip_adds_residual_anchors_and_leaves_everything_inherited_unt
     rows = evaluate_clip(
         setting.capture,
         training.clip,
-        load_clip_model(state, setting.reference),
+        load_clip_model(state, setting.reference, backend=backend_called("cpu")),
         reference=setting.reference,
         cameras=[setting.holdout[0], training.camera_indices[0]],
         holdout=setting.holdout,
@@ -297,7 +298,7 @@ def test_gate_off_gives_every_anchor_a_dynamic_feature_at_every_time(setting, tm
     training = start(setting.capture, 0, tmp_path, config=config)
     training.prepare()
     state = finish(training)
-    model = load_clip_model(state, None)
+    model = load_clip_model(state, None, backend=backend_called("cpu"))
     n_anchors = sum(len(model.anchor_set(role)) for role in model.roles())
     assert len(model.decode(0.0)) == n_anchors * config.gaussians_per_anchor
     assert torch.isfinite(model.decode(0.0).means).all()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from engine.backends.table import backend_called
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
@@ -26,7 +27,14 @@ def scene() -> tuple[ClipModel, MovingCloud]:
     moving = AnchorSet.from_cloud(
         torch.from_numpy(cube), torch.full((len(cube), 3), 0.5), spacing=1.0, feature_dim=16, presence=nobody
     )
-    model = ClipModel(sets={"moving": moving}, decoder=torch.nn.Module(), field=None, clip_length=4, n_frames=4)  # type: ignore[arg-type]
+    model = ClipModel(
+        sets={"moving": moving},
+        decoder=torch.nn.Module(),  # type: ignore[arg-type]
+        field=None,
+        clip_length=4,
+        n_frames=4,
+        backend=backend_called("cpu"),
+    )
     points = np.concatenate([cube, cube + np.array([100, 0, 0], np.float32)])
     presence = (points[:, 2].astype(int) % 4)[:, None] == np.arange(4)
     return model, MovingCloud(points, np.full_like(points, 0.5), presence, 1.0)

@@ -4,6 +4,7 @@ import pytest
 import torch
 from torch import nn
 
+from engine.backends.table import backend_called
 from engine.model.clip_model import load_clip_model
 from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import final_ratio, named_parameters
@@ -26,7 +27,10 @@ PUBLISHED = {
 
 def test_rates_of_the_paper_preset_start_and_end_as_published(tiny):
     config = TrainConfig(**preset("paper"))
-    model, gains = load_clip_model(tiny.reference, None, is_learning=True), nn.Parameter(torch.ones(1, 3))
+    model, gains = (
+        load_clip_model(tiny.reference, None, is_learning=True, backend=backend_called("cpu")),
+        nn.Parameter(torch.ones(1, 3)),
+    )
     rates = {name: rate for name, (_, rate) in named_parameters(model, gains, config).items()}
     ends = {name: rate * final_ratio(name, config) for name, rate in rates.items()}
     assert {name: rates[name] for name in PUBLISHED} == {name: start for name, (start, _) in PUBLISHED.items()}

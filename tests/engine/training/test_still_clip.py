@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from safetensors.numpy import load_file
 
+from engine.backends.table import backend_called
 from engine.clip_files.clip_state import read_clip_state
 from engine.clip_files.compact import write_compact_clip
 from engine.model.clip_model import load_clip_model
@@ -45,7 +46,7 @@ def test_it_stores_a_few_kilobytes_and_can_be_seen(still, tiny, tmp_path):
     counts = counts_of(state.header)
     assert counts is not None
     assert (counts.n_moving, counts.n_alive, counts.n_table_values) == (0, 0, 0)
-    model = load_clip_model(state, tiny.reference)
+    model = load_clip_model(state, tiny.reference, backend=backend_called("cpu"))
     static_alone = tiny.reference.header["n_anchors"]["static"] * model.decoder.gaussians_per_anchor
     assert len(model.decode(0.0)) == static_alone  # inherited moving anchors are there and switched off
 

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from engine.assets import asset_path
+from engine.backends.table import backend_called
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips
 from engine.clip_files.clip_state import ClipState
@@ -48,7 +49,7 @@ class Tiny:
 
     def training(self, clip_index: int, *, is_source: bool = True, **arguments: Any) -> ClipTraining:
         """A training of a clip. Settings of TrainConfig and arguments of ClipTraining by name."""
-        names = {"reference", "previous", "prep_dir", "seed", "report", "clip", "regions"}
+        names = {"reference", "previous", "prep_dir", "seed", "report", "clip", "regions", "backend"}
         given = {name: arguments.pop(name) for name in names & arguments.keys()}
         given.setdefault("reference", self.reference if is_source else None)
         given.setdefault("clip", self.clips[clip_index])
@@ -67,8 +68,8 @@ class Tiny:
 
 def make_training(capture: Capture, holdout: list[int], *, clip: Clip, **arguments: Any) -> ClipTraining:
     """A training with the sizes of this module; settings of TrainConfig by name."""
-    given: dict[str, Any] = {"seed": 0, "report": lambda _: None, "previous": None}
-    for name in ("reference", "previous", "prep_dir", "seed", "report", "regions"):
+    given: dict[str, Any] = {"seed": 0, "report": lambda _: None, "previous": None, "backend": backend_called()}
+    for name in ("reference", "previous", "prep_dir", "seed", "report", "regions", "backend"):
         if name in arguments:
             given[name] = arguments.pop(name)
     return ClipTraining(capture, clip, config=TrainConfig(**(SIZES | arguments)), holdout=holdout, **given)
@@ -101,7 +102,7 @@ def take_steps(training: ClipTraining, n: int) -> ClipTraining:
 
 def picture(tiny: Tiny, state: ClipState, reference: ClipState | None, *, frame: int = 1) -> np.ndarray:
     """What a training camera sees of a saved clip, by frame in the clip. [H, W, 3] float32"""
-    model = load_clip_model(state, reference)
+    model = load_clip_model(state, reference, backend=backend_called("cpu"))
     base = state if reference is None or state.is_reference else reference
     return _picture(tiny, TrainedClip(tiny.clips[state.header["clip_index"]], model, base), frame)
 

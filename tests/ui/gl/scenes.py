@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import torch
 
+from engine.backends.table import backend_called
 from engine.camera.rig import CameraRig
 from engine.raster import Gaussians, rasterize
 
@@ -120,7 +121,7 @@ def rasterized(splats: Splats, camera: Camera, *, near: float = 0.01) -> np.ndar
         camera.width,
         camera.height,
         near_plane=near,
-        backend="reference",
+        backend=backend_called("reference"),
     )
     return torch.cat([rendering.image, rendering.alpha], dim=-1)[0].numpy()
 

@@ -8,7 +8,7 @@ import pytest
 import torch
 from torch import nn
 
-from engine.backends.cpu.step.adam import make_adam
+from engine.backends.table import backend_called
 from engine.errors import NonFiniteLoss
 from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import PhaseOptimizer
@@ -23,8 +23,8 @@ def make_parameters(dtype: torch.dtype = torch.float32, seed: int = 0) -> dict[s
     return {name: (nn.Parameter(value.to(dtype)), RATES[name]) for name, value in values.items()}
 
 
-def make_optimizer(parameters, backend: str = "fused", **config) -> PhaseOptimizer:
-    return PhaseOptimizer(parameters, n_steps=100, config=TrainConfig(**config), backend=backend)
+def make_optimizer(parameters, backend: str = "cpu", **config) -> PhaseOptimizer:
+    return PhaseOptimizer(parameters, n_steps=100, config=TrainConfig(**config), backend=backend_called(backend))
 
 
 def set_gradients(parameters, step: int) -> None:
@@ -69,7 +69,7 @@ def test_a_limit_that_is_not_reached_changes_no_bit():
     assert all(torch.equal(found[0][name][0], found[1][name][0]) for name in SHAPES)
 
 
-@pytest.mark.parametrize("backend", ["fused", "reference"])
+@pytest.mark.parametrize("backend", ["cpu", "reference"])
 def test_gradients_above_the_limit_count_as_if_they_had_that_norm(backend):
     found = []
     for length in (10.0, 1e4):  # the same direction, both above
@@ -114,7 +114,7 @@ def test_gradients_are_cleared():
     assert all(parameter.grad is None for parameter, _ in parameters.values())
 
 
-@pytest.mark.parametrize("backend", ["fused", "reference"])
+@pytest.mark.parametrize("backend", ["cpu", "reference"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_gradient_that_is_not_finite_is_named_and_changes_nothing(backend, value):
     parameters = make_parameters()
@@ -134,8 +134,8 @@ def test_gradient_that_is_not_finite_is_named_and_changes_nothing(backend, value
     assert optimizer.steps_done == 3
 
 
-@pytest.mark.parametrize("backend", ["fused", "reference"])
-@pytest.mark.parametrize("resumed_backend", ["fused", "reference"])
+@pytest.mark.parametrize("backend", ["cpu", "reference"])
+@pytest.mark.parametrize("resumed_backend", ["cpu", "reference"])
 def test_going_on_from_arrays_is_going_on(backend, resumed_backend):
     straight = make_parameters()
     optimizer = make_optimizer(straight, backend)
@@ -200,6 +200,6 @@ def test_back_end_that_does_not_fit_is_refused():
 
 @pytest.mark.parametrize("gradient", [torch.ones(3), torch.ones(4, dtype=torch.float64)])
 def test_a_gradient_unlike_its_parameter_is_an_error(gradient):
-    adam = make_adam({"weights": torch.zeros(4)}, "fused")
+    adam = backend_called("cpu").adam({"weights": torch.zeros(4)})
     with pytest.raises(ValueError, match=r"gradient of weights must be \[4\] in float32"):
         adam.norm({"weights": gradient})

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from engine.backends.table import backend_called
 from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.clip_files.compact import write_compact_clip
 from engine.errors import NonFiniteLoss
@@ -113,7 +114,7 @@ def test_promoted_anchors_go_on_from_what_they_learned_and_every_clip_inherits_t
     seeing_light(monkeypatch, np.zeros(0, dtype=np.int64))
     source = tiny.trained(1, reference=state, gate="images", prep_dir=tmp_path)
     assert source.arrays["inherited.promoted.presence"].all()  # part of the still scene: there at all times
-    model = load_clip_model(source, state)
+    model = load_clip_model(source, state, backend=backend_called("cpu"))
     assert model.roles()[:3] == ["static", "moving", "promoted"]
     for clip_time in (0.0, 0.75):
         assert len(model.alive("promoted", clip_time)) == len(rows)
@@ -134,7 +135,10 @@ def test_a_source_clip_replaces_anchors_and_leaves_all_others_as_they_are(tiny: 
     assert not np.array_equal(
         state.arrays["sets.replacing.features"], tiny.reference.arrays["sets.static.features"][rows]
     )
-    model, reference = load_clip_model(state, tiny.reference), load_clip_model(tiny.reference, None)
+    model, reference = (
+        load_clip_model(state, tiny.reference, backend=backend_called("cpu")),
+        load_clip_model(tiny.reference, None, backend=backend_called("cpu")),
+    )
     kept = np.flatnonzero(~hidden)
     assert len(model.anchor_set("static")) == len(kept)
     for ours, theirs in zip(look_of(model, np.arange(len(kept))), look_of(reference, kept), strict=True):
@@ -225,7 +229,9 @@ def test_the_published_method_knows_no_regions(tiny: Tiny, tmp_path):
 
 def demoted(tiny: Tiny, training: ClipTraining, state: ClipState) -> tuple[ClipState, str]:
     views = [training._views[camera] for camera in training.camera_indices]
-    return demotion.demote(state, training.reference, views, reach=REACH_SPACINGS * state.header["spacing"])
+    return demotion.demote(
+        state, training.reference, views, backend=training.backend, reach=REACH_SPACINGS * state.header["spacing"]
+    )
 
 
 def test_what_nobody_sees_goes(tiny: Tiny, monkeypatch):
@@ -248,7 +254,7 @@ def test_what_nobody_sees_goes(tiny: Tiny, monkeypatch):
 
 def largest_opacities(state: ClipState) -> np.ndarray:
     """Of each moving anchor over frames and the times between them."""
-    model = load_clip_model(state, None)
+    model = load_clip_model(state, None, backend=backend_called("cpu"))
     largest = np.zeros(len(model.anchor_set("moving")))
     for half in range(2 * model.n_frames - 1):
         rows = model.alive("moving", half / (2 * model.clip_length))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from engine.backends.table import backend_called
 from engine.capture.clip import split_clips
 from engine.model.clip_view import render_gaussians
 from engine.raster import TILE_PX
@@ -36,8 +37,8 @@ def pictures_of(training: ClipTraining) -> list[tuple[int, float, ActivePicture]
     return found
 
 
-def pixels_of(tile_mask: np.ndarray, height: int, width: int) -> torch.Tensor:
-    return torch.from_numpy(tile_mask.repeat(TILE_PX, 0).repeat(TILE_PX, 1)[:height, :width])
+def pixels_of(tile_mask: torch.Tensor, height: int, width: int) -> torch.Tensor:
+    return tile_mask.repeat_interleave(TILE_PX, 0).repeat_interleave(TILE_PX, 1)[:height, :width]
 
 
 @pytest.mark.parametrize(
@@ -53,7 +54,7 @@ def test_the_same_is_learned_bit_for_bit(half, settings):
         assert fast.train_psnr == pytest.approx(slow.train_psnr, abs=1e-4)
         assert fast.n_gaussians == slow.n_gaussians
     assert same_arrays(every.state().arrays, active.state().arrays)
-    shares = [part.tile_mask.mean() for _, _, part in pictures_of(active) if part.tile_mask is not None]
+    shares = [part.tile_mask.float().mean() for _, _, part in pictures_of(active) if part.tile_mask is not None]
     assert 0.1 < np.mean(shares) < 0.9
 
 
@@ -81,10 +82,14 @@ def test_no_touched_tile_is_missed_by_a_trained_clip(half):
         outside = ~pixels_of(part.tile_mask, view.height, view.width)
         n_inactive += int(outside.sum())
         with torch.no_grad():
-            assert not render_gaussians(part.learning, view).alpha[0, ..., 0][outside].any()
+            assert (
+                not render_gaussians(part.learning, view, backend=backend_called("cpu")).alpha[0, ..., 0][outside].any()
+            )
             whole = training.model.decode(clip_time, training._sight.rows(camera_row, clip_time))
-            image = render_gaussians(whole, view).image[0]
-            drawn = render_gaussians(part.gaussians, view, tile_mask=part.tile_mask).image[0]
+            image = render_gaussians(whole, view, backend=backend_called("cpu")).image[0]
+            drawn = render_gaussians(
+                part.gaussians, view, tile_mask=part.tile_mask, backend=backend_called("cpu")
+            ).image[0]
         assert torch.equal(torch.where(outside[..., None], part.rest, drawn), image)
         assert len(part.gaussians) < part.n_all == len(whole)
     assert n_inactive
@@ -117,7 +122,7 @@ def test_cameras_beyond_the_memory_are_drawn_with_all_tiles(half):
     whole = half.prepared(1, source_steps=N_STEPS)
     bounded = half.prepared(1, source_steps=N_STEPS)
     one_camera = 160 * 120 * 3 * 4
-    bounded._tiles = ActiveTiles(bounded.model, max_bytes=3 * one_camera)
+    bounded._tiles = ActiveTiles(bounded.model, backend=bounded.backend, max_bytes=3 * one_camera)
     take_steps(whole, N_STEPS)
     take_steps(bounded, N_STEPS)
     assert same_arrays(whole.state().arrays, bounded.state().arrays)

@@ -10,6 +10,7 @@ import pytest
 import torch
 from torch import nn
 
+from engine.backends.table import backend_called
 from engine.training import clip_training
 from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import PhaseOptimizer
@@ -70,7 +71,7 @@ def test_rates_fall_to_their_end_from_where_they_are():
 
     def optimizer() -> PhaseOptimizer:
         parameters = {"a": (nn.Parameter(torch.zeros(2)), 0.1)}
-        return PhaseOptimizer(parameters, n_steps=100, config=config, backend="reference")
+        return PhaseOptimizer(parameters, n_steps=100, config=config, backend=backend_called("reference"))
 
     cut = optimizer()
     cut.steps_done = 50
