@@ -205,7 +205,7 @@ BAD_ROWS = {
     "0..69": (ValueError, torch.tensor([0, 999])),
     "-1..3": (ValueError, torch.tensor([-1, 3])),
     "1 different of 2": (ValueError, torch.tensor([2, 2])),
-    r"int64 \[n\] on the cpu, got torch.float32 of shape \[1\]": (ValueError, torch.tensor([0.5])),
+    r"int64 \[n\] on cpu like the features, got torch.float32 of shape \[1\]": (ValueError, torch.tensor([0.5])),
     r"rows must be int64 \[n\].*of shape \[1, 2\]": (ValueError, torch.tensor([[0, 1]])),
     "rows must hold numbers": (TypeError, torch.zeros(2, dtype=torch.int64, device="meta")),
     "rows must be a torch tensor, got numpy.ndarray": (TypeError, np.arange(3)),

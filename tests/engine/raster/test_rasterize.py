@@ -67,7 +67,7 @@ def truth() -> tuple[Scene, Gaussians, Rendering]:
 def test_float32_matches_float64_forward_and_backward(truth):
     scene, exact, expected = truth
     gaussians = leaves(scene.gaussians, torch.float32)
-    actual = render(scene, gaussians, "auto", want_means2d=True)
+    actual = render(scene, gaussians, "cpu", want_means2d=True)
     loss_of(actual).backward()
     assert (actual.image - expected.image).abs().max() <= PIXEL_TOLERANCE
     assert (actual.alpha - expected.alpha).abs().max() <= PIXEL_TOLERANCE
@@ -326,7 +326,6 @@ BAD_ARGUMENTS = {
     ),
     "background": (ValueError, {"background": torch.zeros(4)}),
     "near_plane": (ValueError, {"near_plane": 0.0}),
-    "backend": (ValueError, {"backend": "gpu"}),
 }
 
 
@@ -343,10 +342,11 @@ def test_a_wrong_argument_is_named(name):
 
 def test_whole_numbers_of_any_kind_are_sizes():
     scene = layered_scene(5, 16, 12, 2.0)
-    expected = rasterize(scene.gaussians, scene.viewmats, scene.Ks, 16, 12, backend=backend_called("cpu")).image
+    expected = rasterize(scene.gaussians, scene.viewmats, scene.Ks, 16, 12, backend=backend_called("reference")).image
     sizes: dict[str, Any] = {"width": np.int64(16), "height": np.int32(12), "near_plane": np.float32(0.01)}
     assert torch.equal(
-        rasterize(scene.gaussians, scene.viewmats, scene.Ks, **sizes, backend=backend_called("cpu")).image, expected
+        rasterize(scene.gaussians, scene.viewmats, scene.Ks, **sizes, backend=backend_called("reference")).image,
+        expected,
     )
 
 

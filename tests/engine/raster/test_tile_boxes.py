@@ -113,10 +113,10 @@ def test_arguments_are_checked():
 
 def test_a_mask_or_rows_that_do_not_fit_the_boxes_are_named():
     scene = layered_scene(5, 70, 40, 2.0)
-    boxes = tile_boxes(scene.gaussians, scene.viewmats[0], scene.Ks[0], 70, 40, backend=backend_called("cpu"))
+    boxes = tile_boxes(scene.gaussians, scene.viewmats[0], scene.Ks[0], 70, 40, backend=backend_called("reference"))
     with pytest.raises(ValueError, match=r"tile_mask must be bool \[2, 3\], got torch.bool \[1, 3\]"):
         boxes.meeting(torch.ones(1, 3, dtype=torch.bool), torch.arange(5))
     with pytest.raises(ValueError, match=r"rows must be \[5\] to match boxes \[5, 2\], got \[4\]"):
         boxes.meeting(torch.ones(2, 3, dtype=torch.bool), torch.arange(4))
     with pytest.raises(TypeError, match="viewmat must be a torch tensor"):
-        tile_boxes(scene.gaussians, scene.viewmats[0].numpy(), scene.Ks[0], 70, 40, backend=backend_called("cpu"))  # pyright: ignore[reportArgumentType]
+        tile_boxes(scene.gaussians, scene.viewmats[0].numpy(), scene.Ks[0], 70, 40, backend=backend_called("reference"))  # pyright: ignore[reportArgumentType]
