@@ -27,10 +27,11 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.setdefault("GOMP_SPINCOUNT", "0")  # a thread that waits leaves its core to the other worker
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files with the most slow tests first: a worker that gets one last leaves the others waiting."""
-    n_slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
-    items.sort(key=lambda item: -n_slow[item.path])
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """In a worker, files with the most slow tests come first: one that comes last leaves the other workers waiting."""
+    if hasattr(config, "workerinput"):
+        n_slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+        items.sort(key=lambda item: -n_slow[item.path])
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
