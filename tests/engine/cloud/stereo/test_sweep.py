@@ -83,7 +83,7 @@ def test_planes_rise_evenly_and_move_what_sources_see_by_about_a_pixel_at_most()
         matrix, shift = relative_homography(rig, 0, other)
         track = matrix @ centre + planes[:, None] * shift
         pixels = track[:, :2] / track[:, 2:]
-        is_inside = ((pixels >= 0) & (pixels < [80, 60])).all(1)
+        is_inside = np.all((pixels >= 0) & (pixels < [80, 60]), axis=1)
         steps = np.linalg.norm(np.diff(pixels, axis=0), axis=1)[is_inside[1:] & is_inside[:-1]]
         assert np.median(steps) < 1.0
         assert steps.max() < 1.5
