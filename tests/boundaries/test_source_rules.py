@@ -41,11 +41,13 @@ BANNED_ATTRIBUTES = {("torch", "save"), ("torch", "load"), ("os", "system"), ("o
 
 # Home folders of people, the temporary folder, drive letters: text that works on one machine only.
 MACHINE_PATH = re.compile(r"(?<![\w./~*-])(?:/(?:home|Users|root|tmp|work|mnt|media|scratch)/[\w.]|[A-Z]:\\\w)")
-# Turns of phrase that are grammar, but not what anyone writes: "is no number" for "is not a number", "where nobody says".
+# Turns of phrase that are grammar but that nobody writes: "is no number" for "is not a number", "where nobody says".
 _KEPT = "longer|more|larger|smaller|better|worse|other|different|faster|slower|wider|use|need|one|room|such"
 ODD_ENGLISH = re.compile(
     rf"(?<!there )\b(?:is|are|was|were|be) no (?!(?:{_KEPT})\b)[a-z]"
-    r"|\b(?:where|what|when) nobody (?:says|knows|named|chose)\b|\bis no\b[.,;]|\bfailing is\b|\b(?:is|are) (?:told|said) (?:at|in|of|that|to)\b",
+    r"|\b(?:where|what|when) nobody (?:says|knows|named|chose)\b"
+    r"|\bfailing is\b"
+    r"|\b(?:is|are) (?:told|said) (?:at|in|of|that|to)\b",
     re.IGNORECASE,
 )
 TEXT_SUFFIXES = {".py", ".md", ".toml", ".lock", ".sh", ".json", ".yml", ".yaml", ".txt", ".glsl", ".cfg", ".ini", ""}
