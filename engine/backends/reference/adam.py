@@ -16,7 +16,8 @@ class ReferenceAdam:
     def __init__(self, parameters: Mapping[str, Tensor]) -> None:
         self._parameters = dict(parameters)
         groups = [{"params": [p], "name": name} for name, p in self._parameters.items()]
-        self._adam = torch.optim.Adam(groups, betas=ADAM_BETAS, eps=ADAM_EPSILON)
+        nothing = {"params": [], "name": ""}  # torch wants a group even where nothing learns
+        self._adam = torch.optim.Adam(groups or [nothing], betas=ADAM_BETAS, eps=ADAM_EPSILON)
 
     def norm(self, gradients: Mapping[str, Tensor]) -> float:
         """See Adam."""
@@ -26,6 +27,8 @@ class ReferenceAdam:
         """See Adam."""
         for group in self._adam.param_groups:
             name = group["name"]
+            if not name:
+                continue
             group["lr"] = rates[name]
             gradient = gradients.get(name)
             group["params"][0].grad = None if gradient is None else gradient * scale
