@@ -36,6 +36,7 @@ def test_the_cloud_of_the_sample_looks_like_the_sample(tmp_path):
     assert error < 0.75 * shuffled  # most points lie where their colour is, some are hidden behind others
 
 
+@pytest.mark.slow
 def test_no_cloud_is_said_and_leaves_nothing(tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(PreparationError, match="exit code 1"):

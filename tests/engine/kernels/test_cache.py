@@ -117,7 +117,7 @@ def real_kernel_files() -> list[str]:
     held = {
         path for path in engine.rglob("*.py") if any(f"\n@{name}" in path.read_text("utf-8") for name in decorators)
     }
-    for folder in ("kernels", "raster/cpu", "model/cpu"):
+    for folder in ("kernels", "raster/cpu", "model/decode/cpu"):
         held.update((engine / folder).glob("*.py"))
     return sorted(path.relative_to(engine).as_posix() for path in held)
 
@@ -133,8 +133,8 @@ def test_a_change_of_any_real_kernel_file_changes_the_key(monkeypatch):
     monkeypatch.setattr(cache, "_python_texts", texts)
     before = sources_hash(ROOT / "engine")
     names = real_kernel_files()
-    assert {"kernels/lanes.py", "model/cpu/forward.py", "model/cpu/backward.py", "cloud/hull.py"} <= set(names)
-    assert {"training/fused_loss.py", "training/ssim_lanes.py", "training/adam.py"} <= set(names)
+    assert {"kernels/lanes.py", "model/decode/cpu/forward.py", "cloud/motion/hull.py"} <= set(names)
+    assert {"training/step/fused_loss.py", "images/ssim_lanes.py", "training/optimizer/adam.py"} <= set(names)
     unnoticed = []
     for changed in [*names, "conventions.py", "model/warm.py"]:
         if sources_hash(ROOT / "engine") == before:
@@ -223,6 +223,7 @@ print(engine.kernels.cache.current_key.cache_info().currsize)
 """
 
 
+@pytest.mark.slow
 def test_importing_engine_leaves_the_process_as_it_is():
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA", "GOMP"))}
     done = subprocess.run(
