@@ -75,10 +75,9 @@ def rng() -> np.random.Generator:
 @pytest.fixture(scope="session")
 def built_once(request: pytest.FixtureRequest) -> BuiltOnce:
     """Keeps what takes seconds to build; see tests.built_once."""
-    cache = request.config.cache
-    return BuiltOnce(
-        None if cache is None or request.config.getoption("--no-fixture-cache") else cache.mkdir("built-once")
-    )
+    cache = getattr(request.config, "cache", None)  # pytest can be told to do without
+    is_kept = cache is not None and not request.config.getoption("--no-fixture-cache")
+    return BuiltOnce(cache.mkdir("built-once") if is_kept else None)
 
 
 @pytest.fixture(scope="session")
