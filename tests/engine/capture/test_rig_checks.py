@@ -1,4 +1,4 @@
-"""What is said of cameras taken together."""
+"""Warnings about cameras that only show when all of them are looked at together."""
 
 from pathlib import Path
 
