@@ -95,8 +95,9 @@ def rng() -> np.random.Generator:
 def built_once(request: pytest.FixtureRequest) -> BuiltOnce:
     """Keeps what takes seconds to build; see tests.built_once."""
     cache = getattr(request.config, "cache", None)  # pytest can be told to do without
-    is_kept = cache is not None and not request.config.getoption("--no-fixture-cache")
-    return BuiltOnce(cache.mkdir("built-once") if is_kept else None)
+    if cache is None or request.config.getoption("--no-fixture-cache"):
+        return BuiltOnce(None)
+    return BuiltOnce(cache.mkdir("built-once"))
 
 
 @pytest.fixture(scope="session")
