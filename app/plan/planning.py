@@ -8,8 +8,8 @@ from typing import Any
 from app.background.kernels import COMPILING
 from app.project.clip_catalog import ClipCatalog
 from app.project.project import Project
+from app.project.stage_seconds import stages_of
 from app.status import PlanStatus, SettingStatus
-from app.training.stage_watch import stages_of
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.text import duration_text
