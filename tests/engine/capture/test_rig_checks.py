@@ -1,4 +1,4 @@
-"""Warnings about cameras that only show when all of them are looked at together."""
+"""Warnings about cameras taken together."""
 
 from pathlib import Path
 

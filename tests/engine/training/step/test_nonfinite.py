@@ -1,4 +1,4 @@
-"""A step whose loss is not finite names the part, the place, and what to change."""
+"""A step that is not finite says which part, where, and what to change."""
 
 import math
 
@@ -21,7 +21,7 @@ CONFIG = TrainConfig()
         (3e38, 3e38, 0, "The loss overflowed at step 3: photometric 3e+38, volume 3e+38."),
     ],
 )
-def test_the_part_of_the_loss_that_is_not_finite_is_named(photometric, volume, n_bad, said):
+def test_the_part_of_the_loss_that_is_no_number_is_named(photometric, volume, n_bad, said):
     image = torch.zeros(2, 2, 3)
     image.view(-1)[:n_bad] = math.nan
     error = loss_not_finite(image=image, photometric=photometric, volume=volume, where="step 3", config=CONFIG)
