@@ -253,14 +253,14 @@ TRAINED = [
 
 @pytest.mark.parametrize(("footage", "trained", "took"), TRAINED)
 def test_forecasts_without_any_clip_lie_within_a_factor_of_one_and_a_half(footage, trained, took):
-    is_source = trained["role"] == "source"
+    is_source = trained.role == "source"
     config = TrainConfig() if footage is BASKETBALL else TrainConfig(passes=8)
-    clip = dataclasses.replace(CLIP, clip_index=trained["clip_index"])
+    clip = dataclasses.replace(CLIP, clip_index=trained.clip_index)
     reference = None
     if is_source:
         reference = TRAINED[0 if footage is BASKETBALL else 3][1]
     found = plan(footage, clip, is_source=is_source, config=config, reference=reference)
-    assert found.n_steps == trained["step"]
+    assert found.n_steps == trained.step
     for line, measured_value in zip(found.forecast, took, strict=True):
         if measured_value is not None:
             assert 1 / 1.5 < line.value / measured_value < 1.5, line
