@@ -22,7 +22,7 @@ _PREFIXES = {TABLES: "field tables", FIELD: "field network", DECODER: "decoder",
 """How the names of other arrays begin; the first that fits counts."""
 OTHER = "other arrays"
 HEADER = "header"
-"""Names, shapes, settings and figures: all that is not an array."""
+"""Names, shapes, settings and figures: everything that is not an array."""
 COMPONENT_NAMES = (*dict.fromkeys(_OWN_COMPONENTS.values()), *_PREFIXES.values(), OTHER, HEADER)
 
 

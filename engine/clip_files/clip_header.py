@@ -108,7 +108,7 @@ class Coverage(Struct, frozen=True):
 
     @property
     def text(self) -> str:
-        """As it is told while the clip is prepared."""
+        """The text shown while the clip is prepared."""
         n_outside = self.n_points - self.n_inherited
         percent = 100 * n_outside / max(self.n_points, 1)
         said = f"{n_outside} of {self.n_points} moving points ({percent:.0f} %) lie outside the inherited anchors; "

@@ -129,7 +129,7 @@ def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> C
     anchors. Source: ClipGStream, geometry-aware deduplication, with the exact union.
 
     A clip has no more anchors that move than `config.max_moving_points`, inherited ones that it uses included. Which
-    of the others become anchors then is said in `engine.cloud.motion.budget`; the rest switch on the one beside them.
+    of the others become anchors then is chosen by `engine.cloud.motion.budget`; the rest switch on the one beside them.
     """
     is_new = np.ones(len(cloud.points), bool)
     moving = model.anchor_set("moving") if "moving" in model.roles() else None
