@@ -40,7 +40,7 @@ class ClipState:
     Attributes:
         arrays: By name. Those of anchors are described by `anchors`; others are the decoder's, the field's, and the
             gains of the cameras.
-        header: What is said of them.
+        header: Everything else that the file holds, checked.
     """
 
     arrays: dict[str, np.ndarray]

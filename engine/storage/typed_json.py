@@ -1,4 +1,4 @@
-"""From parsed JSON to declared types, strictly: msgspec checks, and what it finds is said in our own words."""
+"""From parsed JSON to declared types, strictly: msgspec checks, and this module puts into words what it finds."""
 
 from __future__ import annotations
 
