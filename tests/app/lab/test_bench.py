@@ -37,6 +37,7 @@ from app.lab.bench.timing import Timing, interleaved, peak_extra_mb
 from engine.backends.backend import PhotometricLoss
 from engine.backends.cpu.backend import CpuBackend
 from engine.backends.cpu.step.adam import CpuAdam
+from engine.backends.table import backend_called
 from engine.raster import Gaussians, Rendering
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -89,6 +90,7 @@ def prepare_allocation(n_mb: int):
     return lambda: np.ones(n_mb << 20, np.uint8)
 
 
+@pytest.mark.slow
 def test_peak_memory_sees_what_a_call_allocates():
     found = peak_extra_mb(prepare_allocation, 64)
     assert found is not None
@@ -100,6 +102,7 @@ def prepare_nothing_good():
     raise SystemExit(3)
 
 
+@pytest.mark.slow
 def test_peak_memory_of_a_process_that_dies_is_none():
     assert peak_extra_mb(prepare_nothing_good) is None
 
@@ -150,6 +153,7 @@ def test_the_decodes_row_has_speed_and_error():
     assert [mark.operation for mark in found] == ["decode", "decode"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_source", [False, True])
 def test_a_training_step_is_cut_into_stages(is_source):
     row, found = measure_iteration("tiny", is_source=is_source, n_runs=2, recipe=TINY_CLIP)
@@ -172,6 +176,7 @@ def test_cut_steps_learn_the_same_as_whole_ones():
     assert any(not np.array_equal(p.detach(), first[name].detach()) for name, p in moved.named_parameters())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_source", [False, True])
 def test_the_steps_row_has_speed_and_error(is_source):
     errors, found = measure_errors(replace(TINY_CLIP, is_source=is_source), scene="tiny")
@@ -225,7 +230,7 @@ class WrongBackend(CpuBackend):
         self.operation = operation
 
     def rasterize(self, *arguments: Any, **options: Any) -> Rendering:
-        found = super().rasterize(*arguments, **options)
+        found = super().rasterize(*arguments, **options, backend=backend_called("cpu"))
         if self.operation == "picture":
             return replace(found, image=found.image + 0.01)
         return replace(found, image=skewed(found.image)) if self.operation == "rasterizer" else found
@@ -251,6 +256,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_wrong_back_end_shows_in_its_column_and_in_no_other(fault):
     errors, _ = measure_errors(TINY_CLIP, scene="tiny", fast=WrongBackend(fault))
@@ -266,6 +272,7 @@ def test_the_limit_is_a_plausible_number_of_operations(monkeypatch):
 # ---------------------------------------------------------------- what comes of it
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_table_and_writes_document_and_picture(tiny_plan, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["bench", "--out", str(out), "--json", str(tmp_path / "b.json")]) == 0
@@ -336,6 +343,7 @@ def test_an_interrupt_is_told_in_one_line(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err.strip() == "clipgstream: Interrupted."
 
 
+@pytest.mark.slow
 def test_the_picture_shows_every_operation(tmp_path):
     for operations, height in ((("raster",), 400), (("raster", "decode"), 700), (("raster", "decode", "step"), 1000)):
         path = tmp_path / f"{len(operations)}.png"
@@ -350,6 +358,7 @@ def test_a_picture_of_nothing_is_refused(tmp_path):
         draw_speed_error([], tmp_path / "none.png", footer="")
 
 
+@pytest.mark.slow
 def test_errors_of_zero_have_a_place_in_the_picture(tmp_path):
     draw_speed_error([replace(mark, value_error=0.0) for mark in marks()], tmp_path / "zero.png", footer="")
     assert is_picture(tmp_path / "zero.png")

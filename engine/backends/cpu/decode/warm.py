@@ -5,10 +5,11 @@ from __future__ import annotations
 import torch
 
 from engine.backends.cpu.backend import CpuBackend
+from engine.clip_files.clip_header import FieldShape
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
 from engine.model.decoder import Decoder
-from engine.model.field import FieldShape, SpatioTemporalField
+from engine.model.field import SpatioTemporalField
 
 
 def warm_up() -> None:
