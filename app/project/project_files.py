@@ -25,6 +25,7 @@ from engine.storage.json_files import (
     write_checked_json,
 )
 from engine.training.config import TrainConfig
+from engine.training.retired_settings import without_retired
 
 logger = logging.getLogger(__name__)
 
@@ -120,7 +121,7 @@ def read_settings(folder: Path) -> ProjectSettings:
             clip_length=_count(content.get("clip_length", 10)),
             holdout=tuple(map(_text, _list(content.get("holdout", [])))),
             seed=_count(content.get("seed", 0), 2**32),
-            overrides=_table(content.get("overrides", {})),
+            overrides=without_retired(_table(content.get("overrides", {}))),
             reference_clip=_count(content.get("reference_clip", 0)),
             follow_links=_flag(content.get("follow_links", False)),
         )

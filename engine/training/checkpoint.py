@@ -26,10 +26,8 @@ class Place:
     Attributes:
         phase_index: Phase that was begun last.
         steps_in_phase: Steps done in it.
-        phases: Name and number of steps of every phase, as cut short by now.
+        phases: Name and number of steps of every phase; none of a phase that had nothing to learn.
         order: State of the order in which pictures are drawn.
-        schedule: Where the present fall of the rates began; None in files of earlier versions.
-        patience: State of the early stop; None without one.
         generator: State of the training's random numbers.
     """
 
@@ -37,8 +35,6 @@ class Place:
     steps_in_phase: int
     phases: list[tuple[str, int]]
     order: dict
-    schedule: list[float] | None
-    patience: dict | None
     generator: list[int]
 
 
@@ -132,7 +128,5 @@ def _place(resume: Any) -> Place:
         steps_in_phase=resume["steps_in_phase"],
         phases=phases,
         order=resume["order"],
-        schedule=resume.get("schedule"),
-        patience=resume.get("patience"),
         generator=resume["generator"],
     )

@@ -36,13 +36,10 @@ from engine.training.preparation.clip_field import n_alive
 from engine.training.preparation.clip_preparation import ClipParts, ClipPreparation
 from engine.training.preparation.training_pictures import shared_image_size
 from engine.training.step.active_tiles import ActivePicture, ActiveTiles
-from engine.training.step.demotion import demote
-from engine.training.step.early_stopping import MEASURE_EVERY, Patience, held_in_items, steps_to_finish
 from engine.training.step.fused_loss import LossWorkspace
-from engine.training.step.half_size import HalfSize
 from engine.training.step.losses import photometric_loss
 from engine.training.step.nonfinite import gradient_not_finite, loss_not_finite
-from engine.training.step.order import ErrorOrder, Order, ShuffledOrder
+from engine.training.step.order import ShuffledOrder
 from engine.training.step.visible_anchors import Sight, camera_views
 from engine.training.step.volume import volume_sum
 
@@ -121,10 +118,8 @@ class ClipTraining:
         )
         self._workspace = LossWorkspace(self.height, self.width)
         self._tiles: ActiveTiles | None = None
-        self._held_in = held_in_items(n_cameras, clip.n_frames, seed) if config.patience else []
-        self._trained: tuple[ClipModel, dict[str, np.ndarray]] | None = None
-        """Model and reasons of the gate before they took over the values that are stored."""
-        self._patience: Patience | None = None
+        self._trained: ClipModel | None = None
+        """The model before it took over the values that are stored."""
 
     # ---------------------------------------------------------------- where we are
 
@@ -177,26 +172,15 @@ class ClipTraining:
         parameters = named_parameters(self.model, self.gains, self.config)
         self._optimizer = PhaseOptimizer(parameters, n_steps=n_steps, config=self.config)
         self._optimizer.steps_done = steps_in_phase
-        is_static = name == "static"
-        kept_out = set() if is_static else set(self._held_in)
-        n_all = len(self.camera_indices) if is_static else len(self.pictures)
-        self._items = [item for item in range(n_all) if item not in kept_out]
-        self._patience = Patience(self.config.patience) if kept_out else None
-        is_by_error = name == "source" and self.config.sampling == "error"
-        self._order: Order = (ErrorOrder if is_by_error else ShuffledOrder)(len(self._items), seed=self.seed + index)
+        n_items = len(self.camera_indices) if name == "static" else len(self.pictures)
+        self._order = ShuffledOrder(n_items, seed=self.seed + index)
         self._phase_index = index
         self._sight = Sight(self.model, self._training_views, reach=self._reach)  # a set may have become dynamic
-        self._set_size(is_half=steps_in_phase < self.config.n_coarse_steps(n_steps))
+        has_rest = name == "source" and self.config.tiles == "active" and not self.gains.requires_grad
+        self._tiles = ActiveTiles(self.model) if has_rest and ActiveTiles.applies(self.model) else None
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self._say("Nothing to learn", f"Nothing moves in this clip: no steps instead of {n_steps}")
             self.phases[index] = (name, steps_in_phase)
-
-    def _set_size(self, *, is_half: bool) -> None:
-        """Pictures are drawn and compared at this size from here on; `config.coarse_share`."""
-        self._half = HalfSize(self.capture.rig, near_plane=self.near_plane) if is_half else None
-        is_source = self.phases[self._phase_index][0] == "source"
-        has_rest = is_source and self.config.tiles == "active" and not self.gains.requires_grad
-        self._tiles = ActiveTiles(self.model) if has_rest and ActiveTiles.applies(self.model) else None
 
     def step(self) -> StepStats:
         """Draw a picture, render it, compare, update.
@@ -204,15 +188,11 @@ class ClipTraining:
         Raises:
             NonFiniteLoss: The loss or a gradient is not finite; names it. The model is as it was before this step.
         """
-        index, in_phase = phase_at(self.phases, self.steps_done)
+        index, _ = phase_at(self.phases, self.steps_done)
         if index != self._phase_index:
             self._add_moving()
             self._start_phase(index, 0)
-        stage, n_steps = self.phases[index]
-        if self._half is not None and in_phase >= self.config.n_coarse_steps(n_steps):
-            self._set_size(is_half=False)
-        drawn, weight = self._order.draw()
-        item = self._items[drawn]
+        stage, item = self.phases[index][0], self._order.draw()
         if stage == "static":
             camera_row, clip_time = item, 0.0
             truth, is_counted = self.backgrounds.images[camera_row], self.backgrounds.is_stable[camera_row]
@@ -220,11 +200,7 @@ class ClipTraining:
             camera_row, frame = divmod(item, self.clip.n_frames)
             clip_time = frame / self.clip.clip_length
             truth, is_counted = self.pictures.raw(camera_row, frame), None
-        views, workspace = self._views, self._workspace
-        if self._half is not None:
-            views, workspace = self._half.views, self._half.workspace
-            truth, is_counted = self._half.truth(item, truth, is_counted)
-        view = views[self.camera_indices[camera_row]]
+        view = self._training_views[camera_row]
         active = self._active_picture(camera_row, view, clip_time)
         image = render_gaussians(active.gaussians, view, tile_mask=active.tile_mask).image[0]
         compared = photometric_loss(
@@ -235,7 +211,7 @@ class ClipTraining:
             is_counted=is_counted,  # unstable pixels of a background do not
             tile_mask=active.tile_mask,
             rest=active.rest,
-            workspace=workspace,
+            workspace=self._workspace,
         )
         loss, mean_square, volume = compared.loss, compared.mean_square, torch.zeros(())
         if self._tiles is not None:
@@ -248,9 +224,8 @@ class ClipTraining:
         if not np.isfinite(value):
             terms = {"photometric": float(compared.loss.detach()), "volume": float(volume.detach())}
             raise loss_not_finite(image=image.detach(), **terms, where=where, config=self.config)
-        self._order.saw(drawn, value)
         if loss.requires_grad:
-            (loss if weight == 1.0 else loss * weight).backward()
+            loss.backward()
         try:
             gradient_norm = self._optimizer.step()
         except NonFiniteLoss as error:
@@ -258,7 +233,6 @@ class ClipTraining:
         if self.gains.requires_grad:  # a step moves all cameras a little together; what is unseen stays at gain 1
             self.gains.detach().numpy()[:] = in_gauge(self.gains.detach().numpy())
         self.steps_done += 1
-        self._look_for_stall()
         return StepStats(
             step=self.steps_done,
             n_steps=self.n_steps,
@@ -269,34 +243,6 @@ class ClipTraining:
             gradient_norm=gradient_norm,
             is_clipped=self._optimizer.clips(gradient_norm),
         )
-
-    def _look_for_stall(self) -> None:
-        """Now and then, see whether the pictures kept out of training still gain; else cut the phase short."""
-        name, n_steps = self.phases[self._phase_index]
-        done = self._optimizer.steps_done
-        if self._patience is None or self._half is not None or done % MEASURE_EVERY or done >= n_steps:
-            return
-        if not self._patience.saw(self.held_in_psnr()):
-            return
-        n_left = steps_to_finish(done, n_steps)
-        if n_left < n_steps - done:
-            self._optimizer.finish_within(n_left)
-            self.phases[self._phase_index] = (name, done + n_left)
-            gained = f"{len(self._held_in)} pictures kept out of training stay at {self._patience.best:.2f} dB"
-            self._say("Early stop", f"{gained}: {n_left} steps to the end instead of {n_steps - done}")
-
-    def held_in_psnr(self) -> float:
-        """Mean PSNR of the pictures of training cameras that are kept out of training, dB; NaN without patience."""
-        values = []
-        for item in self._held_in:
-            camera_row, frame = divmod(item, self.clip.n_frames)
-            clip_time = frame / self.clip.clip_length
-            view = self._training_views[camera_row]
-            with torch.no_grad():
-                gaussians = self.model.decode(clip_time, self._sight.rows(camera_row, clip_time))
-                image = render_gaussians(gaussians, view).image[0] * self.gains[camera_row]
-            values.append(psnr(image.numpy(), self.pictures.raw(camera_row, frame) / 255.0))
-        return float(np.mean(values)) if values else float("nan")
 
     def _active_picture(self, camera_row: int, view: View, clip_time: float) -> ActivePicture:
         rows = self._sight.rows(camera_row, clip_time)
@@ -322,10 +268,10 @@ class ClipTraining:
 
     def state(self) -> ClipState:
         """Snapshot of everything the clip owns. Copies, so that training can go on."""
-        return self._state_of(self.model, self._reasons)
+        return self._state_of(self.model)
 
-    def _state_of(self, model: ClipModel, reasons: dict[str, np.ndarray]) -> ClipState:
-        arrays = model.own_arrays() | reasons
+    def _state_of(self, model: ClipModel) -> ClipState:
+        arrays = model.own_arrays() | self._reasons
         header = {
             "schema": SCHEMA,
             "role": "reference" if self.reference is None else "source",
@@ -369,13 +315,7 @@ class ClipTraining:
         if self._base is None and self.phases[self._phase_index][0] != "static":
             self._preparation.keep_backgrounds(self.backgrounds)
         state = self.state()
-        self._trained = self.model, self._reasons
-        # another clip's field may show this one where fields go on: what it would show nobody knows yet
-        if self.config.gate == "images" and self.config.field != "continue":
-            state, said = demote(state, self.reference, self._training_views, reach=self._reach)
-            self._say("Leaving out what is not needed", said)
-            self._reasons = {name: array for name, array in state.arrays.items() if name.startswith("gate.")}
-            self.model = load_clip_model(state, self.reference, is_learning=True)
+        self._trained = self.model
         # a field that goes on in the next clip, and may show this one then, keeps entries that only others read
         entries = None if self.config.field == "continue" else self.model.entries_in_use()
         compact = compact_clip(state, entries)
@@ -391,11 +331,9 @@ class ClipTraining:
             steps_in_phase=in_phase if index == self._phase_index else self.phases[self._phase_index][1],
             phases=self.phases,
             order=self._order.state(),
-            schedule=self._optimizer.schedule,
-            patience=None if self._patience is None else self._patience.state(),
             generator=self._generator.get_state().numpy().tolist(),
         )
-        state = self._state_of(*(self._trained or (self.model, self._reasons)))
+        state = self._state_of(self._trained or self.model)
         state = ClipState(state.arrays | self._optimizer.arrays(), state.header)
         write_checkpoint(path, Checkpoint(state, self.gains.detach().numpy().copy(), self.backgrounds, place))
 
@@ -443,9 +381,5 @@ class ClipTraining:
         self.steps_done = header["step"]
         self._start_phase(place.phase_index, place.steps_in_phase)
         self._optimizer.restore(arrays, place.steps_in_phase)
-        if place.schedule is not None:
-            self._optimizer.schedule = place.schedule
         self._order.restore(place.order)
-        if self._patience is not None and place.patience:
-            self._patience.restore(place.patience)
         self._generator.set_state(torch.tensor(place.generator, dtype=torch.uint8))

@@ -110,20 +110,6 @@ class TrainConfig:
     passes: float = 0.0
     """Passes over the training pictures of a clip, for clips of both kinds; 0 keeps the derived steps above."""
 
-    coarse_share: float = 0.0
-    """Coarse to fine: share of the steps of every phase, the first ones, that look at pictures of half size. Off, as
-    it gives nothing: such a step still has all Gaussians and takes 0.75 to 0.85 of the time of another. Validation
-    cameras, all and moving pixels, against no such steps in as many steps, 1200 to 2000, one seed: sample, 0.25,
-    reference clip -0.08 and -0.18 dB, source clip -0.04 and -0.37; at half its size, 0.4, reference clip -0.8 and -1.1;
-    basketball, reference clip, 0.3, -0.02 and -0.06, source clip, 0.2, -0.02 and -0.04, 0.4, -0.03 and -0.05, and in as
-    much time +0.03 and +0.11."""
-
-    patience: int = 0
-    """Early stop. 0: never. Else 2 % of the training pictures, at least four, are not trained on; when their mean PSNR
-    has not risen by 0.02 dB over so many looks, 150 steps apart, the rates fall to their end within a fifth of the
-    steps done. Off because it saves little and costs: source clip of the basketball, validation cameras, patience=3,
-    5,400 instead of 6,000 steps, 94 s instead of 104, 29.33 to 29.26 dB, 25.29 to 25.04 on moving pixels."""
-
     # learning rates; all fall log-linearly over the phase, to `final_lr_ratio` of their start
     feature_lr: float = 7.5e-3
     scale_lr: float = 7e-3
@@ -162,14 +148,8 @@ class TrainConfig:
     # gate
     gate: str = "hull"
     """hull: static anchors have no dynamic feature, moving ones are decoded only at times where that frame's hull
-    has them. images: likewise, but static anchors that two or more cameras see change where no hull is (lamps, soft
-    shadows), and those inside a hull (of what rested and was taken away), get a dynamic feature, and once a clip is
-    trained, anchors that nobody sees and dynamic ones that learned no change are left out. Where it finds none of
-    these, the result is that of hull, bit for bit. Not the default: held-out cameras, passes=8, one seed, hull against
-    images, sample 27.85 and 27.87 dB, basketball 28.75 and 28.89, but what stands still changes twice as much at the
-    borders of its clips, 0.14 of 1/255 instead of 0.07. static: static anchors have no dynamic feature, moving ones
-    are decoded at all times; what the gate in time is worth. off: the published method, every anchor is evaluated at
-    every time."""
+    has them. static: likewise, but moving ones are decoded at all times; what the gate in time is worth. off: the
+    published method, every anchor is evaluated at every time."""
 
     # what a step of a source clip looks at
     tiles: str = "active"
@@ -179,11 +159,6 @@ class TrainConfig:
     decode_backend: str = "auto"
     """What decodes the anchors of a training step, see engine.model.decode.decoding. auto: fused kernels where they
     can. reference: plain torch, several times slower, to compare with; what is learned is the same but for rounding."""
-    sampling: str = "even"
-    """even: every picture once a pass. error: half of the draws go to pictures by their loss, and a picture's loss
-    weighs the less the more often it is drawn, so that on average the gradient is that of even passes. It gives nothing
-    that could be told from chance (one seed): moving pixels of validation cameras, even against error, basketball after
-    1500 steps 24.02 and 24.06 dB, sample 23.31 and 23.28."""
 
     # what a source clip takes over; every value but the first is an ablation (ClipGStream, ablation studies)
     decoder: str = "frozen"
@@ -264,10 +239,6 @@ class TrainConfig:
         """Steps of a source clip with this many training pictures."""
         return self.source_steps or self._n_pass_steps(n_pictures) or SOURCE_RULE.steps(n_pictures)
 
-    def n_coarse_steps(self, n_steps: int) -> int:
-        """How many of the steps of a phase, the first ones, look at pictures of half size."""
-        return int(self.coarse_share * n_steps)
-
     def _n_pass_steps(self, n_pictures: int) -> int:
         return math.ceil(self.passes * n_pictures)
 
@@ -290,8 +261,6 @@ _RANGES: dict[str, tuple[float, float]] = {
     "joint_steps": (0, 1_000_000),
     "source_steps": (0, 1_000_000),
     "passes": (0.0, 1000.0),
-    "coarse_share": (0.0, 1.0),
-    "patience": (0, 1000),
     "field_levels": (0, 16),
     "feature_lr": (0.0, 1.0),
     "scale_lr": (0.0, 1.0),
@@ -318,7 +287,7 @@ _RANGES: dict[str, tuple[float, float]] = {
 
 _CHOICES: dict[str, tuple[str, ...]] = {
     "color": ("auto", "gain", "off"),
-    "gate": ("hull", "images", "static", "off"),
+    "gate": ("hull", "static", "off"),
     "field_tables": ("shared", "per_frame"),
     "decoder": ("frozen", "finetune", "new"),
     "residual": ("dedup", "none", "full"),
@@ -327,7 +296,6 @@ _CHOICES: dict[str, tuple[str, ...]] = {
     "start": ("scratch", "previous"),
     "tiles": ("active", "all"),
     "decode_backend": ("auto", "reference"),
-    "sampling": ("even", "error"),
 }
 _SHARING = ("decoder", "residual", "inherit")
 """Settings of what a source clip takes over. The first choice of each is the default."""

@@ -59,7 +59,7 @@ def test_a_plan_as_json(run, capture_folder, tmp_path):
     [
         (["--clips", "9"], "clips 0 to 0"),
         (["--preset", "huge"], "no preset called 'huge'"),
-        (["--set", "patience=-1"], "patience is -1"),
+        (["--set", "passes=-1"], "passes is -1"),
         (["--holdout", "0,1,2"], "leaves 1 for training"),
     ],
 )

@@ -83,7 +83,6 @@ class PhaseOptimizer:
         self._max_norm = config.max_gradient_norm
         self.n_steps = n_steps
         self.steps_done = 0
-        self._from_step, self._from_share = 0, 0.0
         self._adam = make_adam(self._parameters, backend)
 
     def step(self) -> float:
@@ -111,22 +110,7 @@ class PhaseOptimizer:
     @property
     def share_done(self) -> float:
         """How much of the fall of the rates lies behind, 0 to 1; rates are start * final_ratio ** this."""
-        share = (self.steps_done - self._from_step) / max(self.n_steps - self._from_step, 1)
-        return self._from_share + (1.0 - self._from_share) * share
-
-    def finish_within(self, n_steps: int) -> None:
-        """From here on rates fall to their end within so many more steps, from where they are."""
-        self._from_step, self._from_share = self.steps_done, self.share_done
-        self.n_steps = self.steps_done + n_steps
-
-    @property
-    def schedule(self) -> list[float]:
-        """Where the present fall of the rates began: step, and share of the fall. For a checkpoint."""
-        return [self._from_step, self._from_share]
-
-    @schedule.setter
-    def schedule(self, values: list[float]) -> None:
-        self._from_step, self._from_share = int(values[0]), float(values[1])
+        return self.steps_done / max(self.n_steps, 1)
 
     def clips(self, norm: float) -> bool:
         """Whether gradients of this norm are scaled down."""

@@ -30,8 +30,6 @@ _FORWARD = 0.6
 """Share of an anchor's cost that remains when it is frozen."""
 _ACTIVE = 0.55
 """Share of the frozen part of a picture that active tiles leave to be drawn."""
-_HALF_SIZE = 0.8
-"""A step at half size against one at full size: Gaussians are decoded and projected all the same."""
 
 # preparation
 _START_S = {True: 1.2, False: 2.0}
@@ -85,7 +83,6 @@ class ClipSizes:
         is_built: Whether they are built from the clip's own depth maps.
         has_gate: Whether static anchors stay out of the field; else every anchor is alive at every time.
         has_active_tiles: Whether only active tiles are drawn.
-        coarse_share: Share of the steps at half size.
     """
 
     n_pixels: int
@@ -105,7 +102,6 @@ class ClipSizes:
     is_built: bool
     has_gate: bool
     has_active_tiles: bool
-    coarse_share: float = 0.0
 
     @property
     def n_pictures(self) -> int:
@@ -130,10 +126,6 @@ def step_ms(phase: str, sizes: ClipSizes) -> float:
         phase: "static", "joint" or "source".
         sizes: Of the clip.
     """
-    return _full_step_ms(phase, sizes) * (1 - (1 - _HALF_SIZE) * sizes.coarse_share)
-
-
-def _full_step_ms(phase: str, sizes: ClipSizes) -> float:
     gaussians = sizes.gaussians_per_anchor * _GAUSSIAN_MS
     heads = _DECODE_MS + _HEADS_MS * sizes.n_products / _HEADS_PRODUCTS
     n_still = sizes.n_static if sizes.has_gate or phase == "static" else 0
@@ -165,9 +157,8 @@ def memory_mb(sizes: ClipSizes) -> float:
     read_mb = sizes.pictures_mb
     if not sizes.is_source:  # backgrounds are estimated from frames of the whole capture
         read_mb = max(read_mb, sizes.n_cameras * sizes.n_background_frames * sizes.n_pixels * 3 / 1e6)
-    half_mb = sizes.pictures_mb / 4 if sizes.coarse_share else 0.0
     tiles_mb = sizes.n_cameras * sizes.n_pixels * 16 / 1e6 if sizes.has_active_tiles else 0.0
-    return _PROGRAM_MB + sizes.pictures_mb + half_mb + min(read_mb, CACHE_MB) + tiles_mb + 2 * checkpoint_mb(sizes)
+    return _PROGRAM_MB + sizes.pictures_mb + min(read_mb, CACHE_MB) + tiles_mb + 2 * checkpoint_mb(sizes)
 
 
 def checkpoint_mb(sizes: ClipSizes) -> float:

@@ -194,5 +194,4 @@ def clip_sizes(footage: Footage, clip: Clip, config: TrainConfig, counts: Counts
         is_built=not is_source or config.inherit == "off",
         has_gate=has_gate,
         has_active_tiles=is_frozen and config.tiles == "active" and has_gate,
-        coarse_share=config.coarse_share,
     )

@@ -16,7 +16,6 @@ from engine.training.config import JOINT_RULE, SOURCE_RULE, STATIC_RULE, StepRul
 from engine.training.plan.cost import checkpoint_mb
 from engine.training.plan.expected_sizes import Counts, Footage, clip_sizes, counts_of, expected_counts
 from engine.training.plan.forecasting import UNKNOWN_MACHINE, MachineSpeed, MeasuredClip, forecast
-from engine.training.step.early_stopping import MEASURE_EVERY, held_in_items
 
 Value = int | float | str
 
@@ -62,7 +61,7 @@ class TrainingPlan:
     Attributes:
         clip_index, start, n_frames: The clip.
         role: "reference" or "source".
-        n_steps: Of all phases; early stopping may do with fewer.
+        n_steps: Of all phases.
         lines: Everything that is known, in the order in which it comes about.
         preparation_s, training_s: Forecast; together the wall time, compiling of kernels left out.
         memory_mb: Most that the training process will hold, 10^6 bytes.
@@ -174,14 +173,6 @@ def make_plan(
         *_model_lines(config, counts, is_source=is_source),
         PlanLine("kept while training", checkpoint_mb(sizes), "MB", "a checkpoint to go on from; it goes in the end"),
     ]
-    if config.coarse_share and sum(int(line.value) for line in phases):
-        n_coarse = sum(config.n_coarse_steps(int(line.value)) for line in phases)
-        reason = f"the first {100 * config.coarse_share:.0f} % of every phase, as set"
-        lines.append(PlanLine("half size", n_coarse, "steps", reason))
-    if config.patience and sum(int(line.value) for line in phases):
-        n_kept = len(held_in_items(footage.n_cameras, clip.n_frames, 0))
-        reason = f"when {_plural(n_kept, 'picture')} kept out of training gain nothing over {config.patience} looks"
-        lines.append(PlanLine("early stop", f"{MEASURE_EVERY * config.patience:,}", "steps", reason))
     steps = [int(line.value) for line in phases]
     expected = forecast(footage, clip, config, sizes, steps=steps, history=history, machine=machine)
     return TrainingPlan(

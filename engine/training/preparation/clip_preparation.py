@@ -22,8 +22,6 @@ from engine.cloud.keeping import Keep
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
 from engine.errors import DiskError, PreparationError, ProjectError
-from engine.gate.image_gate import GateTable, measure_gate
-from engine.gate.inside import frames_inside
 from engine.gate.regions import GateRegion
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, render_gaussians
@@ -50,7 +48,7 @@ from engine.training.preparation.cloud_preparation import (
     static_cloud,
     write_backgrounds,
 )
-from engine.training.preparation.gating import decide, nothing_measured, with_inside, without_static_regions
+from engine.training.preparation.gating import decide, without_static_regions
 from engine.training.preparation.stages import Stages
 from engine.training.preparation.training_pictures import TrainingPictures
 
@@ -155,11 +153,11 @@ class ClipPreparation:
         except DiskError as error:  # clips after this one need them, this one does not: tried again at its end
             self._say("Checking backgrounds", f"{error.message} Tried again when the clip is finished")
         parts = replace(parts, backgrounds=backgrounds)
-        cloud, n_inside, moving_spacing = self._find_motion(parts, pictures)
+        cloud, moving_spacing = self._find_motion(parts, pictures)
         if len(cloud.points):
             parts.model.add_set("moving", moving_anchors(cloud, np.ones(len(cloud.points), bool), self._config))
         self._say("Carving what moves", f"{len(cloud.points)} moving anchors")
-        reasons = self._make_dynamic(parts, pictures, cloud, n_inside)
+        reasons = self._make_dynamic(parts, cloud)
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons)
 
     def source_parts(self, reference: ClipState, pictures: TrainingPictures) -> ClipParts:
@@ -188,10 +186,10 @@ class ClipPreparation:
             drop_inherited(model, own, self._config)
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         parts = ClipParts(model, gains, backgrounds, reference.header["spacing"])
-        cloud, n_inside, moving_spacing = self._find_motion(parts, pictures)
+        cloud, moving_spacing = self._find_motion(parts, pictures)
         coverage = add_residual(model, cloud, self._config)
         self._say("Comparing with the reference", coverage.text)
-        reasons = self._make_dynamic(parts, pictures, cloud, n_inside)
+        reasons = self._make_dynamic(parts, cloud)
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage.as_dict())
 
     def keep_backgrounds(self, backgrounds: Backgrounds) -> None:
@@ -265,17 +263,11 @@ class ClipPreparation:
 
     # ---------------------------------------------------------------- what moves
 
-    def _find_motion(
-        self, parts: ClipParts, pictures: TrainingPictures
-    ) -> tuple[MovingCloud, np.ndarray, float | None]:
-        """What moves, frames of each static anchor inside a hull [A], and the spacing of moving anchors."""
+    def _find_motion(self, parts: ClipParts, pictures: TrainingPictures) -> tuple[MovingCloud, float | None]:
+        """What moves, and the spacing of moving anchors."""
         static_points = parts.model.anchor_set("static").positions.numpy()
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
         masks = motion_masks(pictures, parts.backgrounds, self._report, keep)
-        n_inside = np.zeros(0, np.int64)
-        if self._config.gate == "images":
-            inside = keep("frames inside", lambda: {"n": frames_inside(static_points, masks, self._rig)})
-            n_inside = inside["n"]
         gains = parts.gains.detach().numpy()
         voxel_size = None if self._base is None else self._base.header["moving_spacing"]
         cloud = moving_cloud(
@@ -292,17 +284,15 @@ class ClipPreparation:
         moving_spacing = float(cloud.spacing) if len(cloud.points) else voxel_size
         if self._config.gate != "off":
             cloud = without_static_regions(cloud, self._regions)
-        return cloud, n_inside, moving_spacing
+        return cloud, moving_spacing
 
-    def _make_dynamic(
-        self, parts: ClipParts, pictures: TrainingPictures, cloud: MovingCloud, n_inside: np.ndarray
-    ) -> dict[str, np.ndarray]:
+    def _make_dynamic(self, parts: ClipParts, cloud: MovingCloud) -> dict[str, np.ndarray]:
         """Last step: the gate and the field. Returns the reasons of the gate."""
         reasons = {}
         if self._config.gate == "off":
             remove_gate(parts.model)
         else:
-            reasons = self._decide(parts, pictures, cloud, n_inside)
+            reasons = self._decide(parts.model)
         if self._config.gate == "static":
             remove_gate(parts.model, in_time_only=True)
         if self._config.field == "continue" and self._previous is not None and self._previous.header["field"]:
@@ -314,33 +304,13 @@ class ClipPreparation:
         self._say("Sizing the field", made)
         return reasons
 
-    def _decide(
-        self, parts: ClipParts, pictures: TrainingPictures, cloud: MovingCloud, n_inside: np.ndarray
-    ) -> dict[str, np.ndarray]:
-        """Static anchors that change in this clip get a dynamic feature; which, by config.gate and the regions."""
-        static = parts.model.anchor_set("static")
-        is_measured = self._config.gate == "images"
-        if static.is_dynamic or not (is_measured or self._regions):
-            return {}  # already, where the reference has no gate
-        table = nothing_measured(len(static))
-        if is_measured:
-            table = with_inside(self._measured(parts, pictures, cloud), n_inside, self._clip.n_frames)
-        reasons, said = decide(parts.model, table, self._regions, is_source=self._base is not None)
+    def _decide(self, model: ClipModel) -> dict[str, np.ndarray]:
+        """Static anchors that the user marked as dynamic get a dynamic feature."""
+        if not self._regions or model.anchor_set("static").is_dynamic:
+            return {}  # they all have one where the reference has no gate
+        reasons, said = decide(model, self._regions, is_source=self._base is not None)
         self._say("Deciding what is static", said)
         return reasons
-
-    def _measured(self, parts: ClipParts, pictures: TrainingPictures, cloud: MovingCloud) -> GateTable:
-        return measure_gate(
-            pictures.raw,
-            self._clip.n_frames,
-            parts.backgrounds.images,
-            self._rig,
-            parts.model.anchor_set("static").positions.numpy(),
-            spacing=parts.spacing,
-            moving_points=cloud.points,
-            presence=cloud.presence,
-            moving_spacing=float(cloud.spacing),
-        )
 
     def _say(self, stage: str, message: str) -> None:
         self._report(Progress(stage, 1.0, message))

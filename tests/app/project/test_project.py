@@ -2,9 +2,11 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -26,6 +28,17 @@ def test_settings_come_back_as_they_were(tmp_path):
     create_project(tmp_path / "p", SETTINGS).close()
     assert read_settings(tmp_path / "p") == SETTINGS
     assert sorted(child.name for child in (tmp_path / "p").iterdir()) == ["project.json"]
+
+
+def test_settings_that_are_gone_are_dropped_when_an_old_project_is_read(tmp_path):
+    shutil.copy(Path(__file__).with_name("project_with_retired_settings.json"), tmp_path / "project.json")
+    settings = read_settings(tmp_path)
+    assert settings.overrides == {"joint_steps": 40, "inherit": "moving"}
+    assert settings.config().gate == "hull"
+    project = open_project(tmp_path)
+    project.update(settings)
+    project.close()
+    assert "patience" not in (tmp_path / "project.json").read_text()
 
 
 def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch):

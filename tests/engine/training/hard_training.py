@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -87,13 +87,6 @@ class Trained:
         write_compact_clip(path, training.finish())
         self.trainings.append(training)
         return read_clip_state(path)
-
-    def with_other(self, clip_index: int, **settings: Any) -> Trained:
-        """The same clips, but this one trained anew with other settings."""
-        other = replace(self, states=[*self.states], trainings=[*self.trainings], said=[*self.said])
-        with one_thread():
-            other.states[clip_index] = other.train(clip_index, **settings)
-        return other
 
     def n_bytes(self, clip_index: int) -> int:
         """Of a stored clip."""

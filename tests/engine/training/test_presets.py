@@ -38,7 +38,7 @@ def test_rates_of_the_paper_preset_start_and_end_as_published(tiny):
 def test_other_settings_of_the_paper_preset_are_the_published_ones():
     config = TrainConfig(**preset("paper"))
     assert (config.ssim_weight, config.volume_weight) == (0.2, 0.01)
-    assert (config.gate, config.color, config.sampling, config.decoder) == ("off", "off", "even", "frozen")
+    assert (config.gate, config.color, config.decoder) == ("off", "off", "frozen")
     assert min(config.max_static_points, config.max_moving_points) > 100_000
 
 

@@ -79,7 +79,6 @@ def test_a_reference_clip():
     assert lines["voxel"][0] == "derived"
     assert "22,000" in lines["static anchors"][1]
     assert "tiles" not in lines
-    assert "early stop" not in lines
 
 
 def test_a_source_clip_counts_what_the_reference_has():
@@ -96,17 +95,6 @@ def test_a_source_clip_counts_what_the_reference_has():
 
 def test_a_source_clip_before_its_reference_says_that_it_guesses():
     assert "not trained yet" in texts(plan(clip=NEXT, is_source=True))["static anchors"][1]
-
-
-def test_steps_at_half_size_are_told_take_less_time_and_more_memory():
-    full, coarse = plan(is_source=True), plan(is_source=True, config=TrainConfig(coarse_share=0.5))
-    assert full.line("half size") is None
-    assert texts(coarse)["half size"] == (3000, "the first 50 % of every phase, as set")
-    assert texts(plan(config=TrainConfig(coarse_share=0.5)))["half size"][0] == 405 + 2700
-    assert coarse.n_steps == full.n_steps
-    assert 0.8 < coarse.training_s.value / full.training_s.value < 1.0
-    pictures_mb = 270 * 640 * 360 * 3 / 1e6
-    assert coarse.memory_mb.value - full.memory_mb.value == pytest.approx(pictures_mb / 4, abs=0.01)
 
 
 def test_clips_trained_before_say_what_to_expect():
@@ -165,7 +153,6 @@ def test_the_paper_preset_costs_what_it_costs():
     [
         ({"static_steps": 7}, "static steps", (7, "as set")),
         ({"joint_steps": 9}, "joint steps", (9, "as set")),
-        ({"patience": 4}, "early stop", ("600", "when 6 pictures kept out of training gain nothing over 4 looks")),
         ({"background_frames": 12}, "background frames", (12, "of every camera, spread over the capture")),
     ],
 )
