@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from app.background.logs import PrintableFormatter, start_logging
-from app.cli.arguments import COMMANDS, PlainParser, add_follow_links, parse, path_argument, suggestion
+from app.cli.arguments import PlainParser, add_follow_links, parse, path_argument, suggestion
+from app.cli.commands import COMMANDS
 from engine.assets import asset_path
 from engine.kernels.cache import use_kernel_cache
 from ui.style.ui_scale import parse_scale
@@ -32,11 +33,12 @@ def has_display() -> bool:
 
 def build_parser() -> PlainParser:
     """Arguments of the window and of the headless demo; the other commands have their own."""
+    summaries = {name: command.summary for name, command in COMMANDS.items()} | DEMO
     parser = PlainParser(
         prog="clipgstream",
         description="View, train and replay dynamic captures clip by clip.",
         epilog="without a window, each with its own --help:\n"
-        + "\n".join(f"  clipgstream {name:<8} {words}" for name, words in (COMMANDS | DEMO).items()),
+        + "\n".join(f"  clipgstream {name:<8} {summary}" for name, summary in summaries.items()),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("path", nargs="?", type=path_argument, help="capture or project folder to open")
@@ -102,7 +104,7 @@ def _mistyped_command(arguments: Sequence[str]) -> str:
     word = arguments[0] if arguments else ""
     if not word or word.startswith("-") or os.path.lexists(word):
         return ""
-    near = suggestion(word, COMMANDS | DEMO)
+    near = suggestion(word, [*COMMANDS, *DEMO])
     is_word = not os.path.dirname(word) and len(arguments) > 1 and not arguments[1].startswith("-")
     said = f"'{word}' is neither a command nor a file or folder"
     return f"{said}.{near}" if near else said if is_word else ""

@@ -18,19 +18,6 @@ from engine.text import printable, shown
 logger = logging.getLogger(__name__)
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT = 0, 1, 2
-COMMANDS = {
-    "train": "train clips of a capture, or go on where it stopped",
-    "eval": "measure trained clips against every camera, and the seams between them",
-    "render": "render a camera of the capture, as video or PNG files",
-    "inspect": "describe a capture, or what the trained clips of a project weigh",
-    "gate": "say what is static in a project and why, and overrule it",
-    "doctor": "look at this machine: versions, memory, compiled kernels, OpenGL, disk",
-    "bench": "measure the kernels on this machine, speed beside error",
-    "report": "write a page about a project, alone or beside others",
-    "ablate": "train variants of the method and baselines, and compare them",
-}
-"""Subcommands that app.cli.cli serves without a window, and what each does."""
-
 
 _LONGEST_INSIDE = 200
 """Bytes of the longest name that the program adds to a folder it was given."""

@@ -9,12 +9,12 @@ from app.training.service import Launch
 from engine.storage.json_files import json_text
 
 
-def add_doctor_arguments(command: argparse.ArgumentParser) -> None:
+def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream doctor`."""
     command.add_argument("--json", action="store_true", help="print the findings as JSON")
 
 
-def doctor(options: argparse.Namespace, launch: Launch) -> int:
+def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream doctor: look at this machine. Returns the exit code."""
     from app.cli.doctor import examine
 

@@ -16,7 +16,7 @@ from app.training.service import Launch
 from engine.storage.json_files import json_text
 
 
-def add_eval_arguments(command: argparse.ArgumentParser) -> None:
+def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream eval`."""
     command.add_argument("project", type=path_argument, help="project folder")
     command.add_argument("--json", required=True, metavar="OUT", help="file for all rows and means; - prints them")
@@ -25,7 +25,7 @@ def add_eval_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
-def evaluate(options: argparse.Namespace, launch: Launch) -> int:
+def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream eval: measure trained clips, into a JSON document. Returns the exit code."""
     if options.json != "-":
         check_writable(Path(options.json))

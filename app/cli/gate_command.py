@@ -21,7 +21,7 @@ SCHEMA = 1
 _SHAPES = {"box": (("X0", "Y0", "Z0", "X1", "Y1", "Z1"), "two corners"), "sphere": (("X", "Y", "Z", "R"), "and radius")}
 
 
-def add_gate_arguments(command: argparse.ArgumentParser) -> None:
+def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream gate`."""
     command.add_argument("project", type=path_argument, help="project folder")
     for treat, meaning in (("static", "nothing moves here"), ("dynamic", "everything may change here")):
@@ -51,7 +51,7 @@ class _MarkAction(argparse.Action):
         setattr(namespace, self.dest, [*getattr(namespace, self.dest), {"treat": treat, shape: given}])
 
 
-def gate(options: argparse.Namespace, launch: Launch) -> int:
+def run(options: argparse.Namespace, launch: Launch) -> int:
     """Mark regions if any are given, then say what is marked and what was decided."""
     marks = [parse_region(values) for values in options.marks]
     is_change = bool(marks) or options.forget

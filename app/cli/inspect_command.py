@@ -13,14 +13,14 @@ from engine.text import printable
 LAYOUTS = {reader.FORMAT: reader.LAYOUT for reader in FORMATS}
 
 
-def add_inspect_arguments(command: argparse.ArgumentParser) -> None:
+def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream inspect`."""
     command.add_argument("path", type=path_argument, help="capture or project folder")
     command.add_argument("--json", action="store_true", help="print everything as JSON")
     add_follow_links(command)
 
 
-def inspect(options: argparse.Namespace, launch: Launch) -> int:
+def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream inspect: describe a capture or a project. Returns the exit code."""
     from app.project.project import is_project
     from app.project.project_summary import describe_project, project_lines

@@ -18,7 +18,7 @@ from engine.errors import ProjectError
 VIDEO_SUFFIXES = (".mp4", ".m4v", ".mov")
 
 
-def add_render_arguments(command: argparse.ArgumentParser) -> None:
+def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream render`."""
     command.add_argument("project", type=path_argument, help="project folder")
     command.add_argument("--camera", required=True, metavar="NAME", help="camera of the capture")
@@ -35,7 +35,7 @@ def add_render_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
-def render(options: argparse.Namespace, launch: Launch) -> int:
+def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream render: write the pictures of a camera. Returns the exit code."""
     from app.cli.video import write_pictures, write_video
 

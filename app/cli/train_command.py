@@ -1,12 +1,9 @@
-"""clipgstream train: a project made or opened as the arguments say, its clips trained, or only their plan printed."""
+"""clipgstream train: trains the clips of a project, or only prints their plan."""
 
 from __future__ import annotations
 
 import argparse
 import contextlib
-from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 from app.cli.arguments import (
     EXIT_BAD_INPUT,
@@ -15,29 +12,18 @@ from app.cli.arguments import (
     add_follow_links,
     add_training_settings,
     fail,
-    overrides_of,
-    parse_cameras,
     parse_range,
     path_argument,
 )
+from app.cli.chosen_project import open_for_training, project_to_plan
 from app.cli.progress import ProgressLine, duration_text
 from app.cli.training_lines import PlanLines, show_event, show_outcome, show_status
 from app.evaluation.headless import train_clips, train_document
 from app.plan.planning import clip_history, plan_clip, plan_document, plan_text, totals
 from app.plan.speed import known_machine_speed
 from app.project.clip_catalog import ClipCatalog
-from app.project.project import (
-    PROJECT_FILE,
-    Project,
-    ProjectSettings,
-    check_settings,
-    create_project,
-    default_settings,
-    open_project,
-    read_settings,
-)
+from app.project.project import PROJECT_FILE
 from app.training.service import Launch, TrainingService
-from engine.capture.capture import Capture, open_capture
 from engine.errors import CaptureError, DiskError, ProjectError
 from engine.storage.json_files import json_text
 
@@ -45,7 +31,7 @@ BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
 """Failures of a worker that are the input's and not the program's."""
 
 
-def add_train_arguments(command: argparse.ArgumentParser) -> None:
+def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream train`."""
     command.add_argument("capture", type=path_argument, help="capture folder")
     command.add_argument(
@@ -65,12 +51,12 @@ def add_train_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
-def train(options: argparse.Namespace, launch: Launch) -> int:
+def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream train: train clips, or print their plan. Returns the exit code."""
     if options.plan:
         return _plan(options)
     was_folder, was_project = options.project.exists(), (options.project / PROJECT_FILE).is_file()
-    project, capture = _open_for_training(options)
+    project, capture = open_for_training(options)
     is_refused, outcomes = False, []
     line = ProgressLine(is_quiet=options.quiet)
     service: TrainingService | None = None
@@ -132,7 +118,7 @@ def train(options: argparse.Namespace, launch: Launch) -> int:
 
 
 def _plan(options: argparse.Namespace) -> int:
-    project, capture = _project_to_plan(options)
+    project, capture = project_to_plan(options)
     clips = project.clips(capture.n_frames)
     chosen = parse_range(options.clips, len(clips), option="--clips", what="clips")
     catalog = ClipCatalog(project, len(clips))
@@ -162,82 +148,3 @@ def _plan(options: argparse.Namespace) -> int:
             f"at most {sums['memory_mb'] / 1e3:.1f} GB of memory, {sums['disk_mb']:.2g} MB stored"
         )
     return EXIT_OK
-
-
-def _open_for_training(options: argparse.Namespace) -> tuple[Project, Capture]:
-    """The project of the arguments, made or opened; what was given has to agree with what is there."""
-    settings, stored, capture = _chosen_settings(options)
-    if stored is None:
-        return create_project(options.project, settings), capture
-    project = open_project(options.project)
-    try:
-        _check_changes(options, project, settings)
-    except ProjectError:
-        project.close()
-        raise
-    if settings != stored:
-        project.update(settings)
-    return project, capture
-
-
-def _project_to_plan(options: argparse.Namespace) -> tuple[Project, Capture]:
-    """Likewise, for looking only: nothing is made, changed or locked."""
-    settings, stored, capture = _chosen_settings(options)
-    project = Project(options.project, settings, None)
-    if stored is not None:
-        _check_changes(options, Project(options.project, stored, None), settings)
-    return project, capture
-
-
-def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, ProjectSettings | None, Capture]:
-    """Settings that the arguments ask for, those of the project where there is one, and the capture."""
-    overrides = overrides_of(options)
-    exists = (options.project / PROJECT_FILE).is_file()
-    stored = read_settings(options.project) if exists else None
-    scale = options.scale if options.scale is not None else 1.0 if stored is None else stored.scale
-    follow_links = options.follow_links or (stored is not None and stored.follow_links)
-    capture = open_capture(options.capture, scale=scale, follow_links=follow_links)
-    holdout = None if options.holdout is None else parse_cameras(options.holdout, capture)
-    if stored is None:
-        settings = default_settings(
-            capture,
-            clip_length=options.clip_length,
-            holdout=holdout,
-            seed=options.seed or 0,
-            overrides=overrides,
-            reference_clip=options.reference_clip or 0,
-        )
-        n_clips = len(settings.clips(capture.n_frames))
-        parse_range(options.clips, n_clips, option="--clips", what="clips")  # said before the folder is made
-        return settings, None, capture
-    given = {
-        "scale": options.scale,
-        "clip_length": options.clip_length,
-        "seed": options.seed,
-        "holdout": holdout,
-        "reference_clip": options.reference_clip,
-    }
-    changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    if capture.fingerprint != stored.fingerprint:
-        raise ProjectError(
-            "The project was made for another capture.", hint="Choose another --project folder.", path=options.project
-        )
-    place = str(Path(capture.path).resolve())  # the capture may have moved
-    changes |= {"overrides": stored.overrides | overrides, "capture": place, "follow_links": follow_links}
-    settings = replace(stored, **changes)
-    check_settings(settings, capture)
-    return settings, stored, capture
-
-
-def _check_changes(options: argparse.Namespace, project: Project, settings: ProjectSettings) -> None:
-    """See that nothing was learned with other settings."""
-    stored = project.settings
-    names = ("scale", "clip_length", "seed", "holdout", "reference_clip", "overrides")
-    changed = [name for name in names if getattr(settings, name) != getattr(stored, name)]
-    if changed and project.has_progress:
-        listed = ", ".join(f"{name} {getattr(stored, name)!r}" for name in changed)
-        raise ProjectError(
-            f"The project was trained with {listed}; that cannot change any more.",
-            hint="Leave the option out, or choose another --project folder.",
-            path=options.project,
-        )

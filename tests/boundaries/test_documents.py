@@ -77,15 +77,15 @@ def test_readme_lists_the_keys_of_the_window() -> None:
 
 def test_readme_lists_the_options_of_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     """In the row of the command, or among the settings that commands share."""
-    from app.cli.arguments import COMMANDS
     from app.cli.cli import build_parser
+    from app.cli.commands import COMMANDS
 
     text = (ROOT / "README.md").read_text("utf-8")
     rows = [line for line in text.splitlines() if line.startswith("| `")]
     shared = text[text.index("Settings of `train` and `ablate`:") : text.index("| `--set` |")]
     for command in COMMANDS:
         with pytest.raises(SystemExit):
-            build_parser().parse_args([command, "--help"])
+            build_parser(used=[command]).parse_args([command, "--help"])
         options = set(re.findall(r"^  (--[a-z-]+)", capsys.readouterr().out, re.MULTILINE))
         assert options, command
         said = "".join(row for row in rows if f"`{command}`" in row.split("|")[1] or f"clipgstream {command} " in row)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.cli.arguments import COMMANDS
+from app.cli.commands import COMMANDS
 from ui.main import main
 from ui.panels.shortcuts import SHORTCUTS
 from ui.panels.state import Rect
@@ -142,7 +142,7 @@ def test_help_says_what_each_command_does(capsys: pytest.CaptureFixture[str]) ->
     lines = [line.split(maxsplit=2) for line in capsys.readouterr().out.splitlines()]
     said = {line[1]: line[2] for line in lines if line[:1] == ["clipgstream"]}
     assert said.keys() == {*COMMANDS, "demo"}
-    assert all(said[name] == words for name, words in COMMANDS.items())
+    assert all(said[name] == command.summary for name, command in COMMANDS.items())
 
 
 def test_nonsense_arguments_end_with_2_and_one_line(capsys: pytest.CaptureFixture[str]) -> None:

@@ -24,7 +24,7 @@ from engine.errors import ProjectError
 from engine.storage.json_files import json_text
 
 
-def add_ablate_arguments(command: argparse.ArgumentParser) -> None:
+def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream ablate`."""
     command.add_argument("capture", type=path_argument, nargs="?", help="capture folder")
     command.add_argument("--project", type=path_argument, help="folder for one project per variant and the table")
@@ -47,7 +47,7 @@ def add_ablate_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
-def ablate(options: argparse.Namespace, launch: Launch) -> int:
+def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream ablate: train variants and compare them; prints the table. Returns the exit code."""
     from app.lab.ablation.curves import curve_lines
     from app.lab.ablation.running import RESULT_FILE, TABLE_FILE, Callbacks, run_ablation

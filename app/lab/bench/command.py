@@ -18,7 +18,7 @@ DEFAULT_OUT = Path("bench_output")
 """Where the picture goes unless --out says so, in the current folder."""
 
 
-def add_bench_arguments(command: argparse.ArgumentParser) -> None:
+def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream bench`."""
     command.add_argument(
         "--out",
@@ -33,7 +33,7 @@ def add_bench_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
-def bench(options: argparse.Namespace, launch: Launch) -> int:
+def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream bench: measure the kernels; prints the table. Returns the exit code."""
     chart = options.out / CHART_FILE
     table_file = None if options.json in (None, "-") else Path(options.json)

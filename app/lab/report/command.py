@@ -13,7 +13,7 @@ from app.project.project import read_settings
 from app.training.service import Launch
 
 
-def add_report_arguments(command: argparse.ArgumentParser) -> None:
+def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream report`."""
     command.add_argument("project", type=path_argument, help="project folder")
     command.add_argument(
@@ -32,7 +32,7 @@ def add_report_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
-def report(options: argparse.Namespace, launch: Launch) -> int:
+def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream report: write a page about a project. Returns the exit code."""
     from app.lab.report.write import PAGE_FILE, REPORTS, write_report
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from app.cli import cli
+from app.cli.commands import COMMANDS
 from app.cli.results import check_writable
 from app.project.project import read_settings
 from engine.errors import ProjectError
@@ -22,7 +22,7 @@ def test_a_folder_that_is_no_capture(run, tmp_path):
 
 
 def test_a_fault_of_the_program_is_one_line_and_in_the_log(run, capture_folder, tmp_path, monkeypatch):
-    monkeypatch.setattr("app.cli.train_command.open_capture", lambda *_args, **_kwargs: 1 / 0)
+    monkeypatch.setattr("app.cli.chosen_project.open_capture", lambda *_args, **_kwargs: 1 / 0)
     code, _, err = run("train", capture_folder, "--project", tmp_path / "p")
     assert code == 1
     assert err.count("\n") == 1
@@ -147,8 +147,7 @@ def test_an_interrupted_command_says_what_has_become_of_its_work(run, monkeypatc
     def interrupted(options, launch):
         raise KeyboardInterrupt
 
-    command = cli._COMMANDS[arguments[0]]
-    monkeypatch.setitem(cli._COMMANDS, arguments[0], command._replace(run=interrupted))
+    monkeypatch.setattr(COMMANDS[arguments[0]].load(), "run", interrupted)
     code, out, err = run(*arguments)
     assert (code, out) == (130, "")
     assert err.strip().startswith(f"clipgstream: Interrupted. {expected}".rstrip())

@@ -1,0 +1,101 @@
+"""The project that the arguments of `clipgstream train` ask for, made or opened."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from app.cli.arguments import overrides_of, parse_cameras, parse_range
+from app.project.project import (
+    PROJECT_FILE,
+    Project,
+    ProjectSettings,
+    check_settings,
+    create_project,
+    default_settings,
+    open_project,
+    read_settings,
+)
+from engine.capture.capture import Capture, open_capture
+from engine.errors import ProjectError
+
+
+def open_for_training(options: argparse.Namespace) -> tuple[Project, Capture]:
+    """The project of the arguments, made or opened; what was given has to agree with what is there."""
+    settings, stored, capture = _chosen_settings(options)
+    if stored is None:
+        return create_project(options.project, settings), capture
+    project = open_project(options.project)
+    try:
+        _check_changes(options, project, settings)
+    except ProjectError:
+        project.close()
+        raise
+    if settings != stored:
+        project.update(settings)
+    return project, capture
+
+
+def project_to_plan(options: argparse.Namespace) -> tuple[Project, Capture]:
+    """Likewise, for looking only: nothing is made, changed or locked."""
+    settings, stored, capture = _chosen_settings(options)
+    project = Project(options.project, settings, None)
+    if stored is not None:
+        _check_changes(options, Project(options.project, stored, None), settings)
+    return project, capture
+
+
+def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, ProjectSettings | None, Capture]:
+    """Settings that the arguments ask for, those of the project where there is one, and the capture."""
+    overrides = overrides_of(options)
+    exists = (options.project / PROJECT_FILE).is_file()
+    stored = read_settings(options.project) if exists else None
+    scale = options.scale if options.scale is not None else 1.0 if stored is None else stored.scale
+    follow_links = options.follow_links or (stored is not None and stored.follow_links)
+    capture = open_capture(options.capture, scale=scale, follow_links=follow_links)
+    holdout = None if options.holdout is None else parse_cameras(options.holdout, capture)
+    if stored is None:
+        settings = default_settings(
+            capture,
+            clip_length=options.clip_length,
+            holdout=holdout,
+            seed=options.seed or 0,
+            overrides=overrides,
+            reference_clip=options.reference_clip or 0,
+        )
+        n_clips = len(settings.clips(capture.n_frames))
+        parse_range(options.clips, n_clips, option="--clips", what="clips")  # said before the folder is made
+        return settings, None, capture
+    given = {
+        "scale": options.scale,
+        "clip_length": options.clip_length,
+        "seed": options.seed,
+        "holdout": holdout,
+        "reference_clip": options.reference_clip,
+    }
+    changes: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    if capture.fingerprint != stored.fingerprint:
+        raise ProjectError(
+            "The project was made for another capture.", hint="Choose another --project folder.", path=options.project
+        )
+    place = str(Path(capture.path).resolve())  # the capture may have moved
+    changes |= {"overrides": stored.overrides | overrides, "capture": place, "follow_links": follow_links}
+    settings = replace(stored, **changes)
+    check_settings(settings, capture)
+    return settings, stored, capture
+
+
+def _check_changes(options: argparse.Namespace, project: Project, settings: ProjectSettings) -> None:
+    """See that nothing was learned with other settings."""
+    stored = project.settings
+    names = ("scale", "clip_length", "seed", "holdout", "reference_clip", "overrides")
+    changed = [name for name in names if getattr(settings, name) != getattr(stored, name)]
+    if changed and project.has_progress:
+        listed = ", ".join(f"{name} {getattr(stored, name)!r}" for name in changed)
+        raise ProjectError(
+            f"The project was trained with {listed}; that cannot change any more.",
+            hint="Leave the option out, or choose another --project folder.",
+            path=options.project,
+        )

@@ -1,0 +1,74 @@
+"""The table of commands: name, what it does, and the module that is imported once the command is used.
+
+Each module has `add_arguments(parser)` and `run(options, launch)`. Nothing here imports them, so that a command costs
+nothing until it is called, and the product does not depend on the laboratory whose commands are named here too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+from typing import TYPE_CHECKING, NamedTuple, Protocol, cast
+
+if TYPE_CHECKING:
+    from app.training.service import Launch
+
+_GOES_ON = "What was learned is kept; the same command goes on from there."
+
+
+class CommandModule(Protocol):
+    """What a command's module provides."""
+
+    def add_arguments(self, command: argparse.ArgumentParser) -> None:
+        """Declare the command's arguments."""
+        ...
+
+    def run(self, options: argparse.Namespace, launch: Launch) -> int:
+        """Do the work; returns the exit code. `launch` starts a training worker."""
+        ...
+
+
+class Command(NamedTuple):
+    """One subcommand.
+
+    Attributes:
+        summary: What it does, in one line for the list of commands and for its own help.
+        module: Where its arguments and its work are.
+        interrupted: What has become of the work after an interruption, beside what the interruption itself says.
+    """
+
+    summary: str
+    module: str
+    interrupted: str = ""
+
+    def load(self) -> CommandModule:
+        """Import the command's module."""
+        return cast("CommandModule", importlib.import_module(self.module))
+
+
+COMMANDS = {
+    "train": Command("train clips of a capture, or go on where it stopped", "app.cli.train_command", _GOES_ON),
+    "eval": Command(
+        "measure trained clips against every camera, and the seams between them",
+        "app.cli.eval_command",
+        "The result was not written.",
+    ),
+    "render": Command(
+        "render a camera of the capture, as video or PNG files",
+        "app.cli.render_command",
+        "A video was not written; single pictures that were finished are there.",
+    ),
+    "inspect": Command("describe a capture, or what the trained clips of a project weigh", "app.cli.inspect_command"),
+    "gate": Command("say what is static in a project and why, and overrule it", "app.cli.gate_command"),
+    "doctor": Command(
+        "look at this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.doctor_command"
+    ),
+    "bench": Command("measure the kernels on this machine, speed beside error", "app.lab.bench.command"),
+    "report": Command(
+        "write a page about a project, alone or beside others", "app.lab.report.command", "The page was not written."
+    ),
+    "ablate": Command(
+        "train variants of the method and baselines, and compare them", "app.lab.ablation.command", _GOES_ON
+    ),
+}
+"""Subcommands that run without a window."""
