@@ -679,7 +679,8 @@ class Session:
         picture = self._renderer.picture(gaussians, self.view, width, height)
         if picture is None or picture.is_stale:
             return picture
-        is_of_now = (picture.clip_index, picture.frame_index, picture.revision) == (
+        source = picture.source
+        is_of_now = (source.clip_index, source.frame_index, source.revision) == (
             request.clip_index,
             request.frame_index,
             request.revision,

@@ -151,4 +151,4 @@ def test_the_session_shows_what_was_trained(trained, tmp_path):
 
 def _shows(session: Session, frame_index: int) -> bool:
     shown = session.shown_gaussians()
-    return shown is not None and shown.frame_index == frame_index
+    return shown is not None and shown.source.frame_index == frame_index

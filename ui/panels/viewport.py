@@ -396,7 +396,7 @@ class ViewportPanel:
         captured = self.scene.captured(session, round(area.width))
         shown = self.scene.shown
         self._captured_frame = None if captured is None else captured.frame_index
-        frames = (None if captured is None else captured.frame_index, shown.frame_index)
+        frames = (None if captured is None else captured.frame_index, shown.source.frame_index)
         words = "Captured picture is being read" if captured is None else pane_text("Captured", *frames)
         rendered_words = pane_text(shown.kind, *frames[::-1])
         color = theme.YELLOW if None not in frames and frames[0] != frames[1] else theme.TEXT
