@@ -315,17 +315,7 @@ class ClipTraining:
         if self._base is None and self.phases[self._phase_index][0] != "static":
             self._preparation.keep_backgrounds(self.backgrounds)
         state = self.state()
-<<<<<<< HEAD
         self._trained = self.model
-=======
-        self._trained = self.model, self._reasons
-        # another clip's field may show this one where fields go on: what it would show is not known yet
-        if self.config.gate == "images" and self.config.field != "continue":
-            state, said = demote(state, self.reference, self._training_views, reach=self._reach)
-            self._say("Leaving out what is not needed", said)
-            self._reasons = {name: array for name, array in state.arrays.items() if name.startswith("gate.")}
-            self.model = load_clip_model(state, self.reference, is_learning=True)
->>>>>>> main
         # a field that goes on in the next clip, and may show this one then, keeps entries that only others read
         entries = None if self.config.field == "continue" else self.model.entries_in_use()
         compact = compact_clip(state, entries)

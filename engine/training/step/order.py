@@ -5,25 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 
-<<<<<<< HEAD
-=======
-class Draw(NamedTuple):
-    """An item, and the weight of its loss: draws times weight is one per pass and item, in expectation."""
-
-    item: int
-    weight: float
-
-
-class Order(Protocol):
-    """Draws items of a range, learns what loss each had, and can be stored as JSON."""
-
-    def draw(self) -> Draw: ...
-    def saw(self, item: int, loss: float) -> None: ...
-    def state(self) -> dict: ...
-    def restore(self, state: dict) -> None: ...
-
-
->>>>>>> main
 class ShuffledOrder:
     """Draws items of range(n) without replacement, reshuffled after each pass. Owns its random state."""
 
