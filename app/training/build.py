@@ -22,6 +22,7 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
         CaptureError, ProjectError: Files are missing, damaged or do not fit together.
     """
     from engine.training.clip_training import ClipTraining  # torch takes a second to import
+    from engine.training.variants.variant_method import method_of
 
     report(Progress("Starting", 0.0))
     warm_up_reporting(report)
@@ -47,6 +48,7 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
         capture,
         clips[job.clip_index],
         config=config,
+        method=method_of(config, previous=previous),
         holdout=job.holdout,
         reference=reference,
         seed=job.seed,

@@ -29,9 +29,9 @@ from engine.model.clip_view import REACH_SPACINGS, View, render_gaussians, rende
 from engine.progress import Progress, ReportProgress, StepStats
 from engine.training.checkpoint import Checkpoint, Place, damaged_checkpoint, read_checkpoint, write_checkpoint
 from engine.training.config import TrainConfig
+from engine.training.method import Method
 from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters
 from engine.training.phases import phase_at, phases_of
-from engine.training.preparation.building import merged
 from engine.training.preparation.clip_field import n_alive
 from engine.training.preparation.clip_preparation import ClipParts, ClipPreparation
 from engine.training.preparation.training_pictures import shared_image_size
@@ -51,10 +51,11 @@ class ClipTraining:
         capture: The capture at working resolution.
         clip: Frames to train on.
         config: All numbers.
+        method: All decisions.
         holdout: Camera indices never looked at in training.
         reference: Finished reference clip for a source clip, None to train the reference clip itself, or a clip that
             shares nothing.
-        previous: The clip before, finished: its field goes on with field=continue, all of it with start=previous.
+        previous: The clip before, finished, for a method that goes on from it.
         seed: Fixes initial values and the order of pictures.
         prep_dir: Folder that keeps backgrounds between clips.
         report: Receives progress of the preparation stages.
@@ -67,6 +68,7 @@ class ClipTraining:
         clip: Clip,
         *,
         config: TrainConfig,
+        method: Method,
         holdout: Sequence[int],
         reference: ClipState | None,
         seed: int,
@@ -75,14 +77,9 @@ class ClipTraining:
         previous: ClipState | None = None,
         regions: Sequence[GateRegion] = (),
     ) -> None:
-        self.previous = previous
-        is_streaming = reference is None and previous is not None and config.start == "previous"
-        # what a clip begins with: the reference it inherits from, or the clip before when it goes on from there
-        self._base = merged(previous) if is_streaming and previous is not None else reference
-        self._given_config = config
-        if is_streaming:  # everything that a source clip can take over, and all of it learns
-            config = config.going_on()
-        self.capture, self.clip, self.config, self.reference = (capture, clip, config, reference)
+        self.capture, self.clip, self.config, self.method = capture, clip, config, method
+        self.reference, self.previous = reference, previous
+        self._base = method.base(reference, previous)
         self.regions = tuple(regions)
         self.holdout = sorted(set(holdout))
         self.camera_indices = capture.training_cameras(self.holdout)
@@ -106,6 +103,7 @@ class ClipTraining:
             capture,
             clip,
             config,
+            method,
             camera_indices=self.camera_indices,
             views=self._training_views,
             base=self._base,
@@ -170,13 +168,14 @@ class ClipTraining:
         has_gains = bool((self.gains != 1.0).any())  # all 1 where the cameras do not differ: nothing to learn
         self.gains.requires_grad_(self.reference is None and has_gains)
         parameters = named_parameters(self.model, self.gains, self.config)
-        self._optimizer = PhaseOptimizer(parameters, n_steps=n_steps, config=self.config)
+        ratios = self.method.final_ratios(parameters, self.config)
+        self._optimizer = PhaseOptimizer(parameters, n_steps=n_steps, config=self.config, final_ratios=ratios)
         self._optimizer.steps_done = steps_in_phase
         n_items = len(self.camera_indices) if name == "static" else len(self.pictures)
         self._order = ShuffledOrder(n_items, seed=self.seed + index)
         self._phase_index = index
         self._sight = Sight(self.model, self._training_views, reach=self._reach)  # a set may have become dynamic
-        has_rest = name == "source" and self.config.tiles == "active" and not self.gains.requires_grad
+        has_rest = name == "source" and self.method.has_active_tiles and not self.gains.requires_grad
         self._tiles = ActiveTiles(self.model) if has_rest and ActiveTiles.applies(self.model) else None
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self._say("Nothing to learn", f"Nothing moves in this clip: no steps instead of {n_steps}")
@@ -282,7 +281,7 @@ class ClipTraining:
             "step": self.steps_done,
             "n_steps": self.n_steps,
             "seed": self.seed,
-            "config": self._given_config.difference(),
+            "config": self.config.difference(),
             "camera_names": list(self.rig.names),
             "near_plane": self.near_plane,
             "spacing": self.spacing,
@@ -316,8 +315,7 @@ class ClipTraining:
             self._preparation.keep_backgrounds(self.backgrounds)
         state = self.state()
         self._trained = self.model
-        # a field that goes on in the next clip, and may show this one then, keeps entries that only others read
-        entries = None if self.config.field == "continue" else self.model.entries_in_use()
+        entries = None if self.method.keeps_unread_entries else self.model.entries_in_use()
         compact = compact_clip(state, entries)
         self.model = load_clip_model(compact.state, self.reference, is_learning=True)
         self._sight = Sight(self.model, self._training_views, reach=self._reach)

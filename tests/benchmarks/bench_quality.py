@@ -36,6 +36,7 @@ from engine.synthetic.raycast import make_truth
 from engine.synthetic.scene import make_scene
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig, parse_overrides
+from engine.training.variants.variant_method import method_of
 from tests.benchmarks.options import ending_on_bad_input
 
 COLUMNS = (
@@ -70,6 +71,7 @@ def train(
         capture,
         clip,
         config=config,
+        method=method_of(config, previous=None),
         holdout=holdout,
         reference=reference,
         seed=0,

@@ -6,7 +6,7 @@ Rates carry no scene scale and the horizon is the phase's own number of steps, s
 from __future__ import annotations
 
 import math
-from fnmatch import fnmatchcase
+from collections.abc import Mapping
 
 import numpy as np
 from torch import Tensor, nn
@@ -17,13 +17,6 @@ from engine.training.config import TrainConfig
 from engine.training.optimizer.adam import make_adam, not_finite
 
 _HEADS = ("opacity", "color", "shape", "offset")
-_OWN_RATIOS = {
-    "sets.*.features": "feature_final_ratio",
-    "sets.*.log_*_scales": "scale_final_ratio",
-    "field.*": "field_final_ratio",
-    **{f"decoder.{head}.*": f"{head}_head_final_ratio" for head in _HEADS},
-}
-"""Names of parameters to the setting that says where their rates end."""
 
 
 def named_parameters(
@@ -53,19 +46,14 @@ def named_parameters(
     return chosen
 
 
-def final_ratio(name: str, config: TrainConfig) -> float:
-    """Where the rate of a parameter of `named_parameters` ends, as a share of its start."""
-    own = [getattr(config, setting) for pattern, setting in _OWN_RATIOS.items() if fnmatchcase(name, pattern)]
-    return next((ratio for ratio in own if ratio), config.final_lr_ratio)
-
-
 class PhaseOptimizer:
     """Adam over the trainable parameters of one phase. Owns moments and schedule, not the parameters.
 
     Args:
         parameters: By name, with the rate at the start.
         n_steps: Steps of the phase, over which rates fall.
-        config: Final ratios of the rates and the norm to clip at.
+        config: Final ratio of the rates and the norm to clip at.
+        final_ratios: Of parameters whose rates end elsewhere, by name.
         backend: Of `engine.training.optimizer.adam.make_adam`.
     """
 
@@ -75,11 +63,12 @@ class PhaseOptimizer:
         *,
         n_steps: int,
         config: TrainConfig,
+        final_ratios: Mapping[str, float],
         backend: str = "auto",
     ) -> None:
         self._parameters = {name: parameter for name, (parameter, _) in parameters.items()}
         self._rates = {name: rate for name, (_, rate) in parameters.items()}
-        self._final_ratios = {name: final_ratio(name, config) for name in parameters}
+        self._final_ratios = dict.fromkeys(parameters, config.final_lr_ratio) | dict(final_ratios)
         self._max_norm = config.max_gradient_norm
         self.n_steps = n_steps
         self.steps_done = 0

@@ -27,16 +27,14 @@ from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, render_gaussians
 from engine.progress import Progress, ReportProgress
 from engine.training.config import TrainConfig
+from engine.training.method import Method
 from engine.training.preparation.building import (
     add_residual,
-    choose_decoder,
-    drop_inherited,
     inheriting_model,
     moving_anchors,
-    remove_gate,
+    static_anchors,
     static_model,
 )
-from engine.training.preparation.clip_field import continue_field, fit_field
 from engine.training.preparation.cloud_preparation import (
     Backgrounds,
     correct_backgrounds,
@@ -48,7 +46,7 @@ from engine.training.preparation.cloud_preparation import (
     static_cloud,
     write_backgrounds,
 )
-from engine.training.preparation.gating import decide, without_static_regions
+from engine.training.preparation.gating import without_static_regions
 from engine.training.preparation.stages import Stages
 from engine.training.preparation.training_pictures import TrainingPictures
 
@@ -83,10 +81,11 @@ class ClipPreparation:
         capture: The capture at working resolution.
         clip: Frames to prepare.
         config: All numbers.
+        method: All decisions.
         camera_indices: Training cameras, in capture numbering.
         views: Of these cameras.
         base: What the clip inherits from; None for a reference clip.
-        previous: The clip before, finished: its field goes on with field=continue.
+        previous: The clip before, finished, for a method that goes on from it.
         regions: Where the user overrules the gate.
         seed: Of new decoder heads.
         generator: Draws all other initial values.
@@ -99,6 +98,7 @@ class ClipPreparation:
         capture: Capture,
         clip: Clip,
         config: TrainConfig,
+        method: Method,
         *,
         camera_indices: Sequence[int],
         views: Sequence[View],
@@ -110,7 +110,7 @@ class ClipPreparation:
         prep_dir: Path,
         report: ReportProgress,
     ) -> None:
-        self._capture, self._clip, self._config = capture, clip, config
+        self._capture, self._clip, self._config, self._method = capture, clip, config, method
         self._camera_indices, self._views = list(camera_indices), list(views)
         self._rig = capture.rig.subset(self._camera_indices)
         self._base, self._previous, self._regions = base, previous, tuple(regions)
@@ -173,21 +173,22 @@ class ClipPreparation:
                 "The training cameras differ from those of the reference clip.",
                 hint="Use the same hold-out for every clip of a project.",
             )
-        model, said = inheriting_model(reference, self._clip, self._config)
-        self._say("Taking over the reference", said)
+        model = inheriting_model(reference, self._clip, learns=self._method.learns_inherited)
+        self._say("Taking over the reference", self._method.words(self._config))
         backgrounds = read_backgrounds(self._prep_dir, self._key_of_corrected())
         if backgrounds is None:
             estimated = self._estimated()
             keep = self._keep_after(model, gains, estimated)
             backgrounds = self._corrected(estimated, model, gains, pictures, keep)
-        choose_decoder(model, self._config, seed=self._seed)
-        if self._config.inherit == "off":
+        self._method.choose_decoder(model, seed=self._seed)
+        if self._method.builds_static:
             own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
-            drop_inherited(model, own, self._config)
+            model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         parts = ClipParts(model, gains, backgrounds, reference.header["spacing"])
         cloud, moving_spacing = self._find_motion(parts, pictures)
-        coverage = add_residual(model, cloud, self._config)
+        coverage = add_residual(model, cloud, self._config, self._method.choose_residual)
+        self._method.adapt(model, self._config)
         self._say("Comparing with the reference", coverage.text)
         reasons = self._make_dynamic(parts, cloud)
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage.as_dict())
@@ -282,34 +283,22 @@ class ClipPreparation:
             keep=keep,
         )
         moving_spacing = float(cloud.spacing) if len(cloud.points) else voxel_size
-        if self._config.gate != "off":
+        if self._method.obeys_regions:
             cloud = without_static_regions(cloud, self._regions)
         return cloud, moving_spacing
 
     def _make_dynamic(self, parts: ClipParts, cloud: MovingCloud) -> dict[str, np.ndarray]:
         """Last step: the gate and the field. Returns the reasons of the gate."""
-        reasons = {}
-        if self._config.gate == "off":
-            remove_gate(parts.model)
-        else:
-            reasons = self._decide(parts.model)
-        if self._config.gate == "static":
-            remove_gate(parts.model, in_time_only=True)
-        if self._config.field == "continue" and self._previous is not None and self._previous.header["field"]:
-            made = continue_field(parts.model, self._previous, self._clip)
-        else:
-            has_promoted = {"promoted", "replacing"} & set(parts.model.roles())
-            spacing = parts.spacing if has_promoted and len(cloud.points) == 0 else float(cloud.spacing)
-            made = fit_field(parts.model, spacing=spacing, config=self._config, generator=self._generator)
+        model, config = parts.model, self._config
+        reasons, said = self._method.gate(model, self._regions, is_source=self._base is not None)
+        if said:
+            self._say("Deciding what is static", said)
+        has_promoted = {"promoted", "replacing"} & set(model.roles())
+        spacing = parts.spacing if has_promoted and len(cloud.points) == 0 else float(cloud.spacing)
+        made = self._method.attach_field(
+            model, self._clip, config, spacing=spacing, previous=self._previous, generator=self._generator
+        )
         self._say("Sizing the field", made)
-        return reasons
-
-    def _decide(self, model: ClipModel) -> dict[str, np.ndarray]:
-        """Static anchors that the user marked as dynamic get a dynamic feature."""
-        if not self._regions or model.anchor_set("static").is_dynamic:
-            return {}  # they all have one where the reference has no gate
-        reasons, said = decide(model, self._regions, is_source=self._base is not None)
-        self._say("Deciding what is static", said)
         return reasons
 
     def _say(self, stage: str, message: str) -> None:

@@ -23,6 +23,7 @@ from engine.model.clip_view import View, render_gaussians
 from engine.progress import Progress
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
+from engine.training.variants.variant_method import method_of
 from tests.engine.training.hard_stage import HELD_OUT, N_CAMERAS, HardScene
 
 SIZES: dict[str, Any] = {
@@ -69,7 +70,8 @@ class Trained:
         return ClipTraining(
             self.capture,
             split_clips(self.scene.n_frames, self.scene.clip_length)[clip_index],
-            config=TrainConfig(**(SIZES | self.settings | settings)),
+            config=(config := TrainConfig(**(SIZES | self.settings | settings))),
+            method=method_of(config, previous=None),
             holdout=[HELD_OUT],
             reference=self.states[0] if clip_index else None,
             seed=0,

@@ -20,6 +20,7 @@ from engine.model.clip_model import load_clip_model
 from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
+from engine.training.method import Method
 from engine.training.step.nonfinite import loss_not_finite
 from tests.engine.training.damaged_states import damaged_states
 
@@ -44,6 +45,7 @@ class Setting:
 def start(capture: Capture, clip_index: int, prep_dir: Path, **changes) -> ClipTraining:
     arguments = {
         "config": CONFIG,
+        "method": Method(),
         "holdout": capture.camera_indices(list(capture.default_holdout)),
         "reference": None,
         "seed": 0,

@@ -4,10 +4,10 @@ Regions are known from the scene, figures are pooled over all nine cameras. What
 decibels below what came out when it was written (one seed; the figures are named), because few steps leave a lot to
 chance.
 
-Limits that these scenes show: what rested in the reference clip and goes leaves a hull of its own
-shape behind, on which the clip paints what lies behind it. That does not look like a ghost, but is 3 to 6 dB worse than floor
-that was always free, from cameras in between most of all; and a small thing that appears inside such a hull comes out
-dull when it has a colour that frozen heads have never seen.
+Limits that these scenes show: what rested in the reference clip and goes leaves a hull of its own shape behind, on
+which the clip paints what lies behind it. That does not look like a ghost, but is 3 to 6 dB worse than floor that was
+always free, from cameras in between most of all; and a small thing that appears inside such a hull comes out dull when
+it has a colour that frozen heads have never seen.
 """
 
 from __future__ import annotations

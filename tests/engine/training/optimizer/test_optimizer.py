@@ -24,7 +24,7 @@ def make_parameters(dtype: torch.dtype = torch.float32, seed: int = 0) -> dict[s
 
 
 def make_optimizer(parameters, backend: str = "fused", **config) -> PhaseOptimizer:
-    return PhaseOptimizer(parameters, n_steps=100, config=TrainConfig(**config), backend=backend)
+    return PhaseOptimizer(parameters, n_steps=100, config=TrainConfig(**config), final_ratios={}, backend=backend)
 
 
 def set_gradients(parameters, step: int) -> None:

@@ -11,7 +11,7 @@ from engine.clip_files.compact import write_compact_clip
 from engine.gate.reasons import STILL, USER_DYNAMIC, USER_STATIC
 from engine.gate.regions import GateRegion
 from engine.model.clip_model import ClipModel, load_clip_model
-from engine.training.preparation.building import merged
+from engine.training.variants.variant_method import merged
 from tests.engine.training.tiny_training import (
     CLIP_LENGTH,
     Tiny,
