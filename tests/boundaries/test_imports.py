@@ -58,6 +58,7 @@ def test_import_contracts_hold() -> None:
         ("app/seeded.py", "import moderngl", "app and engine know no window"),
         ("engine/seeded.py", "from pyglet import window", "app and engine know no window"),
         ("ui/seeded.py", "import torch", "ui imports no torch"),
+        ("engine/training/seeded.py", "import engine.training.variants.variant_method", "Only the job of a training"),
         ("engine/capture/seeded.py", "import engine.training.config", "Layers of engine:"),
         ("app/project/seeded.py", "import app.session.session", "Layers of app:"),
         ("app/session/seeded.py", "import app.lab.report.tables", "Layers of app:"),
