@@ -29,11 +29,11 @@ from engine.model.clip_view import REACH_SPACINGS, View, render_gaussians, rende
 from engine.progress import Progress, ReportProgress, StepStats
 from engine.training.checkpoint import Checkpoint, Place, damaged_checkpoint, read_checkpoint, write_checkpoint
 from engine.training.config import TrainConfig
-from engine.training.method import Method
 from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters
 from engine.training.phases import phase_at, phases_of
 from engine.training.preparation.clip_field import n_alive
 from engine.training.preparation.clip_preparation import ClipParts, ClipPreparation
+from engine.training.preparation.method import Method
 from engine.training.preparation.training_pictures import shared_image_size
 from engine.training.step.active_tiles import ActivePicture, ActiveTiles
 from engine.training.step.fused_loss import LossWorkspace

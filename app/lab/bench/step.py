@@ -92,7 +92,9 @@ class StepRun:
         self._workspace = LossWorkspace(window.height, window.width)
         parameters = named_parameters(self._model, self._gain, self._config)
         self._parameters = {name: parameter for name, (parameter, _) in parameters.items()}
-        self._optimizer = PhaseOptimizer(parameters, n_steps=10_000, config=self._config, backend=path.adam)
+        self._optimizer = PhaseOptimizer(
+            parameters, n_steps=10_000, config=self._config, final_ratios={}, backend=path.adam
+        )
         self._frame = 0
         self.n_gaussians = 0
 

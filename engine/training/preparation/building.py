@@ -137,7 +137,7 @@ def uncovered_points(cloud: MovingCloud, is_new: np.ndarray, n_used: int, config
     """Points that no inherited anchor covers, as far as `config.max_moving_points` lets them become anchors.
 
     A clip has no more anchors that move than that, inherited ones that it uses included. Which of the others become
-    anchors then is said in `engine.cloud.motion.budget`; the rest switch on the one beside them.
+    anchors then is chosen by `engine.cloud.motion.budget`; the rest switch on the one beside them.
 
     Args:
         cloud: What moves in the clip.
@@ -160,18 +160,13 @@ def add_residual(
 ) -> Coverage:
     """Split a source clip's moving points into those the reference covers and residual anchors; says how many.
 
-        A point is covered when it lies inside the union of spheres around the inherited moving anchors, each with the
-        mean distance to its three nearest neighbours as radius. Covered points switch on the inherited anchor nearest to
-        them in the frames they are present in, so nothing covered is left without an anchor; the others become residual
-        anchors. Source: ClipGStream, geometry-aware deduplication, with the exact union.
+    A point is covered when it lies inside the union of spheres around the inherited moving anchors, each with the
+    mean distance to its three nearest neighbours as radius. Covered points switch on the inherited anchor nearest to
+    them in the frames they are present in, so nothing covered is left without an anchor; the others become residual
+    anchors. Source: ClipGStream, geometry-aware deduplication, with the exact union.
 
-    <<<<<<< HEAD
-        A clip has no more anchors that move than `config.max_moving_points`, inherited ones that it uses included. Which
-        of the others become anchors then is chosen by `engine.cloud.motion.budget`; the rest switch on the one beside them.
-    =======
-        Args:
-            choose: Chooses residual anchors, see engine.training.method.Method.choose_residual.
-    >>>>>>> wip-less2
+    Args:
+        choose: Chooses residual anchors, see engine.training.preparation.method.Method.choose_residual.
     """
     is_new = np.ones(len(cloud.points), bool)
     moving = model.anchor_set("moving") if "moving" in model.roles() else None

@@ -27,7 +27,6 @@ from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, render_gaussians
 from engine.progress import Progress, ReportProgress
 from engine.training.config import TrainConfig
-from engine.training.method import Method
 from engine.training.preparation.building import (
     add_residual,
     inheriting_model,
@@ -47,6 +46,7 @@ from engine.training.preparation.cloud_preparation import (
     write_backgrounds,
 )
 from engine.training.preparation.gating import without_static_regions
+from engine.training.preparation.method import Method
 from engine.training.preparation.stages import Stages
 from engine.training.preparation.training_pictures import TrainingPictures
 

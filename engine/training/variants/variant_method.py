@@ -16,9 +16,9 @@ from engine.gate.regions import GateRegion
 from engine.model.clip_model import ClipModel, decoder_sizes, read_field
 from engine.model.decoder import Decoder
 from engine.training.config import TrainConfig
-from engine.training.method import Method
 from engine.training.preparation.building import ResidualAnchors, adapt_moving
 from engine.training.preparation.clip_field import fit_field
+from engine.training.preparation.method import Method
 
 _FINAL_RATIOS = {
     "sets.*.features": "feature_final_ratio",

@@ -20,7 +20,7 @@ from engine.model.clip_model import load_clip_model
 from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
-from engine.training.method import Method
+from engine.training.preparation.method import Method
 from engine.training.step.nonfinite import loss_not_finite
 from tests.engine.training.damaged_states import damaged_states
 

@@ -32,7 +32,7 @@ def test_warm_up_leaves_nothing_to_compile():
         for options in choices:
             photometric_loss(torch.rand(3, height, width).permute(1, 2, 0), truth, ssim_weight=0.2, **options)
     parameters = {"large": (nn.Parameter(torch.zeros(40_000)), 0.1), "small": (nn.Parameter(torch.zeros(2, 3)), 0.1)}
-    optimizer = PhaseOptimizer(parameters, n_steps=2, config=TrainConfig(max_gradient_norm=1.0))
+    optimizer = PhaseOptimizer(parameters, n_steps=2, config=TrainConfig(max_gradient_norm=1.0), final_ratios={})
     optimizer.step()
     for parameter, _ in parameters.values():
         parameter.grad = torch.ones(parameter.shape)

@@ -7,7 +7,7 @@ import pytest
 
 from engine.clip_files.clip_state import ClipState
 from engine.training.config import TrainConfig
-from engine.training.method import Method
+from engine.training.preparation.method import Method
 from engine.training.variants.variant_method import StreamingMethod, VariantMethod, method_of
 
 BEFORE = ClipState({"sets.residual.positions": np.zeros((2, 3), np.float32)}, {})
