@@ -43,8 +43,9 @@ def method_of(config: TrainConfig, *, previous: ClipState | None) -> Method:
 
 def _is_product(config: TrainConfig) -> bool:
     default = TrainConfig()
-    names = ["gate", "tiles", "decoder", "residual", "field", "field_tables", *_FINAL_RATIOS.values()]
-    return config.inherit in ("frozen", "moving") and all(getattr(config, n) == getattr(default, n) for n in names)
+    names = ["gate", "tiles", "decoder", "residual", "field_tables", *_FINAL_RATIOS.values()]
+    is_default = all(getattr(config, name) == getattr(default, name) for name in names)
+    return is_default and config.inherit in ("frozen", "moving") and config.field != "continue"
 
 
 class VariantMethod(Method):
