@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
 from app.evaluation.kept_figures import EVALUATIONS, KeptFigures
-from engine.parallel import n_workers
+from engine.parallel import n_cores
 
 if TYPE_CHECKING:
     from engine.metrics.clips.evaluate import Evaluation
@@ -165,7 +165,7 @@ def kept_figures(opened: TrainedProject, scope: Scope, clip_index: int, say: Cal
         "scale": opened.capture.scale,
         "frames": [clip.start, clip.stop, clip.clip_length],
         "clip": _fingerprint(opened, clip_index),
-        "reference": opened.reference and opened.reference.header.get("fingerprint", ""),
+        "reference": opened.reference and opened.reference.header.fingerprint,
         "field": _fingerprint(opened, opened.last_trained) if config.field == "continue" else None,
         "metrics": scope.metrics,
         "precision": scope.precision,
@@ -196,7 +196,7 @@ class ClipMeasuring:
     """
 
     def __init__(self, n_threads: int | None = None) -> None:
-        self._n_threads = n_workers() if n_threads is None else n_threads
+        self._n_threads = n_cores() if n_threads is None else n_threads
         self._evaluation: Evaluation | None = None
 
     def __call__(
@@ -222,7 +222,7 @@ class ClipMeasuring:
 
 
 def _fingerprint(opened: TrainedProject, clip_index: int) -> str:
-    return str(opened.header(clip_index).get("fingerprint", ""))
+    return opened.header(clip_index).fingerprint
 
 
 def _unknown(opened: TrainedProject, scope: Scope, clip_index: int, kept: KeptFigures) -> Frames:

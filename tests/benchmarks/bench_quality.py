@@ -27,8 +27,9 @@ from engine.capture.clip import Clip, split_clips
 from engine.clip_files.clip_state import ClipState
 from engine.images.psnr import psnr
 from engine.kernels.threads import configure_threads
-from engine.metrics.clips.evaluate import evaluate_clip
+from engine.metrics.clips.evaluate import Evaluation
 from engine.metrics.clips.summary import means
+from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.clip_model import load_clip_model
 from engine.model.clip_view import REACH_SPACINGS, View, render_model
 from engine.progress import Progress
@@ -111,7 +112,7 @@ def write_pictures(
     """Truth, render and four times the error, one row per camera."""
     model = load_clip_model(state, reference)
     frame = clip.start + clip.n_frames // 2
-    reach = REACH_SPACINGS * reference.header["spacing"]
+    reach = REACH_SPACINGS * reference.header.spacing
     rows = []
     for camera in cameras:
         view = _view(capture, camera, reference)
@@ -142,7 +143,7 @@ def new_object_psnr(
             mask = make_truth(scene, camera, frame).mask("gift")
             if mask.sum() < 50:  # hidden from this camera
                 continue
-            image = render_model(model, view, clip.clip_time(frame), reach=REACH_SPACINGS * reference.header["spacing"])
+            image = render_model(model, view, clip.clip_time(frame), reach=REACH_SPACINGS * reference.header.spacing)
             values.append(psnr(image.numpy(), capture.frame(camera, frame) / 255.0, mask))
     return float(np.mean(values)) if values else None
 
@@ -150,7 +151,7 @@ def new_object_psnr(
 def _view(capture: Capture, camera: int, reference: ClipState) -> View:
     width, height = (int(v) for v in capture.rig.image_sizes[camera])
     matrices = (capture.rig.world_to_camera[camera], capture.rig.Ks[camera])
-    return View.from_arrays(*matrices, width=width, height=height, near_plane=reference.header["near_plane"])
+    return View.from_arrays(*matrices, width=width, height=height, near_plane=reference.header.near_plane)
 
 
 def main() -> None:
@@ -184,15 +185,8 @@ def main() -> None:
             state, timing = train(capture, clip, config, holdout, reference, Path(prep_dir))
             reference = reference or state
             frames = list(clip.frame_indices())[:: args.frames_every]
-            rows = evaluate_clip(
-                capture,
-                clip,
-                load_clip_model(state, reference),
-                reference=reference,
-                cameras=holdout,
-                holdout=holdout,
-                frames=frames,
-            )
+            trained = TrainedClip(clip, load_clip_model(state, reference), reference)
+            rows = Evaluation(capture, cameras=holdout, holdout=holdout).measure(trained, frames=frames)
             figures = means(rows)
             by_camera = {n: means([row for row in rows if row.camera == n])["psnr"] for n in names}
             size_mb = sum(array.nbytes for array in state.arrays.values()) / 1e6

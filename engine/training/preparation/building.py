@@ -6,13 +6,14 @@ Sizes follow the data and the reasons are returned as lines to report. Nothing h
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from scipy.spatial import KDTree
 
 from engine.capture.clip import Clip
+from engine.clip_files.clip_header import Coverage
 from engine.clip_files.clip_state import ClipState
 from engine.cloud.motion.budget import NOBODY, choose_within_budget
 from engine.cloud.motion.dedup import mean_neighbor_distance, residual_rows
@@ -59,9 +60,9 @@ def inheriting_model(reference: ClipState, clip: Clip, *, learns: bool) -> ClipM
     """
     presence = {
         # promoted anchors are part of the still scene and exist at all times; what moves is not known yet
-        role: torch.full((len(reference.arrays[f"sets.{role}.positions"]), clip.n_frames), role == "promoted")
-        for role in ("static", "moving", "promoted")
-        if f"sets.{role}.presence" in reference.arrays
+        role: torch.full((len(record.own), clip.n_frames), role == "promoted")
+        for role, record in reference.anchors.items()
+        if record.own is not None and record.own.presence is not None
     }
     sets, decoder = inherit(reference, presence, is_trainable=learns)
     return ClipModel(sets=sets, decoder=decoder, field=None, clip_length=clip.clip_length, n_frames=clip.n_frames)
@@ -76,42 +77,6 @@ def moving_anchors(cloud: MovingCloud, rows: np.ndarray, config: TrainConfig) ->
         feature_dim=config.static_feature_dim,
         presence=torch.from_numpy(cloud.presence[rows]),
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Coverage:
-    """How much of what moves in a source clip has an anchor near it. A value.
-
-    Attributes:
-        n_points: Moving points of the clip.
-        n_inherited: Of these, inside the spheres of inherited anchors.
-        n_residual: Anchors of the clip's own.
-        n_left_out: Points that would have become anchors beyond the budget.
-        share: Of the points that are within reach of an anchor of either kind; 1 where nothing moves.
-        reason: Where the budget comes from.
-    """
-
-    n_points: int
-    n_inherited: int
-    n_residual: int
-    n_left_out: int
-    share: float
-    reason: str
-
-    @property
-    def text(self) -> str:
-        """The text shown while the clip is prepared."""
-        n_outside = self.n_points - self.n_inherited
-        percent = 100 * n_outside / max(self.n_points, 1)
-        said = f"{n_outside} of {self.n_points} moving points ({percent:.0f} %) lie outside the inherited anchors; "
-        said += f"{self.n_residual} residual anchors ({self.reason})"
-        if self.n_left_out:
-            said += f", {self.n_left_out} points left to the anchors beside them"
-        return f"{said}; {100 * self.share:.1f} % of what moves is within reach of an anchor"
-
-    def as_dict(self) -> dict[str, int | float | str]:
-        """JSON-able."""
-        return asdict(self)
 
 
 @dataclass(frozen=True, slots=True)

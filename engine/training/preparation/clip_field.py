@@ -5,8 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from engine.clip_files.clip_header import FieldShape
 from engine.model.clip_model import ClipModel
-from engine.model.field import FieldShape, SpatioTemporalField
+from engine.model.field import SpatioTemporalField
 from engine.model.field_sizes import derive_cells, derive_log2_entries
 from engine.training.config import TrainConfig
 

@@ -17,7 +17,8 @@ from torch import nn
 
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.clip_files.clip_state import ClipState
+from engine.clip_files.clip_header import Coverage
+from engine.clip_files.clip_state import ClipState, fingerprint_of
 from engine.cloud.keeping import Keep
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
@@ -61,7 +62,7 @@ class ClipParts:
         backgrounds: What the training cameras see when nothing moves.
         spacing: Distance between static anchors, scene units.
         moving_spacing: Likewise of moving ones; None as long as nothing has moved.
-        reasons: Of the gate, by the name under which they are stored; empty without a decision.
+        reasons: Of the gate, by role; empty without a decision.
         coverage: How much of what moves in a source clip has an anchor near it; None for a reference clip.
     """
 
@@ -71,7 +72,7 @@ class ClipParts:
     spacing: float
     moving_spacing: float | None = None
     reasons: dict[str, np.ndarray] = field(default_factory=dict)
-    coverage: dict[str, int | float | str] | None = None
+    coverage: Coverage | None = None
 
 
 class ClipPreparation:
@@ -168,7 +169,7 @@ class ClipPreparation:
             ProjectError: The reference was trained with other cameras, or the field before cannot go on.
         """
         gains = nn.Parameter(torch.from_numpy(reference.arrays["gains"].copy()), requires_grad=False)
-        if list(reference.header["camera_names"]) != list(self._rig.names):
+        if reference.header.camera_names != list(self._rig.names):
             raise ProjectError(
                 "The training cameras differ from those of the reference clip.",
                 hint="Use the same hold-out for every clip of a project.",
@@ -185,13 +186,13 @@ class ClipPreparation:
             own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
             model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
-        parts = ClipParts(model, gains, backgrounds, reference.header["spacing"])
+        parts = ClipParts(model, gains, backgrounds, reference.header.spacing)
         cloud, moving_spacing = self._find_motion(parts, pictures)
         coverage = add_residual(model, cloud, self._config, self._method.choose_residual)
         self._method.adapt(model, self._config)
         self._say("Comparing with the reference", coverage.text)
         reasons = self._make_dynamic(parts, cloud)
-        return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage.as_dict())
+        return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage)
 
     def keep_backgrounds(self, backgrounds: Backgrounds) -> None:
         """Keep a reference clip's corrected backgrounds for source clips, unless they are kept already.
@@ -210,7 +211,7 @@ class ClipPreparation:
         """What a preparation depends on, apart from what `_keep_after` adds."""
 
         def named(state: ClipState | None) -> str | None:
-            return None if state is None else state.header["fingerprint"]
+            return None if state is None else state.header.fingerprint
 
         return {
             "capture": self._capture.fingerprint,
@@ -227,7 +228,7 @@ class ClipPreparation:
     def _keep_after(self, model: ClipModel, gains: nn.Parameter, backgrounds: Backgrounds) -> Keep:
         """Keeps what follows from a model as it is now, the gains and the backgrounds."""
         arrays = model.own_arrays() | {"gains": gains.detach().numpy(), "backgrounds": backgrounds.images}
-        name = ClipState(arrays, {}).fingerprint
+        name = fingerprint_of(arrays)
         return lambda piece, work: self._stages.keep(f"{name} {piece}", work)
 
     # ---------------------------------------------------------------- what does not move
@@ -270,7 +271,7 @@ class ClipPreparation:
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
         masks = motion_masks(pictures, parts.backgrounds, self._report, keep)
         gains = parts.gains.detach().numpy()
-        voxel_size = None if self._base is None else self._base.header["moving_spacing"]
+        voxel_size = None if self._base is None else self._base.header.moving_spacing
         cloud = moving_cloud(
             pictures,
             masks,

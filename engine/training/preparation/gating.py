@@ -37,7 +37,7 @@ def decide(model: ClipModel, regions: Sequence[GateRegion], *, is_source: bool) 
         regions: What the user marked; later regions overrule earlier ones.
         is_source: Whether the clip inherits from another one.
     Returns:
-        Reasons by the name under which the clip stores them, and the decision in one line.
+        Reasons by role, and the decision in one line.
     """
     static = model.anchor_set("static")
     points = static.positions.numpy()
@@ -47,13 +47,13 @@ def decide(model: ClipModel, regions: Sequence[GateRegion], *, is_source: bool) 
     reasons[is_dynamic] = USER_DYNAMIC
     counts = np.bincount(reasons, minlength=len(REASONS))
     said = "; ".join(f"{n} {words}" for n, words in zip(counts, REASONS, strict=True) if n)
-    named = {"gate.static": reasons}
+    by_role = {"static": reasons}
     if not is_source or static.is_trainable:  # otherwise the inherited set keeps its rows, of which some are hidden
-        role = "replacing" if is_source else "promoted"
-        named = {"gate.static": reasons[~is_dynamic]}
-        named |= {f"gate.{role}": reasons[is_dynamic]} if is_dynamic.any() else {}
+        by_role = {"static": reasons[~is_dynamic]}
+        if is_dynamic.any():
+            by_role["replacing" if is_source else "promoted"] = reasons[is_dynamic]
     promote(model, is_dynamic, is_source=is_source)
-    return named, said
+    return by_role, said
 
 
 def promote(model: ClipModel, is_dynamic: np.ndarray, *, is_source: bool) -> None:

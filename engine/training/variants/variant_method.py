@@ -7,13 +7,15 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 import torch
+from msgspec.structs import asdict
 
 from engine.capture.clip import Clip
+from engine.clip_files.anchor_record import AnchorRecord
 from engine.clip_files.clip_state import ClipState
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.errors import ProjectError
 from engine.gate.regions import GateRegion
-from engine.model.clip_model import ClipModel, decoder_sizes, read_field
+from engine.model.clip_model import ClipModel, decoder_shape, read_field
 from engine.model.decoder import Decoder
 from engine.training.config import TrainConfig
 from engine.training.preparation.building import ResidualAnchors, adapt_moving
@@ -79,7 +81,9 @@ class VariantMethod(Method):
     def choose_decoder(self, model: ClipModel, *, seed: int) -> None:
         """New heads have a generator of their own: what else starts at random is the same for any choice."""
         if self._decoder == "new":
-            model.decoder = Decoder(**decoder_sizes(model.decoder), generator=torch.Generator().manual_seed(seed))
+            model.decoder = Decoder(
+                **asdict(decoder_shape(model.decoder)), generator=torch.Generator().manual_seed(seed)
+            )
         model.decoder.requires_grad_(self._decoder != "frozen")
 
     def choose_residual(
@@ -122,7 +126,7 @@ class VariantMethod(Method):
         previous: ClipState | None,
         generator: torch.Generator,
     ) -> str:
-        if self._field_goes_on and previous is not None and previous.header["field"]:
+        if self._field_goes_on and previous is not None and previous.header.field:
             return _continue_field(model, previous, clip)
         is_shared = self._tables == "shared"
         return fit_field(model, spacing=spacing, config=config, generator=generator, is_shared=is_shared)
@@ -150,12 +154,15 @@ class StreamingMethod(VariantMethod):
 def merged(state: ClipState) -> ClipState:
     """A finished clip as a start for another: its residual anchors count among the moving ones from here on, its
     replacing ones among the promoted."""
+    own = {role: record.own for role, record in state.anchors.items() if record.own is not None}
     arrays = dict(state.arrays)
-    for own, inherited in (("residual", "moving"), ("replacing", "promoted")):
-        prefix = f"sets.{own}."
-        for name in [name for name in arrays if name.startswith(prefix)]:
-            array, target = arrays.pop(name), f"sets.{inherited}.{name.removeprefix(prefix)}"
-            arrays[target] = np.concatenate([arrays[target], array]) if target in arrays else array
+    for added, among in (("residual", "moving"), ("replacing", "promoted")):
+        if added not in own:
+            continue
+        for name in AnchorRecord(own=own[added]).arrays(added):
+            del arrays[name]
+        anchors = own[among].joined(own[added]) if among in own else own[added]
+        arrays |= AnchorRecord(own=anchors).arrays(among)
     return ClipState(arrays, state.header)
 
 
@@ -165,7 +172,7 @@ def _continue_field(model: ClipModel, previous: ClipState, clip: Clip) -> str:
     Raises:
         ProjectError: It has fewer frames than this clip.
     """
-    field, index = read_field(previous), previous.header["clip_index"]
+    field, index = read_field(previous), previous.header.clip_index
     if field.shape.n_knots < clip.n_frames:
         raise ProjectError(
             f"The field of clip {index} has {field.shape.n_knots} frames, clip {clip.clip_index} has "

@@ -34,7 +34,7 @@ def make_project(folder: Path, *, n_cameras: int, size: tuple[int, int] = (48, 3
     capture = write_capture(folder / "ring", n_cameras=n_cameras, size=size)
     project = train(folder / "p", capture)
     for path in (project / "clips").iterdir():
-        change_header(path, lambda header: header.update(HEADER))
+        change_header(path, **HEADER)
     return project
 
 
@@ -139,10 +139,10 @@ def test_a_line_that_was_cut_off_spoils_no_other(project):
 
 def test_another_version_of_a_clip_or_of_its_reference_is_measured_again(project, capsys):
     evaluate(project, "--quiet")
-    change_header(project / "clips" / "0001.safetensors", lambda header: header.update(fingerprint="another"))
+    change_header(project / "clips" / "0001.safetensors", fingerprint="another")
     evaluate(project)
     assert "12/24" in capsys.readouterr().err
-    change_header(project / "clips" / "0000.safetensors", lambda header: header.update(near_plane=0.2))
+    change_header(project / "clips" / "0000.safetensors", near_plane=0.2)
     evaluate(project)
     assert "24/24" in capsys.readouterr().err  # the arrays are what counts
 

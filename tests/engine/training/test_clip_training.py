@@ -8,20 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from msgspec import to_builtins
 
 from engine.assets import asset_path
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import split_clips
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.errors import NonFiniteLoss, PreparationError, ProjectError
-from engine.metrics.clips.evaluate import evaluate_clip
+from engine.metrics.clips.evaluate import Evaluation
 from engine.metrics.clips.summary import means
+from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.clip_model import load_clip_model
 from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from engine.training.preparation.method import Method
 from engine.training.step.nonfinite import loss_not_finite
+from tests.clip_headers import write_values
 from tests.engine.training.damaged_states import damaged_states
 
 CLIP_LENGTH = 10
@@ -140,15 +143,10 @@ def test_a_source_clip_adds_residual_anchors_and_leaves_everything_inherited_unt
             kept = getattr(model.anchor_set(role), name).detach().numpy()
             assert np.array_equal(kept, before[f"sets.{role}.{name}"]), (role, name)
     assert training.held_out_psnr() > first
-    rows = evaluate_clip(
-        setting.capture,
-        training.clip,
-        load_clip_model(state, setting.reference),
-        reference=setting.reference,
-        cameras=[setting.holdout[0], training.camera_indices[0]],
-        holdout=setting.holdout,
-        frames=[training.clip.start],
-    )
+    cameras = [setting.holdout[0], training.camera_indices[0]]
+    trained = TrainedClip(training.clip, load_clip_model(state, setting.reference), setting.reference)
+    evaluation = Evaluation(setting.capture, cameras=cameras, holdout=setting.holdout)
+    rows = evaluation.measure(trained, frames=[training.clip.start])
     assert [row.is_held_out for row in rows] == [True, False]
     raw, fitted = ([value for row in rows if (value := row.figures[name]) is not None] for name in ("psnr", "psnr_fit"))
     assert all(after >= before - 1e-6 for before, after in zip(raw, fitted, strict=True))  # it includes doing nothing
@@ -216,7 +214,7 @@ def test_every_damage_to_a_checkpoint_is_an_error_that_names_the_file(source, tm
     good, state = kept.read_bytes(), read_clip_state(kept)
     other = source()
     for name, bad in damaged_states(state).items():
-        write_clip_state(kept, bad)
+        bad(kept)
         with pytest.raises(ProjectError) as caught:
             other.restore_checkpoint(kept)
         assert (name, caught.value.path) == (name, kept)
@@ -224,8 +222,9 @@ def test_every_damage_to_a_checkpoint_is_an_error_that_names_the_file(source, tm
     for at in rng.integers(0, len(good), 20):
         kept.write_bytes(good[:at] + bytes([good[at] ^ 0x10]) + good[at + 1 :])
         with pytest.raises(ProjectError):
-            read_checkpoint(kept, {})
-    write_clip_state(kept, ClipState(state.arrays, state.header | {"resume": json.dumps(state.header["resume"])}))
+            read_checkpoint(kept, clip_index=1, camera_names=[], seed=0)
+    values = to_builtins(state.header, builtin_types=())
+    write_values(kept, state.arrays, values | {"resume": json.dumps(values["resume"])})
     other = source()
     other.restore_checkpoint(kept)  # as the version before wrote it
     training.step()

@@ -32,7 +32,7 @@ def test_a_reference_and_a_clip_trained_on_it_show_the_stored_pixels(tiny: Tiny,
         # worst: 0.27 of the reference (16 bits a value), 0.13 of the source clip
         assert path.stat().st_size < (0.4 if clip_index == 0 else 0.25) * n_bytes(trained.arrays)
         if reference is not None:
-            assert again.header["reference_fingerprint"] == reference.fingerprint == reference.header["fingerprint"]
+            assert again.header.reference_fingerprint == reference.fingerprint == reference.header.fingerprint
         reference = reference or again
 
 

@@ -59,7 +59,7 @@ def test_clips_of_one_frame_are_trained_and_read_back(jumps):
 
         still = pooled_psnr(jumps, [frame], ball, static_only=True)
         assert pooled_psnr(jumps, [frame], ball) > still + 4.0
-        assert jumps.states[frame].header["n_frames"] == 1
+        assert jumps.states[frame].header.n_frames == 1
 
 
 def test_the_ball_is_only_where_it_is(jumps):

@@ -39,8 +39,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for project, factor in ((folder / ODD_NAME, 1.0), (folder / "others" / "fast", 0.1)):
             metrics = {"stages_s": {"Carving": seconds * factor, "Training": 60.0 * factor}}
             metrics |= {"preparation_s": seconds * factor, "training_s": 60.0 * factor}
-            change_header(project / "clips" / f"{clip:04d}.safetensors", lambda h, m=metrics: h.update(metrics=m))
-    change_header(folder / ODD_NAME / "clips" / "0001.safetensors", lambda h: h.update(coverage=COVERAGE))
+            change_header(project / "clips" / f"{clip:04d}.safetensors", metrics=metrics)
+    change_header(folder / ODD_NAME / "clips" / "0001.safetensors", coverage=COVERAGE)
     report(folder / ODD_NAME, compare=[folder / "others"])
     return folder
 
