@@ -9,9 +9,9 @@ from __future__ import annotations
 import logging
 import os
 
-from engine.conventions import SPIN_COUNT
 from engine.kernels.cache import is_cache_warm
 from engine.kernels.compile_ahead import compile_all, warm_up_all
+from engine.kernels.threads import SPIN_COUNT
 from engine.progress import Progress, ReportProgress
 
 logger = logging.getLogger(__name__)

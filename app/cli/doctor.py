@@ -135,7 +135,7 @@ def _threads() -> Finding:
     n_threads = use_threads(None)
     from numba.np.ufunc.parallel import threading_layer
 
-    from engine.kernels.threads import parallel_guard
+    from engine.kernels.launch import parallel_guard
 
     with parallel_guard():  # starts the threads, so that the layer is known
         layer = threading_layer()

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 import torch
+from engine.kernels.arrays import Doubles1, Flags2, Floats2, Ints1, address_of, job_reader, pack
 from numba import njit, types
 
 from engine.kernels import routines
-from engine.kernels.arrays import Doubles1, Flags2, Floats2, Ints1, address_of, job_reader, pack
 from engine.kernels.lanes import kernel_intrinsic
 from engine.kernels.routines import WORKER, link, routine, run
 
