@@ -5,6 +5,7 @@ because a contract cannot see an import made through a library.
 """
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -90,3 +91,11 @@ def test_importing_the_command_line_loads_no_window_library() -> None:
 
 def test_loaded_modules_sees_an_import() -> None:
     assert "moderngl" in loaded_modules("import moderngl"), "the probe of this file must be able to see a bad import"
+
+
+def test_tests_of_the_engine_import_nothing_from_above_it() -> None:
+    upper = re.compile(r"^\s*(?:from|import) (?:tests\.)?(?:app|ui)\b.*", re.MULTILINE)
+    assert upper.search("import app.project") is not None
+    files = sorted((ROOT / "tests" / "engine").rglob("*.py"))
+    assert len(files) > 50, "the tests were not found"
+    assert [(path.name, found[0]) for path in files if (found := upper.search(path.read_text("utf-8")))] == []

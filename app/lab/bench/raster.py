@@ -17,10 +17,11 @@ import torch
 from torch import Tensor
 
 from app.lab.bench.rows import KernelRow, SpeedError, kernel_row
-from app.lab.bench.scenes import RECIPES, Recipe, Scene
+from app.lab.bench.scenes import RECIPES, Recipe
 from app.lab.bench.timing import interleaved, peak_extra_mb
 from engine.raster import Gaussians, Rendering, rasterize
 from engine.raster.rasterize import BackendName
+from engine.synthetic.gaussian_scenes import Scene
 
 FORWARD_OPERATIONS, BACKWARD_OPERATIONS = 20, 43
 """Instructions on the multiply-add ports per block of sixteen pairs, counted in the two inner loops: exponent 3,

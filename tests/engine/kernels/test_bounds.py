@@ -44,7 +44,7 @@ def rasterize_cases(memory: GuardedMemory) -> Iterator[str]:
 
     from engine.raster import Gaussians, rasterize, tile_boxes
     from engine.raster.cpu import backend
-    from tests.raster_scenes import layered_scene
+    from engine.synthetic.gaussian_scenes import layered_scene
 
     sizes = ((0, 40, 33), (1, 1, 1), (15, 31, 65), (16, 64, 32), (17, 33, 5), (161, 70, 50))
     background = memory.tensor(torch.ones(3))

@@ -9,7 +9,8 @@ import torch
 from engine.raster import Gaussians, Rendering, rasterize
 from engine.raster.cpu import backend as cpu_backend
 from engine.raster.rasterize import BackendName
-from tests.raster_scenes import Scene, gaussians_of, gradients, layered_scene, simple_scene
+from engine.synthetic.gaussian_scenes import Scene, gaussians_of, layered_scene, simple_scene
+from tests.engine.raster.gradients import gradients
 
 BACKENDS = ("cpu", "reference")
 

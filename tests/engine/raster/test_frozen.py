@@ -10,7 +10,8 @@ import torch
 from engine.raster import Gaussians, Rendering, rasterize
 from engine.raster.cpu import blend_backward
 from engine.raster.rasterize import BackendName
-from tests.raster_scenes import Scene, gradient, gradients, layered_scene
+from engine.synthetic.gaussian_scenes import Scene, layered_scene
+from tests.engine.raster.gradients import gradient, gradients
 
 BACKENDS = ("cpu", "reference")
 

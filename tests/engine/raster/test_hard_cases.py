@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from engine.raster import TILE_PX, Gaussians, rasterize
 from engine.raster.rasterize import BackendName
-from tests.raster_scenes import Scene, camera, gaussians_of, gradients, layered_scene, simple_scene
+from engine.synthetic.gaussian_scenes import Scene, camera, gaussians_of, layered_scene, simple_scene
+from tests.engine.raster.gradients import gradients
 
 NAMES = ("means", "quats", "scales", "opacities", "colors")
 NAN, INF = math.nan, math.inf

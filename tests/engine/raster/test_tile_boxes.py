@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import engine.raster.cpu.tile_boxes as kernels
 from engine.raster import TILE_PX, Gaussians, TileBoxes, rasterize, tile_boxes
 from engine.raster.pinhole_view import n_tiles
-from tests.raster_scenes import Scene, layered_scene
+from engine.synthetic.gaussian_scenes import Scene, layered_scene
 
 BACKENDS = ("cpu", "reference")
 

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from engine.raster import TILE_PX, Gaussians, Rendering, rasterize
 from engine.raster.rasterize import BackendName
-from tests.raster_scenes import Scene, gradient, gradients, layered_scene
+from engine.synthetic.gaussian_scenes import Scene, layered_scene
+from tests.engine.raster.gradients import gradient, gradients
 
 BACKENDS = ("cpu", "reference")
 

@@ -1,13 +1,10 @@
-"""Scenes of the raster tests (those of the benchmarks), and what tests ask of a gradient. No scene is made here."""
+"""What tests ask of gradients."""
 
 from __future__ import annotations
 
 from torch import Tensor
 
-from app.lab.bench.scenes import Scene, camera, gaussians_of, layered_scene, simple_scene
 from engine.raster import Gaussians
-
-__all__ = ["Scene", "camera", "gaussians_of", "gradient", "gradients", "layered_scene", "simple_scene"]
 
 
 def gradient(tensor: Tensor | None) -> Tensor:
