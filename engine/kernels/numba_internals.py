@@ -33,9 +33,9 @@ def external(symbol: str, signature: Any) -> Any:
     return types.ExternalFunction(symbol, signature)
 
 
-def publish(symbol: str, address: int) -> None:
-    """Let code that is linked from now on find an address under a symbol."""
-    llvm.add_symbol(symbol, address)
+def publish(symbol: str, compiled: Any) -> None:
+    """Let code that is linked from now on find what numba's `cfunc` has compiled under a symbol."""
+    llvm.add_symbol(symbol, compiled.address)
 
 
 def called_externals(function: FunctionType) -> Iterator[str]:

@@ -69,7 +69,7 @@ def _compile(name: str) -> None:
         if called != name and called in _defined:
             _compile(called)
     compiled = cfunc(signature, **options)(function)
-    publish(name, compiled.address)
+    publish(name, compiled)
     _compiled[name] = compiled
 
 
