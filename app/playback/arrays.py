@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from app.playback.picture_source import UNKNOWN, PictureSource
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GaussianArrays:
@@ -21,10 +23,7 @@ class GaussianArrays:
         colors: [N, 3] in 0..1.
         key: Changes when the content does.
         near_plane: Nearest depth that should be drawn, scene units.
-        clip_index, frame_index, revision: What it shows: a frame, and the state of the clip it was decoded from.
-        step: Training steps behind that state; None when unknown.
-        is_still: Whether that state holds nothing that changes over time, as a reference clip before its motion is
-            learned.
+        source: The frame, and the state of the clip it was decoded from.
     """
 
     means: np.ndarray
@@ -34,11 +33,7 @@ class GaussianArrays:
     colors: np.ndarray
     key: Hashable
     near_plane: float = 0.01
-    clip_index: int = 0
-    frame_index: int = 0
-    revision: str = ""
-    step: int | None = None
-    is_still: bool = False
+    source: PictureSource = UNKNOWN
 
     def __len__(self) -> int:
         return len(self.means)
@@ -57,10 +52,10 @@ class AnchorArrays:
         inherited_positions: From the reference clip; empty in the reference clip itself. [A0, 3]
         own_positions: Trained by this clip: all of the reference clip, the residual ones of a source clip. [A, 3]
         key: Changes when the content does.
-        inherited_roles, own_roles: What each anchor is, in engine.model.roles.ROLES; None where nobody says.
+        inherited_roles, own_roles: What each anchor is, in engine.model.roles.ROLES; None where unknown.
             [A0], [A] uint8
         inherited_reasons, own_reasons: Why the gate decided so, codes of engine.gate.reasons. [A0], [A] uint8
-        clip_index, frame_index: What they are of; None for all anchors of the clip.
+        source: The frame they are of; unknown for all anchors of the clip.
     """
 
     inherited_positions: np.ndarray
@@ -70,8 +65,7 @@ class AnchorArrays:
     own_roles: np.ndarray | None = None
     inherited_reasons: np.ndarray | None = None
     own_reasons: np.ndarray | None = None
-    clip_index: int | None = None
-    frame_index: int | None = None
+    source: PictureSource = UNKNOWN
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,25 +100,16 @@ class Picture:
     Attributes:
         image: [H, W, 3] uint8 RGB.
         key: What it shows; equal keys mean equal pictures.
-        is_stale: It is not what was asked for now, but the newest there is. What it is says the rest:
+        is_stale: It is not what was asked for now, but the newest there is.
         duration_s: How long it took to make; 0 when unknown.
-        clip_index, frame_index, revision, step, is_still: The frame it shows, and the state of the clip, see
-            GaussianArrays; None and "" where that is not known or, for a captured picture, without meaning.
-        camera_index: The capture camera that took it, or that a rendered one looks through; None for a free view.
-        look: From where and through which lens it was rendered, whatever its size; see OrbitView.look_key.
+        source: What it shows.
     """
 
     image: np.ndarray
     key: Hashable
     is_stale: bool = False
     duration_s: float = 0.0
-    clip_index: int | None = None
-    frame_index: int | None = None
-    revision: str = ""
-    step: int | None = None
-    is_still: bool = False
-    camera_index: int | None = None
-    look: Hashable = None
+    source: PictureSource = UNKNOWN
 
     @property
     def size(self) -> tuple[int, int]:

@@ -9,6 +9,7 @@ from PIL import Image
 
 from app.background.latest import LatestWorker
 from app.playback.arrays import Picture
+from app.playback.picture_source import PictureSource
 from app.playback.playback import ByteCache
 from engine.capture.capture import Capture
 
@@ -76,8 +77,7 @@ class CapturedPictures:
         picture = Picture(
             downsized(frame, request.max_width),
             request_key(request),
-            frame_index=request.frame_index,
-            camera_index=request.camera_index,
+            source=PictureSource(frame_index=request.frame_index, camera_index=request.camera_index),
         )
         if request.generation == self.viewing.generation:
             self._cache.put(request, picture, picture.image.nbytes)

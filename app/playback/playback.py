@@ -19,6 +19,7 @@ from scipy.spatial import KDTree
 from app.background.kernels import prepare_decoding
 from app.background.latest import LatestWorker
 from app.playback.arrays import AnchorArrays, GaussianArrays, PointArrays
+from app.playback.picture_source import UNKNOWN, PictureSource
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, read_clip_state
 
@@ -197,19 +198,12 @@ class Playback:
         clip_time = request.clip.clip_time(request.frame_index)
         with torch.no_grad():
             gaussians = loaded.model.decode(clip_time)
-        anchors = _anchor_arrays(loaded.model.anchors(clip_time), request.key)
-        anchors = replace(anchors, clip_index=request.clip_index, frame_index=request.frame_index)
-        values = [np.ascontiguousarray(tensor.numpy(), np.float32) for tensor in gaussians.tensors()]
-        arrays = GaussianArrays(
-            *values,
-            key=request.key,
-            near_plane=loaded.near_plane,
-            clip_index=request.clip_index,
-            frame_index=request.frame_index,
-            revision=request.revision,
-            step=loaded.step,
-            is_still=loaded.model.field is None,
+        source = PictureSource(
+            request.clip_index, request.frame_index, request.revision, loaded.step, loaded.model.field is None
         )
+        anchors = _anchor_arrays(loaded.model.anchors(clip_time), request.key, source)
+        values = [np.ascontiguousarray(tensor.numpy(), np.float32) for tensor in gaussians.tensors()]
+        arrays = GaussianArrays(*values, key=request.key, near_plane=loaded.near_plane, source=source)
         shown = ShownFrame(arrays, anchors)
         if request.generation == self.worker.generation:
             n_bytes = arrays.n_bytes + anchors.inherited_positions.nbytes + anchors.own_positions.nbytes
@@ -246,7 +240,7 @@ class Playback:
         return self._reference[1]
 
 
-def _anchor_arrays(view: AnchorView, key: Hashable) -> AnchorArrays:
+def _anchor_arrays(view: AnchorView, key: Hashable, source: PictureSource = UNKNOWN) -> AnchorArrays:
     return AnchorArrays(
         np.ascontiguousarray(view.inherited_positions, np.float32),
         np.ascontiguousarray(view.own_positions, np.float32),
@@ -255,6 +249,7 @@ def _anchor_arrays(view: AnchorView, key: Hashable) -> AnchorArrays:
         own_roles=view.own_roles,
         inherited_reasons=view.inherited_reasons,
         own_reasons=view.own_reasons,
+        source=source,
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,6 +11,7 @@ from app.background.kernels import prepare_drawing
 from app.background.latest import LatestWorker
 from app.playback.arrays import GaussianArrays, Picture
 from app.playback.orbit_view import OrbitView
+from app.playback.picture_source import PictureSource
 
 BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
 """Behind everything; the viewport takes its dark grey from here."""
@@ -22,19 +22,17 @@ class RenderRequest:
     """Gaussians from a view at a size. Equal requests give equal pictures.
 
     Attributes:
-        look: Of the picture, see app.playback.arrays.Picture.
-        camera_index: The capture camera looked through; None for a free view.
+        source: What the picture will be of.
     """
 
     gaussians_key: object
     view_bytes: bytes
     width: int
     height: int
-    look: Hashable
+    source: PictureSource
     gaussians: GaussianArrays = field(compare=False)
     world_to_camera: np.ndarray = field(compare=False)
     K: np.ndarray = field(compare=False)
-    camera_index: int | None = field(compare=False, default=None)
 
 
 class Renderer:
@@ -56,11 +54,10 @@ class Renderer:
             view_bytes,
             width,
             height,
-            view.look_key,
+            replace(gaussians.source, camera_index=view.look_through, look=view.look_key),
             gaussians,
             world_to_camera,
             K,
-            view.look_through,
         )
         self._asked = request
         newest = self.worker.newest
@@ -107,15 +104,4 @@ def render(request: RenderRequest) -> Picture:
         )
         image = (rendering.image[0].clamp(0.0, 1.0) * 255.0 + 0.5).to(torch.uint8).numpy()
     key = (arrays.key, request.view_bytes, request.width, request.height)
-    return Picture(
-        image,
-        key,
-        duration_s=time.perf_counter() - started_s,
-        clip_index=arrays.clip_index,
-        frame_index=arrays.frame_index,
-        revision=arrays.revision,
-        step=arrays.step,
-        is_still=arrays.is_still,
-        camera_index=request.camera_index,
-        look=request.look,
-    )
+    return Picture(image, key, duration_s=time.perf_counter() - started_s, source=request.source)

@@ -171,7 +171,7 @@ class Session:
         """Carry out a command. What the user could have known better becomes a notice.
 
         Raises:
-            TypeError: The object is no command.
+            TypeError: The object is not a command.
         """
         try:
             self._obey(command)
@@ -325,7 +325,7 @@ class Session:
         self._jobs.start("Opening", work, take, failed)
 
     def _take_opened(self, opened: Opened) -> None:
-        for notice in self._refusals:  # something is open now; why something else was not is no news any more
+        for notice in self._refusals:  # something is open now; why something else was not no longer matters
             self.notices.withdraw(notice)
         self._refusals.clear()
         if opened.choices:
@@ -679,7 +679,8 @@ class Session:
         picture = self._renderer.picture(gaussians, self.view, width, height)
         if picture is None or picture.is_stale:
             return picture
-        is_of_now = (picture.clip_index, picture.frame_index, picture.revision) == (
+        source = picture.source
+        is_of_now = (source.clip_index, source.frame_index, source.revision) == (
             request.clip_index,
             request.frame_index,
             request.revision,

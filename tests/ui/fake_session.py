@@ -14,6 +14,7 @@ import numpy as np
 
 from app.playback.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.orbit_view import OrbitView
+from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
 from app.project.recents import RecentProject
 from app.session import commands
@@ -213,11 +214,13 @@ class FakeSession:
         return Picture(
             image,
             key=(frame_index, width, height, matrix.tobytes()),
-            clip_index=clip.clip_index,
-            frame_index=frame_index,
-            revision="trained",
-            camera_index=self.view.look_through,
-            look=self.view.look_key,
+            source=PictureSource(
+                clip.clip_index,
+                frame_index,
+                "trained",
+                camera_index=self.view.look_through,
+                look=self.view.look_key,
+            ),
         )
 
     def shown_gaussians(self) -> None:
@@ -239,4 +242,4 @@ class FakeSession:
         image = np.broadcast_to(x, (height, max_width, 3)).astype(np.uint8).copy()
         image[:, :, camera_index % 3] = (camera_index * 37) % 255
         key = (camera_index, frame_index, max_width)
-        return Picture(image, key=key, camera_index=camera_index, frame_index=frame_index)
+        return Picture(image, key=key, source=PictureSource(frame_index=frame_index, camera_index=camera_index))

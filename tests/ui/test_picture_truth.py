@@ -209,7 +209,7 @@ def test_playing_every_frame_shows_each_one(window: Pilot) -> None:
     seen: list[int] = []
 
     def is_round() -> bool:
-        shown = window.studio.frame.viewport.scene.shown.frame_index
+        shown = window.studio.frame.viewport.scene.shown.source.frame_index
         if shown is not None and (not seen or seen[-1] != shown):
             seen.append(shown)
         return len(seen) > 7
@@ -238,7 +238,7 @@ def test_the_cloud_key_does_something_on_a_trained_clip_and_says_what(window: Pi
     assert not np.array_equal(picture(window), before)
     window.key(key.SPACE)
     window.draw(40)
-    assert hud(window).rate == "", "a cloud does not change, so no rate of pictures is told"
+    assert hud(window).rate == "", "a cloud does not change, so no rate of pictures is shown"
     window.key(key.SPACE)
     window.session.dispatch(c.SetFrame(0))
     window.key(key._4)
@@ -256,4 +256,4 @@ def test_a_view_that_moved_is_being_redrawn_and_the_resolution_is_told(window: P
     window.draw(1)
     assert hud(window).pending == "being redrawn from here"
     draw_until(window, lambda: hud(window).pending == "", "the new picture")
-    assert scene.shown.look == window.session.view.look_key
+    assert scene.shown.source.look == window.session.view.look_key

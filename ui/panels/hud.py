@@ -12,8 +12,8 @@ from imgui_bundle import ImVec2, imgui
 from ui.panels.regions import draw_region_mark
 from ui.panels.state import Rect, UiState
 from ui.panels.timeline import STATE_WORDS
-from ui.panels.widgets import format_count
 from ui.style import theme
+from ui.style.numbers import format_count
 from ui.style.theme import Icon
 from ui.viewport.hud_text import HudText, count_text, hud_text
 from ui.viewport.picture_rate import PictureRate
@@ -60,11 +60,12 @@ class Hud:
 
     def _text(self, session: Any, scene: Scene) -> HudText | None:
         wanted, timeline, shown = session.wanted_frame(), session.timeline, scene.shown
+        shown_frame = shown.source.frame_index
         if wanted is None:
             return None
         rate, now_s = None, time.perf_counter()
-        if timeline.is_playing and shown.frame_index is not None:  # a cloud stands still, whatever the playhead does
-            self._rate.note(shown.frame_index, timeline.n_frames, now_s)
+        if timeline.is_playing and shown_frame is not None:  # a cloud stands still, whatever the playhead does
+            self._rate.note(shown_frame, timeline.n_frames, now_s)
             rate = self._rate.rate(now_s, is_every_frame=timeline.is_every_frame)
         else:
             self._rate.stop()
@@ -148,14 +149,15 @@ def _draw_busy(draw: Any, middle: ImVec2, color: theme.Color) -> None:
 def legend_rows(session: Any, scene: Scene) -> list[tuple[str, theme.Color, str]]:
     """Shape, colour and words of what is marked."""
     counts, rows = scene.counts, []
-    status = None if counts.clip_index is None else session.clip_states[counts.clip_index]
+    clip_index, frame_index = counts.source.clip_index, counts.source.frame_index
+    status = None if clip_index is None else session.clip_states[clip_index]
     n_inherited, n_own = (0, 0) if status is None else (status.n_inherited, status.n_own)
     if session.overlays.show_inherited and counts.n_inherited:
         words, n_all = ("reference anchors", n_own) if counts.is_reference else ("inherited anchors", n_inherited)
-        text = count_text(counts.n_inherited, n_all, words, counts.frame_index)
+        text = count_text(counts.n_inherited, n_all, words, frame_index)
         rows += [("circle", theme.INHERITED, text), *_role_rows("circle", counts.inherited_roles)]
     if session.overlays.show_residual and counts.n_residual:
-        text = count_text(counts.n_residual, n_own, "residual anchors", counts.frame_index)
+        text = count_text(counts.n_residual, n_own, "residual anchors", frame_index)
         rows += [("diamond", theme.RESIDUAL, text), *_role_rows("diamond", counts.residual_roles)]
     if session.overlays.show_regions:
         for treat, words in REGION_WORDS.items():

@@ -5,11 +5,12 @@ The label is always that of the picture on screen, never that of the playhead; w
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import dataclass
 
+from app.playback.picture_source import UNKNOWN, PictureSource
 from app.status import WantedFrame
-from ui.panels.widgets import format_count
+from ui.style.numbers import format_count
 from ui.viewport.picture_rate import ShownRate
 
 RENDERED, CLOUD, FIRST_CLOUD, HINT, CAPTURED, MARKS = (
@@ -36,23 +37,14 @@ class ShownPicture:
 
     Attributes:
         kind: One of the words above.
-        clip_index, frame_index, revision, step: Of what it shows; None and "" for what belongs to no frame.
-        is_still: Whether nothing that moves is in it yet.
-        camera_index: The capture camera looked through, or that took it; None for a free view.
-        look: From where and through which lens it was rendered; see OrbitView.look_key.
+        source: The frame and where it is seen from; of a cloud, which belongs to no frame, only the latter.
         size, full_size: Width and height it has, and will have when nothing moves, px.
         is_on_its_way: Whether a newer one is being made.
         is_cloud_chosen: Whether the cloud is shown because the user asked for it, although there is a trained picture.
     """
 
     kind: str = MARKS
-    clip_index: int | None = None
-    frame_index: int | None = None
-    revision: str = ""
-    step: int | None = None
-    is_still: bool = False
-    camera_index: int | None = None
-    look: Hashable = None
+    source: PictureSource = UNKNOWN
     size: tuple[int, int] = (0, 0)
     full_size: tuple[int, int] = (0, 0)
     is_on_its_way: bool = False
@@ -63,8 +55,8 @@ class ShownPicture:
         if wanted.has_failed or self.is_cloud_chosen:
             return True
         if self.kind == RENDERED:
-            return (self.clip_index, self.frame_index) == (wanted.clip_index, wanted.frame_index)
-        return not wanted.revision and self.frame_index in (None, wanted.frame_index)
+            return (self.source.clip_index, self.source.frame_index) == (wanted.clip_index, wanted.frame_index)
+        return not wanted.revision and self.source.frame_index in (None, wanted.frame_index)
 
 
 @dataclass(frozen=True)
@@ -96,7 +88,7 @@ def hud_text(
     camera_name: Callable[[int | None], str],
     rate: ShownRate | None = None,
 ) -> HudText:
-    """Everything that is said of the picture.
+    """Everything that the HUD says about the picture.
 
     Args:
         fps: Frames per second of the capture.
@@ -146,19 +138,21 @@ def count_text(n_alive: int, n_all: int, words: str, frame_index: int | None) ->
 
 def _is_right(shown: ShownPicture, wanted: WantedFrame) -> bool:
     """Whether the picture is what it should be but for its size."""
-    is_frame = (shown.clip_index, shown.frame_index, shown.revision) == (
+    source = shown.source
+    is_frame = (source.clip_index, source.frame_index, source.revision) == (
         wanted.clip_index,
         wanted.frame_index,
         wanted.revision,
     )
-    return is_frame and shown.look == wanted.look
+    return is_frame and source.look == wanted.look
 
 
 def _label(
     shown: ShownPicture, wanted: WantedFrame, fps: float, camera_name: Callable[[int | None], str], *, is_playing: bool
 ) -> str:
-    clip_index = wanted.clip_index if shown.clip_index is None else shown.clip_index
-    frame_index = wanted.frame_index if shown.frame_index is None else shown.frame_index
+    source = shown.source
+    clip_index = wanted.clip_index if source.clip_index is None else source.clip_index
+    frame_index = wanted.frame_index if source.frame_index is None else source.frame_index
     frame = f"frame {frame_index}"
     if is_playing and frame_index != wanted.frame_index:
         frame += f" (playhead {wanted.frame_index})"
@@ -166,30 +160,33 @@ def _label(
     size = f"{width} x {height}"
     if width < shown.full_size[0]:
         size += f" of {shown.full_size[0]} x {shown.full_size[1]}"
-    camera = camera_name(shown.camera_index)
+    camera = camera_name(source.camera_index)
     return "   ".join((f"clip {clip_index}", frame, f"{frame_index / max(fps, 1e-6):.2f} s", camera, size))
 
 
 def _pending_text(
     shown: ShownPicture, wanted: WantedFrame, camera_name: Callable[[int | None], str], *, is_playing: bool
 ) -> str:
+    source = shown.source
     if shown.is_cloud_chosen:
         return ""
     if shown.kind != RENDERED:
         return _pending_beside(shown, wanted)
     if not shown.is_on_its_way:
         return ""
-    if shown.clip_index != wanted.clip_index and not wanted.is_loaded:
-        return f"showing frame {shown.frame_index} of clip {shown.clip_index}, clip {wanted.clip_index} is being loaded"
-    if shown.frame_index != wanted.frame_index:
+    if source.clip_index != wanted.clip_index and not wanted.is_loaded:
+        return (
+            f"showing frame {source.frame_index} of clip {source.clip_index}, clip {wanted.clip_index} is being loaded"
+        )
+    if source.frame_index != wanted.frame_index:
         if is_playing:
             return ""  # the label names both, and changes with every picture
-        return f"showing frame {shown.frame_index}, frame {wanted.frame_index} is being drawn"
-    if shown.camera_index != wanted.camera_index:
-        return f"showing {camera_name(shown.camera_index)}, {camera_name(wanted.camera_index)} is being drawn"
-    if shown.look != wanted.look:
+        return f"showing frame {source.frame_index}, frame {wanted.frame_index} is being drawn"
+    if source.camera_index != wanted.camera_index:
+        return f"showing {camera_name(source.camera_index)}, {camera_name(wanted.camera_index)} is being drawn"
+    if source.look != wanted.look:
         return "being redrawn from here"
-    if shown.revision != wanted.revision:
+    if source.revision != wanted.revision:
         return f"a newer state of clip {wanted.clip_index} is being drawn"
     return "full resolution follows"
 
@@ -200,19 +197,20 @@ def _pending_beside(shown: ShownPicture, wanted: WantedFrame) -> str:
         return f"loading clip {wanted.clip_index}"
     if wanted.revision:
         return f"frame {wanted.frame_index} is being drawn"
-    if shown.kind == CAPTURED and shown.frame_index != wanted.frame_index:
-        return f"showing frame {shown.frame_index}, frame {wanted.frame_index} is being read"
+    if shown.kind == CAPTURED and shown.source.frame_index != wanted.frame_index:
+        return f"showing frame {shown.source.frame_index}, frame {wanted.frame_index} is being read"
     return "the point cloud is being read" if shown.is_on_its_way else ""
 
 
 def _note(shown: ShownPicture, wanted: WantedFrame, state: str, state_words: str) -> str:
+    source = shown.source
     if shown.is_cloud_chosen:
         return "point cloud, not the trained result (4 switches)"
     if shown.kind == RENDERED:
-        if state == "trained" or shown.clip_index != wanted.clip_index:
+        if state == "trained" or source.clip_index != wanted.clip_index:
             return ""
-        step = "" if shown.step is None else f", picture of step {format_count(shown.step)}"
-        still = ", moving objects are missing until they are learned" if shown.is_still else ""
+        step = "" if source.step is None else f", picture of step {format_count(source.step)}"
+        still = ", moving objects are missing until they are learned" if source.is_still else ""
         return f"clip {wanted.clip_index} {state_words}{step}{still}"
     what = _STANDS_IN[shown.kind]
     if wanted.has_failed:

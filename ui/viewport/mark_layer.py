@@ -13,6 +13,7 @@ import moderngl
 import numpy as np
 
 from app.playback.arrays import AnchorArrays, GaussianArrays
+from app.playback.picture_source import UNKNOWN, PictureSource
 from ui.gl import (
     INHERITED_ANCHOR_COLOR,
     NEAR,
@@ -50,15 +51,14 @@ class AnchorCounts:
     """Anchors held for the overlays, by origin. Those of the reference clip itself count as inherited.
 
     Attributes:
-        clip_index, frame_index: What they are of; None where nobody says.
-        inherited_roles, residual_roles: Likewise by what they are; empty where nobody says.
+        source: What they are of.
+        inherited_roles, residual_roles: Likewise by what they are; empty where unknown.
     """
 
     n_inherited: int = 0
     n_residual: int = 0
     is_reference: bool = False
-    clip_index: int | None = None
-    frame_index: int | None = None
+    source: PictureSource = UNKNOWN
     inherited_roles: dict[str, int] = field(default_factory=dict)
     residual_roles: dict[str, int] = field(default_factory=dict)
 
@@ -156,8 +156,7 @@ class MarkLayer:
             len(inherited[0]),
             len(own[0]),
             is_reference,
-            anchors.clip_index,
-            anchors.frame_index,
+            anchors.source,
             first.counts,
             second.counts,
         )

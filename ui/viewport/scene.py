@@ -14,6 +14,7 @@ from typing import Any, Literal
 import moderngl
 import numpy as np
 
+from app.playback.picture_source import PictureSource
 from app.playback.pointing import pixel_ray, seen_point
 from app.playback.render import BACKGROUND
 from ui.gl import (
@@ -158,8 +159,7 @@ class Scene:
         is_cloud_chosen = points_key is not None
         self._asked_size = None
         shown = ShownPicture(
-            camera_index=session.view.look_through,
-            look=session.view.look_key,
+            source=PictureSource(camera_index=session.view.look_through, look=session.view.look_key),
             size=(view.width, view.height),
             full_size=(view.width, view.height),
             is_cloud_chosen=is_cloud_chosen,
@@ -204,7 +204,7 @@ class Scene:
             return None
         self._captured.set(picture.image, key=picture.key)
         self._captured_key = picture.key
-        return CapturedPicture(self._captured.texture, picture.frame_index, bool(picture.is_stale))
+        return CapturedPicture(self._captured.texture, picture.source.frame_index, picture.is_stale)
 
     def _without_render(
         self, shown: ShownPicture, points_key: Hashable, captured: CapturedPicture | None
@@ -215,7 +215,7 @@ class Scene:
             return replace(
                 shown,
                 kind=CAPTURED,
-                frame_index=captured.frame_index,
+                source=replace(shown.source, frame_index=captured.frame_index),
                 size=captured.texture.size,
                 full_size=captured.texture.size,
                 is_on_its_way=captured.is_stale,
@@ -237,16 +237,10 @@ class Scene:
         return picture.key, replace(
             shown,
             kind=RENDERED,
-            clip_index=picture.clip_index,
-            frame_index=picture.frame_index,
-            revision=picture.revision,
-            step=picture.step,
-            is_still=picture.is_still,
-            camera_index=picture.camera_index,
-            look=picture.look,
+            source=picture.source,
             size=picture.size,
             full_size=picture_size(view.width, view.height, full),
-            is_on_its_way=bool(picture.is_stale) or (view.is_moving and share < full),
+            is_on_its_way=picture.is_stale or (view.is_moving and share < full),
         )
 
     def _take_gaussians(self, session: Any, view: SceneView, shown: ShownPicture) -> tuple[Hashable, ShownPicture]:
@@ -258,13 +252,9 @@ class Scene:
         shown = replace(
             shown,
             kind=RENDERED,
-            clip_index=gaussians.clip_index,
-            frame_index=gaussians.frame_index,
-            revision=gaussians.revision,
-            step=gaussians.step,
-            is_still=gaussians.is_still,
+            source=replace(gaussians.source, camera_index=shown.source.camera_index, look=shown.source.look),
         )
-        is_current = wanted is None or (shown.is_of(wanted) and shown.revision == wanted.revision)
+        is_current = wanted is None or (shown.is_of(wanted) and shown.source.revision == wanted.revision)
         return gaussians.key, replace(shown, is_on_its_way=not is_current)
 
     def _take_points(self, session: Any) -> Hashable:
@@ -283,7 +273,7 @@ class Scene:
         return key
 
     def anchor_text(self, session: Any, view: SceneView, x: float, y: float) -> str:
-        """What the anchor under a pixel of the view is and why; empty where none is shown or nobody says. It stands
+        """What the anchor under a pixel of the view is and why; empty where none is shown or that is unknown. It stands
         out from the next frame on."""
         found = self.marks.anchor_under(session, view, x, y, self._near)
         text = "" if found is None else found[0].text(found[1], session.regions.regions)

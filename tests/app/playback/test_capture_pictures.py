@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from app.playback.capture_pictures import CapturedPictures
+from app.playback.picture_source import PictureSource
 from engine.capture.capture import Capture, open_capture
 from tests.app.fakes import write_capture
 
@@ -33,10 +34,10 @@ def test_a_picture_says_what_it_is_of(takes: tuple[Capture, Capture]):
     assert pictures.viewing.wait_idle(WAIT_S)
     picture = pictures.picture(takes[0], 1, 1, 400)
     assert picture is not None
-    assert (picture.camera_index, picture.frame_index, picture.size) == (1, 1, (32, 24))
+    assert (picture.source, picture.size) == (PictureSource(camera_index=1, frame_index=1), (32, 24))
     last = pictures.picture(takes[0], 1, 0, 400)
     assert last is not None
-    assert (last.is_stale, last.frame_index) == (True, 1)
+    assert (last.is_stale, last.source.frame_index) == (True, 1)
     pictures.close()
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.playback.picture_source import PictureSource
 from app.playback.playback import FrameRequest, Playback
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, write_clip_state
@@ -89,9 +90,8 @@ def test_a_frame_says_what_it_is(playback: Playback, tmp_path: Path):
     wait_for(playback, request)
     shown = playback.frame(request)
     assert shown is not None
-    gaussians = shown.gaussians
-    assert (gaussians.clip_index, gaussians.frame_index, gaussians.revision, gaussians.step) == (0, 2, "live-1", 4)
-    assert gaussians.is_still
+    expected = PictureSource(clip_index=0, frame_index=2, revision="live-1", step=4, is_still=True)
+    assert shown.gaussians.source == shown.anchors.source == expected
 
 
 def test_what_was_decoded_for_one_project_is_not_shown_in_the_next(playback: Playback, tmp_path: Path):
@@ -145,7 +145,7 @@ def test_until_a_frame_is_there_the_last_one_is_shown_and_says_so(playback: Play
     wait_for(playback, frame_of(path, frame_index=0))
     shown = playback.frame(frame_of(path, frame_index=2))
     assert shown is not None
-    assert shown.gaussians.frame_index == 0
+    assert shown.gaussians.source.frame_index == 0
 
 
 def test_a_damaged_file_is_not_on_its_way(playback: Playback, tmp_path: Path):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
+from app.playback.picture_source import PictureSource
 from app.status import WantedFrame
 from ui.viewport.hud_text import (
     CAPTURED,
@@ -23,15 +25,17 @@ from ui.viewport.picture_rate import ShownRate
 
 SHOWN = ShownPicture(
     kind=RENDERED,
-    clip_index=0,
-    frame_index=0,
-    revision="trained-a",
-    step=100,
-    look="home",
+    source=PictureSource(clip_index=0, frame_index=0, revision="trained-a", step=100, look="home"),
     size=(960, 600),
     full_size=(960, 600),
 )
 WANTED = WantedFrame(0, 0, revision="trained-a", look="home", is_loaded=True)
+
+
+def showing(**changes: Any) -> ShownPicture:
+    """SHOWN with other values, of itself or of its source."""
+    of_source = {name: changes.pop(name) for name in [*changes] if name in PictureSource.__dataclass_fields__}
+    return replace(SHOWN, source=replace(SHOWN.source, **of_source), **changes)
 
 
 def text_of(
@@ -80,7 +84,7 @@ def test_another_clip_that_is_not_in_memory_is_being_loaded():
     ],
 )
 def test_every_way_in_which_a_picture_can_be_behind_has_words(shown: dict, wanted: dict, pending: str):
-    text = text_of(replace(SHOWN, is_on_its_way=True, **shown), replace(WANTED, **wanted))
+    text = text_of(showing(is_on_its_way=True, **shown), replace(WANTED, **wanted))
     assert text.pending == pending
 
 
@@ -115,12 +119,12 @@ def test_a_cloud_that_stands_in_for_a_clip_that_loads_says_what_is_missing():
     ],
 )
 def test_where_nothing_is_trained_the_reason_is_told(kind: str, state: str, words: str, note: str):
-    text = text_of(replace(SHOWN, kind=kind, revision=""), replace(WANTED, revision=""), state=state, state_words=words)
+    text = text_of(showing(kind=kind, revision=""), replace(WANTED, revision=""), state=state, state_words=words)
     assert text.note == note
 
 
 def test_a_picture_of_a_running_training_says_of_which_step_it_is():
-    shown, wanted = replace(SHOWN, revision="live-1-1", step=1200), replace(WANTED, revision="live-1-1")
+    shown, wanted = showing(revision="live-1-1", step=1200), replace(WANTED, revision="live-1-1")
     assert (
         text_of(shown, wanted, state="training", state_words="training").note
         == "clip 0 training, picture of step 1,200"
@@ -133,7 +137,7 @@ def test_a_cloud_in_place_of_a_trained_picture_says_so():
 
 
 def test_while_playing_the_label_names_both_frames_and_the_rate_is_told():
-    shown = replace(SHOWN, frame_index=3, is_on_its_way=True)
+    shown = showing(frame_index=3, is_on_its_way=True)
     text = text_of(shown, replace(WANTED, frame_index=5), rate=ShownRate(4.0, has_skipped=True))
     assert "frame 3 (playhead 5)   0.30 s" in text.label
     assert (text.pending, text.rate) == ("", "4.0 of 10 fps, frames skipped")
@@ -172,4 +176,4 @@ def test_a_count_says_whether_it_is_of_the_frame_or_of_the_clip():
     ],
 )
 def test_playing_every_frame_waits_for_the_right_picture(shown: dict, wanted: dict, is_of: bool):
-    assert replace(SHOWN, **shown).is_of(replace(WANTED, **wanted)) is is_of
+    assert showing(**shown).is_of(replace(WANTED, **wanted)) is is_of

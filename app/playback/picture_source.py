@@ -1,0 +1,34 @@
+"""PictureSource: what something on screen is of. It travels from the decoder to the words over the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class PictureSource:
+    """A frame, the state of the clip it was made from, and where it is seen from. None and "" where unknown, or
+    where it has no meaning: a captured picture belongs to no state of a clip.
+
+    Attributes:
+        clip_index, frame_index: The frame.
+        revision: Names the state of the clip.
+        step: Training steps behind that state.
+        is_still: Whether that state holds nothing that changes over time, as a reference clip before its motion is
+            learned.
+        camera_index: The capture camera that took it, or that it is looked at through; None for a free view.
+        look: From where and through which lens, whatever the size; see OrbitView.look_key.
+    """
+
+    clip_index: int | None = None
+    frame_index: int | None = None
+    revision: str = ""
+    step: int | None = None
+    is_still: bool = False
+    camera_index: int | None = None
+    look: Hashable = None
+
+
+UNKNOWN = PictureSource()
+"""Of what belongs to no frame."""
