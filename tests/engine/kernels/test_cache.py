@@ -133,7 +133,9 @@ def test_a_change_of_any_real_kernel_file_changes_the_key(monkeypatch):
     monkeypatch.setattr(cache, "_python_texts", texts)
     before = sources_hash(ROOT / "engine")
     names = real_kernel_files()
-    assert {"kernels/lanes.py", "model/decode/cpu/forward.py", "raster/cpu/blend.py", "cloud/motion/hull.py"} <= set(names)
+    assert {"kernels/lanes.py", "model/decode/cpu/forward.py", "raster/cpu/blend.py", "cloud/motion/hull.py"} <= set(
+        names
+    )
     assert {"training/fused_loss.py", "training/ssim_lanes.py", "training/adam.py"} <= set(names)
     unnoticed = []
     for changed in [*names, "conventions.py", "model/warm.py"]:
