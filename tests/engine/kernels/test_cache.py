@@ -136,7 +136,7 @@ def test_a_change_of_any_real_kernel_file_changes_the_key(monkeypatch):
     assert {"kernels/lanes.py", "model/decode/cpu/forward.py", "raster/cpu/blend.py", "cloud/motion/hull.py"} <= set(
         names
     )
-    assert {"training/fused_loss.py", "training/ssim_lanes.py", "training/adam.py"} <= set(names)
+    assert {"training/step/fused_loss.py", "images/ssim_lanes.py", "training/optimizer/adam.py"} <= set(names)
     unnoticed = []
     for changed in [*names, "conventions.py", "model/warm.py"]:
         if sources_hash(ROOT / "engine") == before:
