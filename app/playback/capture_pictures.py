@@ -10,7 +10,7 @@ from PIL import Image
 from app.background.latest import LatestWorker
 from app.playback.arrays import Picture
 from app.playback.picture_source import PictureSource
-from app.playback.playback import ByteCache
+from engine.byte_cache import ByteCache
 from engine.capture.capture import Capture
 
 CACHE_BYTES = 96 << 20
@@ -38,7 +38,7 @@ class CapturedPictures:
     """What the cameras took. Methods are for one thread, not those it owns."""
 
     def __init__(self, *, cache_bytes: int = CACHE_BYTES) -> None:
-        self._cache = ByteCache(cache_bytes)
+        self._cache: ByteCache[PictureRequest, Picture] = ByteCache(cache_bytes)
         self._last: dict[int, Picture] = {}
         self.viewing: LatestWorker[PictureRequest, Picture] = LatestWorker("captured picture", self._compute)
         self.thumbnails: LatestWorker[PictureRequest, Picture] = LatestWorker("thumbnails", self._compute)

@@ -6,7 +6,6 @@ what the thread finishes for the one before is dropped. A new revision of a live
 
 from __future__ import annotations
 
-import threading
 from collections import OrderedDict
 from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
@@ -20,6 +19,7 @@ from app.background.kernels import prepare_decoding
 from app.background.latest import LatestWorker
 from app.playback.arrays import AnchorArrays, GaussianArrays, PointArrays
 from app.playback.picture_source import UNKNOWN, PictureSource
+from engine.byte_cache import ByteCache
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, read_clip_state
 
@@ -36,6 +36,8 @@ MAX_MODELS = 3
 
 ModelKey = tuple[int, str, int, str]
 """generation, path, clip_index, revision"""
+FrameKey = tuple[int, str, int, str, int]
+"""A ModelKey and frame_index"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +68,7 @@ class FrameRequest:
         return self.generation, str(self.path), self.clip_index, self.revision
 
     @property
-    def key(self) -> tuple[int, str, int, str, int]:
+    def key(self) -> FrameKey:
         """Identity of the result."""
         return *self.model_key, self.frame_index
 
@@ -89,56 +91,11 @@ class ShownFrame:
     anchors: AnchorArrays
 
 
-class ByteCache:
-    """Most recently used values up to a number of bytes. Safe to use from several threads."""
-
-    def __init__(self, max_bytes: int) -> None:
-        self._max_bytes = max_bytes
-        self._values: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
-        self._n_bytes = 0
-        self._lock = threading.Lock()
-
-    def __len__(self) -> int:
-        return len(self._values)
-
-    @property
-    def n_bytes(self) -> int:
-        """Bytes held."""
-        return self._n_bytes
-
-    def get(self, key: Hashable) -> Any | None:
-        """The value, which becomes the most recent one; None when it is not there."""
-        with self._lock:
-            if key not in self._values:
-                return None
-            self._values.move_to_end(key)
-            return self._values[key][0]
-
-    def put(self, key: Hashable, value: Any, n_bytes: int) -> None:
-        """Keep a value; the oldest ones go when there is no room. The newest always stays."""
-        with self._lock:
-            _, old_bytes = self._values.pop(key, (None, 0))
-            self._values[key] = (value, n_bytes)
-            self._n_bytes += n_bytes - old_bytes
-            while self._n_bytes > self._max_bytes and len(self._values) > 1:
-                self._n_bytes -= self._values.popitem(last=False)[1][1]
-
-    def drop(self, is_unwanted: Any) -> None:
-        """Forget every value whose key the predicate accepts."""
-        with self._lock:
-            for key in [key for key in self._values if is_unwanted(key)]:
-                self._n_bytes -= self._values.pop(key)[1]
-
-    def clear(self) -> None:
-        """Forget everything."""
-        self.drop(lambda key: True)
-
-
 class Playback:
     """Frames to arrays on one thread; the newest request wins. Methods are for one other thread."""
 
     def __init__(self, *, cache_bytes: int = CACHE_BYTES) -> None:
-        self._cache = ByteCache(cache_bytes)
+        self._cache: ByteCache[FrameKey, ShownFrame] = ByteCache(cache_bytes)
         self._models: OrderedDict[ModelKey, LoadedClip] = OrderedDict()
         self._reference: tuple[tuple[str, int], ClipState] | None = None
         self._last: ShownFrame | None = None

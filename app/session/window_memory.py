@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from app.session.settings import config_dir
 from app.status import COMPARE_MODES, OVERLAY_NAMES
 from engine.errors import EngineError
 from engine.storage.json_files import read_checked_json, write_checked_json
+from engine.user_folders import config_dir
 
 logger = logging.getLogger(__name__)
 

@@ -6,8 +6,8 @@ from typing import Any
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
+from engine.text import duration_text
 from ui.panels.state import UiState
-from ui.panels.training import duration_text
 from ui.panels.widgets import elided
 from ui.style import theme
 from ui.style.numbers import format_count
