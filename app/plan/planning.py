@@ -8,7 +8,6 @@ from typing import Any
 from app.background.kernels import COMPILING
 from app.project.clip_catalog import ClipCatalog
 from app.project.project import Project
-from app.project.stage_seconds import stages_of
 from app.status import PlanStatus, SettingStatus
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -63,7 +62,7 @@ def plan_clip(
         clip,
         config,
         is_source=base is not None,
-        reference=None if found is None or found.damage else found.header,
+        reference=None if found is None else found.header,
         history=history,
         machine=UNKNOWN_MACHINE if is_measured else measure_machine(),
         is_still=base is not None and _looks_still(project, capture, clip, config),
@@ -87,11 +86,10 @@ def _looks_still(project: Project, capture: Capture, clip: Clip, config: TrainCo
 
 def _measured(project: Project, clip_index: int) -> MeasuredClip | None:
     found = project.headers.read(project.clip_path(clip_index))
-    if found is None or found.damage:
+    if found is None or found.header is None:
         return None
-    metrics = found.header.get("metrics")
-    stages_s = stages_of(metrics) if isinstance(metrics, dict) else {}
-    return measured_clip(found.header, disk_mb=found.n_bytes / 1e6, uncounted_s=stages_s.get(COMPILING, 0.0))
+    compiling_s = found.header.figures.stages_s.get(COMPILING, 0.0)
+    return measured_clip(found.header, disk_mb=found.n_bytes / 1e6, uncounted_s=compiling_s)
 
 
 # ---------------------------------------------------------------- for the window

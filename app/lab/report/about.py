@@ -8,6 +8,8 @@ from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
+import msgspec
+
 from app.lab.bench.machine import Machine
 from app.lab.report.parts import Section
 from app.lab.report.tables import Table, TableColumn
@@ -75,7 +77,9 @@ def split_section(facts: ProjectFacts, capture: Mapping[str, Any], n_clips: int)
         + ", ".join(f"{c.clip_index} (frames {c.start} to {c.start + c.n_frames - 1})" for c in facts.clips),
     }
     parts: list[Any] = [_pairs("split", "Cameras and clips", rows)]
-    covered = [{"clip": clip.clip_index, **clip.coverage} for clip in facts.clips if clip.coverage]
+    covered = [
+        {"clip": clip.clip_index, **msgspec.structs.asdict(clip.coverage)} for clip in facts.clips if clip.coverage
+    ]
     if covered:
         columns = (
             TableColumn("clip", "Clip"),

@@ -17,6 +17,8 @@ import pytest
 
 from tests.guarded_memory import SEGMENTATION_FAULT, GuardedMemory, needs_page_rights, run_child
 
+pytestmark = pytest.mark.slow
+
 Say = Callable[[str], None]
 MODULES = (
     "engine.kernels.jobs",

@@ -156,6 +156,7 @@ def test_addresses_of_empty_and_read_only_arrays():
     assert address_of(array[:0]) == 0
 
 
+@pytest.mark.slow
 def test_the_workqueue_layer_runs_every_worker():
     probe = (
         "from engine.kernels.launch import launch\n"
@@ -233,12 +234,14 @@ def _touch(worker, address):
     values[0] += np.float32(1)
 
 
+@pytest.mark.slow
 @needs_page_rights
 def test_temporaries_live_until_the_kernel_is_done():
     code, _ = run_child(_launch_temporaries)
     assert code == 0, f"{SEGMENTATION_FAULT} is an access to memory that nobody held"
 
 
+@pytest.mark.slow
 @needs_page_rights
 def test_memory_that_nobody_holds_would_be_noticed():
     code, _ = run_child(_launch_what_nobody_holds)

@@ -14,6 +14,7 @@ from pathlib import Path
 import llvmlite.binding as llvm
 import numba
 import numpy as np
+import pytest
 from numba import cfunc, njit, types
 from numba.core import cgutils
 from numba.np.numpy_support import from_dtype
@@ -87,6 +88,7 @@ def test_called_symbols_are_found():
     )
 
 
+@pytest.mark.slow
 def test_the_loop_of_the_threading_layer_gives_every_number_once():
     probe = """
 import ctypes, sys
@@ -175,6 +177,7 @@ def test_layer_and_most_threads_are_known():
     _check("config.NUMBA_NUM_THREADS is the number of threads", lambda: internals.most_threads() >= 1)
 
 
+@pytest.mark.slow
 def test_a_layer_is_chosen_before_the_start():
     probe = (
         "from engine.kernels import numba_internals as i; assert i.layer() is None; i.choose_layer('workqueue'); "
