@@ -147,6 +147,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_interrupting_stops_cleanly_and_keeps_what_was_learned(tmp_path, capture_folder, name):
     assert hasattr(signal, name)
@@ -168,6 +169,7 @@ def test_interrupting_stops_cleanly_and_keeps_what_was_learned(tmp_path, capture
     open_project(tmp_path / "p").close()
 
 
+@pytest.mark.slow
 def test_a_dead_worker_ends_with_1(capture_folder, tmp_path, capsys):
     from app.training.process import ProcessWorker
 

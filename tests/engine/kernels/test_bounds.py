@@ -18,6 +18,8 @@ import pytest
 
 from tests.guarded_memory import SEGMENTATION_FAULT, GuardedMemory, run_child
 
+pytestmark = pytest.mark.slow
+
 Say = Callable[[str], None]
 MODULES = (
     "engine.kernels.arrays",

@@ -110,6 +110,7 @@ def test_addresses_of_empty_and_read_only_arrays():
     assert address_of(array[:0]) == 0
 
 
+@pytest.mark.slow
 def test_the_workqueue_layer_runs_every_worker():
     probe = (
         "import numpy as np\n"

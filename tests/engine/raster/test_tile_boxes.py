@@ -25,6 +25,7 @@ def as_float32(gaussians: Gaussians) -> Gaussians:
     return Gaussians(*(tensor.float() for tensor in gaussians.tensors()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", BACKENDS)
 @settings(deadline=None, max_examples=20)
 @given(size_px=st.sampled_from([0.3, 3.0, 30.0]), seed=st.integers(0, 99), n_rows=st.integers(0, 40))

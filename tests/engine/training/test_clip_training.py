@@ -26,6 +26,8 @@ from engine.training.step.nonfinite import loss_not_finite
 from tests.clip_headers import write_values
 from tests.engine.training.damaged_states import damaged_states
 
+pytestmark = pytest.mark.slow
+
 CLIP_LENGTH = 10
 CONFIG = TrainConfig(
     static_steps=200, joint_steps=250, source_steps=150, max_static_points=5000, max_moving_points=3000

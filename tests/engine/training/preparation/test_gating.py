@@ -30,6 +30,8 @@ from tests.engine.training.tiny_training import (
     take_steps,
 )
 
+pytestmark = pytest.mark.slow
+
 STATIC = ("positions", "color_logits", "features", "log_offset_scales", "log_base_scales")
 
 
