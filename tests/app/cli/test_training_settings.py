@@ -1,9 +1,11 @@
-"""The list of training settings on the command line."""
+"""Training settings on the command line: what was chosen, and the list of all."""
 
 import pytest
 
-from app.cli.training_settings import WIDTH, settings_lines
+from app.cli.arguments import PlainParser, parse
+from app.cli.training_settings import WIDTH, add_training_settings, overrides_of, settings_lines
 from engine.training.config import SETTINGS
+from engine.training.presets import preset
 
 
 @pytest.mark.parametrize("command", ["train", "ablate"])
@@ -18,3 +20,10 @@ def test_help_settings_lists_every_setting_and_trains_nothing(run, command):
 
 def test_lines_fit_a_terminal():
     assert max(map(len, settings_lines())) <= WIDTH
+
+
+def test_settings_of_the_command_line_go_before_those_of_the_preset():
+    parser = PlainParser()
+    add_training_settings(parser)
+    options = parse(parser, ["--preset", "toy", "--set", "static_steps=7", "--set", "gaussians_per_anchor=2"])
+    assert overrides_of(options) == preset("toy") | {"static_steps": 7, "gaussians_per_anchor": 2}
