@@ -14,8 +14,8 @@ from app.training.process import ProcessWorker
 from app.training.service import TrainingService
 from app.training.worker import n_training_threads
 from engine.clip_files.clip_state import read_clip_state
-from engine.conventions import SPIN_COUNT
 from engine.kernels.cache import kernel_folder
+from engine.kernels.threads import SPIN_COUNT
 from tests.app.conftest import DEADLINE_S, poll_until
 from tests.app.fakes import N_STEPS, make_crashing, make_fake, make_slow, make_telling
 
