@@ -12,7 +12,7 @@ from app.status import PlanStatus, SettingStatus
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.text import duration_text
-from engine.training.config import TrainConfig
+from engine.training.config import SETTINGS, TrainConfig
 from engine.training.plan.expected_sizes import footage_of
 from engine.training.plan.forecasting import UNKNOWN_MACHINE, MachineSpeed, MeasuredClip, measured_clip
 from engine.training.plan.plan import TrainingPlan, make_plan, resumed_plan
@@ -94,16 +94,6 @@ def _measured(project: Project, clip_index: int) -> MeasuredClip | None:
 
 # ---------------------------------------------------------------- for the window
 
-MAIN_SETTINGS = {
-    "static_steps": "Static steps",
-    "joint_steps": "Joint steps",
-    "source_steps": "Steps of later clips",
-    "gaussians_per_anchor": "Gaussians per anchor",
-    "max_static_points": "Static anchors, at most",
-    "max_moving_points": "Moving anchors, at most",
-}
-"""Name in TrainConfig to what the window calls it."""
-
 
 def plan_status(
     project: Project, capture: Capture, clip: Clip, plan: TrainingPlan | None, *, can_edit: bool
@@ -117,7 +107,7 @@ def plan_status(
     """
     settings, config = project.settings, project.settings.config()
     n_cameras = len(capture.rig) - len(settings.holdout)
-    values = {name: getattr(config, name) for name in MAIN_SETTINGS} | {
+    derived: dict[str, int] = {
         "static_steps": config.n_static_steps(n_cameras),
         "joint_steps": config.n_joint_steps(n_cameras * clip.n_frames),
         "source_steps": config.n_source_steps(n_cameras * clip.n_frames),
@@ -130,8 +120,15 @@ def plan_status(
         presets=tuple(PRESETS),
         preset=closest_preset(settings.overrides),
         settings=tuple(
-            SettingStatus(name, label, int(values[name]), name in settings.overrides)
-            for name, label in MAIN_SETTINGS.items()
+            SettingStatus(
+                setting.name,
+                setting.label,
+                int(derived.get(setting.name) or getattr(config, setting.name)),
+                setting.name in settings.overrides,
+                f"{setting.meaning}\n{setting.span}",
+            )
+            for setting in SETTINGS.values()
+            if setting.label
         ),
         can_edit=can_edit,
     )

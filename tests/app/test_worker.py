@@ -11,12 +11,15 @@ import pytest
 
 from app.session import commands as c
 from app.training.process import ProcessWorker
+from app.training.service import TrainingService
 from app.training.worker import n_training_threads
 from engine.clip_files.clip_state import read_clip_state
-from engine.conventions import SPIN_COUNT
 from engine.kernels.cache import kernel_folder
-from tests.app.conftest import poll_until
+from engine.kernels.threads import SPIN_COUNT
+from tests.app.conftest import DEADLINE_S, poll_until
 from tests.app.fakes import N_STEPS, make_crashing, make_fake, make_slow, make_telling
+
+pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -77,7 +80,9 @@ def test_a_worker_that_dies_while_starting_is_told(make_session):
     assert session.timeline.frame_index == 2
 
 
-def test_closing_ends_the_process_and_keeps_what_it_learned(make_session):
+def test_closing_ends_the_process_and_keeps_what_it_learned(make_session, monkeypatch):
+    # on a busy machine, keeping takes longer than the window waits
+    monkeypatch.setitem(TrainingService.close.__kwdefaults__, "timeout_s", DEADLINE_S)
     session = make_session(launch=launch(make_slow))
     session.dispatch(c.TrainNextClip())
     poll_until(session, lambda: session.training.step >= 1)

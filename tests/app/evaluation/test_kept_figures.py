@@ -53,6 +53,7 @@ def lines_of(project: Path) -> list[bytes]:
     return [line for path in sorted((project / "evaluations").iterdir()) for line in path.read_bytes().splitlines()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM])  # SIGINT is ignored below a shell's "&"
 def test_an_evaluation_that_was_killed_goes_on_and_ends_the_same(tmp_path, sent):
     # so many and so large that it takes seconds: the signal is to come in the middle on any machine

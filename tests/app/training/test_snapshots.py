@@ -49,6 +49,6 @@ def test_there_is_one_unconsumed_snapshot_at_a_time_and_older_ones_go(tmp_path):
 
 
 @pytest.mark.parametrize(("value", "expected"), [(1.0, True), (np.nan, False), (np.inf, False)])
-def test_a_state_with_a_number_that_is_none_is_not_finite(value, expected):
+def test_a_state_with_nan_or_infinity_is_not_finite(value, expected):
     arrays = {"a": np.array([1.0, value], np.float32), "b": np.array([True]), "c": np.array([1], np.int64)}
     assert is_finite(ClipState(arrays, make_header())) is expected

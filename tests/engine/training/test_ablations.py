@@ -17,6 +17,8 @@ from engine.training.variants.variant_method import merged
 from tests.clip_headers import with_header
 from tests.engine.training.tiny_training import Tiny, finish, live_picture, picture, same_arrays, take_steps
 
+pytestmark = pytest.mark.slow
+
 SWITCHES: dict[str, dict[str, str]] = {
     "full": {},
     "finetune": {"decoder": "finetune"},

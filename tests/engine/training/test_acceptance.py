@@ -46,6 +46,8 @@ from engine.training.config import TrainConfig
 from engine.training.preparation.building import add_residual
 from tests.engine.training.tiny_training import Tiny, finish, live_picture, make_training, picture, take_steps
 
+pytestmark = pytest.mark.slow
+
 
 def first_view(tiny: Tiny, camera: int = 0) -> View:
     rig = tiny.capture.rig

@@ -10,6 +10,8 @@ from engine.clip_files.compact import write_compact_clip
 from engine.model.clip_model import load_clip_model
 from tests.engine.training.tiny_training import Tiny, finish, live_picture, picture, take_steps
 
+pytestmark = pytest.mark.slow
+
 
 def n_bytes(arrays: dict[str, np.ndarray]) -> int:
     return sum(array.nbytes for array in arrays.values())

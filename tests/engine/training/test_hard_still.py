@@ -9,6 +9,8 @@ from tests.engine.training.hard_scenes import all_still, one_frame_clips
 from tests.engine.training.hard_stage import HEIGHT, N_CAMERAS, WIDTH
 from tests.engine.training.hard_training import Trained, pooled_psnr, train_scene
 
+pytestmark = pytest.mark.slow
+
 MAX_BYTES = 2_000
 """Of a clip in which nothing is new: names and numbers of its header. It took 840."""
 

@@ -65,6 +65,7 @@ def continued(tmp_path, built_once) -> Iterator[tuple[Project, TrainJob]]:
     project.close()
 
 
+@pytest.mark.slow
 def test_one_field_goes_on_in_training_order_and_shows_every_clip_as_it_ends(continued, monkeypatch):
     from app.training import build
     from engine.training.clip_training import ClipTraining

@@ -55,6 +55,7 @@ def numbers(made: Path) -> dict[str, Any]:
     return json.loads((made / ODD_NAME / "reports" / "report.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_the_page_needs_nothing_but_itself(page):
     names = {name for name, _ in page.tags}
     assert not names & {"script", "link", "iframe", "object", "base", "form", "i"}

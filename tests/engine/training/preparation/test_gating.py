@@ -22,6 +22,8 @@ from tests.engine.training.tiny_training import (
     take_steps,
 )
 
+pytestmark = pytest.mark.slow
+
 
 def around(points: np.ndarray, treat: str, n: int = 9) -> tuple[GateRegion, np.ndarray]:
     """A box that holds the n leftmost of these points, and which these are."""
