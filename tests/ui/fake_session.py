@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -69,6 +68,14 @@ class FakeCapture:
     fps: float = 30.0
 
 
+@dataclass
+class FakeRecent:
+    """What the panels read of RecentProjects."""
+
+    entries: list[RecentProject]
+    missing: frozenset[Path]
+
+
 class FakeSession:
     """See the module docstring. `has_capture=False` starts empty."""
 
@@ -77,15 +84,15 @@ class FakeSession:
         self.notices = Notices()
         self.jobs: list[JobStatus] = []
         self.overlays = Overlays()
-        self.settings = SimpleNamespace(
-            recent=[
+        self.recent = FakeRecent(
+            entries=[
                 RecentProject("/projects/kitchen-toy", "/captures/kitchen", "kitchen-toy", 2, 3),
                 RecentProject("/projects/gone", "/captures/dance_floor", "gone", 1, 70),
                 RecentProject("", "/captures/dance_floor", "dance_floor"),
-            ]
+            ],
+            missing=frozenset({Path("/projects/gone")}),
         )
-        self.missing = frozenset({Path("/projects/gone")})
-        self.opened: ProjectStatus | None = None
+        self.project_status: ProjectStatus | None = None
         self.question: Question | None = None
         self.training = TrainingStatus(can_train_next=True, next_clip_index=0)
         self.plan: PlanStatus | None = PlanStatus(
@@ -129,7 +136,7 @@ class FakeSession:
         self.capture, self.rig = capture, capture.rig
         self.clips = split_clips(capture.n_frames, 10)
         self.clip_states = [ClipStatus() for _ in self.clips]
-        self.opened = ProjectStatus("juggling", Path("/projects/juggling"), 1, len(self.clips))
+        self.project_status = ProjectStatus("juggling", Path("/projects/juggling"), 1, len(self.clips))
         self.timeline = Timeline(self.clips, fps=capture.fps)
         self.view = OrbitView(capture.rig)
         self.regions = RegionsStatus(can_mark=True, effect="Marks apply to clips whose training starts from now on.")

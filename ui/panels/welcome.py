@@ -67,12 +67,12 @@ def open_recent(entry: RecentProject) -> OpenProject | OpenCapture:
 
 def _draw_recent(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     """One row per project: its name and how far it is trained, its path; those that are gone can be removed."""
-    for index, entry in enumerate(session.settings.recent[:MAX_RECENT]):
+    for index, entry in enumerate(session.recent.entries[:MAX_RECENT]):
         _draw_recent_row(index, entry, session, dispatch, ui)
 
 
 def _draw_recent_row(index: int, entry: RecentProject, session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    is_gone = entry.folder in session.missing
+    is_gone = entry.folder in session.recent.missing
     start, width = imgui.get_cursor_pos(), imgui.get_content_region_avail().x
     row = ImVec2(width - (34 if is_gone else 0), RECENT_HEIGHT)
     imgui.begin_disabled(is_gone)

@@ -128,17 +128,17 @@ def _draw_window_menu(ui: UiState) -> None:
 
 
 def _draw_recent_menu(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    if not imgui.begin_menu("Open a recent project", bool(session.settings.recent)):
+    if not imgui.begin_menu("Open a recent project", bool(session.recent.entries)):
         ui.mark("menu.recent")
         return
-    for index, entry in enumerate(session.settings.recent):
-        is_gone = entry.folder in session.missing
+    for index, entry in enumerate(session.recent.entries):
+        is_gone = entry.folder in session.recent.missing
         words = "not found" if is_gone else entry.trained_text
         if imgui.menu_item(f"{entry.name}##{index}", words, False, not is_gone)[0]:
             dispatch(open_recent(entry))
         ui.mark(f"menu.recent{index}")
         imgui.set_item_tooltip(str(entry.folder))
-    gone = [entry.folder for entry in session.settings.recent if entry.folder in session.missing]
+    gone = [entry.folder for entry in session.recent.entries if entry.folder in session.recent.missing]
     if gone:
         imgui.separator()
         if _item(ui, "Remove those that were not found"):
@@ -149,7 +149,7 @@ def _draw_recent_menu(session: Any, dispatch: Dispatch, ui: UiState) -> None:
 
 def _draw_name(session: Any, ui: UiState) -> None:
     """What is open: name, how far it is trained and where it lies, as much of it as there is room for."""
-    opened = session.opened
+    opened = session.project_status
     name = "no project open" if opened is None else f"{opened.name} - {opened.trained_text}"
     room = imgui.get_window_width() - imgui.get_cursor_pos_x() - 40
     if opened is not None:

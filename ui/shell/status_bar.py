@@ -50,7 +50,7 @@ def status_text(session: Any) -> str:
         return f"{words[status.state]} clip {status.clip_index}  {stage_words(status)}  {status.message or ''}"
     if session.capture is None:
         return "Open a capture or a project to begin"
-    return "" if session.opened is None else session.opened.trained_text
+    return "" if session.project_status is None else session.project_status.trained_text
 
 
 def _right_text(session: Any, *, is_software: bool) -> str:

@@ -67,7 +67,7 @@ def make_window(width: int, height: int, *, is_visible: bool = True) -> Any:
 
 def window_title(session: Any) -> str:
     """The open project, how far it is trained and where it lies."""
-    opened = session.opened
+    opened = session.project_status
     return TITLE if opened is None else f"{opened.name} - {opened.trained_text} - {opened.folder} - {TITLE}"
 
 
