@@ -8,7 +8,7 @@ SETUP_FLAGS :=
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run test lint types fmt bench faults golden clean
+.PHONY: help setup run test lint types fmt bench faults docs golden clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /  make \1	/p' Makefile | expand -t 16
@@ -44,6 +44,9 @@ faults: setup ## damage files and captures, contend for locks, kill trainings, f
 	@for script in $$(grep -l "^if __name__" tests/faults/*.py); do \
 		$(BIN)/python -m $$(echo $${script%.py} | tr / .) || exit 1; \
 	done
+
+docs: setup ## fill the generated parts of the documents: keys, commands, settings, tree
+	@$(BIN)/python -m tests.documents write
 
 golden: setup ## draw the golden pictures anew; look at each before committing it
 	@$(BIN)/python -m pytest tests --update-golden -k golden

@@ -64,7 +64,9 @@ def build_demo_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "path", nargs="?", type=path_argument, default=None, help="capture folder (default: the sample)"
     )
-    parser.add_argument("--out", type=path_argument, default=Path("demo_output"), help="folder for the results")
+    parser.add_argument(
+        "--out", type=path_argument, default=Path("demo_output"), help="folder for the results (default: demo_output)"
+    )
     parser.add_argument("--quick", action="store_true", help="a few steps only; shows that every part works")
     return parser
 

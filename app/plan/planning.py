@@ -9,8 +9,8 @@ from app.background.kernels import COMPILING
 from app.cli.progress import duration_text
 from app.project.clip_catalog import ClipCatalog
 from app.project.project import Project
+from app.project.stage_seconds import stages_of
 from app.status import PlanStatus, SettingStatus
-from app.training.stage_watch import stages_of
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.training.config import TrainConfig

@@ -11,7 +11,7 @@ from typing import Any
 from app.background.kernels import COMPILING
 from app.project.clip_bytes import storage_of
 from app.project.project import PROJECT_FILE, Project, ProjectSettings, open_project
-from app.training.stage_watch import stages_of
+from app.project.stage_seconds import stages_of
 from engine.clip_files.clip_state import DamagedClip, look_at_clip
 from engine.errors import ProjectError
 

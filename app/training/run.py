@@ -19,6 +19,7 @@ from typing import Any
 from app.background.memory import peak_bytes
 from app.project.project import Project, open_project
 from app.project.project_files import read_metrics
+from app.project.stage_seconds import stages_of
 from app.training.interface import MakeTraining, Training
 from app.training.keeping import FolderWatch, ProjectGone, Refusals, Retries
 from app.training.messages import (
@@ -43,7 +44,7 @@ from app.training.messages import (
 )
 from app.training.rate import Rate
 from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
-from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch, stages_of
+from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch
 from engine.clip_files.clip_state import read_clip_header
 from engine.clip_files.compact import CompactClip
 from engine.errors import DiskError, EngineError, NonFiniteLoss, ProjectError

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -53,15 +52,3 @@ class StageWatch:
             "preparation_s": round(sum(self.seconds.values()) - training_s, 3),
             "training_s": round(training_s, 3),
         }
-
-
-def stages_of(row: Mapping[str, Any]) -> dict[str, float]:
-    """The stages_s of a document or metrics row; empty where there are none or they are no numbers."""
-    found = row.get("stages_s")
-    if not isinstance(found, dict):
-        return {}
-    return {
-        str(stage): float(seconds)
-        for stage, seconds in found.items()
-        if isinstance(seconds, int | float) and math.isfinite(seconds) and seconds >= 0
-    }

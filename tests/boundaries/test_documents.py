@@ -1,16 +1,18 @@
-"""README and ARCHITECTURE say what is there: links lead somewhere, keys and commands are the real ones."""
+"""The documents say what is there: links lead somewhere, and generated blocks are what the code would generate now."""
 
-import ast
 import re
 from pathlib import Path
 
 import pytest
 
-from engine.training import config
+from tests.documents.blocks import GENERATORS, block_names, documents, filled
+from tests.documents.commands import command_sections
+from tests.documents.keys import key_tables
+from tests.documents.table import table
+from tests.documents.tree import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 LINK = re.compile(r"\]\(([^)#\s]+)\)")
-TREE_ENTRY = re.compile(r"^( *)([\w.{},*-]+/?)(?:  |$)")
+DOCUMENTS = [path.relative_to(ROOT).as_posix() for path in documents()]
 
 
 def dead_links(text: str, folder: Path) -> list[str]:
@@ -19,36 +21,10 @@ def dead_links(text: str, folder: Path) -> list[str]:
     return [target for target in targets if not (folder / target).exists()]
 
 
-def tree_of(text: str) -> set[str]:
-    """Paths named by the first indented tree (two spaces a level) below the heading "Tree" of ARCHITECTURE.md."""
-    block = text.split("## Tree", 1)[1].split("```")[1]
-    paths: set[str] = set()
-    parents: list[str] = []
-    for line in block.splitlines():
-        if not (entry := TREE_ENTRY.match(line)):
-            continue
-        depth = len(entry[1]) // 2
-        parents = [*parents[:depth], entry[2]]
-        paths.add("".join(parents))
-    return paths
-
-
-def shortcut_rows() -> list[tuple[str, str]]:
-    """(key, text) of every row of the table in ui/panels/shortcuts.py, read without importing ImGui."""
-    tree = ast.parse((ROOT / "ui" / "panels" / "shortcuts.py").read_text("utf-8"))
-    rows = []
-    for node in ast.walk(tree):
-        match node:
-            case ast.Call(
-                func=ast.Name(id="Shortcut"), args=[_, ast.Constant(value=str(key)), ast.Constant(value=str(text)), *_]
-            ):
-                rows.append((key, text))
-    return rows
-
-
-@pytest.mark.parametrize("name", ["README.md", "ARCHITECTURE.md", "CHANGELOG.md"])
+@pytest.mark.parametrize("name", DOCUMENTS)
 def test_links_lead_somewhere(name: str) -> None:
-    assert dead_links((ROOT / name).read_text("utf-8"), ROOT) == []
+    path = ROOT / name
+    assert dead_links(path.read_text("utf-8"), path.parent) == []
 
 
 def test_dead_link_is_seen(tmp_path: Path) -> None:
@@ -57,46 +33,33 @@ def test_dead_link_is_seen(tmp_path: Path) -> None:
     assert dead_links(text, tmp_path) == ["gone.md"]
 
 
-def test_architecture_names_every_folder_of_the_packages_and_nothing_that_is_gone() -> None:
-    named = tree_of((ROOT / "ARCHITECTURE.md").read_text("utf-8"))
-    assert [path for path in sorted(named) if not (ROOT / path).exists()] == []
-    folders = {
-        f"{path.parent.relative_to(ROOT).as_posix()}/"
-        for package in ("app", "engine", "ui")
-        for path in (ROOT / package).rglob("*.py")
-    }
-    assert sorted(folders - named) == []
+@pytest.mark.parametrize("name", DOCUMENTS)
+def test_generated_blocks_are_up_to_date(name: str) -> None:
+    text = (ROOT / name).read_text("utf-8")
+    assert filled(text) == text, "run `make docs` and commit what it changes"
 
 
-def test_readme_lists_the_keys_of_the_window() -> None:
-    rows = shortcut_rows()
-    assert len(rows) > 10, "the table of shortcuts was not found"
-    text = (ROOT / "README.md").read_text("utf-8")
-    assert [f"| {key} | {what} |" for key, what in rows if f"| {key} | {what} |" not in text] == []
+def test_every_generated_block_is_in_a_document() -> None:
+    found = [block for name in DOCUMENTS for block in block_names((ROOT / name).read_text("utf-8"))]
+    assert sorted(found) == sorted(GENERATORS)
 
 
-def test_readme_lists_the_options_of_every_command(capsys: pytest.CaptureFixture[str]) -> None:
-    """In the row of the command, or among the settings that commands share."""
-    from app.cli.cli import build_parser
-    from app.cli.commands import COMMANDS
-
-    text = (ROOT / "README.md").read_text("utf-8")
-    rows = [line for line in text.splitlines() if line.startswith("| `")]
-    shared = text[text.index("Settings of `train` and `ablate`:") : text.index("| `--set` |")]
-    for command in COMMANDS:
-        with pytest.raises(SystemExit):
-            build_parser(used=[command]).parse_args([command, "--help"])
-        options = set(re.findall(r"^  (--[a-z-]+)", capsys.readouterr().out, re.MULTILINE))
-        assert options, command
-        said = "".join(row for row in rows if f"`{command}`" in row.split("|")[1] or f"clipgstream {command} " in row)
-        settings = shared if command in ("train", "ablate") else ""
-        assert sorted(o for o in options if not re.search(rf"{o}(?![a-z-])", said + settings)) == [], command
+def test_a_block_that_is_out_of_date_is_seen_and_the_text_around_it_stays() -> None:
+    text = "above\n<!-- generated: keys -->\n| `Q` | gone |\n<!-- end -->\nbelow\n"
+    new = filled(text)
+    assert "gone" not in new
+    assert new == f"above\n<!-- generated: keys -->\n{key_tables()}\n<!-- end -->\nbelow\n"
+    with pytest.raises(KeyError, match="nothing"):
+        filled("<!-- generated: nothing -->\n<!-- end -->")
 
 
-def test_readme_lists_the_switches_of_the_method_with_the_default_first() -> None:
-    text = (ROOT / "README.md").read_text("utf-8")
-    choices = config._CHOICES | {"independent": ("false", "true")}
-    for name, values in choices.items():
-        row = re.search(rf"^\| `{name}` \|(.*)\|$", text, re.MULTILINE)
-        assert row is not None, name
-        assert tuple(word for word in re.findall(r"`(\w+)`", row[1]) if word in values) == values, name
+def test_blocks_hold_what_they_are_for() -> None:
+    assert "| `Ctrl+T` | Stop training and keep what was learned |" in key_tables()
+    sections = command_sections()
+    assert "### `clipgstream eval PROJECT --json OUT [options]`" in sections
+    assert "| `--size WxH` | window size in pixels, for example 1440x900 |" in sections
+    assert r"| `--metrics quick\|all` |" in sections
+
+
+def test_bars_inside_cells_do_not_end_them() -> None:
+    assert table(("a", "b"), [("x|y", "z")]) == "| a | b |\n| --- | --- |\n| x\\|y | z |"

@@ -30,6 +30,7 @@ def tree_lines(folder: Path, depth: int = 0) -> Iterator[str]:
             yield f"{'  ' * (depth + 1) + module.name:{WIDTH}} {first_sentence(module)}".rstrip()
 
 
-def tree() -> str:
-    """The tree of all packages as text."""
-    return "\n\n".join("\n".join(tree_lines(ROOT / name)) for name in PACKAGES) + "\n"
+def tree_block() -> str:
+    """The trees of all packages, as a fenced block."""
+    trees = "\n\n".join("\n".join(tree_lines(ROOT / name)) for name in PACKAGES)
+    return f"```\n{trees}\n```"

@@ -8,8 +8,9 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import LookThrough
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.widgets import elided, format_count, pop_bold, push_bold, text_wrapped_dim
+from ui.panels.widgets import elided, pop_bold, push_bold, text_wrapped_dim
 from ui.style import theme
+from ui.style.numbers import format_count
 from ui.style.theme import Icon
 
 THUMBNAIL_WIDTH_PX = 160

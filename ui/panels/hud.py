@@ -12,8 +12,8 @@ from imgui_bundle import ImVec2, imgui
 from ui.panels.regions import draw_region_mark
 from ui.panels.state import Rect, UiState
 from ui.panels.timeline import STATE_WORDS
-from ui.panels.widgets import format_count
 from ui.style import theme
+from ui.style.numbers import format_count
 from ui.style.theme import Icon
 from ui.viewport.hud_text import HudText, count_text, hud_text
 from ui.viewport.picture_rate import PictureRate

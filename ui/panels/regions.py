@@ -9,8 +9,9 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.commands import RedoMark, RemoveRegion, UndoMark
 from ui.panels.state import REGIONS, Dispatch, Rect, UiState
-from ui.panels.widgets import chip, format_count, primary_button, text_right, text_wrapped_dim
+from ui.panels.widgets import chip, primary_button, text_right, text_wrapped_dim
 from ui.style import theme
+from ui.style.numbers import format_count
 from ui.style.theme import Icon
 from ui.viewport.region_tool import REGION_WORDS
 

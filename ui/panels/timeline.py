@@ -10,8 +10,9 @@ from imgui_bundle import ImVec2, imgui
 from app.session.commands import SetFrame, TogglePlay, TrainClip
 from ui.panels.shortcuts import go_to_frame
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.widgets import format_count, text_right
+from ui.panels.widgets import text_right
 from ui.style import theme
+from ui.style.numbers import format_count
 from ui.style.progress_words import band_words
 from ui.style.theme import Icon
 

@@ -12,9 +12,10 @@ from app.session.commands import PauseTraining, ResumeTraining, StopTraining, Tr
 from ui.panels.plan import draw_plan
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline import STATE_WORDS, state_note
-from ui.panels.widgets import format_count, primary_button, text_right, text_wrapped_dim
+from ui.panels.widgets import primary_button, text_right, text_wrapped_dim
 from ui.style import theme
 from ui.style.axis import ticks_that_fit, whole_ticks
+from ui.style.numbers import format_count
 from ui.style.progress_words import stage_words
 from ui.style.theme import Icon
 

@@ -81,8 +81,3 @@ def _longest_fit(text: str, width: float, cut: Callable[[int], str]) -> str:
         else:
             too_long = middle
     return cut(fits)
-
-
-def format_count(number: int) -> str:
-    """A count as it is written everywhere: 4,320."""
-    return f"{number:,}"

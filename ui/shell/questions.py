@@ -14,8 +14,9 @@ from app.session.commands import CloseQuestion, OpenCapture, OpenProject, TrainC
 from app.session.questions import ProjectQuestion, RetrainQuestion
 from ui.panels.state import Dispatch, UiState
 from ui.panels.training import duration_text
-from ui.panels.widgets import elided, format_count, primary_button, text_wrapped_dim
+from ui.panels.widgets import elided, primary_button, text_wrapped_dim
 from ui.style import theme
+from ui.style.numbers import format_count
 from ui.style.theme import Icon
 
 WIDTH = 560.0

@@ -8,8 +8,9 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from ui.panels.state import UiState
 from ui.panels.training import duration_text
-from ui.panels.widgets import elided, format_count
+from ui.panels.widgets import elided
 from ui.style import theme
+from ui.style.numbers import format_count
 from ui.style.progress_words import stage_words
 from ui.style.theme import Icon
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from app.playback.picture_source import UNKNOWN, PictureSource
 from app.status import WantedFrame
-from ui.panels.widgets import format_count
+from ui.style.numbers import format_count
 from ui.viewport.picture_rate import ShownRate
 
 RENDERED, CLOUD, FIRST_CLOUD, HINT, CAPTURED, MARKS = (

@@ -7,8 +7,8 @@ import itertools
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ui.panels.widgets import format_count
 from ui.style.axis import ticks_that_fit, whole_ticks
+from ui.style.numbers import format_count
 
 
 @given(last=st.integers(1, 10**7), most=st.integers(2, 12))

@@ -1,0 +1,45 @@
+"""Generated blocks of the documents: `<!-- generated: NAME -->` to `<!-- end -->`, filled with what NAME stands for."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.documents.commands import command_sections
+from tests.documents.keys import key_tables
+from tests.documents.tree import ROOT, tree_block
+
+GENERATORS: dict[str, Callable[[], str]] = {
+    "tree": tree_block,
+    "keys": key_tables,
+    "commands": command_sections,
+}
+"""What each block is filled with."""
+_BLOCK = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+
+def documents() -> list[Path]:
+    """The documents that a reader opens."""
+    return [ROOT / "README.md", ROOT / "ARCHITECTURE.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+def block_names(text: str) -> list[str]:
+    """Names of the generated blocks in a document."""
+    return [match[2] for match in _BLOCK.finditer(text)]
+
+
+def filled(text: str) -> str:
+    """A document with every block as the code would have it now. Raises KeyError for a block that nothing generates."""
+    return _BLOCK.sub(lambda match: f"{match[1]}{GENERATORS[match[2]]().strip()}\n{match[3]}", text)
+
+
+def write() -> list[Path]:
+    """Fill all documents; returns those that changed."""
+    changed = []
+    for path in documents():
+        text = path.read_text("utf-8")
+        if (new := filled(text)) != text:
+            path.write_text(new, "utf-8")
+            changed.append(path)
+    return changed
