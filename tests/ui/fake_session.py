@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -31,8 +30,8 @@ from app.status import (
     TrainingStatus,
     WantedFrame,
 )
-from engine.camera.rig import CameraRig
-from engine.capture.clip import split_clips
+from engine.camera.rig import NO_CAMERAS, CameraRig
+from engine.capture.clip import Clip, split_clips
 from engine.gate.regions import GateRegion, sphere_region
 
 
@@ -80,7 +79,7 @@ class FakeSession:
     """See the module docstring. `has_capture=False` starts empty."""
 
     def __init__(self, *, has_capture: bool = True, seed: int = 0) -> None:
-        self.commands: list[Any] = []
+        self.commands: list[commands.Command] = []
         self.notices = Notices()
         self.jobs: list[JobStatus] = []
         self.overlays = Overlays()
@@ -123,8 +122,8 @@ class FakeSession:
         )
         self.regions = RegionsStatus(why_not="Open a capture first.")
         self.capture: FakeCapture | None = None
-        self.rig: CameraRig | None = None
-        self.clips: list[Any] = []
+        self.rig: CameraRig = NO_CAMERAS
+        self.clips: list[Clip] = []
         self.clip_states: list[ClipStatus] = []
         self.project = None
         self.timeline = Timeline()
@@ -141,7 +140,7 @@ class FakeSession:
         self.view = OrbitView(capture.rig)
         self.regions = RegionsStatus(can_mark=True, effect="Marks apply to clips whose training starts from now on.")
 
-    def dispatch(self, command: Any) -> None:
+    def dispatch(self, command: commands.Command) -> None:
         """Record the command; carry out what needs no worker."""
         self.commands.append(command)
         match command:

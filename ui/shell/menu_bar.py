@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Protocol
 
 from imgui_bundle import imgui
 
 from app.session.commands import ForgetRecent, OpenCapture
-from ui.panels.shortcuts import COMPARE, MARK, SHORTCUTS, TIME, VIEW, choose_scale, train_or_pause
+from app.status import ProjectStatus
+from ui.panels.shortcuts import COMPARE, MARK, SHORTCUTS, TIME, VIEW, ShortcutNeeds, choose_scale, train_or_pause
 from ui.panels.state import PANELS, Dispatch, UiState
-from ui.panels.training import next_label
-from ui.panels.welcome import SAMPLE_PATH, open_recent
+from ui.panels.training import TrainingNeeds, next_label
+from ui.panels.welcome import SAMPLE_PATH, WelcomeNeeds, open_recent
 from ui.panels.widgets import elided_path
 from ui.style.theme import Icon
 from ui.style.ui_scale import CHOICES, scale_text
@@ -20,7 +21,14 @@ MIN_PATH_WIDTH = 60.0
 """Less of a path says nothing."""
 
 
-def draw_menu_bar(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+class MenuNeeds(ShortcutNeeds, TrainingNeeds, WelcomeNeeds, Protocol):
+    """What the menus read."""
+
+    @property
+    def project_status(self) -> ProjectStatus | None: ...
+
+
+def draw_menu_bar(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
     """All menus, and the name of what is open at the right end."""
     if not imgui.begin_main_menu_bar():
         return
@@ -84,7 +92,7 @@ def _item(ui: UiState, label: str, key_label: str = "", *, is_on: bool = False) 
 
 
 def _draw_rows(
-    groups: tuple[str, ...], session: Any, dispatch: Dispatch, ui: UiState, *, is_on_only: bool = False
+    groups: tuple[str, ...], session: MenuNeeds, dispatch: Dispatch, ui: UiState, *, is_on_only: bool = False
 ) -> None:
     """Rows of the table of keys. is_on_only: Those only that can be on or off."""
     for shortcut in SHORTCUTS:
@@ -127,7 +135,7 @@ def _draw_window_menu(ui: UiState) -> None:
         ui.is_help_open = not ui.is_help_open
 
 
-def _draw_recent_menu(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_recent_menu(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
     if not imgui.begin_menu("Open a recent project", bool(session.recent.entries)):
         ui.mark("menu.recent")
         return
@@ -147,7 +155,7 @@ def _draw_recent_menu(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     imgui.end_menu()
 
 
-def _draw_name(session: Any, ui: UiState) -> None:
+def _draw_name(session: MenuNeeds, ui: UiState) -> None:
     """What is open: name, how far it is trained and where it lies, as much of it as there is room for."""
     opened = session.project_status
     name = "no project open" if opened is None else f"{opened.name} - {opened.trained_text}"
