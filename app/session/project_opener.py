@@ -80,7 +80,7 @@ class ProjectOpener:
         self._jobs.start("Opening", work, take, failed)
 
     def _withdraw_refusals(self) -> None:
-        """Something is open now; why something else was not is no news any more."""
+        """Something is open now; why something else was not no longer matters."""
         for notice in self._refusals:
             self._notices.withdraw(notice)
         self._refusals.clear()

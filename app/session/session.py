@@ -149,7 +149,7 @@ class Session:
         """Carry out a command. What the user could have known better becomes a notice.
 
         Raises:
-            TypeError: The object is no command.
+            TypeError: The object is not a command.
         """
         try:
             self._obey(command)
