@@ -25,7 +25,7 @@ logger = logging.getLogger(__name__)
 
 
 class LiveTraining:
-    """What trains, and what the user is told of it. For one thread, and nothing here waits.
+    """The running training, its queue and what comes of it. For one thread, and nothing here waits.
 
     At most one snapshot of a running training is unread: its worker writes no other before that was given back.
 

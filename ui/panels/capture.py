@@ -28,7 +28,7 @@ HELD_OUT_WORDS = ("held out", "test")
 
 
 class CaptureFacts(Protocol):
-    """What is told of a capture."""
+    """What the summary shows of a capture."""
 
     @property
     def path(self) -> Path: ...

@@ -33,7 +33,7 @@ LEGEND_WIDTH = 760.0
 
 
 class HudNeeds(Protocol):
-    """What is said of the picture depends on this."""
+    """What the words over the picture depend on."""
 
     @property
     def timeline(self) -> Timeline: ...
