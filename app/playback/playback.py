@@ -58,7 +58,7 @@ class Playback:
 
     def start(self) -> None:
         """Start the threads now rather than with the first request, and load what they need."""
-        for worker in self._workers:
+        for worker in self.workers:
             worker.start()
 
     def show(self, opened: OpenedProject) -> None:
@@ -167,7 +167,8 @@ class Playback:
     # ---------------------------------------------------------------- threads
 
     @property
-    def _workers(self) -> tuple[LatestWorker[Any, Any], ...]:
+    def workers(self) -> tuple[LatestWorker[Any, Any], ...]:
+        """Every thread of it."""
         return (
             self.captured.viewing,
             self.captured.thumbnails,
@@ -179,12 +180,12 @@ class Playback:
     @property
     def finished(self) -> tuple[object, ...]:
         """Identities of the newest results. Another value means that there is something new to see."""
-        return tuple(None if worker.newest is None else worker.newest[0] for worker in self._workers)
+        return tuple(None if worker.newest is None else worker.newest[0] for worker in self.workers)
 
     def take_failures(self) -> list[Failure]:
         """What could not be made since the last call."""
         found = []
-        for worker, title in zip(self._workers, _TITLES, strict=True):
+        for worker, title in zip(self.workers, _TITLES, strict=True):
             failure = worker.take_error()
             if failure is not None:
                 request, error = failure
