@@ -9,10 +9,11 @@ import logging
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 import moderngl
 from imgui_bundle import ImVec2, ImVec4, imgui
+from pyglet.window import BaseWindow
 
 from app.session.commands import Command
 from app.session.window_memory import WindowMemory
@@ -70,7 +71,7 @@ class FrameNeeds(
     def poll(self) -> bool: ...
 
 
-def _recover(stack: Any) -> None:
+def _recover(stack: imgui.internal.ErrorRecoveryState) -> None:
     """End windows, tables and groups that the failed part left open."""
     io = imgui.get_io()
     is_assert_on = io.config_error_recovery_enable_assert
@@ -96,7 +97,7 @@ class Frame:
 
     def __init__(
         self,
-        window: Any,
+        window: BaseWindow,
         ctx: moderngl.Context,
         session: FrameNeeds,
         *,

@@ -14,10 +14,9 @@ from typing import Literal, Protocol
 import moderngl
 import numpy as np
 
-from app.playback.arrays import GaussianArrays, Picture, PointArrays
+from app.playback.arrays import BACKGROUND, GaussianArrays, Picture, PointArrays
 from app.playback.picture_source import PictureSource
 from app.playback.pointing import pixel_ray, seen_point
-from app.playback.render import BACKGROUND
 from app.playback.timeline import Timeline
 from app.status import RegionsStatus, WantedFrame
 from ui.gl import (
