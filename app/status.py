@@ -219,10 +219,8 @@ class JobStatus:
 
     Attributes:
         done: Share that is finished, 0..1; 0 when unknown.
-        eta_s: Seconds left; None when unknown.
     """
 
     name: str
     done: float = 0.0
     message: str = ""
-    eta_s: float | None = None

@@ -1,4 +1,4 @@
-"""Text that came from a file or a path, made fit for a message: no control characters, not endless."""
+"""Values as text for people: what came from a file or a path made fit for a message, and durations."""
 
 from __future__ import annotations
 
@@ -21,6 +21,14 @@ def shown(value: object) -> str:
     """A value as a message repeats it: as Python writes it, cut off after MAX_SHOWN characters."""
     text = repr(value if not isinstance(value, str) else value[: MAX_SHOWN + 1])
     return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."
+
+
+def duration_text(seconds: float | None) -> str:
+    """Minutes and seconds below an hour, hours and minutes above; a dash when unknown."""
+    if seconds is None or not 0 <= seconds < 1e9:
+        return "–"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes}:{rest:02d}" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
 
 
 def _escaped(sign: str) -> str:

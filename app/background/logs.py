@@ -10,8 +10,8 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-from app.project.project import data_dir
 from engine.text import printable
+from engine.user_folders import data_dir
 
 FORMAT = "%(asctime)s %(levelname)s %(name)s: %(message)s"
 MAX_LOG_BYTES = 2_000_000

@@ -12,9 +12,10 @@ import sys
 from dataclasses import dataclass
 
 from app.background.kernels import use_threads
-from app.project.project import data_dir
-from app.training.worker import n_cores, n_training_threads
-from engine.kernels.cache import UNWRITABLE, cache_root, cache_state
+from app.training.worker import n_training_threads
+from engine.kernels.cache import UNWRITABLE, cache_state
+from engine.parallel import n_cores
+from engine.user_folders import cache_dir, data_dir
 
 PACKAGES = ("torch", "numpy", "numba", "scipy", "av", "open3d-cpu", "open3d", "pycolmap", "pyglet", "moderngl")
 PACKAGES += ("imgui-bundle", "safetensors")
@@ -91,7 +92,7 @@ def _kernels() -> Finding:
     state = cache_state()
     place = f"{state.folder}, {state.n_bytes / 2**20:.1f} MB"
     if state.is_fallback:
-        place += f" (a temporary folder, because {cache_root()} cannot be written)"
+        place += f" (a temporary folder, because {cache_dir()} cannot be written)"
     if state.is_warm:
         return Finding("Kernels", f"compiled, in {place}", not state.is_fallback)
     is_fine = state.reason != UNWRITABLE and not state.is_fallback

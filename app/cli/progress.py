@@ -9,20 +9,11 @@ from collections.abc import Callable
 from typing import Any, TextIO
 
 from app.training.rate import Rate
-from engine.text import printable
+from engine.text import duration_text, printable
 
 BAR_WIDTH = 24
 REDRAW_EVERY_S = 0.1
 PLAIN_EVERY_S = 10.0
-
-
-def duration_text(seconds: float | None) -> str:
-    """Minutes and seconds as people read them; "?" when unknown."""
-    if seconds is None or not 0 <= seconds < 1e7:
-        return "?"
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
 
 
 class ProgressLine:

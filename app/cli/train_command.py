@@ -16,7 +16,7 @@ from app.cli.arguments import (
     path_argument,
 )
 from app.cli.chosen_project import open_for_training, project_to_plan
-from app.cli.progress import ProgressLine, duration_text
+from app.cli.progress import ProgressLine
 from app.cli.training_lines import PlanLines, show_event, show_outcome, show_status
 from app.evaluation.headless import train_clips, train_document
 from app.plan.planning import clip_history, plan_clip, plan_document, plan_text, totals
@@ -26,6 +26,7 @@ from app.project.project import PROJECT_FILE
 from app.training.service import Launch, TrainingService
 from engine.errors import CaptureError, DiskError, ProjectError
 from engine.storage.json_files import json_text
+from engine.text import duration_text
 
 BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
 """Failures of a worker that are the input's and not the program's."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from app.cli.progress import ProgressLine, duration_text
+from app.cli.progress import ProgressLine
 from app.evaluation.headless import ClipOutcome
 from app.plan.planning import begin_text, compared_text, plan_clip
 from app.project.clip_catalog import ClipCatalog
@@ -14,6 +14,7 @@ from app.training.messages import Event, StageReported, WarningRaised
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import EngineError
+from engine.text import duration_text
 from engine.training.plan.forecasting import MachineSpeed
 from engine.training.plan.plan import TrainingPlan
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
 from app.evaluation.kept_figures import EVALUATIONS, KeptFigures
-from engine.parallel import n_workers
+from engine.parallel import n_cores
 
 if TYPE_CHECKING:
     from engine.metrics.clips.evaluate import Evaluation
@@ -196,7 +196,7 @@ class ClipMeasuring:
     """
 
     def __init__(self, n_threads: int | None = None) -> None:
-        self._n_threads = n_workers() if n_threads is None else n_threads
+        self._n_threads = n_cores() if n_threads is None else n_threads
         self._evaluation: Evaluation | None = None
 
     def __call__(

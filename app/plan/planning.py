@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from app.background.kernels import COMPILING
-from app.cli.progress import duration_text
 from app.project.clip_catalog import ClipCatalog
 from app.project.project import Project
 from app.project.stage_seconds import stages_of
 from app.status import PlanStatus, SettingStatus
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.text import duration_text
 from engine.training.config import TrainConfig
 from engine.training.plan.expected_sizes import footage_of
 from engine.training.plan.forecasting import UNKNOWN_MACHINE, MachineSpeed, MeasuredClip, measured_clip

@@ -9,8 +9,8 @@ from PIL import Image
 
 from app.background.latest import LatestWorker
 from app.playback.arrays import Picture
-from app.playback.byte_cache import ByteCache
 from app.playback.picture_source import PictureSource
+from engine.byte_cache import ByteCache
 from engine.capture.capture import Capture
 
 CACHE_BYTES = 96 << 20

@@ -18,8 +18,8 @@ import numpy as np
 from app.background.kernels import prepare_decoding
 from app.background.latest import LatestWorker
 from app.playback.arrays import AnchorArrays, GaussianArrays
-from app.playback.byte_cache import ByteCache
 from app.playback.picture_source import UNKNOWN, PictureSource
+from engine.byte_cache import ByteCache
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, read_clip_state
 

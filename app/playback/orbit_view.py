@@ -125,11 +125,6 @@ class OrbitView:
         if math.isfinite(factor) and factor > 0:
             self.distance = min(max(self.distance * factor, 1e-4), 1e6)
 
-    def fly(self, right: float, down: float, forward: float) -> None:
-        """Move eye and pivot together, in scene units along the view's axes."""
-        axes = self._free_axes()
-        self.pivot = self.pivot + right * axes[0] + down * axes[1] + forward * axes[2]
-
     def home(self) -> None:
         """Frame the point that the cameras look at, from where a level, central camera stands."""
         self.look_through = None

@@ -16,7 +16,6 @@ from __future__ import annotations
 import logging
 import os
 import shutil
-import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -38,6 +37,7 @@ from engine.capture.clip import Clip
 from engine.errors import ProjectError
 from engine.gate.regions import GateRegion
 from engine.storage.files import PARTIAL_PREFIX, is_left_over
+from engine.user_folders import data_dir
 
 logger = logging.getLogger(__name__)
 
@@ -351,17 +351,6 @@ def sweep(project: Project) -> None:
 
 
 # ---------------------------------------------------------------- where projects lie
-
-
-def data_dir() -> Path:
-    """The user's folder for data of this program; need not exist."""
-    if sys.platform == "win32":
-        root = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        root = Path.home() / "Library" / "Application Support"
-    else:
-        root = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share")
-    return root / "ClipGStream"
 
 
 def default_project_dir(capture: Capture) -> Path:

@@ -1,29 +1,17 @@
-"""The user's preferences: projects opened lately. A small JSON file in the platform's configuration folder."""
+"""The user's preferences: projects opened lately. A small JSON file in the user's configuration folder."""
 
 from __future__ import annotations
 
 import logging
-import os
-import sys
 from pathlib import Path
 
 from app.project.recents import RecentProject, read_recents, recents_document, with_entry
 from engine.storage.json_files import JsonError, read_checked_json, write_checked_json
+from engine.user_folders import config_dir
 
 logger = logging.getLogger(__name__)
 
 MAX_BYTES = 1 << 20
-
-
-def config_dir() -> Path:
-    """The user's folder for this program's configuration; need not exist."""
-    if sys.platform == "win32":
-        root = Path(os.environ.get("APPDATA") or Path.home() / "AppData" / "Roaming")
-    elif sys.platform == "darwin":
-        root = Path.home() / "Library" / "Application Support"
-    else:
-        root = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config")
-    return root / "ClipGStream"
 
 
 class Settings:

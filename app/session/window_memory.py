@@ -16,11 +16,11 @@ import numpy as np
 
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
-from app.session.settings import config_dir
 from app.status import COMPARE_MODES, OVERLAY_NAMES, Overlays
 from engine.camera.rig import CameraRig
 from engine.errors import EngineError
 from engine.storage.json_files import read_checked_json, write_checked_json
+from engine.user_folders import config_dir
 
 logger = logging.getLogger(__name__)
 

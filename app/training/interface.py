@@ -25,6 +25,11 @@ class Training(Protocol):
         """Steps done."""
         ...
 
+    @property
+    def is_finished(self) -> bool:
+        """Whether every step was done."""
+        ...
+
     def prepare(self) -> None:
         """Build what the first step needs; may take a minute and report often."""
         ...

@@ -151,7 +151,7 @@ class TrainingRun:
         self._obey()
         if self._is_paused:
             return True
-        if training.steps_done >= training.n_steps:
+        if training.is_finished:
             return self._finish(training)
         self._is_in_step, self._is_checkpointed_in_step = True, False
         self._watch.enter(TRAINING)
@@ -207,7 +207,7 @@ class TrainingRun:
         self._losses.append(stats.loss)
         self._gradient_norms.append(stats.gradient_norm)
         self._n_clipped += stats.is_clipped
-        is_last = training.steps_done >= training.n_steps
+        is_last = training.is_finished
         if self._report_cadence.is_due(now_s) or is_last:
             self._report_cadence.done(now_s, now_s)
             self._check_folder()

@@ -21,15 +21,9 @@ from app.training.interface import MakeTraining
 from app.training.messages import Command, Event, TrainJob, decode, encode
 from app.training.run import TrainingRun
 from engine.kernels.cache import use_kernel_cache
+from engine.parallel import n_cores
 
 logger = logging.getLogger(__name__)
-
-
-def n_cores() -> int:
-    """Cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def n_training_threads(cores: int, *, is_window_open: bool) -> int:

@@ -1,4 +1,4 @@
-"""Pixels on demand: frame sources (image files, video files) and the byte-bounded cache in front of them.
+"""Pixels on demand: frame sources (image files, video files) behind a cache bounded in bytes.
 
 Nothing here knows about calibration. A source decodes full-size frames of one camera; the FrameStore resizes them to
 the working size, keeps the most recently used ones and may be called from several threads.
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import threading
 from bisect import bisect_left
-from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -16,6 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 from PIL import Image
 
+from engine.byte_cache import ByteCache
 from engine.capture.limits import MAX_PIXELS
 from engine.capture.media import (
     IMAGE_FAULTS,
@@ -206,45 +206,6 @@ class VideoFrames:
         self._decoder = self._container.decode(stream)
 
 
-class FrameCache:
-    """Most recently used frames, bounded in bytes. Safe to use from several threads."""
-
-    def __init__(self, max_bytes: int) -> None:
-        self.max_bytes = max_bytes
-        self.n_bytes = 0
-        self._lock = threading.Lock()
-        self._frames: OrderedDict[tuple[int, int], np.ndarray] = OrderedDict()
-
-    def __len__(self) -> int:
-        return len(self._frames)
-
-    def get(self, key: tuple[int, int]) -> np.ndarray | None:
-        """The frame, now the most recently used one, or None."""
-        with self._lock:
-            frame = self._frames.get(key)
-            if frame is not None:
-                self._frames.move_to_end(key)
-            return frame
-
-    def put(self, key: tuple[int, int], frame: np.ndarray) -> None:
-        """Keep a frame and drop the least recently used ones above the bound; a frame above it alone is not kept."""
-        if frame.nbytes > self.max_bytes:
-            return
-        with self._lock:
-            replaced = self._frames.pop(key, None)
-            self.n_bytes += frame.nbytes - (0 if replaced is None else replaced.nbytes)
-            self._frames[key] = frame
-            while self.n_bytes > self.max_bytes:
-                _, dropped = self._frames.popitem(last=False)
-                self.n_bytes -= dropped.nbytes
-
-    def clear(self) -> None:
-        """Forget everything."""
-        with self._lock:
-            self._frames.clear()
-            self.n_bytes = 0
-
-
 class FrameStore:
     """Sources of all cameras, the working size of each, and the cache. What Capture.frame asks."""
 
@@ -259,7 +220,7 @@ class FrameStore:
         self.sources = tuple(sources)
         self.native_sizes = np.asarray(native_sizes)
         self.working_sizes = np.asarray(working_sizes)
-        self.cache = FrameCache(cache_bytes)
+        self.cache: ByteCache[tuple[int, int], np.ndarray] = ByteCache(cache_bytes)
 
     def frames(self, camera_index: int, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
         """Frames of one camera at the working size, each a read-only [H, W, 3] uint8.
@@ -272,7 +233,7 @@ class FrameStore:
             frame = self.cache.get(key)
             if frame is None:
                 frame = self._decode(camera_index, frame_index)
-                self.cache.put(key, frame)
+                self.cache.put(key, frame, frame.nbytes)
             yield frame
 
     def close(self) -> None:

@@ -12,7 +12,6 @@ FOCAL_RANGE = (0.01, 1000.0)
 """Focal length divided by the side of the picture: from 178 degrees of view to a twentieth of one."""
 MAX_POSITION = 1e9
 """Distance of a camera from the origin, scene units; map coordinates in millimetres reach it."""
-MAX_FRAMES = 100_000_000
 MAX_CAMERA_ID = 10**9
 MAX_NAME_LENGTH = 100
 """Characters of a camera's name."""

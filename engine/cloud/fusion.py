@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from engine.cloud.voxel import voxel_means
-from engine.parallel import n_workers
+from engine.parallel import n_cores
 
 logger = logging.getLogger(__name__)
 
@@ -51,7 +51,7 @@ def fuse_tiers(tiers: list[Samples], spacing: float) -> tuple[np.ndarray, np.nda
             samples.points, spacing / 2, [samples.normals, samples.colors], own_weights
         )
         if len(points) and distance > 0:
-            is_apart = KDTree(points).query(new, workers=n_workers())[0] > distance * spacing
+            is_apart = KDTree(points).query(new, workers=n_cores())[0] > distance * spacing
             new, new_normals, new_colors, new_weights = (
                 a[is_apart] for a in (new, new_normals, new_colors, new_weights)
             )
@@ -76,7 +76,7 @@ def project_to_planes(
         radius: Neighbour weights fall with exp(-(distance / radius)^2).
     """
     n_neighbors = min(N_PLANE_NEIGHBORS, len(points))
-    distances, neighbors = KDTree(points).query(points, n_neighbors, workers=n_workers())
+    distances, neighbors = KDTree(points).query(points, n_neighbors, workers=n_cores())
     distances, neighbors = distances.reshape(len(points), -1), neighbors.reshape(len(points), -1)
     pull = weights[neighbors] * np.exp(-((distances / radius) ** 2))
     centers = np.einsum("pk,pki->pi", pull, points[neighbors]) / pull.sum(1)[:, None]

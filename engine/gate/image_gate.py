@@ -28,7 +28,7 @@ from engine.camera.projection import is_in_picture, project, projection_matrices
 from engine.camera.rig import CameraRig
 from engine.cloud.median import median_over_cameras
 from engine.gate.reasons import ALONE, CHANGES, LIGHT, NEAR_MOTION, ONE_VIEW, REASONS, STILL, UNSEEN
-from engine.parallel import map_ordered, n_workers
+from engine.parallel import map_ordered, n_cores
 
 MIN_CHANGE = 0.06
 """Smallest change that counts, in log colour: 6 %, about what a motion mask asks for on a mid-grey wall."""
@@ -153,14 +153,14 @@ def _are_alone(points: np.ndarray, reach: float) -> np.ndarray:
     """Points without another one within reach. [P] bool"""
     if len(points) < 2:
         return np.ones(len(points), dtype=bool)
-    distances, _ = KDTree(points).query(points, 2, workers=n_workers())
+    distances, _ = KDTree(points).query(points, 2, workers=n_cores())
     return np.asarray(distances[:, 1] > reach)
 
 
 def _is_near(points: np.ndarray, others: np.ndarray, reach: float) -> np.ndarray:
     if len(others) == 0 or len(points) == 0:
         return np.zeros(len(points), dtype=bool)
-    distances, _ = KDTree(others).query(points, distance_upper_bound=reach, workers=n_workers())
+    distances, _ = KDTree(others).query(points, distance_upper_bound=reach, workers=n_cores())
     return np.asarray(np.isfinite(distances))
 
 

@@ -26,6 +26,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
+from engine.user_folders import NAME, cache_dir
+
 VARIABLE = "NUMBA_CACHE_DIR"
 MARKER = "warm.json"
 MAX_FOLDERS = 3
@@ -34,7 +36,6 @@ MAX_FOLDERS = 3
 UNWRITABLE = "folder not writable"
 """Reason of `CacheState` that only the user can mend."""
 
-_ROOT_NAME = "ClipGStream"
 _PREFIX = "kernels-"
 _PACKAGE = Path(__file__).resolve().parents[1]
 _DECORATORS = tuple(
@@ -97,17 +98,6 @@ class CacheState(NamedTuple):
     n_bytes: int
 
 
-def cache_root() -> Path:
-    """The user's folder for things that can be made again; need not exist."""
-    if sys.platform == "win32":
-        root = Path(os.environ.get("LOCALAPPDATA") or _home() / "AppData" / "Local") / "Cache"
-    elif sys.platform == "darwin":
-        root = _home() / "Library" / "Caches"
-    else:
-        root = Path(os.environ.get("XDG_CACHE_HOME") or _home() / ".cache")
-    return root / _ROOT_NAME
-
-
 def fallback_root() -> Path:
     """Where kernels go when the user's cache cannot be written: a temporary folder of this user alone. Made here.
 
@@ -116,10 +106,10 @@ def fallback_root() -> Path:
     import tempfile
 
     user = str(os.getuid()) if hasattr(os, "getuid") else os.environ.get("USERNAME", "user")
-    folder = Path(tempfile.gettempdir()) / f"{_ROOT_NAME}-{user}"
+    folder = Path(tempfile.gettempdir()) / f"{NAME}-{user}"
     with suppress(OSError):
         folder.mkdir(mode=0o700)
-    return folder if _is_private(folder) else Path(tempfile.mkdtemp(prefix=f"{_ROOT_NAME}-"))
+    return folder if _is_private(folder) else Path(tempfile.mkdtemp(prefix=f"{NAME}-"))
 
 
 def kernel_folder() -> Path:
@@ -358,7 +348,7 @@ def _mac_brand() -> str:
 
 def _chosen_root() -> tuple[Path, bool]:
     """Root of the keyed folders, and whether it is the fall-back."""
-    root = cache_root()
+    root = cache_dir()
     if _is_writable(root):
         return root, False
     given = Path(os.environ.get(VARIABLE, ""))
@@ -368,7 +358,7 @@ def _chosen_root() -> tuple[Path, bool]:
 
 
 def _is_ours(folder: Path) -> bool:
-    return folder.name.startswith(_PREFIX) and folder.parent.name.startswith(_ROOT_NAME)
+    return folder.name.startswith(_PREFIX) and folder.parent.name.startswith(NAME)
 
 
 def _is_private(folder: Path) -> bool:
@@ -392,13 +382,6 @@ def _is_writable(folder: Path) -> bool:
     except OSError:
         return False
     return False
-
-
-def _home() -> Path:
-    try:
-        return Path.home()
-    except RuntimeError:  # no home at all, as for some system users
-        return Path(os.sep, "nonexistent")
 
 
 def _hash(parts: Iterable[bytes]) -> str:

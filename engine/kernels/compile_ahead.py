@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from engine.kernels.cache import VARIABLE, current_key, kernel_folder, read_marker, write_marker
+from engine.parallel import n_cores
 
 if TYPE_CHECKING:
     from filelock import BaseFileLock
@@ -83,7 +84,7 @@ def compile_all(report: ReportGroups | None = None, *, n_processes: int | None =
     try:
         if read_marker(folder) == current_key():  # the program we waited for has done it
             return True
-        for bundle in _bundles(min(n_processes or _n_cores(), MAX_PROCESSES)):
+        for bundle in _bundles(min(n_processes or n_cores(), MAX_PROCESSES)):
             running.append((bundle, _start(bundle, folder), time.monotonic()))
         while running:
             report(n_done, n, " and ".join(_names(bundle) for bundle, _, _ in running))
@@ -174,9 +175,3 @@ def _take(path: Path) -> BaseFileLock | None:
     except OSError:
         return None
     return lock
-
-
-def _n_cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

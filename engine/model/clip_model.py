@@ -45,8 +45,6 @@ class AnchorView:
     Attributes:
         inherited_positions: Anchors of the reference clip in a source clip; empty in the reference clip. [A0, 3]
         own_positions: Anchors this clip trains. [A, 3]
-        own_is_dynamic: Whether each own anchor has a dynamic feature. [A] bool
-        inherited_is_dynamic: Likewise. [A0] bool
         own_roles: Role of each own anchor, in engine.model.roles.ROLES. [A] uint8
         inherited_roles: Likewise. [A0] uint8
         own_reasons: Why the gate decided so, a code of engine.gate.reasons. [A] uint8
@@ -55,8 +53,6 @@ class AnchorView:
 
     inherited_positions: np.ndarray
     own_positions: np.ndarray
-    own_is_dynamic: np.ndarray
-    inherited_is_dynamic: np.ndarray
     own_roles: np.ndarray
     inherited_roles: np.ndarray
     own_reasons: np.ndarray
@@ -200,7 +196,7 @@ class ClipModel(nn.Module):
 
     def anchors(self, clip_time: float | None = None) -> AnchorView:
         """Positions for display: all, or those that exist at a time of the clip, in [0, 1)."""
-        nothing = (np.zeros((0, 3), np.float32), np.zeros(0, bool), np.zeros(0, np.uint8), np.zeros(0, np.uint8))
+        nothing = (np.zeros((0, 3), np.float32), np.zeros(0, np.uint8), np.zeros(0, np.uint8))
         inherited, own = [nothing], [nothing]
         for role in self.roles():
             anchors = self.anchor_set(role)
@@ -208,20 +204,15 @@ class ClipModel(nn.Module):
             reasons = self.reasons.get(role)
             shown = (
                 anchors.positions.numpy()[rows],
-                np.full(len(rows), anchors.is_dynamic),
                 np.full(len(rows), ROLES.index(role), np.uint8),
                 np.full(len(rows), NO_REASON, np.uint8) if reasons is None else reasons[rows],
             )
             (own if anchors.is_trainable else inherited).append(shown)
-        inherited_points, inherited_flags, inherited_roles, inherited_reasons = map(
-            np.concatenate, zip(*inherited, strict=True)
-        )
-        own_points, own_flags, own_roles, own_reasons = map(np.concatenate, zip(*own, strict=True))
+        inherited_points, inherited_roles, inherited_reasons = map(np.concatenate, zip(*inherited, strict=True))
+        own_points, own_roles, own_reasons = map(np.concatenate, zip(*own, strict=True))
         return AnchorView(
-            inherited_points,
-            own_points,
-            own_flags,
-            inherited_flags,
+            inherited_positions=inherited_points,
+            own_positions=own_points,
             own_roles=own_roles,
             inherited_roles=inherited_roles,
             own_reasons=own_reasons,

@@ -15,7 +15,6 @@ from torch import Tensor, nn
 
 HEADS = {"opacity": 1, "color": 3, "shape": 7, "offset": 3}
 """Values per Gaussian of each head, in the order of their slices in the output."""
-N_OUT = sum(HEADS.values())
 
 
 class Decoder(nn.Module):

@@ -113,6 +113,10 @@ class FakeTraining:
     value: float = 0.0
     previous: ClipState | None = None
 
+    @property
+    def is_finished(self) -> bool:
+        return self.steps_done >= self.n_steps
+
     def prepare(self) -> None:
         for share in (0.0, 0.5, 1.0):
             self.report(Progress("Building the cloud", share, f"{share:.0%} of 12 points"))

@@ -11,11 +11,11 @@ import pytest
 
 from app.background.jobs import Jobs
 from app.project.opening import Opened, open_for_window
-from app.project.project import data_dir
 from app.session import commands as c
 from app.session.questions import ProjectQuestion, RetrainQuestion
 from app.session.session import Session
 from app.session.settings import Settings
+from engine.user_folders import data_dir
 from tests.app.conftest import inline, poll_until
 from tests.app.fakes import make_fake, write_capture
 

@@ -27,8 +27,9 @@ from engine.capture.clip import Clip, split_clips
 from engine.clip_files.clip_state import ClipState
 from engine.images.psnr import psnr
 from engine.kernels.threads import configure_threads
-from engine.metrics.clips.evaluate import evaluate_clip
+from engine.metrics.clips.evaluate import Evaluation
 from engine.metrics.clips.summary import means
+from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.clip_model import load_clip_model
 from engine.model.clip_view import REACH_SPACINGS, View, render_model
 from engine.progress import Progress
@@ -182,15 +183,8 @@ def main() -> None:
             state, timing = train(capture, clip, config, holdout, reference, Path(prep_dir))
             reference = reference or state
             frames = list(clip.frame_indices())[:: args.frames_every]
-            rows = evaluate_clip(
-                capture,
-                clip,
-                load_clip_model(state, reference),
-                reference=reference,
-                cameras=holdout,
-                holdout=holdout,
-                frames=frames,
-            )
+            trained = TrainedClip(clip, load_clip_model(state, reference), reference)
+            rows = Evaluation(capture, cameras=holdout, holdout=holdout).measure(trained, frames=frames)
             figures = means(rows)
             by_camera = {n: means([row for row in rows if row.camera == n])["psnr"] for n in names}
             size_mb = sum(array.nbytes for array in state.arrays.values()) / 1e6

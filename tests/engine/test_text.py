@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from engine.errors import CaptureError, EngineError
-from engine.text import MAX_SHOWN, printable, shown
+from engine.text import MAX_SHOWN, duration_text, printable, shown
 
 
 def test_ordinary_text_stays_as_it_is() -> None:
@@ -38,3 +40,21 @@ def test_a_thousand_problems_do_not_fill_the_screen() -> None:
     assert len(error.problems) == 1000
     assert len(str(error).splitlines()) == 22
     assert str(error).endswith("and 980 more like these.")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "expected"),
+    [
+        (0, "0:00"),
+        (61.4, "1:01"),
+        (3599.4, "59:59"),
+        (3599.6, "1 h 00 min"),
+        (3725, "1 h 02 min"),
+        (None, "–"),
+        (-1, "–"),
+        (float("nan"), "–"),
+        (1e9, "–"),
+    ],
+)
+def test_durations(seconds, expected):
+    assert duration_text(seconds) == expected

@@ -15,7 +15,7 @@ from ui.main import main
 from ui.panels.shortcuts import SHORTCUTS
 from ui.panels.state import Rect
 from ui.panels.timeline import MIN_TICK_SPACING_PX, cell_left, frame_at, tick_step
-from ui.panels.training import MAX_PLOT_POINTS, anchors_text, duration_text, plot_arrays
+from ui.panels.training import MAX_PLOT_POINTS, anchors_text, plot_arrays
 from ui.panels.viewport import arrange, fit
 
 
@@ -48,13 +48,6 @@ def test_plot_arrays_are_contiguous_finite_and_short() -> None:
     assert np.isfinite(values).all()
     assert (steps[0], steps[-1]) == (0, 4999)
     assert plot_arrays([])[0].shape == (0,)
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"), [(None, "–"), (float("nan"), "–"), (0, "0:00"), (61.4, "1:01"), (3725, "1 h 02 min")]
-)
-def test_duration_text(seconds: float | None, text: str) -> None:
-    assert duration_text(seconds) == text
 
 
 def test_panes_keep_the_camera_s_aspect_and_do_not_overlap() -> None:

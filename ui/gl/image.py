@@ -1,4 +1,4 @@
-"""Pictures on the GPU, and the quad that draws one, or two with a wipe between them, into a target."""
+"""Pictures on the GPU, and the quad that draws one into a target."""
 
 from __future__ import annotations
 
@@ -14,9 +14,6 @@ from ui.gl.shaders import load_program
 
 if TYPE_CHECKING:
     from ui.gl.targets import Target
-
-Color3 = tuple[float, float, float]
-DIVIDER_COLOR: Color3 = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,64 +133,20 @@ class ImagePainter:
             image: Holds a picture.
             rect: Where in the target; the whole of it by default.
         """
-        self._paint(target, image, image, rect=rect, position=1.0, divider_px=0.0, divider_color=DIVIDER_COLOR)
-
-    def draw_wipe(
-        self,
-        target: Target,
-        left: ImageTexture,
-        right: ImageTexture,
-        position: float,
-        *,
-        rect: Rect | None = None,
-        divider_px: float = 2.0,
-        divider_color: Color3 = DIVIDER_COLOR,
-    ) -> None:
-        """Draw two pictures of one view in the same place, one on each side of a divider.
-
-        Args:
-            target: Where to.
-            left: Seen left of the divider.
-            right: Seen right of it. Both are stretched to the rectangle, so sizes may differ.
-            position: Where the divider stands, share of the rectangle's width, 0..1.
-            rect: Where in the target; the whole of it by default.
-            divider_px: Width of the divider, target px; 0 draws none.
-            divider_color: Its colour.
-        """
-        self._paint(
-            target, left, right, rect=rect, position=position, divider_px=divider_px, divider_color=divider_color
-        )
-
-    def release(self) -> None:
-        """Free the program."""
-        self._quad.release()
-        self._program.release()
-
-    def _paint(
-        self,
-        target: Target,
-        left: ImageTexture,
-        right: ImageTexture,
-        *,
-        rect: Rect | None,
-        position: float,
-        divider_px: float,
-        divider_color: Color3,
-    ) -> None:
         width, height = target.size
         rect = rect or Rect(0, 0, width, height)
         target.use(moderngl.NOTHING)
-        left.texture.use(0)
-        right.texture.use(1)
-        self._program["left_image"] = 0
-        self._program["right_image"] = 1
+        image.texture.use(0)
+        self._program["image"] = 0
         self._program["rect_ndc"] = (
             2 * rect.x0 / width - 1,
             2 * rect.y0 / height - 1,
             2 * rect.x1 / width - 1,
             2 * rect.y1 / height - 1,
         )
-        self._program["divider_x_px"] = rect.x0 + rect.width * position
-        self._program["divider_px"] = divider_px
-        self._program["divider_color"] = divider_color
         self._quad.render(moderngl.TRIANGLE_STRIP, vertices=4)
+
+    def release(self) -> None:
+        """Free the program."""
+        self._quad.release()
+        self._program.release()

@@ -13,10 +13,11 @@ from typing import Protocol
 import moderngl
 import numpy as np
 
+from app.background.latest import LatestWorker
 from engine.conventions import ALPHA_MIN
 from ui.gl.camera import NEAR, resized_K, uniform_matrix
+from ui.gl.depth_order import DepthOrder, OrderKey, OrderRequest, depth_order
 from ui.gl.shaders import load_program
-from ui.gl.splat_sorter import DepthOrder, SplatSorter, depth_order
 from ui.gl.targets import Target
 
 TEXELS_PER_SPLAT = 4
@@ -64,7 +65,7 @@ class SplatRenderer:
     def __init__(self, ctx: moderngl.Context, *, sort_on_thread_above: int = SORT_ON_THREAD_ABOVE) -> None:
         self._ctx = ctx
         self._program = load_program(ctx, "splat")
-        self._sorter = SplatSorter()
+        self._sorter: LatestWorker[OrderRequest, DepthOrder] = LatestWorker("splat-sorter", OrderRequest.answer)
         self._sort_on_thread_above = sort_on_thread_above
         self._texture: moderngl.Texture | None = None
         self._ids: moderngl.Buffer | None = None
@@ -73,7 +74,7 @@ class SplatRenderer:
         self._key: Hashable = None
         self._revision = 0
         self._order: DepthOrder | None = None
-        self._wanted_order: Hashable = None
+        self._wanted_order: OrderKey | None = None
         self._n_dropped = 0
 
     def __len__(self) -> int:
@@ -146,13 +147,9 @@ class SplatRenderer:
         self._program["near"] = near
         self._quads.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=len(ids))
 
-    def finish_sorting(self, timeout_s: float) -> None:
-        """Wait for an order that is under way; the next draw uses it. For tests and for files."""
-        self._sorter.wait(timeout_s)
-
     def release(self) -> None:
         """Free everything and end the sorter's thread. The renderer cannot be used afterwards."""
-        self._sorter.release()
+        self._sorter.close()
         for thing in (self._quads, self._ids, self._texture, self._program):
             if thing is not None:
                 thing.release()
@@ -169,14 +166,15 @@ class SplatRenderer:
         if key != self._wanted_order:
             self._wanted_order = key
             if self._order is not None and len(self._means) > self._sort_on_thread_above:
-                self._sorter.request(key, self._means, view_row, near)
+                self._sorter.request(OrderRequest(key, self._means, np.array(view_row, np.float32), near))
             else:  # few rows, or rows without any order yet
                 self._take_order(DepthOrder(key, depth_order(self._means, view_row, near)))
         if self.is_order_stale:
-            latest = self._sorter.latest()
-            is_ours = latest is not None and isinstance(latest.key, tuple) and latest.key[0] == self._revision
-            if latest is not None and is_ours and latest is not self._order:
-                self._take_order(latest)
+            failure, newest = self._sorter.take_error(), self._sorter.newest
+            if failure is not None:
+                raise failure[1]
+            if newest is not None and newest[1] is not self._order and newest[1].key[0] == self._revision:
+                self._take_order(newest[1])
         assert self._order is not None
         return self._order.ids
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import Literal
 
 import moderngl
-import numpy as np
 
 from ui.gl.changes import note_change
 from ui.gl.image import ImagePainter, ImageTexture, Rect
@@ -148,20 +147,6 @@ class Target:
         self._program["is_transparent"] = background is None
         self._quad.render(moderngl.TRIANGLE_STRIP, vertices=4)
         return self.texture
-
-    def read_color(self) -> np.ndarray:
-        """Premultiplied RGBA as drawn. [H, W, 4] float32. Waits for the GPU: for tests and files, not for frames."""
-        width, height = self._size
-        raw = self.framebuffer.read(components=4, dtype="f4")
-        return np.frombuffer(raw, dtype=np.float32).reshape(height, width, 4).copy()
-
-    def read_resolved(self) -> np.ndarray:
-        """The picture of the last resolve() without its alpha. [H, W, 3] uint8. Waits for the GPU."""
-        shown = self._framebuffer if self.is_direct else self._resolved_framebuffer
-        assert shown is not None, "the target was released"
-        width, height = self._size
-        raw = shown.read(components=3, alignment=1)
-        return np.frombuffer(raw, dtype=np.uint8).reshape(height, width, 3).copy()
 
     def release(self) -> None:
         """Free everything. The target cannot be used afterwards."""

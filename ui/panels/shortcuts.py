@@ -331,10 +331,6 @@ _STEERING: dict[str, Any] = {"needs_choosing": True, "repeats": True}
 _SCALING: dict[str, Any] = {"is_ctrl": True, "is_any_shift": True, "needs_capture": False}
 
 
-def _overlay_row(digit: str, name: str, what: str) -> Shortcut:
-    return Shortcut(f"_{digit}", digit, f"Show or hide {what}", COMPARE, _toggle_overlay(name), is_on=_is_shown(name))
-
-
 SHORTCUTS: tuple[Shortcut, ...] = (
     Shortcut("space", "Space", "Play or pause", TIME, _toggle_play),
     Shortcut("left_arrow", "Left", "One frame back", TIME, _step_by(-1), repeats=True),

@@ -21,7 +21,6 @@ from ui.style.progress_words import band_words
 from ui.style.theme import Icon
 
 RULER_HEIGHT = 22.0
-BAND_GAP = 6.0
 MIN_TRACK_HEIGHT = RULER_HEIGHT + 18.0
 MIN_TICK_SPACING_PX = 56.0
 NOTE_WIDTH = 380.0

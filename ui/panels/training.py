@@ -11,6 +11,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui, implot
 from app.session.commands import PauseTraining, ResumeTraining, StopTraining, TrainNextClip
 from app.status import ClipStatus, PlanStatus, TrainingStatus
 from engine.capture.clip import Clip
+from engine.text import duration_text
 from ui.panels.plan import draw_plan
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline import STATE_WORDS, state_note
@@ -50,17 +51,6 @@ class TrainingNeeds(Protocol):
 
     @property
     def reference_index(self) -> int: ...
-
-
-def duration_text(seconds: float | None) -> str:
-    """Minutes and seconds as people read them; a dash when unknown."""
-    if seconds is None or not np.isfinite(seconds) or seconds < 0:
-        return "–"
-    whole = round(seconds)
-    hours, rest = divmod(whole, 3600)
-    if hours:
-        return f"{hours} h {rest // 60:02d} min"
-    return f"{rest // 60}:{rest % 60:02d}"
 
 
 def plot_arrays(history: Sequence[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:

@@ -12,8 +12,8 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import CloseQuestion, Command, OpenCapture, OpenProject, TrainClip
 from app.session.questions import ProjectQuestion, Question, RetrainQuestion
+from engine.text import duration_text
 from ui.panels.state import Dispatch, UiState
-from ui.panels.training import duration_text
 from ui.panels.widgets import elided, primary_button, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count

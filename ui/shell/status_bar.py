@@ -9,8 +9,8 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.notices import Notices
 from app.status import JobStatus, ProjectStatus, TrainingStatus
+from engine.text import duration_text
 from ui.panels.state import UiState
-from ui.panels.training import duration_text
 from ui.panels.widgets import elided
 from ui.style import theme
 from ui.style.numbers import format_count

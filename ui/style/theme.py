@@ -119,7 +119,6 @@ CLIP_ICONS: dict[str, str] = {
 class Fonts:
     """The loaded faces and the sizes used with them, in points of the logical window."""
 
-    regular: imgui.ImFont | None = None
     bold: imgui.ImFont | None = None
     body_size: float = 15.0
     small_size: float = 13.0
@@ -136,7 +135,7 @@ def load_fonts() -> Fonts:
         return Fonts()
     atlas = imgui.get_io().fonts
     loaded = []
-    for face in faces:
+    for face in faces:  # the first one loaded is the default of the context
         font = atlas.add_font_from_file_ttf(str(face), Fonts.body_size)
         merge = imgui.ImFontConfig()
         merge.merge_mode = True
@@ -144,7 +143,7 @@ def load_fonts() -> Fonts:
         merge.glyph_offset = ImVec2(0.0, 1.0)
         atlas.add_font_from_file_ttf(str(icons), Fonts.body_size - 2.0, merge)
         loaded.append(font)
-    return Fonts(regular=loaded[0], bold=loaded[1])
+    return Fonts(bold=loaded[1])
 
 
 def apply_style() -> None:

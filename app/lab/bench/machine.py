@@ -37,7 +37,7 @@ class Machine:
 def describe_machine(n_threads: int) -> Machine:
     """Look at this machine."""
     from app.cli.doctor import host_vectors
-    from app.training.worker import n_cores
+    from engine.parallel import n_cores
 
     return Machine(
         cpu=_cpu(),

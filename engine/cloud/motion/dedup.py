@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import KDTree
 
-from engine.parallel import n_workers
+from engine.parallel import n_cores
 
 FIRST_NEIGHBORS = 8
 
@@ -60,7 +60,7 @@ def mean_neighbor_distance(points: np.ndarray, k: int = 3) -> np.ndarray:
     n_neighbors = min(k, len(points) - 1)
     if n_neighbors < 1:
         return np.zeros(len(points))
-    distances, _ = KDTree(points).query(points, n_neighbors + 1, workers=n_workers())
+    distances, _ = KDTree(points).query(points, n_neighbors + 1, workers=n_cores())
     return distances[:, 1:].mean(axis=1)
 
 
@@ -70,7 +70,7 @@ def _search_band(points: np.ndarray, centers: np.ndarray, radii: np.ndarray, bes
     open_rows = np.arange(len(points))
     k = min(FIRST_NEIGHBORS, len(centers))
     while len(open_rows):
-        distances, neighbors = tree.query(points[open_rows], k, workers=n_workers())
+        distances, neighbors = tree.query(points[open_rows], k, workers=n_cores())
         distances, neighbors = distances.reshape(-1, k), neighbors.reshape(-1, k)
         best[open_rows] = np.minimum(best[open_rows], (distances - radii[neighbors]).min(axis=1))
         if k == len(centers):

@@ -14,7 +14,6 @@ import numpy as np
 
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.clip_files.clip_state import ClipState
 from engine.cloud.background.background import estimate_background
 from engine.cloud.background.masks import motion_mask
 from engine.metrics.clips.seams import PairRow, SeamMaps, change_of, part_means, seam_maps
@@ -22,7 +21,6 @@ from engine.metrics.clips.summary import EvalRow
 from engine.metrics.clips.trained_clip import TrainedClip
 from engine.metrics.pictures.colors import Precision, as_shown
 from engine.metrics.pictures.picture import Choice, measure_picture
-from engine.model.clip_model import ClipModel
 from engine.training.preparation.cloud_preparation import spread_frames
 
 _BACKGROUND_FRAMES = 50
@@ -223,21 +221,3 @@ def _pair_row(
         is_extrapolated=is_boundary,
         is_held=is_held,
     )
-
-
-def evaluate_clip(
-    capture: Capture,
-    clip: Clip,
-    model: ClipModel,
-    *,
-    reference: ClipState,
-    cameras: Sequence[int],
-    holdout: Sequence[int],
-    frames: Sequence[int] | None = None,
-    metrics: Choice = "all",
-    precision: Precision = "float",
-    on_row: Callable[[EvalRow], None] | None = None,
-) -> list[EvalRow]:
-    """One clip by itself; `reference` is the base of TrainedClip, other arguments as in Evaluation and `measure`."""
-    evaluation = Evaluation(capture, cameras=cameras, holdout=holdout, metrics=metrics, precision=precision)
-    return evaluation.measure(TrainedClip(clip, model, reference), frames=frames, on_row=on_row)

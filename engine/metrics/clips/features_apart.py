@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Literal
 
 import torch
 
@@ -10,7 +10,6 @@ from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
 
 Features = Literal["both", "static", "dynamic"]
-FEATURES: tuple[Features, ...] = get_args(Features)
 
 
 def with_features(model: ClipModel, features: Features) -> ClipModel:

@@ -5,12 +5,11 @@ Pictures are [H, W, 3] in 0..1.
 
 from __future__ import annotations
 
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
 Precision = Literal["float", "8bit"]
-PRECISIONS: tuple[Precision, ...] = get_args(Precision)
 
 
 def as_shown(image: np.ndarray, precision: Precision) -> np.ndarray:

@@ -2,9 +2,7 @@
 
 import io
 
-import pytest
-
-from app.cli.progress import ProgressLine, duration_text
+from app.cli.progress import ProgressLine
 
 
 class Stream(io.StringIO):
@@ -50,11 +48,3 @@ def test_quiet_writes_nothing():
     line.say("done")
     line.finish()
     assert stream.text == ""
-
-
-@pytest.mark.parametrize(
-    ("seconds", "expected"),
-    [(0, "0:00"), (61.4, "1:01"), (3725, "1:02:05"), (None, "?"), (float("nan"), "?"), (1e9, "?")],
-)
-def test_durations(seconds, expected):
-    assert duration_text(seconds) == expected

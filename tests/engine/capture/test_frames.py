@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.capture.frames import FrameCache, VideoFrames, resize_area
+from engine.capture.frames import VideoFrames, resize_area
 from engine.capture.media import read_video_header
 
 
@@ -72,18 +72,6 @@ def test_a_file_without_pictures_is_refused(tmp_path: Path) -> None:
         container.mux(stream.encode(sound))
     with pytest.raises(Exception, match="no video stream"):
         read_video_header(path)
-
-
-@given(
-    max_bytes=st.integers(0, 60),
-    puts=st.lists(st.tuples(st.integers(0, 5), st.integers(1, 30)), max_size=40),
-)
-def test_cache_bytes_are_counted_and_bounded(max_bytes: int, puts: list[tuple[int, int]]) -> None:
-    cache = FrameCache(max_bytes)
-    for key, n_bytes in puts:
-        cache.put((0, key), np.zeros(n_bytes, np.uint8))
-        kept = [cache.get((0, k)) for k in range(6)]
-        assert cache.n_bytes == sum(frame.nbytes for frame in kept if frame is not None) <= max_bytes
 
 
 @settings(deadline=None)

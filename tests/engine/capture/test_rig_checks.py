@@ -1,4 +1,4 @@
-"""What is said of cameras taken together."""
+"""Warnings about cameras taken together."""
 
 from pathlib import Path
 

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from filelock import FileLock
@@ -133,8 +134,8 @@ def test_a_change_of_any_real_kernel_file_changes_the_key(monkeypatch):
     monkeypatch.setattr(cache, "_python_texts", texts)
     before = sources_hash(ROOT / "engine")
     names = real_kernel_files()
-    assert {"kernels/lanes.py", "model/cpu/forward.py", "model/cpu/backward.py", "cloud/hull.py"} <= set(names)
-    assert {"training/fused_loss.py", "training/ssim_lanes.py", "training/adam.py"} <= set(names)
+    assert {"kernels/lanes.py", "model/decode/cpu/forward.py", "cloud/motion/hull.py"} <= set(names)
+    assert {"training/step/fused_loss.py", "images/ssim_lanes.py", "training/optimizer/adam.py"} <= set(names)
     unnoticed = []
     for changed in [*names, "conventions.py", "model/warm.py"]:
         if sources_hash(ROOT / "engine") == before:
@@ -201,8 +202,9 @@ def test_a_temporary_folder_that_others_may_write_to_is_not_taken(tmp_path):
 
 
 def test_no_home_at_all_is_no_failure(monkeypatch):
-    monkeypatch.setattr(cache, "_home", lambda: Path("/nonexistent/home"))
     monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.delenv("HOME", raising=False)
+    monkeypatch.setattr("pwd.getpwuid", Mock(side_effect=KeyError("no such user")))
     monkeypatch.setattr(cache, "_is_writable", lambda folder: False)
     assert use_kernel_cache().is_relative_to(tempfile.gettempdir())
 

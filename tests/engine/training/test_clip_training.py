@@ -14,8 +14,9 @@ from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import split_clips
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.errors import NonFiniteLoss, PreparationError, ProjectError
-from engine.metrics.clips.evaluate import evaluate_clip
+from engine.metrics.clips.evaluate import Evaluation
 from engine.metrics.clips.summary import means
+from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.clip_model import load_clip_model
 from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
@@ -138,15 +139,10 @@ def test_a_source_clip_adds_residual_anchors_and_leaves_everything_inherited_unt
             kept = getattr(model.anchor_set(role), name).detach().numpy()
             assert np.array_equal(kept, before[f"sets.{role}.{name}"]), (role, name)
     assert training.held_out_psnr() > first
-    rows = evaluate_clip(
-        setting.capture,
-        training.clip,
-        load_clip_model(state, setting.reference),
-        reference=setting.reference,
-        cameras=[setting.holdout[0], training.camera_indices[0]],
-        holdout=setting.holdout,
-        frames=[training.clip.start],
-    )
+    cameras = [setting.holdout[0], training.camera_indices[0]]
+    trained = TrainedClip(training.clip, load_clip_model(state, setting.reference), setting.reference)
+    evaluation = Evaluation(setting.capture, cameras=cameras, holdout=setting.holdout)
+    rows = evaluation.measure(trained, frames=[training.clip.start])
     assert [row.is_held_out for row in rows] == [True, False]
     raw, fitted = ([value for row in rows if (value := row.figures[name]) is not None] for name in ("psnr", "psnr_fit"))
     assert all(after >= before - 1e-6 for before, after in zip(raw, fitted, strict=True))  # it includes doing nothing

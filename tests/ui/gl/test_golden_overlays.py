@@ -8,6 +8,7 @@ import pytest
 
 from tests.golden_images import assert_matches_golden
 from tests.ui.gl.keep import Keep
+from tests.ui.gl.pixels import read_resolved
 from tests.ui.gl.scenes import Camera, make_camera, make_ring_rig, make_splats
 from ui.gl.context import is_software
 from ui.gl.image import ImageTexture, fit_rect
@@ -38,7 +39,7 @@ def finish(ctx: moderngl.Context, target: Target, name: str, update: bool) -> No
     target.resolve(BACKGROUND)
     if not is_software(ctx):
         pytest.skip("drawn without an error; golden pictures are compared on software drivers only")
-    assert_matches_golden(target.read_resolved(), name, update=update)
+    assert_matches_golden(read_resolved(target), name, update=update)
 
 
 def test_golden_splats_with_overlays(ctx: moderngl.Context, keep: Keep, update_golden: bool) -> None:

@@ -1,4 +1,4 @@
-"""Pictures on the GPU, where they fit, and the wipe between two."""
+"""Pictures on the GPU, and where they fit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.ui.gl.keep import Keep
-from ui.gl.image import ImagePainter, ImageTexture, Rect, fit_rect
+from tests.ui.gl.pixels import read_color
+from ui.gl.image import ImageTexture, Rect, fit_rect
 from ui.gl.targets import Target
 
 sizes = st.tuples(st.integers(1, 4000), st.integers(1, 4000))
@@ -26,14 +27,6 @@ def test_fitted_rectangle_touches_two_borders_and_keeps_the_aspect(
     assert rect.y0 >= -1e-9
     assert rect.x0 + rect.x1 == pytest.approx(target_size[0])
     assert rect.y0 + rect.y1 == pytest.approx(target_size[1])
-
-
-@pytest.fixture
-def white_and_grey(ctx: moderngl.Context, keep: Keep) -> tuple[ImageTexture, ImageTexture]:
-    white, grey = keep(ImageTexture(ctx)), keep(ImageTexture(ctx))
-    white.set(np.full((3, 5, 3), 255, dtype=np.uint8))
-    grey.set(np.full((6, 4, 3), 51, dtype=np.uint8))
-    return white, grey
 
 
 @pytest.mark.gl
@@ -86,27 +79,10 @@ class TestImageTexture:
 
 
 @pytest.mark.gl
-class TestWipe:
-    @pytest.mark.parametrize("position", [0.0, 0.3, 1.0])
-    def test_left_picture_is_left_of_the_divider(
-        self,
-        ctx: moderngl.Context,
-        keep: Keep,
-        white_and_grey: tuple[ImageTexture, ImageTexture],
-        position: float,
-    ) -> None:
-        target, painter = keep(Target(ctx, (40, 10), precision="f4")), keep(ImagePainter(ctx))
-        painter.draw_wipe(target, *white_and_grey, position, divider_px=0)
-        expected = np.where(np.arange(40) + 0.5 < 40 * position, 1.0, 0.2)
-        np.testing.assert_allclose(target.read_color()[..., 0], np.tile(expected, (10, 1)), atol=1e-6)
-
-    def test_divider_is_as_wide_as_asked_and_moves_with_the_rectangle(
-        self, ctx: moderngl.Context, keep: Keep, white_and_grey: tuple[ImageTexture, ImageTexture]
-    ) -> None:
-        target, painter = keep(Target(ctx, (40, 10), precision="f4")), keep(ImagePainter(ctx))
-        painter.draw_wipe(
-            target, *white_and_grey, 0.5, rect=Rect(10, 0, 30, 10), divider_px=4, divider_color=(0.0, 0.0, 1.0)
-        )
-        row = target.read_color()[5]
-        assert np.flatnonzero((row == [0, 0, 1, 1]).all(axis=1)).tolist() == [18, 19, 20, 21]
-        assert np.flatnonzero(row[:, 3] == 0).tolist() == [*range(10), *range(30, 40)]
+def test_picture_fills_its_rectangle_and_nothing_else(ctx: moderngl.Context, keep: Keep) -> None:
+    target, image = keep(Target(ctx, (40, 10), precision="f4")), keep(ImageTexture(ctx))
+    image.set(np.full((6, 4, 3), 51, dtype=np.uint8))
+    target.draw_image(image, Rect(10, 0, 30, 10))
+    row = read_color(target)[5]
+    np.testing.assert_allclose(row[10:30], np.tile([0.2, 0.2, 0.2, 1.0], (20, 1)), atol=1e-6)
+    assert np.flatnonzero(row[:, 3] == 0).tolist() == [*range(10), *range(30, 40)]

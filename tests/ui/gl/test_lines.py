@@ -8,6 +8,7 @@ import pytest
 
 from engine.camera.rig import CameraRig
 from tests.ui.gl.keep import Keep
+from tests.ui.gl.pixels import read_color
 from tests.ui.gl.scenes import Camera, centered_camera, make_ring_rig
 from ui.gl.lines import (
     CHOSEN_CAMERA_COLOR,
@@ -73,7 +74,7 @@ def alpha_of(
     lines = keep(LineRenderer(ctx))
     lines.set(np.array(vertices), WHITE)
     lines.draw(target, *camera.arguments, **settings)  # type: ignore[arg-type]
-    return target.read_color()[..., 3]
+    return read_color(target)[..., 3]
 
 
 @pytest.mark.gl
@@ -134,10 +135,10 @@ def test_depth_tested_line_hides_behind_a_nearer_one(ctx: moderngl.Context, keep
     near_red, far_blue = [[-1, 0, -1], [1, 0, -1]], [[0, -1, 1], [0, 1, 1]]
     lines.set(np.array(near_red + far_blue), np.array([[1, 0, 0]] * 2 + [[0, 0, 1]] * 2))
     lines.draw(target, *camera.arguments, width_px=3.0, is_depth_tested=True)
-    np.testing.assert_allclose(target.read_color()[32, 32], [1, 0, 0, 1], atol=1e-3)
+    np.testing.assert_allclose(read_color(target)[32, 32], [1, 0, 0, 1], atol=1e-3)
     target.clear()
     lines.draw(target, *camera.arguments, width_px=3.0)
-    np.testing.assert_allclose(target.read_color()[32, 32], [0, 0, 1, 1], atol=1e-3)
+    np.testing.assert_allclose(read_color(target)[32, 32], [0, 0, 1, 1], atol=1e-3)
 
 
 @pytest.mark.gl
@@ -145,7 +146,7 @@ def test_opacity_and_vertex_alpha_multiply(ctx: moderngl.Context, keep: Keep) ->
     target, lines = keep(Target(ctx, (64, 64), precision="f4")), keep(LineRenderer(ctx))
     lines.set(np.array([[-9, 0, 0], [9, 0, 0]]), np.array([1.0, 0.5, 0.0, 0.5]))
     lines.draw(target, *centered_camera().arguments, width_px=3.0, opacity=0.5)
-    np.testing.assert_allclose(target.read_color()[32, 32], [0.25, 0.125, 0, 0.25], atol=1e-4)
+    np.testing.assert_allclose(read_color(target)[32, 32], [0.25, 0.125, 0, 0.25], atol=1e-4)
 
 
 @pytest.mark.gl
@@ -158,7 +159,7 @@ def test_set_replaces_counts_and_checks(ctx: moderngl.Context, keep: Keep) -> No
     assert lines.set(np.zeros((0, 3)), WHITE)
     assert len(lines) == 0
     lines.draw(target, *camera.arguments)
-    assert not target.read_color().any()
+    assert not read_color(target).any()
     with pytest.raises(ValueError, match=r"\[2 L, 3\]"):
         lines.set(np.zeros((3, 3)), WHITE)
 
@@ -170,7 +171,7 @@ def test_camera_sees_its_own_frustum_as_the_picture_border(ctx: moderngl.Context
     target, lines = keep(Target(ctx, (64, 48), precision="f4")), keep(LineRenderer(ctx))
     lines.set(*frusta_lines(rig.subset([1]), 0.5))
     lines.draw(target, rig.world_to_camera[1], rig.Ks[1], 64, 48, width_px=4.0)
-    alpha = target.read_color()[..., 3]
+    alpha = read_color(target)[..., 3]
     border = np.ones((48, 64), dtype=bool)
     border[1:-1, 1:-1] = False
     assert alpha[border].min() > 0.9

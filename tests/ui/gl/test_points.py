@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.ui.gl.keep import Keep
+from tests.ui.gl.pixels import read_color
 from tests.ui.gl.scenes import centered_camera, make_camera
 from ui.gl.points import INHERITED_ANCHOR_COLOR, RESIDUAL_ANCHOR_COLOR, PointRenderer, PointShape
 from ui.gl.targets import Target
@@ -24,7 +25,7 @@ def alpha_of_origin(ctx: moderngl.Context, keep: Keep, distance: float = 4.0, **
     target, points = keep(Target(ctx, (64, 64), precision="f4")), keep(PointRenderer(ctx))
     points.set(ORIGIN, WHITE)
     points.draw(target, *camera.arguments, **settings)
-    return target.read_color()[..., 3]
+    return read_color(target)[..., 3]
 
 
 @pytest.mark.parametrize(
@@ -68,7 +69,7 @@ def test_points_stand_where_the_camera_projects_them(
         target, points = keep(Target(ctx, (96, 72), precision="f4")), keep(PointRenderer(ctx))
         points.set(position[None], WHITE)
         points.draw(target, *camera.arguments, size=9.0)
-        alpha = target.read_color()[..., 3].astype(np.float64)
+        alpha = read_color(target)[..., 3].astype(np.float64)
         y, x = np.mgrid[0:72, 0:96] + 0.5
         center = np.array([(alpha * x).sum(), (alpha * y).sum()]) / alpha.sum()
         # Drivers place a sprite to a sixteenth of a pixel or better.
@@ -96,7 +97,7 @@ def test_depth_test_hides_farther_points_in_any_order(ctx: moderngl.Context, kee
         target, points = keep(Target(ctx, (64, 64), precision="f4")), keep(PointRenderer(ctx))
         points.set(positions[order], colors[order])
         points.draw(target, *camera.arguments, size=9.0, is_depth_tested=True)
-        picture = target.read_color()
+        picture = read_color(target)
         np.testing.assert_allclose(picture[32, 32], [1, 0, 0, 1], atol=1e-6)
         assert set(np.unique(picture[..., 3])) == {0.0, 1.0}, "edges are sharp"
 
@@ -105,7 +106,7 @@ def test_outline_darkens_the_rim_only(ctx: moderngl.Context, keep: Keep) -> None
     target, points = keep(Target(ctx, (64, 64), precision="f4")), keep(PointRenderer(ctx))
     points.set(ORIGIN, np.array(RESIDUAL_ANCHOR_COLOR))
     points.draw(target, *centered_camera().arguments, size=20.0, outline_px=2.0)
-    row = target.read_color()[32]
+    row = read_color(target)[32]
     np.testing.assert_allclose(row[32, :3], RESIDUAL_ANCHOR_COLOR[:3], atol=1e-6)
     assert row[23, :3].max() < 0.1
     assert row[23, 3] == pytest.approx(1.0)
@@ -117,12 +118,12 @@ def test_colours_are_per_point_or_for_all(ctx: moderngl.Context, keep: Keep) -> 
     places = [(32, 16), (32, 48)]
     points.set(positions, np.array([[1, 0, 0, 1.0], [0, 1, 0, 0.5]]))
     points.draw(target, *centered_camera().arguments, size=9.0, opacity=0.5)
-    picture = target.read_color()
+    picture = read_color(target)
     np.testing.assert_allclose([picture[p] for p in places], [[0.5, 0, 0, 0.5], [0, 0.25, 0, 0.25]], atol=1e-6)
     target.clear()
     points.set(positions, np.array(INHERITED_ANCHOR_COLOR))
     points.draw(target, *centered_camera().arguments, size=9.0)
-    picture = target.read_color()
+    picture = read_color(target)
     for place in places:
         assert np.round(255 * picture[place]).tolist() == [86, 180, 233, 255]
 
@@ -133,7 +134,7 @@ def test_points_before_the_near_plane_or_not_finite_are_not_drawn(ctx: moderngl.
     points.set(np.array([[0, 0, -1.0], [0, 0, 0.4], [np.nan, 0, 1], [np.inf, 0, 1]]), WHITE)
     assert len(points) == 2
     points.draw(target, *camera.arguments, 0.5, size=9.0)
-    assert not target.read_color().any()
+    assert not read_color(target).any()
 
 
 def test_set_replaces_and_checks(ctx: moderngl.Context, keep: Keep) -> None:
@@ -144,7 +145,7 @@ def test_set_replaces_and_checks(ctx: moderngl.Context, keep: Keep) -> None:
     assert len(points) == 7
     assert points.set(np.zeros((0, 3)), WHITE)
     points.draw(target, *camera.arguments)
-    assert not target.read_color().any()
+    assert not read_color(target).any()
     with pytest.raises(ValueError, match=r"\[N, 3\]"):
         points.set(np.zeros((4, 2)), WHITE)
     with pytest.raises(ValueError, match="broadcast"):

@@ -10,6 +10,7 @@ from app.playback.arrays import AnchorArrays
 from engine.gate.regions import sphere_region
 from engine.model.roles import ROLES
 from tests.ui.gl.keep import Keep
+from tests.ui.gl.pixels import read_color
 from tests.ui.gl.scenes import Camera, centered_camera
 from ui.gl.targets import Target
 from ui.style.colors import CHOSEN, REGION_COLORS
@@ -45,7 +46,7 @@ def drawn(
     target, layer = keep(Target(ctx, (SIZE, SIZE), precision="f4")), keep(RegionLayer(ctx))
     layer.take(shown, held, -camera.world_to_camera[:3, :3].T @ camera.world_to_camera[:3, 3])
     layer.draw(target, camera.arguments)
-    return target.read_color()[:, :, :3], layer
+    return read_color(target)[:, :, :3], layer
 
 
 def is_like(picture: np.ndarray, color: tuple[float, ...]) -> np.ndarray:
@@ -91,7 +92,7 @@ def test_what_is_gone_is_not_drawn_any_more(ctx: moderngl.Context, keep: Keep, c
     assert layer.take(ShownRegions(marked=(STATIC,), sphere=DYNAMIC), held, 2 * eye) != first
     assert layer.take(ShownRegions(), None, eye) != first
     layer.draw(target, camera.arguments)
-    assert target.read_color().max() == 0.0
+    assert read_color(target).max() == 0.0
     assert layer.counts == {}
 
 

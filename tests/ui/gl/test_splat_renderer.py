@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import moderngl
 import numpy as np
 import pytest
 
+from app.background.latest import LatestWorker
 from engine.conventions import ALPHA_MAX, ALPHA_MIN, EPS2D_PX2, TRANSMITTANCE_MIN
 from tests.ui.gl.keep import Keep
+from tests.ui.gl.pixels import read_color
 from tests.ui.gl.scenes import (
     FIELDS,
     Camera,
@@ -23,13 +26,24 @@ from tests.ui.gl.scenes import (
 )
 from ui.gl.camera import resized_K
 from ui.gl.splat_renderer import SPLATS_PER_ROW, SplatRenderer, pack_splats
-from ui.gl.splat_sorter import SplatSorter
 from ui.gl.targets import Precision, Target
 
 pytestmark = pytest.mark.gl
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 DEADLINE_S = 20.0
+
+
+def draw_until_sorted(renderer: SplatRenderer, target: Target, camera: Camera) -> None:
+    """Draw again and again, as a window does, until the order belongs to the camera."""
+    deadline = time.monotonic() + DEADLINE_S
+    while True:
+        target.clear()
+        renderer.draw(target, *camera.arguments)
+        if not renderer.is_order_stale:
+            return
+        assert time.monotonic() < deadline, "no order came"
+        time.sleep(0.005)
 
 
 def psnr_db(actual: np.ndarray, expected: np.ndarray) -> float:
@@ -50,7 +64,7 @@ def drawn(
     renderer = keep(SplatRenderer(ctx))
     renderer.upload(splats)
     renderer.draw(target, *camera.arguments, near)
-    return target.read_color()
+    return read_color(target)
 
 
 def needles(n: int) -> Splats:
@@ -165,14 +179,14 @@ def test_empty_upload_draws_nothing_and_a_later_one_does(ctx: moderngl.Context, 
     renderer.upload(make_splats(0))
     renderer.draw(target, *camera.arguments)
     assert len(renderer) == 0
-    assert not target.read_color().any()
+    assert not read_color(target).any()
     renderer.upload(ball((0, 0, 0), RED))
     renderer.draw(target, *camera.arguments)
-    assert target.read_color()[32, 32, 0] > 0.9
+    assert read_color(target)[32, 32, 0] > 0.9
     renderer.upload(make_splats(0))
     target.clear()
     renderer.draw(target, *camera.arguments)
-    assert not target.read_color().any()
+    assert not read_color(target).any()
 
 
 @pytest.mark.parametrize("name", ["means", "quats", "scales", "opacities", "colors"])
@@ -231,7 +245,7 @@ def test_growing_and_shrinking_uploads_reuse_the_renderer(ctx: moderngl.Context,
         renderer.upload(splats)
         target.clear()
         renderer.draw(target, *camera.arguments)
-        np.testing.assert_array_equal(target.read_color(), drawn(ctx, keep, splats, camera))
+        np.testing.assert_array_equal(read_color(target), drawn(ctx, keep, splats, camera))
 
 
 def test_same_key_uploads_once(ctx: moderngl.Context, keep: Keep) -> None:
@@ -264,7 +278,7 @@ def test_smaller_target_shows_the_same_view(ctx: moderngl.Context, keep: Keep) -
     renderer.upload(splats)
     renderer.draw(target, *camera.arguments)
     small = Camera(camera.world_to_camera, resized_K(camera.K, (96, 72), (48, 36)), 48, 36)
-    assert psnr_db(target.read_color(), rasterized(splats, small)) > 75.0
+    assert psnr_db(read_color(target), rasterized(splats, small)) > 75.0
 
 
 def test_draws_over_what_is_there(ctx: moderngl.Context, keep: Keep) -> None:
@@ -272,8 +286,8 @@ def test_draws_over_what_is_there(ctx: moderngl.Context, keep: Keep) -> None:
     target.framebuffer.clear(0.0, 0.5, 0.0, 1.0)
     renderer.upload(ball((0, 0, 0), RED, opacity=0.5))
     renderer.draw(target, *camera.arguments)
-    np.testing.assert_allclose(target.read_color()[32, 32], [0.5, 0.25, 0.0, 1.0], atol=1e-6)
-    np.testing.assert_allclose(target.read_color()[0, 0], [0.0, 0.5, 0.0, 1.0], atol=1e-6)
+    np.testing.assert_allclose(read_color(target)[32, 32], [0.5, 0.25, 0.0, 1.0], atol=1e-6)
+    np.testing.assert_allclose(read_color(target)[0, 0], [0.0, 0.5, 0.0, 1.0], atol=1e-6)
 
 
 def test_state_left_by_others_changes_nothing(ctx: moderngl.Context, keep: Keep) -> None:
@@ -300,14 +314,10 @@ def test_moved_camera_is_drawn_in_the_last_order_until_the_new_one_is_ready(ctx:
 
     renderer.draw(target, *front.arguments)
     assert not renderer.is_order_stale, "rows without any order are sorted at once"
-    assert target.read_color()[32, 32, 0] > 0.9
+    assert read_color(target)[32, 32, 0] > 0.9
 
-    renderer.draw(target, *behind.arguments)  # may or may not have been sorted in time
-    renderer.finish_sorting(DEADLINE_S)
-    target.clear()
-    renderer.draw(target, *behind.arguments)
-    assert not renderer.is_order_stale
-    assert target.read_color()[32, 32, 2] > 0.9
+    draw_until_sorted(renderer, target, behind)
+    assert read_color(target)[32, 32, 2] > 0.9
 
 
 def test_order_of_replaced_rows_is_never_used(
@@ -320,16 +330,15 @@ def test_order_of_replaced_rows_is_never_used(
     behind_viewer = ball((0, 0, -50), RED)
     renderer.upload(joined(behind_viewer, behind_viewer, ball((0, 0, 0), RED)))
     renderer.draw(target, *camera.arguments)
-    renderer.draw(target, *moved.arguments)
-    renderer.finish_sorting(DEADLINE_S)  # leaves an order without the rows 0 and 1
+    draw_until_sorted(renderer, target, moved)  # leaves an order without the rows 0 and 1
 
     renderer.upload(joined(ball((0, 0, -0.8), RED), ball((0, 0, 0.8), BLUE)))
-    monkeypatch.setattr(SplatSorter, "request", lambda *_: None)  # a thread that is late
+    monkeypatch.setattr(LatestWorker, "request", lambda *_: None)  # a thread that is late
     for view, is_stale in ((camera, False), (moved, True)):
         target.clear()
         renderer.draw(target, *view.arguments)
         assert renderer.is_order_stale is is_stale
-        assert target.read_color()[32, 32, 0] > 0.9
+        assert read_color(target)[32, 32, 0] > 0.9
 
 
 def test_release_frees_and_can_be_repeated(ctx: moderngl.Context) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.ui.gl.keep import Keep
+from tests.ui.gl.pixels import read_color, read_resolved
 from ui.gl.image import ImageTexture, Rect
 from ui.gl.targets import Precision, Target
 
@@ -16,8 +17,8 @@ pytestmark = pytest.mark.gl
 def test_new_target_is_empty(ctx: moderngl.Context, keep: Keep) -> None:
     target = keep(Target(ctx, (7, 5)))
     assert target.size == (7, 5)
-    assert target.read_color().shape == (5, 7, 4)
-    assert not target.read_color().any()
+    assert read_color(target).shape == (5, 7, 4)
+    assert not read_color(target).any()
     assert target.texture.size == (7, 5)
 
 
@@ -25,10 +26,10 @@ def test_resize_tells_whether_anything_changed_and_clears(ctx: moderngl.Context,
     target = keep(Target(ctx, (7, 5)))
     target.framebuffer.clear(1.0, 1.0, 1.0, 1.0)
     assert not target.resize(7, 5)
-    assert target.read_color().all()
+    assert read_color(target).all()
     assert target.resize(12, 9)
-    assert not target.read_color().any()
-    assert target.read_resolved().shape == (9, 12, 3)
+    assert not read_color(target).any()
+    assert read_resolved(target).shape == (9, 12, 3)
     assert target.framebuffer.size == (12, 9)
 
 
@@ -50,7 +51,7 @@ def test_resolve_puts_premultiplied_colour_over_the_background(
     target.framebuffer.clear(0.25, 0.0, 0.5, 0.5)
     target.resolve((0.0, 1.0, 0.5))
     # 0.25, 0.5 and 0.75 are exact in half floats; 255 times them is rounded to nearest.
-    assert np.unique(target.read_resolved().reshape(-1, 3), axis=0).tolist() == [[64, 128, 191]]
+    assert np.unique(read_resolved(target).reshape(-1, 3), axis=0).tolist() == [[64, 128, 191]]
 
 
 def test_resolve_without_background_keeps_straight_alpha(ctx: moderngl.Context, keep: Keep) -> None:
@@ -69,10 +70,10 @@ def test_picture_is_drawn_upright(ctx: moderngl.Context, keep: Keep, rng: np.ran
     image.set(picture)
     target = keep(Target(ctx, (7, 9), precision="f4"))
     target.draw_image(image)
-    np.testing.assert_allclose(target.read_color()[..., :3], picture / 255, atol=1e-6)
-    assert (target.read_color()[..., 3] == 1).all()
+    np.testing.assert_allclose(read_color(target)[..., :3], picture / 255, atol=1e-6)
+    assert (read_color(target)[..., 3] == 1).all()
     target.resolve()
-    np.testing.assert_array_equal(target.read_resolved(), picture)
+    np.testing.assert_array_equal(read_resolved(target), picture)
 
 
 def test_picture_fills_only_its_rectangle(ctx: moderngl.Context, keep: Keep) -> None:
@@ -82,7 +83,7 @@ def test_picture_fills_only_its_rectangle(ctx: moderngl.Context, keep: Keep) -> 
     target.draw_image(image, Rect(4, 2, 10, 12))
     expected = np.zeros((16, 20))
     expected[2:12, 4:10] = 1
-    np.testing.assert_array_equal(target.read_color()[..., 3], expected)
+    np.testing.assert_array_equal(read_color(target)[..., 3], expected)
 
 
 def test_released_target_can_be_released_again_and_gives_nothing_out(ctx: moderngl.Context) -> None:
@@ -101,6 +102,4 @@ def test_a_direct_target_shows_marks_over_its_background(ctx: moderngl.Context, 
     target.clear((0.2, 0.4, 0.6))
     target.use(moderngl.BLEND)
     assert target.resolve((1.0, 0.0, 0.0)) is target.texture  # nothing is left to do
-    np.testing.assert_array_equal(
-        target.read_resolved(), np.broadcast_to(np.array([51, 102, 153], np.uint8), (2, 4, 3))
-    )
+    np.testing.assert_array_equal(read_resolved(target), np.broadcast_to(np.array([51, 102, 153], np.uint8), (2, 4, 3)))

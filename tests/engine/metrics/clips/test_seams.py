@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from engine.metrics.clips.evaluate import Evaluation, evaluate_clip
+from engine.metrics.clips.evaluate import Evaluation
 from engine.metrics.clips.seams import STATIC_THRESHOLD, PairRow, part_means, seam_maps, summarize
 from engine.metrics.clips.summary import EvalRow
 from engine.metrics.clips.trained_clip import TrainedClip
@@ -300,13 +300,6 @@ def test_a_picture_that_is_not_finite_costs_its_figures_only(capture, monkeypatc
 def test_one_clip_by_itself_gives_the_same_rows(capture):
     models = [make_model(has_motion=True), make_model(has_motion=True, seed=1)]
     rows, _ = evaluate(capture, models)
-    alone = evaluate_clip(
-        capture,  # type: ignore[arg-type]
-        clips()[1],
-        models[1],
-        reference=reference(),
-        cameras=[0, 1],
-        holdout=[1],
-        metrics="quick",
-    )
+    evaluation = Evaluation(capture, cameras=[0, 1], holdout=[1], metrics="quick")
+    alone = evaluation.measure(TrainedClip(clips()[1], models[1], reference()))
     assert alone == [row for row in rows if row.clip_index == 1]

@@ -1,4 +1,4 @@
-"""A step that is no number says which part, where, and what to change."""
+"""A step that is not finite says which part, where, and what to change."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""ByteCache: the most recently used values, up to a number of bytes."""
+"""ByteCache: the values used last, up to a number of bytes."""
 
 from __future__ import annotations
 
@@ -12,10 +12,14 @@ Value = TypeVar("Value")
 
 
 class ByteCache(Generic[Key, Value]):
-    """Most recently used values up to a number of bytes. Safe to use from several threads."""
+    """Most recently used values. Safe to use from several threads.
+
+    Args:
+        max_bytes: Beyond it the values used longest ago go. The newest always stays, however large.
+    """
 
     def __init__(self, max_bytes: int) -> None:
-        self._max_bytes = max_bytes
+        self.max_bytes = max_bytes
         self._values: OrderedDict[Key, tuple[Value, int]] = OrderedDict()
         self._n_bytes = 0
         self._lock = threading.Lock()
@@ -37,12 +41,12 @@ class ByteCache(Generic[Key, Value]):
             return self._values[key][0]
 
     def put(self, key: Key, value: Value, n_bytes: int) -> None:
-        """Keep a value; the oldest ones go when there is no room. The newest always stays."""
+        """Keep a value of so many bytes."""
         with self._lock:
-            before = self._values.pop(key, None)
+            replaced = self._values.pop(key, None)
             self._values[key] = (value, n_bytes)
-            self._n_bytes += n_bytes - (0 if before is None else before[1])
-            while self._n_bytes > self._max_bytes and len(self._values) > 1:
+            self._n_bytes += n_bytes - (0 if replaced is None else replaced[1])
+            while self._n_bytes > self.max_bytes and len(self._values) > 1:
                 self._n_bytes -= self._values.popitem(last=False)[1][1]
 
     def drop(self, is_unwanted: Callable[[Key], bool]) -> None:
