@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from engine.camera.projection import to_camera, to_pixels
 from engine.gate.reasons import NO_REASON, USER_DYNAMIC, USER_STATIC, reason_text
 from engine.gate.regions import GateRegion, marked
 from engine.model.roles import ROLES
@@ -76,12 +77,10 @@ def nearest_under(
     positions: np.ndarray, world_to_camera: np.ndarray, K: np.ndarray, x: float, y: float, *, near: float
 ) -> int | None:
     """Row of the position under a pixel, see `AnchorMarks.at`. positions: [N, 3]"""
-    points = positions @ world_to_camera[:3, :3].T + world_to_camera[:3, 3]
-    depths = np.maximum(points[:, 2], 1e-9)
-    dx = K[0, 0] * points[:, 0] / depths + K[0, 2] - x
-    dy = K[1, 1] * points[:, 1] / depths + K[1, 2] - y
-    rows = np.flatnonzero((points[:, 2] > near) & (dx * dx + dy * dy <= REACH_PX**2))
-    return int(rows[np.argmin(depths[rows])]) if len(rows) else None
+    points = to_camera(positions, world_to_camera)
+    offsets = to_pixels(points, K) - (x, y)
+    rows = np.flatnonzero((points[:, 2] > near) & ((offsets * offsets).sum(axis=1) <= REACH_PX**2))
+    return int(rows[np.argmin(points[rows, 2])]) if len(rows) else None
 
 
 def anchor_marks(

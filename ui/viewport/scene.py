@@ -19,6 +19,7 @@ from app.playback.picture_source import PictureSource
 from app.playback.pointing import pixel_ray, seen_point
 from app.playback.timeline import Timeline
 from app.status import RegionsStatus, WantedFrame
+from engine.camera.projection import camera_center
 from ui.gl import (
     NEAR,
     ImageTexture,
@@ -80,7 +81,7 @@ class SceneView:
     @property
     def eye(self) -> np.ndarray:
         """Where from, scene units. [3]"""
-        return -self.world_to_camera[:3, :3].T @ self.world_to_camera[:3, 3]
+        return camera_center(self.world_to_camera)
 
     @property
     def key(self) -> Hashable:

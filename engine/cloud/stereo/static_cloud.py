@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from engine.camera.depth_range import MIN_POINTS, depth_ranges, focus_distances, near_plane
-from engine.camera.projection import is_in_picture, project, projection_matrices, unproject
+from engine.camera.projection import focal_px, is_in_picture, project, projection_matrices, unproject
 from engine.camera.rig import CameraRig
 from engine.cloud.background.gains import gain_spread, gains_from_observations, gains_from_pictures, scene_colors
 from engine.cloud.fusion import Samples, fuse_tiers, keep_inliers
@@ -322,7 +322,7 @@ def _sweep_all(
 
 def _median_footprint(maps: DepthMaps) -> float:
     """Scene units per working pixel at the median depth."""
-    focal = np.sqrt(maps.rig.Ks[:, 0, 0] * maps.rig.Ks[:, 1, 1])[:, None, None]
+    focal = focal_px(maps.rig.Ks)[:, None, None]
     return float(np.median(maps.depths / focal))
 
 
