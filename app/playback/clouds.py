@@ -19,6 +19,7 @@ from app.project.opened_project import OpenedProject
 from app.training.service import ShownState
 from engine.capture.capture import Capture
 from engine.clip_files.clip_state import read_clip_state
+from engine.errors import ProjectError
 
 logger = logging.getLogger(__name__)
 
@@ -98,11 +99,14 @@ def static_points(path: Path, revision: str) -> PointArrays:
     """The still part of a reference clip as a coloured cloud.
 
     Raises:
-        ProjectError: The file is missing or damaged.
+        ProjectError: The file is missing or damaged, or not of a reference clip.
     """
     state = read_clip_state(path)
-    points = state.arrays["sets.static.positions"].astype(np.float32, copy=False)
-    logits = state.arrays["sets.static.color_logits"].astype(np.float32, copy=False)
+    record = state.anchors.get("static")
+    if record is None or record.own is None:
+        raise ProjectError("The clip file holds no static anchors.", hint="Train the clip again.", path=path)
+    points = record.own.positions.astype(np.float32, copy=False)
+    logits = record.own.color_logits.astype(np.float32, copy=False)
     colors = 1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0)))
     spacing = point_spacing(points)
     key = ("cloud", str(path), revision)

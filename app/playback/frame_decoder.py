@@ -173,7 +173,7 @@ class FrameDecoder:
         reference = None if state.is_reference else self._read_reference(request.reference_path)
         model = load_clip_model(state, reference)
         anchors = _anchor_arrays(model.anchors(), identity)
-        loaded = LoadedClip(model, anchors, float(state.header["near_plane"]), state.header.get("step"))
+        loaded = LoadedClip(model, anchors, state.header.near_plane, state.header.step)
         if not self.worker.is_still_wanted:
             return loaded
         self._cache.drop(lambda key: key[2] == request.clip_index and key[3] != request.revision)

@@ -1,6 +1,6 @@
 """Anchors as marks: which of them are shown, in which colour, and which one lies under the pointer. No GL.
 
-Colour says what an anchor is (engine.model.roles), shape whether this clip learned it.
+Colour says what an anchor is (engine.clip_files.roles), shape whether this clip learned it.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.camera.projection import to_camera, to_pixels
+from engine.clip_files.roles import ROLES
 from engine.gate.reasons import NO_REASON, USER_DYNAMIC, USER_STATIC, reason_text
 from engine.gate.regions import GateRegion, marked
-from engine.model.roles import ROLES
 from ui.style.colors import ROLE_COLORS, Color
 from ui.viewport.region_tool import REGION_WORDS
 
@@ -36,7 +36,7 @@ class AnchorMarks:
     Attributes:
         positions: [N, 3]
         colors: [N, 4]
-        roles, reasons: Codes of engine.model.roles and engine.gate.reasons; None where unknown. [N] uint8
+        roles, reasons: Codes of engine.clip_files.roles and engine.gate.reasons; None where unknown. [N] uint8
         counts: Of all anchors, drawn or not, by role; empty where unknown.
     """
 

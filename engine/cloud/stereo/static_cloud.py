@@ -32,7 +32,7 @@ from engine.parallel import map_ordered
 Report = Callable[[str], None]
 
 WORKING_PIXELS = 160 * 90
-"""Depth maps of about this many pixels: at twice the size the cloud was no better (measured 2026-11 on a dome)."""
+"""Depth maps of about this many pixels; larger ones make the cloud no better."""
 PROBE_PIXELS = 80 * 45
 """Size of the first look that finds the depth range where there are no sparse points."""
 PROBE_RANGE = (0.3, 12.0)

@@ -7,12 +7,12 @@ with the pixels of a picture until they reach their limits. Good for a forecast,
 from __future__ import annotations
 
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.clip_files.clip_header import ClipHeader
 from engine.errors import PreparationError
 from engine.model.field_sizes import derive_log2_entries
 from engine.training.config import TrainConfig
@@ -87,25 +87,18 @@ class Counts:
     n_table_values: int
 
 
-def counts_of(header: Mapping[str, Any] | None) -> Counts | None:
+def counts_of(header: ClipHeader) -> Counts | None:
     """Counts in the header of a trained clip; None where it has none, as those of earlier versions."""
-    try:
-        assert header is not None
-        anchors, field = header["n_anchors"], header.get("field")
-        own = ("moving",) if header["role"] == "reference" else ("residual", "adapted")
-        return Counts(
-            n_static=int(anchors.get("static", 0)),
-            n_moving=sum(int(anchors.get(role, 0)) for role in own),
-            n_alive=int(header["n_alive"]),
-            n_table_values=0 if not field else _n_table_values(field),
-        )
-    except (AssertionError, KeyError, TypeError, ValueError, AttributeError):
+    if header.n_alive is None:
         return None
-
-
-def _n_table_values(field: Mapping[str, Any]) -> int:
-    n_tables = 1 if field.get("is_shared") else int(field["n_knots"])
-    return n_tables * len(field["cells"]) * int(field["n_entries"]) * int(field["channels"])
+    anchors, field = header.n_anchors, header.field
+    own = ("moving",) if header.role == "reference" else ("residual", "adapted")
+    return Counts(
+        n_static=anchors.get("static", 0),
+        n_moving=sum(anchors.get(role, 0) for role in own),
+        n_alive=header.n_alive,
+        n_table_values=0 if field is None else field.n_table_values,
+    )
 
 
 def expected_counts(

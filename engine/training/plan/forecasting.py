@@ -6,13 +6,13 @@ correction is a factor: the middle of measured over modelled. No torch, no clock
 
 from __future__ import annotations
 
-import math
 import statistics
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from engine.capture.clip import Clip
+from engine.clip_files.clip_header import ClipHeader
 from engine.training.config import TrainConfig
 from engine.training.plan.cost import ClipSizes, disk_mb, memory_mb, preparation_s, step_ms
 from engine.training.plan.expected_sizes import Counts, Footage, clip_sizes, counts_of, expected_counts
@@ -44,38 +44,31 @@ class MeasuredClip:
     disk_mb: float | None
 
 
-def measured_clip(header: Mapping[str, Any], *, disk_mb: float | None, uncounted_s: float = 0.0) -> MeasuredClip | None:
+def measured_clip(header: ClipHeader, *, disk_mb: float | None, uncounted_s: float = 0.0) -> MeasuredClip:
     """What a clip's file says.
 
     Args:
         header: Of the finished clip.
         disk_mb: Its size, 10^6 bytes.
         uncounted_s: Part of its preparation that does not come again, such as compiling.
-    Returns:
-        None for a header that is not a clip's.
     """
-    metrics = header.get("metrics")
-    metrics = metrics if isinstance(metrics, Mapping) else {}
-    prepared_s = _positive(metrics.get("preparation_s"))
-    try:
-        return MeasuredClip(
-            clip_index=int(header["clip_index"]),
-            is_source=header["role"] == "source" or "previous_fingerprint" in header,
-            n_frames=int(header["n_frames"]),
-            n_steps=int(header["step"]),
-            counts=counts_of(header),
-            preparation_s=None if prepared_s is None else max(prepared_s - uncounted_s, 0.1),
-            training_s=_positive(metrics.get("training_s")),
-            memory_mb=_positive(metrics.get("memory_mb")),
-            disk_mb=disk_mb,
-        )
-    except (KeyError, TypeError, ValueError):
-        return None
+    figures = header.figures
+    prepared_s = _positive(figures.preparation_s)
+    return MeasuredClip(
+        clip_index=header.clip_index,
+        is_source=header.role == "source" or header.previous_fingerprint is not None,
+        n_frames=header.n_frames,
+        n_steps=header.step,
+        counts=counts_of(header),
+        preparation_s=None if prepared_s is None else max(prepared_s - uncounted_s, 0.1),
+        training_s=_positive(figures.training_s),
+        memory_mb=_positive(figures.memory_mb),
+        disk_mb=disk_mb,
+    )
 
 
-def _positive(value: Any) -> float | None:
-    is_number = isinstance(value, int | float) and math.isfinite(value) and value > 0
-    return float(value) if is_number else None
+def _positive(value: float | None) -> float | None:
+    return value if value is not None and value > 0 else None
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,11 +7,12 @@ by how fast this machine computes a step of known size. No torch, no clock, no f
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from engine.capture.clip import Clip
+from engine.clip_files.clip_header import ClipHeader
 from engine.training.config import JOINT_RULE, SOURCE_RULE, STATIC_RULE, StepRule, TrainConfig
 from engine.training.plan.cost import checkpoint_mb
 from engine.training.plan.expected_sizes import Counts, Footage, clip_sizes, counts_of, expected_counts
@@ -135,7 +136,7 @@ def make_plan(
     config: TrainConfig,
     *,
     is_source: bool,
-    reference: Mapping[str, Any] | None = None,
+    reference: ClipHeader | None = None,
     history: Sequence[MeasuredClip] = (),
     machine: MachineSpeed = UNKNOWN_MACHINE,
     is_still: bool = False,
@@ -157,7 +158,7 @@ def make_plan(
     siblings = [
         known.counts for known in history if known.counts and known.counts.n_alive and known.is_source == is_source
     ]
-    known = counts_of(reference)
+    known = None if reference is None else counts_of(reference)
     counts = expected_counts(footage, clip, config, reference=known, siblings=siblings, is_source=is_source)
     if is_still:
         counts = Counts(counts.n_static, 0, 0, 0)
@@ -250,9 +251,9 @@ def _step_reason(given: int, passes: float, rule: StepRule, n_items: int, item: 
     return f"{rule.per_item} for each of {_plural(n_items, item)}{bound}"
 
 
-def _voxel_line(reference: Mapping[str, Any] | None, *, is_source: bool) -> PlanLine:
+def _voxel_line(reference: ClipHeader | None, *, is_source: bool) -> PlanLine:
     """The grid on which what moves is carved."""
-    known = None if reference is None else reference.get("moving_spacing")
+    known = None if reference is None else reference.moving_spacing
     if is_source and isinstance(known, int | float):
         return PlanLine("voxel", float(known), "units", "the reference clip's: the same place gives the same anchors")
     if is_source:

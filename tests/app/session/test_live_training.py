@@ -78,7 +78,7 @@ def test_clips_are_trained_one_after_the_other_and_the_user_hears_of_it(desk: De
     assert desk.notices[-1].title == "Every clip is trained"
     state = desk.training.state_of(1)
     assert state is not None
-    assert read_clip_state(state.file).header["step"] == N_STEPS
+    assert read_clip_state(state.file).header.step == N_STEPS
 
 
 def test_a_finished_clip_is_trained_again_only_when_that_is_confirmed(desk: Desk, make_opened):
@@ -157,7 +157,7 @@ def test_another_project_ends_the_training_on_a_thread_and_keeps_it(slow_desk: D
     assert training.clip_states()[0].state == "untrained"
     slow_desk.poll_until(lambda: not training.is_ending)
     again = open_project(tmp_path / "a")  # the lock was given back
-    assert read_clip_state(again.checkpoint_path(0)).header["step"] >= 2
+    assert read_clip_state(again.checkpoint_path(0)).header.step >= 2
     again.close()
 
 

@@ -46,7 +46,7 @@ def test_it_stores_a_few_kilobytes_and_can_be_seen(still, tiny, tmp_path):
     assert counts is not None
     assert (counts.n_moving, counts.n_alive, counts.n_table_values) == (0, 0, 0)
     model = load_clip_model(state, tiny.reference)
-    static_alone = tiny.reference.header["n_anchors"]["static"] * model.decoder.gaussians_per_anchor
+    static_alone = tiny.reference.header.n_anchors["static"] * model.decoder.gaussians_per_anchor
     assert len(model.decode(0.0)) == static_alone  # inherited moving anchors are there and switched off
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import subprocess
 import sys
 
@@ -13,12 +12,14 @@ import pytest
 from engine.assets import asset_path
 from engine.capture.capture import open_capture
 from engine.capture.clip import Clip
+from engine.clip_files.clip_header import ClipHeader
 from engine.errors import PreparationError
 from engine.training.config import TrainConfig
 from engine.training.plan.expected_sizes import Counts, Footage, counts_of, footage_of
 from engine.training.plan.forecasting import MachineSpeed, MeasuredClip, measured_clip
 from engine.training.plan.plan import make_plan
 from engine.training.presets import preset
+from tests.clip_headers import make_header
 
 SAMPLE = Footage(width=320, height=240, n_cameras=18, n_held_out=2, n_frames=30)
 BASKETBALL = Footage(width=640, height=360, n_cameras=27, n_held_out=4, n_frames=40)
@@ -26,33 +27,37 @@ CLIP = Clip(clip_index=0, start=0, n_frames=10, clip_length=10)
 NEXT = Clip(clip_index=1, start=10, n_frames=10, clip_length=10)
 
 
-def header(**changes) -> dict:
+FIELD = {
+    "n_knots": 10,
+    "cells": [8, 13, 20, 33, 52, 84, 134],
+    "n_entries": 65536,
+    "channels": 4,
+    "hidden": 64,
+    "feature_dim": 16,
+    "bounds_min": [0.0, 0.0, 0.0],
+    "side": 1.0,
+    "is_shared": True,
+}
+
+
+def header(**changes) -> ClipHeader:
     """Of a trained reference clip of the basketball."""
     found = {
-        "role": "reference",
-        "clip_index": 0,
         "n_frames": 10,
         "step": 6210,
         "n_anchors": {"static": 20621, "moving": 26923},
         "n_alive": 7235,
         "moving_spacing": 0.02855,
-        "field": {
-            "is_shared": True,
-            "n_knots": 10,
-            "cells": [8, 13, 20, 33, 52, 84, 134],
-            "n_entries": 65536,
-            "channels": 4,
-        },
+        "field": FIELD,
+        "reference_fingerprint": "clip",
         "metrics": {"preparation_s": 24.3, "training_s": 175.2, "memory_mb": 1400.0},
     }
-    return found | changes
+    return make_header(**found | changes)
 
 
 def measured(**changes) -> MeasuredClip:
     """The same clip as history."""
-    found = measured_clip(header(**changes), disk_mb=2.36, uncounted_s=2.5)
-    assert found is not None
-    return found
+    return measured_clip(header(**changes), disk_mb=2.36, uncounted_s=2.5)
 
 
 def plan(footage=BASKETBALL, clip=CLIP, *, is_source=False, config=None, **arguments):
@@ -129,7 +134,7 @@ def test_a_still_clip_before_says_nothing_of_one_in_which_something_may_move():
         "field": None,
         "n_anchors": {"static": 20621, "moving": 26923},
     }
-    still = measured_clip(header(clip_index=1, **nothing) | {"metrics": {}}, disk_mb=0.001, uncounted_s=0.0)
+    still = measured_clip(header(clip_index=1, **nothing, metrics={}), disk_mb=0.001, uncounted_s=0.0)
     assert still is not None
     later = dataclasses.replace(NEXT, clip_index=2, start=20)
     arguments = {"clip": later, "is_source": True, "reference": header()}
@@ -248,14 +253,14 @@ TRAINED = [
 
 @pytest.mark.parametrize(("footage", "trained", "took"), TRAINED)
 def test_forecasts_without_any_clip_lie_within_a_factor_of_one_and_a_half(footage, trained, took):
-    is_source = trained["role"] == "source"
+    is_source = trained.role == "source"
     config = TrainConfig() if footage is BASKETBALL else TrainConfig(passes=8)
-    clip = dataclasses.replace(CLIP, clip_index=trained["clip_index"])
+    clip = dataclasses.replace(CLIP, clip_index=trained.clip_index)
     reference = None
     if is_source:
         reference = TRAINED[0 if footage is BASKETBALL else 3][1]
     found = plan(footage, clip, is_source=is_source, config=config, reference=reference)
-    assert found.n_steps == trained["step"]
+    assert found.n_steps == trained.step
     for line, measured_value in zip(found.forecast, took, strict=True):
         if measured_value is not None:
             assert 1 / 1.5 < line.value / measured_value < 1.5, line
@@ -310,9 +315,8 @@ def test_the_machine_counts_where_no_clip_does():
 # ---------------------------------------------------------------- bad input
 
 
-@pytest.mark.parametrize("bad", [None, {}, {"role": "reference"}, header(n_anchors=3), header(n_alive="many")])
-def test_headers_without_counts_are_no_counts(bad):
-    assert counts_of(bad) is None
+def test_a_header_of_an_earlier_version_has_no_counts():
+    assert counts_of(header(n_alive=None)) is None
 
 
 def test_counts_of_a_header():
@@ -320,12 +324,11 @@ def test_counts_of_a_header():
     assert counts_of(header(field=None)) == Counts(20621, 26923, 7235, 0)
 
 
-@pytest.mark.parametrize("value", [None, "soon", -1.0, math.nan, math.inf, 0])
+@pytest.mark.parametrize("value", [None, -1.0, 0])
 def test_times_that_are_none_are_not_used(value):
     known = measured(metrics={"training_s": value, "preparation_s": value})
     assert (known.training_s, known.preparation_s) == (None, None)
-    assert measured(metrics=["nonsense"]).memory_mb is None
-    assert measured_clip({"role": "source"}, disk_mb=None) is None
+    assert measured(metrics=None).memory_mb is None
 
 
 def test_a_capture_without_enough_cameras_is_refused():
