@@ -1,14 +1,18 @@
-# Two commands matter: `make run` and `make test`. Both make the environment first; see setup.sh.
+# Three commands matter: `make run`, `make check` while working, `make test` before handing in. All of them make the
+# environment first; see setup.sh.
 # The other targets are parts of them, for daily work.
 
 VENV := .venv
 BIN := $(VENV)/bin
 SAMPLE := assets/sample
 SETUP_FLAGS :=
+WORKERS := 2
+# Files as a whole, so that what a file builds for its tests is built once; in the order of tests/conftest.py.
+PYTEST := $(BIN)/python -m pytest --numprocesses=$(WORKERS) --dist=loadfile --no-loadscope-reorder
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run test lint types fmt bench faults docs golden clean
+.PHONY: help setup run check test coverage lint types fmt bench faults docs golden clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /  make \1	/p' Makefile | expand -t 16
@@ -19,9 +23,17 @@ setup: ## make .venv from requirements.lock, add missing system libraries
 run: setup ## start on the sample capture: the window, or the same job headless where there is no display
 	@$(BIN)/clipgstream $(SAMPLE)
 
+check: setup lint ## linters, types, import contracts and the fast tests
+	@$(BIN)/pyright --pythonpath $(BIN)/python & types=$$!; \
+	$(PYTEST) --quiet -m "not slow and not e2e"; tests=$$?; \
+	wait $$types && exit $$tests
+
 test: SETUP_FLAGS := --tests
-test: setup lint types ## everything CI runs: linters, types, import contracts, tests
-	@$(BIN)/python -m pytest --durations=15
+test: setup lint types ## everything CI runs: linters, types, import contracts, all tests
+	@$(PYTEST) --durations=15
+
+coverage: setup ## branches of engine and app that tests take; compiled kernels and child processes are not seen
+	@$(PYTEST) --quiet --cov=engine --cov=app --cov-branch --cov-report=term:skip-covered --cov-report=html:out/coverage
 
 lint: setup ## ruff (rules and format) and the import contracts
 	@$(BIN)/ruff check .

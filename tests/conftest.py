@@ -3,20 +3,35 @@
 import os
 import random
 import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.built_once import BuiltOnce
+
 SEED = 20_240
 TORCH_THREADS = 2  # what the smallest machine has; more would make sums, and so results, depend on the machine
 
 
-def pytest_configure() -> None:
+def pytest_configure(config: pytest.Config) -> None:
     from engine.kernels.cache import use_kernel_cache
 
     use_kernel_cache()  # as the program's main functions do; before any test imports kernels
     os.environ.setdefault("NUMBA_THREADING_LAYER", "omp")  # the layer the program uses; set before numba is imported
+    if config.getoption("numprocesses", None):  # the process that starts workers, which would all compile the same
+        from engine.kernels.compile_ahead import compile_all
+
+        compile_all()
+        os.environ.setdefault("GOMP_SPINCOUNT", "0")  # a thread that waits leaves its core to the other worker
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """In a worker, files with the most slow tests come first: one that comes last leaves the other workers waiting."""
+    if hasattr(config, "workerinput"):
+        n_slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+        items.sort(key=lambda item: -n_slow[item.path])
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -25,6 +40,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         default=False,
         help="write the golden pictures anew instead of comparing with them; look at each before committing it",
+    )
+    parser.addoption(
+        "--no-fixture-cache",
+        action="store_true",
+        default=False,
+        help="train the clips that tests look at anew instead of taking those of an earlier run",
     )
 
 
@@ -52,14 +73,26 @@ def rng() -> np.random.Generator:
 
 
 @pytest.fixture(scope="session")
-def tiny_capture(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder of a small capture in the layout of the shipped sample, made once per session by our own generator.
+def built_once(request: pytest.FixtureRequest) -> BuiltOnce:
+    """Keeps what takes seconds to build; see tests.built_once."""
+    cache = request.config.cache
+    return BuiltOnce(
+        None if cache is None or request.config.getoption("--no-fixture-cache") else cache.mkdir("built-once")
+    )
+
+
+@pytest.fixture(scope="session")
+def tiny_capture(tmp_path_factory: pytest.TempPathFactory, built_once: BuiltOnce) -> Path:
+    """Folder of a small capture in the layout of the shipped sample, made by our own generator.
 
     Eight cameras of 96x72, two clips of five frames; the second clip has the object that appears. Takes a few seconds.
     """
     pytest.importorskip("open3d", reason="the generator needs Open3D and its system libraries", exc_type=ImportError)
     from engine.synthetic import write_capture
 
-    folder = tmp_path_factory.mktemp("tiny_capture")
-    write_capture(folder, size=(96, 72), n_cameras=8, n_frames=10, clip_length=5, supersampling=2)
-    return folder
+    def build(folder: Path) -> None:
+        write_capture(folder, size=(96, 72), n_cameras=8, n_frames=10, clip_length=5, supersampling=2)
+
+    return built_once.copy(
+        "tiny_capture", tmp_path_factory.mktemp("tiny_capture"), build, sources=["tests/conftest.py"]
+    )

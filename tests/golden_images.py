@@ -48,7 +48,7 @@ def compare_images(actual: np.ndarray, expected: np.ndarray, *, tolerance: int =
     """Compare two pictures [H, W, 3] uint8 pixel by pixel.
 
     Raises:
-        AssertionError: They differ in size, or the actual one is no such picture.
+        AssertionError: They differ in size, or the actual one is not such a picture.
     """
     assert actual.dtype == np.uint8, f"a golden picture is uint8, got {actual.dtype}"
     assert actual.shape == expected.shape, f"the picture is {actual.shape}, the golden one {expected.shape}"

@@ -20,7 +20,7 @@ COMPILING = "Compiling kernels, first start only"
 
 
 def warm_cache() -> None:
-    """Compile what is not in the cache yet. Blocks until it is done; failing is no failure."""
+    """Compile what is not in the cache yet. Blocks until it is done; a failure is logged and otherwise ignored."""
     try:
         compile_all()
     except OSError as error:

@@ -60,7 +60,8 @@ class PlainParser(argparse.ArgumentParser):
 def parse(parser: PlainParser, argv: Sequence[str] | None) -> argparse.Namespace:
     """Arguments after the program's name (those of the process when None) as options.
 
-    What is left over is said with the help of the subcommand it was meant for. Raises SystemExit as argparse does.
+    Arguments left over are reported with the help of the subcommand they were meant for. Raises SystemExit as
+    argparse does.
     """
     options, unknown = parser.parse_known_args(argv)
     if unknown:
@@ -89,7 +90,7 @@ def add_figure_choices(command: argparse.ArgumentParser, *, default: str | None,
 
 
 def path_argument(text: str) -> Path:
-    """A path of the command line; what cannot be one is said at once, with exit code 2, whatever it is for."""
+    """A path of the command line; text that cannot be a path is refused at once with exit code 2."""
     if not text.strip():
         raise argparse.ArgumentTypeError("it is empty; name a folder")
     try:
@@ -156,7 +157,7 @@ def parse_range(text: str, n: int, *, option: str, what: str) -> range:
 
 
 def parse_cameras(text: str, capture: Capture) -> tuple[str, ...]:
-    """Camera names separated by commas; numbers that are no names count cameras from 0. "none" is an empty choice.
+    """Camera names separated by commas; numbers that are not names count cameras from 0. "none" is an empty choice.
 
     Raises:
         ProjectError: There is no such camera.

@@ -74,7 +74,7 @@ class KeptFigures:
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """Write what is added inside the block. Where that cannot be done, it is said and the work goes on."""
+        """Write what is added inside the block. Where that fails, the reason is reported and the work goes on."""
         with contextlib.ExitStack() as stack:
             try:
                 if not self._is_of_this_clip:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class PictureSource:
-    """A frame, the state of the clip it was made from, and where it is seen from. None and "" where nobody knows, or
+    """A frame, the state of the clip it was made from, and where it is seen from. None and "" where unknown, or
     where it has no meaning: a captured picture belongs to no state of a clip.
 
     Attributes:

@@ -25,7 +25,7 @@ COMPONENTS = (
 inherited anchors too, and what the gate decided."""
 OTHER = "other arrays"
 HEADER = "header"
-"""Names, shapes, settings and figures: all that is no array."""
+"""Names, shapes, settings and figures: everything that is not an array."""
 COMPONENT_NAMES = (*dict.fromkeys(name for name, _, _ in COMPONENTS), OTHER, HEADER)
 
 

@@ -173,7 +173,7 @@ class Project:
         """Where the user overrules the gate; later ones overrule earlier ones. Clips trained from now on heed them.
 
         Raises:
-            ProjectError: The file is damaged or holds something that is no region.
+            ProjectError: The file is damaged or holds something that is not a region.
         """
         return read_regions(self.folder / GATE_FILE)
 
@@ -322,7 +322,7 @@ def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
     """Open an existing project folder; for writing it is locked, and left-over snapshots are swept.
 
     Raises:
-        ProjectError: The folder is no project, is damaged, of a newer schema, or open for writing elsewhere.
+        ProjectError: The folder is not a project, is damaged, of a newer schema, or open for writing elsewhere.
     """
     folder = Path(folder)
     settings = read_settings(folder)

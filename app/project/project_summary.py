@@ -27,7 +27,7 @@ def describe_project(folder: Path) -> dict[str, Any]:
         of all others: what video costs once the reference is there. None where there are none, or where the frame
         rate is not known.
     Raises:
-        ProjectError: It is no project, nothing is trained yet, or none of what is trained can be read.
+        ProjectError: It is not a project, nothing is trained yet, or none of what is trained can be read.
     """
     facts = read_facts(folder, folder.name, leave_out_damaged=True)
     try:

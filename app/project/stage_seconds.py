@@ -8,7 +8,7 @@ from typing import Any
 
 
 def stages_of(row: Mapping[str, Any]) -> dict[str, float]:
-    """The stages_s of a document or metrics row; empty where there are none or they are no numbers."""
+    """The stages_s of a document or metrics row; empty where there are none or they are not numbers."""
     found = row.get("stages_s")
     if not isinstance(found, dict):
         return {}

@@ -113,7 +113,7 @@ class Marking:
         """Mark a sphere.
 
         Raises:
-            ProjectError: It is no sphere, or nothing can be marked now.
+            ProjectError: It is not a sphere, or nothing can be marked now.
         """
         self._change(after_marking(self._regions, [sphere_region(treat, center, radius)]))
 

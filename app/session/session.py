@@ -171,7 +171,7 @@ class Session:
         """Carry out a command. What the user could have known better becomes a notice.
 
         Raises:
-            TypeError: The object is no command.
+            TypeError: The object is not a command.
         """
         try:
             self._obey(command)
@@ -325,7 +325,7 @@ class Session:
         self._jobs.start("Opening", work, take, failed)
 
     def _take_opened(self, opened: Opened) -> None:
-        for notice in self._refusals:  # something is open now; why something else was not is no news any more
+        for notice in self._refusals:  # something is open now; why something else was not no longer matters
             self.notices.withdraw(notice)
         self._refusals.clear()
         if opened.choices:

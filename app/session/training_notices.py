@@ -1,4 +1,4 @@
-"""What the user is told of a background training: its events as notices."""
+"""Notices to the user about a background training, made of its events."""
 
 from __future__ import annotations
 

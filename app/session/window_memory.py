@@ -39,7 +39,7 @@ class WindowMemory:
         is_maximized: Whether it filled the screen.
         ui_scale: Chosen scale of the interface; None follows the screen.
         layout: Where the panels are, as text of ImGui's; empty before the first time.
-        mark_size, mark_opacity: Of anchor marks; None where nobody chose.
+        mark_size, mark_opacity: Of anchor marks; None where none was chosen.
         views: By project folder, the one used last at the end; see `view_of` and `show_again`.
     """
 

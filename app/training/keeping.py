@@ -13,7 +13,7 @@ from engine.errors import ProjectError, TrainingError
 RETRY_AFTER_S = (1.0, 2.0, 4.0, 10.0)
 """Waits between attempts to write a finished clip; the last one repeats."""
 PATIENCE_S = 7.0
-"""For so long a finished clip is tried again where nobody looks on and a checkpoint holds all of it."""
+"""For so long a finished clip is tried again where no user is waiting and a checkpoint holds all of it."""
 PATIENCE_UNKEPT_S = 60.0
 """Likewise, where it exists in memory only."""
 

@@ -221,7 +221,7 @@ def decode(data: bytes) -> Message:
     """Inverse of `encode`.
 
     Raises:
-        ValueError: The bytes are no message of this version.
+        ValueError: The bytes are not a message of this version.
     """
     try:
         name, values = json.loads(data)

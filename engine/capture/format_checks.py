@@ -209,7 +209,7 @@ def check_image_size(name: str, found: tuple[int, int], calibrated: tuple[int, i
 
 
 def check_image_header(name: str, header: ImageHeader, calibrated: tuple[int, int], path: Path) -> list[CaptureError]:
-    """As `check_image_size`; of a picture that EXIF lays on its side, this is said as the likely cause."""
+    """As `check_image_size`; of a picture that EXIF lays on its side, the text names that as the likely cause."""
     problems = check_image_size(name, header.size, calibrated, path)
     if problems and header.orientation > 4 and header.size[::-1] == calibrated:
         text = f"{problems[0].message} An EXIF entry turns them for display; pictures are read as they are stored."

@@ -97,7 +97,7 @@ def decode_array(payload: np.ndarray, spec: dict[str, Any]) -> np.ndarray:
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise CodingError(f"the description is incomplete ({error})") from error
     if min((*shape, n_bytes)) < 0 or max(n_values * dtype.itemsize, n_bytes) > MAX_BYTES:
-        raise CodingError(f"shape {shape} of {dtype} in {n_bytes} bytes is no array of a clip")
+        raise CodingError(f"shape {shape} of {dtype} in {n_bytes} bytes is not an array of a clip")
     try:
         unpacker = lzma.LZMADecompressor(format=lzma.FORMAT_RAW, filters=_FILTERS)
         raw = unpacker.decompress(np.ascontiguousarray(payload, np.uint8).tobytes(), max_length=n_bytes + 1)
@@ -236,7 +236,7 @@ def _grouped(array: np.ndarray) -> np.ndarray:
 def _pack_lattice(array: np.ndarray, *, spacing: float) -> Packed:
     _need_float(array)
     if array.ndim != 2 or not spacing > 0:
-        raise CodingError(f"shape {array.shape} with spacing {spacing} is no set of positions")
+        raise CodingError(f"shape {array.shape} with spacing {spacing} is not a set of positions")
     positions = array.astype(np.float64)
     origin = positions[0] if len(positions) else np.zeros(array.shape[1])
     spacing = _fitted_spacing(positions - origin, spacing)
@@ -282,7 +282,7 @@ def _planes(array: np.ndarray) -> bytes:
 
 def _from_planes(raw: bytes, dtype: np.dtype) -> np.ndarray:
     if len(raw) % dtype.itemsize:
-        raise CodingError(f"{len(raw)} bytes are no whole number of {dtype}")
+        raise CodingError(f"{len(raw)} bytes are not a whole number of {dtype}")
     planes = np.frombuffer(raw, np.uint8).reshape(dtype.itemsize, len(raw) // dtype.itemsize)
     return np.ascontiguousarray(planes.T).reshape(-1).view(dtype)
 

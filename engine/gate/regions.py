@@ -56,7 +56,7 @@ def parse_region(values: Any) -> GateRegion:
     """A region from what JSON gives.
 
     Raises:
-        ProjectError: It is no region; says what is wrong.
+        ProjectError: It is not a region; says what is wrong.
     """
     hint = 'Write {"treat": "static" or "dynamic", "box": [corner, corner]}, or "sphere": [centre, radius].'
     shapes = set(values) - {"treat"} if isinstance(values, dict) else set()

@@ -213,7 +213,7 @@ def read_marker(folder: Path) -> CacheKey | None:
 
 
 def write_marker(folder: Path) -> None:
-    """Say that everything is compiled, and remove the oldest folders of other keys. Failing is no failure."""
+    """Say that everything is compiled, and remove the oldest folders of other keys. A failure to do so is ignored."""
     import json
 
     key = current_key()
@@ -234,7 +234,7 @@ def keyed_folders(root: Path) -> list[Path]:
 
 
 def prune(root: Path, *, keep: Path) -> None:
-    """Remove all but the newest folders of kernels; `keep` stays whatever its age. Failing is no failure."""
+    """Remove all but the newest folders of kernels; `keep` stays whatever its age. A failure is ignored."""
     import shutil
 
     others = [path for path in keyed_folders(root) if path != keep]

@@ -69,7 +69,7 @@ def pinhole_views(viewmats: Tensor, Ks: Tensor, width: int, height: int, near_pl
     """One PinholeView per row of `viewmats` [C, 4, 4] and `Ks` [C, 3, 3].
 
     Raises:
-        TypeError: No tensor, or one without numbers (device meta); a size that is no whole number.
+        TypeError: No tensor, or one without numbers (device meta); a size that is not a whole number.
         ValueError: A wrong shape, a number that is not finite, a pose with another bottom row than 0 0 0 1 or without
             an inverse, a focal length <= 0, skew, an empty image or a near plane <= 0. The message names the argument.
     """

@@ -79,7 +79,7 @@ def read_arrays(path: Path | str, entries: Collection[str]) -> tuple[dict[str, n
     Args:
         entries: Names that its texts may have; another one is damage.
     Raises:
-        OSError: The file is missing, cannot be read, or is no regular file.
+        OSError: The file is missing, cannot be read, or is not a regular file.
         ArraysError: It is damaged, or something else.
     """
     arrays, metadata, _ = _read(path, entries, with_arrays=True)

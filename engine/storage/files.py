@@ -112,7 +112,7 @@ def open_regular(path: Path | str) -> BinaryIO:
     """Open a regular file for reading bytes; a pipe or a device, which would block or never end, is refused.
 
     Raises:
-        OSError: It is missing, cannot be read or is no regular file. `strerror` says which, in words.
+        OSError: It is missing, cannot be read or is not a regular file. `strerror` says which, in words.
     """
     try:
         # without O_NONBLOCK, opening a pipe waits for its writer

@@ -140,8 +140,8 @@ def read_json_object(path: Path | str, *, max_bytes: int = MAX_JSON_BYTES) -> di
     """Read a file that holds one JSON object.
 
     Raises:
-        OSError: It cannot be read, is no regular file, or larger than `max_bytes`; see engine.storage.files.read_bytes.
-        JsonError: See `parse_object`.
+        OSError: It cannot be read, is not a regular file, or larger than `max_bytes`; see
+        engine.storage.files.read_bytes. JsonError: See `parse_object`.
     """
     return parse_object(read_bytes(path, max_bytes=max_bytes))
 

@@ -1,4 +1,4 @@
-"""The synthetic sample capture: a textured room that Open3D ray-casts, so that its truth is no Gaussian.
+"""The synthetic sample capture: a textured room that Open3D ray-casts, so that its truth is not made of Gaussians.
 
 `python -m engine.synthetic --out assets/sample` regenerates what the project ships. Tests call `write_capture` with
 small sizes. Ground truth: `make_truth` (depth, object and motion masks) and `SceneCamera` (pictures, coverage).

@@ -370,7 +370,7 @@ class ClipTraining:
             self._preparation.keep_backgrounds(self.backgrounds)
         state = self.state()
         self._trained = self.model, self._reasons
-        # another clip's field may show this one where fields go on: what it would show nobody knows yet
+        # another clip's field may show this one where fields go on: what it would show is not known yet
         if self.config.gate == "images" and self.config.field != "continue":
             state, said = demote(state, self.reference, self._training_views, reach=self._reach)
             self._say("Leaving out what is not needed", said)

@@ -16,6 +16,7 @@ from app.session.settings import Settings
 from engine.assets import asset_path
 from engine.capture.capture import open_capture
 from tests.app.conftest import poll_until
+from tests.built_once import BuiltOnce
 
 SETTINGS = (
     "max_static_points=1500",
@@ -27,19 +28,23 @@ SETTINGS = (
 )
 SCALE = 0.25
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
-def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def trained(tmp_path_factory: pytest.TempPathFactory, built_once: BuiltOnce) -> Path:
     """A project with clips 0 and 1 of the sample, trained for a few steps."""
-    folder = tmp_path_factory.mktemp("project") / "p"
-    arguments = ["train", str(asset_path("sample")), "--project", str(folder), "--scale", str(SCALE), "--clips", "0:2"]
-    for assignment in SETTINGS:
-        arguments += ["--set", assignment]
-    assert main([*arguments, "--quiet"]) == 0
-    return folder
+
+    def train(folder: Path) -> None:
+        arguments = ["train", str(asset_path("sample")), "--project", str(folder / "p"), "--scale", str(SCALE)]
+        for assignment in SETTINGS:
+            arguments += ["--set", assignment]
+        assert main([*arguments, "--clips", "0:2", "--quiet"]) == 0
+
+    folder = tmp_path_factory.mktemp("project")
+    return built_once.copy("project", folder, train, sources=["app", "tests/app/test_real_training.py"]) / "p"
 
 
-@pytest.mark.slow
 def test_eval_has_one_row_per_clip_frame_and_camera(trained, tmp_path):
     out = tmp_path / "rows.json"
     assert main(["eval", str(trained), "--json", str(out), "--clips", "1", "--quiet"]) == 0
@@ -74,7 +79,6 @@ def test_eval_has_one_row_per_clip_frame_and_camera(trained, tmp_path):
     assert worst["psnr"] == min(row["psnr"] for row in held_out)
 
 
-@pytest.mark.slow
 def test_eval_of_neighbouring_clips_measures_the_seam_between_them(trained, tmp_path, capsys):
     out = tmp_path / "rows.json"
     assert main(["eval", str(trained), "--json", str(out), "--metrics", "quick", "--precision", "8bit"]) == 0
@@ -98,7 +102,6 @@ def test_eval_of_neighbouring_clips_measures_the_seam_between_them(trained, tmp_
         boundary_maps(opened, clip_index=0, camera_index=3)
 
 
-@pytest.mark.slow
 def test_render_shows_features_apart(trained, tmp_path):
     pictures = {}
     for features in ("both", "static", "dynamic"):
@@ -108,7 +111,6 @@ def test_render_shows_features_apart(trained, tmp_path):
     assert len(set(pictures.values())) == 3
 
 
-@pytest.mark.slow
 def test_render_follows_the_camera_across_clips(trained, tmp_path):
     arguments = ["render", str(trained), "--camera", "cam03", "--frames", "8:12", "--quiet"]
     assert main([*arguments, "--out", str(tmp_path / "v.mp4")]) == 0
@@ -117,7 +119,6 @@ def test_render_follows_the_camera_across_clips(trained, tmp_path):
     assert sorted(path.name for path in (tmp_path / "frames").iterdir()) == [f"frame_{i:06d}.png" for i in range(8, 12)]
 
 
-@pytest.mark.slow
 def test_the_session_shows_what_was_trained(trained, tmp_path):
     session = Session(settings=Settings(tmp_path / "settings.json"), is_preloading=False)
     try:

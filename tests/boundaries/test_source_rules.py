@@ -41,6 +41,15 @@ BANNED_ATTRIBUTES = {("torch", "save"), ("torch", "load"), ("os", "system"), ("o
 
 # Home folders of people, the temporary folder, drive letters: text that works on one machine only.
 MACHINE_PATH = re.compile(r"(?<![\w./~*-])(?:/(?:home|Users|root|tmp|work|mnt|media|scratch)/[\w.]|[A-Z]:\\\w)")
+# Turns of phrase that are grammar but that nobody writes: "is no number" for "is not a number", "where nobody says".
+_KEPT = "longer|more|larger|smaller|better|worse|other|different|faster|slower|wider|use|need|one|room|such"
+ODD_ENGLISH = re.compile(
+    rf"(?<!there )\b(?:is|are|was|were|be) no (?!(?:{_KEPT})\b)[a-z]"
+    r"|\b(?:where|what|when) nobody (?:says|knows|named|chose)\b"
+    r"|\bfailing is\b"
+    r"|\b(?:is|are) (?:told|said) (?:at|in|of|that|to)\b",
+    re.IGNORECASE,
+)
 TEXT_SUFFIXES = {".py", ".md", ".toml", ".lock", ".sh", ".json", ".yml", ".yaml", ".txt", ".glsl", ".cfg", ".ini", ""}
 
 
@@ -146,3 +155,38 @@ def test_machine_path_rule_refuses_seeded_text(seeded: str) -> None:
 )
 def test_machine_path_rule_accepts_innocent_text(innocent: str) -> None:
     assert not machine_paths(innocent)
+
+
+def odd_english(text: str) -> list[str]:
+    """Lines of `text` with a turn of phrase that we do not use, as "line: text"."""
+    return [f"{n}: {line.strip()}" for n, line in enumerate(text.splitlines(), 1) if ODD_ENGLISH.search(line)]
+
+
+def test_text_is_idiomatic_english() -> None:
+    here = Path(__file__).resolve()  # this file seeds such phrases itself
+    found = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for path in tracked_text_files()
+        if path != here and path.suffix in (".py", ".md", ".sh")
+        for line in odd_english(path.read_text("utf-8", errors="replace"))
+    ]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    "seeded",
+    [
+        "This folder is no capture.",
+        "'wide' is no size",
+        "Numbers that are no names",
+        "where nobody says",
+        "it is told at once",
+    ],
+)
+def test_english_rule_refuses_seeded_text(seeded: str) -> None:
+    assert odd_english(seeded)
+
+
+@pytest.mark.parametrize("innocent", ["There is no such folder.", "It is no longer there.", "is not a capture folder"])
+def test_english_rule_accepts_plain_text(innocent: str) -> None:
+    assert not odd_english(innocent)

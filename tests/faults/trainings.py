@@ -15,7 +15,7 @@ from typing import Any
 
 from app.cli.cli import main
 from app.project.project import open_project
-from app.training import run
+from app.training import keeping, run
 from app.training.build import build_training
 from app.training.interface import Training
 from app.training.messages import TrainJob
@@ -30,6 +30,8 @@ SETTINGS = ("--preset", "toy", "--scale", "0.25", "--set", "passes=6", "--clip-l
 FAST = (*SETTINGS, "--set", "static_steps=30", "--set", "joint_steps=30", "--set", "source_steps=20")
 """The same with so few steps that a clip takes seconds."""
 CADENCE = "CLIPGSTREAM_TEST_CHECKPOINT_EVERY_S"
+PATIENCE = "CLIPGSTREAM_TEST_PATIENCE_S"
+"""How long a finished clip that nothing else holds is tried again on a full disk."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,6 +168,8 @@ def make_training(job: TrainJob, report: ReportProgress) -> Training:
 
 if CADENCE in os.environ:
     run.CHECKPOINT_EVERY_S = float(os.environ[CADENCE])
+if PATIENCE in os.environ:
+    keeping.PATIENCE_UNKEPT_S = float(os.environ[PATIENCE])
 
 
 def run_command() -> None:

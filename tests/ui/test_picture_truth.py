@@ -238,7 +238,7 @@ def test_the_cloud_key_does_something_on_a_trained_clip_and_says_what(window: Pi
     assert not np.array_equal(picture(window), before)
     window.key(key.SPACE)
     window.draw(40)
-    assert hud(window).rate == "", "a cloud does not change, so no rate of pictures is told"
+    assert hud(window).rate == "", "a cloud does not change, so no rate of pictures is shown"
     window.key(key.SPACE)
     window.session.dispatch(c.SetFrame(0))
     window.key(key._4)

@@ -79,7 +79,7 @@ def test_the_pointer_leads_the_sphere_until_a_click_fixes_it(pilot: Pilot) -> No
     fixed = center(pilot)
     pilot.move(pilot.x - 90, pilot.y)
     assert np.array_equal(center(pilot), fixed)
-    assert pilot.session.view.yaw == yaw, "a click is no drag"
+    assert pilot.session.view.yaw == yaw, "a click is not a drag"
     pilot.drag((pilot.x, pilot.y), (pilot.x + 50, pilot.y))
     assert pilot.session.view.yaw != yaw
     assert np.array_equal(center(pilot), fixed), "one may look at it from all sides"

@@ -57,7 +57,7 @@ def inject_constants(source: str, constants: dict[str, float]) -> str:
         source: GLSL whose first line is its #version.
         constants: Written with all their digits, so that GLSL rounds them as float32 arithmetic would.
     Raises:
-        ShaderError: The first line is no #version.
+        ShaderError: The first line is not a #version.
     """
     version, _, rest = source.partition("\n")
     if not version.startswith("#version"):

@@ -260,7 +260,7 @@ class ViewportPanel:
             buttons = (imgui.MouseButton_.left, imgui.MouseButton_.right, imgui.MouseButton_.middle)
             self._button = next((button for button in buttons if imgui.is_mouse_down(button)), buttons[0])
             self._drag = "wipe" if self._is_on_wipe(session, panes, io.mouse_pos) else "view"
-            return  # the pointer's way to where it was pressed is no drag
+            return  # the pointer's way to where it was pressed is not a drag
         # The last stretch of a quick drag arrives in the same frame as the release, when the item is active no more.
         is_dragged = imgui.is_item_active() or (imgui.is_item_deactivated() and self._drag is not None)
         if not is_dragged:
@@ -285,7 +285,7 @@ class ViewportPanel:
             if max(abs(io.mouse_pos.x - x), abs(io.mouse_pos.y - y)) < CLICK_PX:
                 self._is_click = imgui.is_item_deactivated()
                 return
-            self._drag = "turn"  # from here on it is no click, even if it comes back
+            self._drag = "turn"  # from here on it is not a click, even if it comes back
         dx, dy = io.mouse_delta.x, io.mouse_delta.y
         if dx == 0.0 and dy == 0.0:
             return

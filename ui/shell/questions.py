@@ -46,14 +46,14 @@ class QuestionDialogs:
         imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.always, ImVec2(0.5, 0.5))
         imgui.set_next_window_size(ImVec2(min(WIDTH, viewport.work_size.x - 40), 0))
         flags = imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize
-        flags |= imgui.WindowFlags_.no_nav_inputs  # Enter, Escape and the arrows mean what is said here
+        flags |= imgui.WindowFlags_.no_nav_inputs  # Enter, Escape and the arrows belong to the dialog
         is_open, is_kept = imgui.begin_popup_modal(title, True, flags)
         if not is_open:
             if not is_new:  # closed by its cross
                 dispatch(CloseQuestion())
             return
         imgui.push_text_wrap_pos(0.0)
-        # the key that led to the question is still pressed in its first frame, and is no answer to it
+        # the key that led to the question is still pressed in its first frame, and is not an answer to it
         is_agreed = not is_new and imgui.is_key_pressed(imgui.Key.enter, False)
         if isinstance(question, RetrainQuestion):
             answer = _draw_retrain(question, ui, is_agreed)

@@ -35,8 +35,8 @@ class AnchorMarks:
     Attributes:
         positions: [N, 3]
         colors: [N, 4]
-        roles, reasons: Codes of engine.model.roles and engine.gate.reasons; None where nobody says. [N] uint8
-        counts: Of all anchors, drawn or not, by role; empty where nobody says.
+        roles, reasons: Codes of engine.model.roles and engine.gate.reasons; None where unknown. [N] uint8
+        counts: Of all anchors, drawn or not, by role; empty where unknown.
     """
 
     positions: np.ndarray
@@ -46,7 +46,7 @@ class AnchorMarks:
     counts: dict[str, int]
 
     def text(self, row: int, regions: Sequence[GateRegion] = ()) -> str:
-        """What an anchor is and why, in one to three lines; empty where nobody says.
+        """What an anchor is and why, in one to three lines; empty where unknown.
 
         Args:
             regions: What is marked by now; the clip may have been trained before.
@@ -87,7 +87,7 @@ def nearest_under(
 def anchor_marks(
     positions: np.ndarray, roles: np.ndarray | None, reasons: np.ndarray | None, *, most: int, color: Color
 ) -> AnchorMarks:
-    """Marks of at most that many anchors. color: Where nobody says what they are."""
+    """Marks of at most that many anchors. color: Where that is unknown."""
     rows = thinned(np.arange(len(positions)), most)
     colors, counts = np.tile(np.array(color, np.float32), (len(rows), 1)), {}
     if roles is not None:

@@ -88,7 +88,7 @@ def hud_text(
     camera_name: Callable[[int | None], str],
     rate: ShownRate | None = None,
 ) -> HudText:
-    """Everything that is said of the picture.
+    """Everything that the HUD says about the picture.
 
     Args:
         fps: Frames per second of the capture.

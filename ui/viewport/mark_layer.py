@@ -52,7 +52,7 @@ class AnchorCounts:
 
     Attributes:
         source: What they are of.
-        inherited_roles, residual_roles: Likewise by what they are; empty where nobody says.
+        inherited_roles, residual_roles: Likewise by what they are; empty where unknown.
     """
 
     n_inherited: int = 0

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 WINDOW_S = 2.0
 """The rate is that of the last seconds."""
 LEAST_S = 0.5
-"""Before this much time has passed no rate is told."""
+"""Before this much time has passed no rate is shown."""
 
 
 @dataclass(frozen=True)

@@ -113,7 +113,7 @@ def _dark(colors: np.ndarray) -> np.ndarray:
 
 
 def _counts(anchors: AnchorArrays, rows: np.ndarray) -> dict[str, int]:
-    """How many of these anchors have which role; all as "anchor" where nobody says."""
+    """How many of these anchors have which role; all as "anchor" where unknown."""
     if anchors.inherited_roles is None or anchors.own_roles is None:
         return {"anchor": len(rows)} if len(rows) else {}
     roles = np.concatenate([anchors.inherited_roles, anchors.own_roles])[rows]

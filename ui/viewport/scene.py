@@ -273,7 +273,7 @@ class Scene:
         return key
 
     def anchor_text(self, session: Any, view: SceneView, x: float, y: float) -> str:
-        """What the anchor under a pixel of the view is and why; empty where none is shown or nobody says. It stands
+        """What the anchor under a pixel of the view is and why; empty where none is shown or that is unknown. It stands
         out from the next frame on."""
         found = self.marks.anchor_under(session, view, x, y, self._near)
         text = "" if found is None else found[0].text(found[1], session.regions.regions)

@@ -29,7 +29,7 @@ def curves_of(lines: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         Per variant: `variant`, `points` (each with source_steps, later_s and FIGURES, rising in steps) and, beside
         "full", `at_equal`: per figure the PSNR, `seconds`, `seconds_full`, `ratio`, and `is_least` where "full" is
         already better at its first point, so that the ratio is at least that. None where the curves do not meet, or
-        where the other one is already better at its first point: nobody knows how much earlier it was as good.
+        where the other one is already better at its first point: how much earlier it was as good is unknown.
     """
     found: dict[str, list[dict[str, Any]]] = {}
     for line in lines:

@@ -36,7 +36,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream report: write a page about a project. Returns the exit code."""
     from app.lab.report.write import PAGE_FILE, REPORTS, write_report
 
-    read_settings(options.project)  # a folder that is no project is said first
+    read_settings(options.project)  # refuses a folder that is not a project before anything else
     check_writable((options.project / REPORTS if options.out is None else options.out) / PAGE_FILE)
     line = ProgressLine(is_quiet=options.quiet)
     shown: dict[str, Callable[[int, int, Any], None]] = {}

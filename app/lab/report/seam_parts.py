@@ -32,8 +32,8 @@ def seams_section(evaluation: dict[str, Any], pictures: Pictures, tick: Tick) ->
     else:
         parts += [
             "R is the change of the render from one frame to the next, G that of the truth, E = max(R - G, 0). The "
-            "score is E on static pixels at the boundary less what is normal inside the two clips; 0 is no seam. A "
-            "ratio is mean R at the boundary / mean R inside; 1 is no seam. Moving pixels may move more at a boundary "
+            "score is E on static pixels at the boundary less what is normal inside the two clips; 0: no seam. A "
+            "ratio is mean R at the boundary / mean R inside; 1: no seam. Moving pixels may move more at a boundary "
             "than elsewhere; the ratio of the truth says by how much.",
             _boundaries(seams),
             *_two_clips(seams["rows"]),

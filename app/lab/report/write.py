@@ -74,7 +74,7 @@ def write_report(
     Returns:
         The page.
     Raises:
-        ProjectError, CaptureError: A folder is no project, nothing is trained in it, its capture is gone, or the
+        ProjectError, CaptureError: A folder is not a project, nothing is trained in it, its capture is gone, or the
             report cannot be written.
     """
     out = folder / REPORTS if out is None else out

@@ -75,7 +75,7 @@ def gains_from_observations(log_colors: np.ndarray, first_guess: np.ndarray) -> 
         log_colors: log(colour + 1) of each point in each camera, NaN where not seen. [C, P, 3]
         first_guess: [C, 3]
     Returns:
-        gains float64 [C, 3] with median 1 over the cameras; colours [P, 3] 0..255, NaN where nobody sees the point.
+        gains float64 [C, 3] with median 1 over the cameras; colours [P, 3] 0..255, NaN where no camera sees the point.
     """
     log_colors = np.ascontiguousarray(log_colors, dtype=np.float32)
     is_seen = np.isfinite(log_colors[..., 0])
@@ -108,7 +108,7 @@ def scene_colors(log_colors: np.ndarray, gains: np.ndarray) -> np.ndarray:
         log_colors: As in gains_from_observations. [C, P, 3]
         gains: [C, 3]
     Returns:
-        [P, 3] 0..255, NaN where nobody sees the point.
+        [P, 3] 0..255, NaN where no camera sees the point.
     """
     observations = log_colors - np.log(gains)[:, None].astype(log_colors.dtype)
     return np.exp(median_over_cameras(np.ascontiguousarray(observations))) - 1.0

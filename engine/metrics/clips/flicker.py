@@ -22,7 +22,7 @@ def definition_of(borders: str = OWN_BORDERS) -> str:
     return (
         "Flicker: mean change of the render (R) on pixels where the truth stands still, from one frame to the next, in "
         "1/255, inside clips and at clip borders. Seam ratio: R at borders / R inside clips, on static or on moving "
-        f"pixels; 1 is no seam. Held-out cameras, all where none is held out; {borders}."
+        f"pixels; 1 means no seam. Held-out cameras, all where none is held out; {borders}."
     )
 
 

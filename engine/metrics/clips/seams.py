@@ -174,8 +174,8 @@ DEFINITIONS = {
     "excess": "E: max(R - G, 0) per pixel",
     "static": f"pixels with a blurred G below {STATIC_THRESHOLD * 255:g}/255, outside the motion masks; moving: others",
     "score": "mean over boundaries and cameras of: E on static pixels at the boundary, less the median of the interior"
-    " pairs of the two clips in the same camera, in units of 1/255; 0 is no seam",
-    "ratio": "mean R of the boundaries / mean R of the interior pairs; null where the latter is 0; 1 is no seam. Moving"
+    " pairs of the two clips in the same camera, in units of 1/255; 0: no seam",
+    "ratio": "mean R of the boundaries / mean R of the interior pairs; null where the latter is 0; 1: no seam. Moving"
     " pixels may move more at a boundary than elsewhere: truth_ratio_moving is the same of G",
     "two_clips": "mean over channels of |clip before the boundary, asked beyond its last frame, - clip after it, at its"
     " first frame|; extrapolated, and equal to R where is_held",

@@ -30,7 +30,7 @@ def join_frozen(frozen: Gaussians, rows: np.ndarray, learning: Gaussians) -> Gau
         learning: Not frozen, or frozen in part.
     Raises:
         ValueError: A row is out of range.
-        TypeError: Rows are not int64 in one piece, or a column of either part is no float32 on the cpu.
+        TypeError: Rows are not int64 in one piece, or a column of either part is not float32 on the cpu.
     """
     if rows.dtype != np.int64 or rows.ndim != 1 or not rows.flags.c_contiguous:
         raise TypeError(f"rows must be contiguous int64 [n], got {rows.dtype} {list(rows.shape)}")

@@ -54,6 +54,6 @@ KERNEL_OPTIONS = {
     "cache": True,
     "error_model": "numpy",
 }
-"""Options of every kernel that is no routine."""
+"""Options of every kernel that is not a routine."""
 
 f4 = np.float32

@@ -54,7 +54,7 @@ def measured_clip(header: Mapping[str, Any], *, disk_mb: float | None, uncounted
         disk_mb: Its size, 10^6 bytes.
         uncounted_s: Part of its preparation that does not come again, such as compiling.
     Returns:
-        None for a header that is no clip's.
+        None for a header that is not a clip's.
     """
     metrics = header.get("metrics")
     metrics = metrics if isinstance(metrics, Mapping) else {}

@@ -21,7 +21,7 @@ def looks_still(
     """Whether no training camera sees anything move in the middle, at the end and at the beginning of a
     source clip.
 
-    It ends at the first picture in which something moves. False where nobody knows, for there are no backgrounds yet,
+    It ends at the first picture in which something moves. False where that is unknown, as there are no backgrounds yet,
     and where a clip learns something even if nothing moves.
 
     Args:

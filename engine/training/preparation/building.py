@@ -136,7 +136,7 @@ class Coverage:
 
     @property
     def text(self) -> str:
-        """As it is told while the clip is prepared."""
+        """The text shown while the clip is prepared."""
         n_outside = self.n_points - self.n_inherited
         percent = 100 * n_outside / max(self.n_points, 1)
         said = f"{n_outside} of {self.n_points} moving points ({percent:.0f} %) lie outside the inherited anchors; "
@@ -159,7 +159,7 @@ def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> C
     anchors. Source: ClipGStream, geometry-aware deduplication, with the exact union.
 
     A clip has no more anchors that move than `config.max_moving_points`, inherited ones that it uses included. Which
-    of the others become anchors then is said in `engine.cloud.motion.budget`; the rest switch on the one beside them.
+    of the others become anchors then is chosen by `engine.cloud.motion.budget`; the rest switch on the one beside them.
     """
     is_new = np.ones(len(cloud.points), bool)
     moving = model.anchor_set("moving") if "moving" in model.roles() else None

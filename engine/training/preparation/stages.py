@@ -34,7 +34,7 @@ class Stages:
         prep_dir: Folder for the files; need not exist.
         clip_index: Of the clip.
         key: What every piece depends on; JSON-able.
-        report: Is told what is taken over or removed.
+        report: Gets one line about what is taken over or removed.
         clock: Seconds; tests bring their own.
     """
 

@@ -65,7 +65,7 @@ def _without_unseen(
 ) -> tuple[dict[str, np.ndarray], int, int]:
     """Arrays without anchors that are never visible; how many own ones went, how many inherited ones rest."""
     n_dropped = n_cleared = 0
-    k = model.decoder.gaussians_per_anchor  # given, not found out: there may be no row at a time
+    k = model.decoder.gaussians_per_anchor  # given, not found out: there may not be a row at a time
     for role in model.roles():
         anchors = model.anchor_set(role)
         if anchors.presence is None or len(anchors) == 0:

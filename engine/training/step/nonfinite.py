@@ -1,4 +1,4 @@
-"""What is said when the loss or a gradient of a step is no number: which part, at which step, and what to change."""
+"""Error texts for a loss or gradient that is not finite: which part, at which step, and what to change."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ class Draw(NamedTuple):
 
 
 class Order(Protocol):
-    """Draws items of a range, is told what loss each had, and can be stored as JSON."""
+    """Draws items of a range, learns what loss each had, and can be stored as JSON."""
 
     def draw(self) -> Draw: ...
     def saw(self, item: int, loss: float) -> None: ...

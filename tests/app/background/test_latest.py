@@ -1,4 +1,4 @@
-"""LatestWorker: the newest request wins, failures are told once, closing ends the thread."""
+"""LatestWorker: the newest request wins, failures are reported once, closing ends the thread."""
 
 import threading
 

@@ -116,7 +116,7 @@ def test_options_that_contradict_a_trained_project_are_refused(run, capture_fold
     code, _, err = run(*arguments, "--clip-length", 2)
     assert code == 2
     assert "clip_length 3" in err
-    assert run(*arguments, "--clip-length", 3)[0] == 0  # the same value is no contradiction
+    assert run(*arguments, "--clip-length", 3)[0] == 0  # the same value is not a contradiction
 
 
 def test_a_source_clip_alone_is_refused(run, capture_folder, tmp_path):

@@ -1,4 +1,4 @@
-"""Regions marked by commands: kept in the project, handed to the next training, and what is said of them."""
+"""Regions marked by commands: kept in the project, handed to the next training, and the words about them."""
 
 import threading
 from functools import partial

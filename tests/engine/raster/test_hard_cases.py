@@ -45,7 +45,7 @@ def _at_the_plane() -> Scene:
 
 
 def _odd_and_opaque() -> Scene:
-    """Opacities of exactly one and the two sides of 1/255, in an image that is no multiple of anything."""
+    """Opacities of exactly one and the two sides of 1/255, in an image whose sides are multiples of nothing."""
     edge = np.float32(1 / 255)
     opacities = np.tile([1.0, np.nextafter(edge, np.float32(0)), np.nextafter(edge, np.float32(1))], 20)
     scene = gaussians_of(_spread(60), np.full((60, 3), 0.2), opacities=opacities)
@@ -110,7 +110,7 @@ def _long_quats() -> Scene:
 
 
 PIXEL, GRADIENT = 2e-6, 5e-6
-"""Tolerances of a case, unless something is said beside it. "Slow in float32" is the reference on the same inputs."""
+"""Tolerances of a case, unless stated beside it. "Slow in float32" is the reference on the same inputs."""
 
 CASES = {
     # name: (scene, pixel tolerance, gradient tolerance); worst seen of all others: 2.0e-6 and 2.5e-6.

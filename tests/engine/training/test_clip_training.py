@@ -62,15 +62,22 @@ def finish(training: ClipTraining) -> ClipState:
 
 
 @pytest.fixture(scope="module")
-def setting(tmp_path_factory) -> Setting:
+def setting(tmp_path_factory, built_once) -> Setting:
     capture = open_capture(asset_path("sample"), scale=0.5)
-    prep_dir = tmp_path_factory.mktemp("prep")
-    training = start(capture, 0, prep_dir)
-    training.prepare()
-    training.step()
-    first = training.held_out_psnr()
-    state = finish(training)
-    return Setting(capture, training.holdout, prep_dir, state, first, training.held_out_psnr())
+
+    def train(folder: Path) -> None:
+        training = start(capture, 0, folder / "prep")
+        training.prepare()
+        training.step()
+        first = training.held_out_psnr()
+        write_clip_state(folder / "reference.safetensors", finish(training))
+        (folder / "psnr.json").write_text(json.dumps([first, training.held_out_psnr()]))
+
+    folder = tmp_path_factory.mktemp("clip_training")
+    built_once.copy("clip_training", folder, train, sources=["tests/engine/training/test_clip_training.py"])
+    holdout = capture.camera_indices(list(capture.default_holdout))
+    reference = read_clip_state(folder / "reference.safetensors")
+    return Setting(capture, holdout, folder / "prep", reference, *json.loads((folder / "psnr.json").read_text()))
 
 
 @pytest.fixture

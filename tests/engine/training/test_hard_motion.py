@@ -5,7 +5,8 @@ decibels below what came out when it was written (one seed; the figures are name
 chance.
 
 Limits that these scenes show, whatever the gate: what rested in the reference clip and goes leaves a hull of its own
-shape behind, on which the clip paints what lies behind it. That is no ghost to the eye, but 3 to 6 dB worse than floor
+shape behind, on which the clip paints what lies behind it. That does not look like a ghost, but 3 to 6 dB worse than
+floor
 that was always free, from cameras in between most of all; and a small thing that appears inside such a hull comes out
 dull when it has a colour that frozen heads have never seen.
 """

@@ -12,11 +12,12 @@ import torch
 from engine.assets import asset_path
 from engine.capture.capture import Capture, open_capture
 from engine.capture.clip import Clip, split_clips
-from engine.clip_files.clip_state import ClipState
+from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.clip_model import load_clip_model
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
+from tests.built_once import BuiltOnce
 
 CLIP_LENGTH = 4
 N_CAMERAS = 8
@@ -74,15 +75,24 @@ def make_training(capture: Capture, holdout: list[int], *, clip: Clip, **argumen
     return ClipTraining(capture, clip, config=TrainConfig(**(SIZES | arguments)), holdout=holdout, **given)
 
 
-def make_tiny(prep_dir: Path, *, scale: float = 0.25) -> Tiny:
-    """Open the sample, at a part of its size, and train its first clip as the reference."""
+def make_tiny(folder: Path, built_once: BuiltOnce, *, scale: float = 0.25) -> Tiny:
+    """The sample, at a part of its size, with its first clip trained as the reference.
+
+    Args:
+        folder: An empty one, for the reference and what clips share.
+    """
     capture = open_capture(asset_path("sample"), scale=scale)
     others = [camera for camera in range(len(capture.rig)) if camera % 5 in (1, 3, 4)]
     holdout = others[: len(capture.rig) - N_CAMERAS]
     clips = split_clips(capture.n_frames, CLIP_LENGTH)
-    training = make_training(capture, holdout, clip=clips[0], reference=None, prep_dir=prep_dir)
-    training.prepare()
-    return Tiny(capture, clips, holdout, prep_dir, finish(training))
+
+    def train(folder: Path) -> None:
+        training = make_training(capture, holdout, clip=clips[0], reference=None, prep_dir=folder / "prep")
+        training.prepare()
+        write_clip_state(folder / "reference.safetensors", finish(training))
+
+    built_once.copy(f"tiny-{scale}", folder, train, sources=["tests/engine/training/tiny_training.py"])
+    return Tiny(capture, clips, holdout, folder / "prep", read_clip_state(folder / "reference.safetensors"))
 
 
 def finish(training: ClipTraining) -> ClipState:

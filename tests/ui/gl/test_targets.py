@@ -64,7 +64,7 @@ def test_resolve_without_background_keeps_straight_alpha(ctx: moderngl.Context, 
 
 
 def test_picture_is_drawn_upright(ctx: moderngl.Context, keep: Keep, rng: np.random.Generator) -> None:
-    """Row 0 stays row 0, also with a width that is no multiple of four bytes."""
+    """Row 0 stays row 0, also with a width that is not a multiple of four bytes."""
     picture = rng.integers(0, 256, (9, 7, 3), dtype=np.uint8)
     image = keep(ImageTexture(ctx, is_smooth=False))
     image.set(picture)

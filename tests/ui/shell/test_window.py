@@ -442,12 +442,12 @@ def test_a_panel_that_raises_becomes_one_notice_and_the_others_go_on(
 
 
 def test_dismissing_a_notice_takes_its_index(pilot: Pilot) -> None:
-    pilot.session.notices.add("error", "This folder is no capture", "It holds no cameras.json.", "Choose another.")
+    pilot.session.notices.add("error", "Not a capture folder", "It holds no cameras.json.", "Choose another.")
     pilot.session.notices.add("error", "Second")
     pilot.draw(3)
     pilot.click("notice1.close")
     assert pilot.sent(DismissNotice) == [DismissNotice(1)]
-    assert [notice.title for notice in pilot.session.notices] == ["This folder is no capture"]
+    assert [notice.title for notice in pilot.session.notices] == ["Not a capture folder"]
 
 
 def test_nothing_is_drawn_while_nothing_changes(pilot: Pilot) -> None:

@@ -38,12 +38,12 @@ def test_a_reference_clip_that_is_none_is_refused(capture_folder):
 
 
 @pytest.fixture
-def continued(tmp_path) -> Iterator[tuple[Project, TrainJob]]:
+def continued(tmp_path, built_once) -> Iterator[tuple[Project, TrainJob]]:
     """A real project of the sample whose one field goes on: reference clip 1, then clip 0; and a job of it."""
     from engine.clip_files.clip_state import ClipState, write_clip_state
     from tests.engine.training.tiny_training import SIZES, make_tiny
 
-    tiny = make_tiny(tmp_path / "prep")
+    tiny = make_tiny(tmp_path / "tiny", built_once)
     reference = ClipState(tiny.reference.arrays, tiny.reference.header | {"clip_index": 1, "start": 4})
     settings = default_settings(
         tiny.capture,

@@ -65,7 +65,7 @@ class Measure:
                 )  # fmt: skip
 
     def pair(self, row: PairRow) -> PairRow:
-        """What is told of a pair; tests change it."""
+        """The values of a pair; tests change them."""
         return row
 
 

@@ -1,10 +1,19 @@
-"""Which angle between two cameras a plane sweep aims for."""
+"""What a plane sweep compares: which angle between two cameras it aims for, with which sources, on which planes."""
 
 import numpy as np
 import pytest
 
+from engine.camera.depth_range import depth_ranges
+from engine.camera.projection import project, projection_matrices
 from engine.camera.rig import CameraRig
-from engine.cloud.stereo.sweep import BEST_ANGLES_DEG, preferred_angle_deg
+from engine.cloud.stereo.sweep import (
+    BEST_ANGLES_DEG,
+    choose_sources,
+    plane_inverse_depths,
+    preferred_angle_deg,
+    relative_homography,
+)
+from engine.synthetic.scene import make_rig
 
 
 def cone_rig(angle_deg: float, n_cameras: int = 8) -> CameraRig:
@@ -29,3 +38,53 @@ def test_the_angle_aimed_for_is_a_third_of_the_median_spread(spread_deg):
 @pytest.mark.parametrize(("spread_deg", "expected"), [(1.0, BEST_ANGLES_DEG[0]), (85.0, BEST_ANGLES_DEG[1])])
 def test_the_angle_aimed_for_stays_within_what_narrow_and_wide_rigs_need(spread_deg, expected):
     assert preferred_angle_deg(cone_rig(spread_deg)) == expected
+
+
+# ---------------------------------------------------------------- sources and planes
+
+
+def test_a_homography_moves_a_pixel_where_the_point_is_seen():
+    rig = make_rig(4, (80, 60))
+    matrix, shift = relative_homography(rig, 0, 1)
+    depth, pixel = 3.0, np.array([20.5, 40.5])
+    ray = np.linalg.inv(rig.Ks[0]) @ [*pixel, 1.0] * depth
+    point = rig.world_to_camera[0, :3, :3].T @ (ray - rig.world_to_camera[0, :3, 3])
+    expected, _ = project(point[None], projection_matrices(rig)[1])
+    moved = matrix @ [*pixel, 1.0] + shift / depth
+    assert moved[:2] / moved[2] == pytest.approx(expected[0])
+
+
+def test_sources_are_neighbours_and_never_the_camera_itself():
+    rig = make_rig(12, (80, 60))
+    near, far = depth_ranges(rig, None)
+    for camera, sources in enumerate(choose_sources(rig, near, far, n_sources=2)):
+        steps = [min((other - camera) % 12, (camera - other) % 12) for other in sources]
+        assert len(sources) == 2
+        assert all(1 <= step <= 2 for step in steps), (camera, sources)  # of a ring: next to it, or one further
+
+
+def test_a_camera_that_shares_nothing_with_others_has_no_sources():
+    rig = cone_rig(10.0, 2)
+    poses = rig.world_to_camera.copy()
+    poses[1, :3, 3] = 1e6, 0.0, 0.0
+    apart = CameraRig(rig.names, poses, rig.Ks, rig.image_sizes)
+    assert choose_sources(apart, np.ones(2), np.full(2, 5.0)) == [[], []]
+
+
+def test_planes_rise_evenly_and_move_what_sources_see_by_about_a_pixel_at_most():
+    rig = make_rig(12, (80, 60))
+    near, far = depth_ranges(rig, None)
+    sources = choose_sources(rig, near, far)[0]
+    planes = plane_inverse_depths(rig, 0, sources, near[0], far[0])
+    assert planes[[0, -1]] == pytest.approx([1 / far[0], 1 / near[0]])
+    assert np.allclose(np.diff(planes), np.diff(planes).mean(), rtol=1e-3)
+    centre = np.array([40.0, 30.0, 1.0])
+    for other in sources:
+        matrix, shift = relative_homography(rig, 0, other)
+        track = matrix @ centre + planes[:, None] * shift
+        pixels = track[:, :2] / track[:, 2:]
+        is_inside = np.all((pixels >= 0) & (pixels < [80, 60]), axis=1)
+        steps = np.linalg.norm(np.diff(pixels, axis=0), axis=1)[is_inside[1:] & is_inside[:-1]]
+        assert np.median(steps) < 1.0
+        assert steps.max() < 1.5
+    assert len(plane_inverse_depths(rig, 0, [], near[0], far[0])) == 25

@@ -222,7 +222,7 @@ def test_a_clip_of_another_brightness_is_a_seam_in_the_colours_of_the_camera(cap
     boundary = summarize(pairs)["boundaries"][0]
     assert boundary["held_out"]["score"] == pytest.approx(255 * held_out.change_static)
     assert boundary["worst_camera"] == "b"
-    # a clip without a field answers beyond its end with its last frame, which is said
+    # a clip without a field answers beyond its end with its last frame, and says so
     assert held_out.is_held
     assert held_out.two_clips_static == held_out.change_static
 

@@ -20,9 +20,9 @@ N_STEPS = 12
 
 
 @pytest.fixture(scope="module")
-def half(tmp_path_factory) -> Tiny:
+def half(tmp_path_factory, built_once) -> Tiny:
     """The sample at half size: 5 x 4 tiles."""
-    return make_tiny(tmp_path_factory.mktemp("half"), scale=0.5)
+    return make_tiny(tmp_path_factory.mktemp("half"), built_once, scale=0.5)
 
 
 def pictures_of(training: ClipTraining) -> list[tuple[int, float, ActivePicture]]:
