@@ -4,7 +4,9 @@ import os
 import random
 import sys
 from collections import Counter
+from collections.abc import Generator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,6 +34,23 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if hasattr(config, "workerinput"):
         n_slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
         items.sort(key=lambda item: -n_slow[item.path])
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_report_to_serializable() -> Generator[None, Any, Any]:
+    """A worker can send Unicode only, and tests log names of files that are none."""
+    return _as_unicode((yield))
+
+
+def _as_unicode(value: Any) -> Any:
+    match value:
+        case str():
+            return value.encode("utf-8", "backslashreplace").decode()
+        case dict():
+            return {key: _as_unicode(entry) for key, entry in value.items()}
+        case list() | tuple():
+            return type(value)(_as_unicode(entry) for entry in value)
+    return value
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -75,10 +94,10 @@ def rng() -> np.random.Generator:
 @pytest.fixture(scope="session")
 def built_once(request: pytest.FixtureRequest) -> BuiltOnce:
     """Keeps what takes seconds to build; see tests.built_once."""
-    cache = request.config.cache
-    return BuiltOnce(
-        None if cache is None or request.config.getoption("--no-fixture-cache") else cache.mkdir("built-once")
-    )
+    cache = getattr(request.config, "cache", None)  # pytest can be told to do without
+    if cache is None or request.config.getoption("--no-fixture-cache"):
+        return BuiltOnce(None)
+    return BuiltOnce(cache.mkdir("built-once"))
 
 
 @pytest.fixture(scope="session")

@@ -7,10 +7,11 @@ from typing import Any
 
 import torch
 
+from engine.clip_files.clip_header import FieldShape
 from engine.model.anchors import AnchorSet
 from engine.model.decode.decoding import ChosenAnchors, decode_anchors
 from engine.model.decoder import Decoder
-from engine.model.field import FieldShape, SpatioTemporalField
+from engine.model.field import SpatioTemporalField
 from engine.raster.gaussians import Gaussians
 
 PAPER: dict[str, Any] = {"features": 64, "hidden": 64, "k": 10}

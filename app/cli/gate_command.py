@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from app.cli.arguments import EXIT_OK, path_argument
 from app.project.project import Project, open_project
 from app.session.marking import after_marking, effect_text, region_text
 from app.training.service import Launch
+from engine.clip_files.anchor_record import AnchorRecord
 from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.errors import ProjectError
 from engine.gate.reasons import REASONS
@@ -95,19 +97,18 @@ def describe_gate(project: Project) -> dict[str, Any]:
 
 
 def _describe_clip(state: ClipState) -> dict[str, Any]:
-    sets = {name.split(".")[1] for name in state.arrays if name.startswith("sets.")}
-    is_hidden = state.arrays.get("inherited.static.is_hidden", np.zeros(0, dtype=bool))
+    records = state.anchors
     return {
-        "clip_index": state.header["clip_index"],
-        "role": state.header["role"],
-        "sets": {name: len(state.arrays[f"sets.{name}.positions"]) for name in sorted(sets)},
-        "n_hidden": int(is_hidden.sum()),
-        "reasons": _reasons(state),
+        "clip_index": state.header.clip_index,
+        "role": state.header.role,
+        "sets": {role: len(record.own) for role, record in sorted(records.items()) if record.own is not None},
+        "n_hidden": sum(int(record.is_hidden.sum()) for record in records.values() if record.is_hidden is not None),
+        "reasons": _reasons(records.values()),
     }
 
 
-def _reasons(state: ClipState) -> dict[str, int]:
-    codes = [array for name, array in state.arrays.items() if name.startswith("gate.")]
+def _reasons(records: Iterable[AnchorRecord]) -> dict[str, int]:
+    codes = [record.reasons for record in records if record.reasons is not None]
     counts = np.bincount(np.concatenate([np.zeros(0, np.uint8), *codes]), minlength=len(REASONS))
     return {words: int(n) for words, n in zip(REASONS, counts, strict=True) if n}
 

@@ -10,7 +10,6 @@ from app.cli.arguments import (
     EXIT_FAILED,
     EXIT_OK,
     add_follow_links,
-    add_training_settings,
     fail,
     parse_range,
     path_argument,
@@ -18,6 +17,7 @@ from app.cli.arguments import (
 from app.cli.chosen_project import open_for_training, project_to_plan
 from app.cli.progress import ProgressLine
 from app.cli.training_lines import PlanLines, show_event, show_outcome, show_status
+from app.cli.training_settings import add_training_settings
 from app.evaluation.headless import train_clips, train_document
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
 from app.plan.speed import step_time

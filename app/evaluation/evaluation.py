@@ -165,7 +165,7 @@ def kept_figures(opened: TrainedProject, scope: Scope, clip_index: int, say: Cal
         "scale": opened.capture.scale,
         "frames": [clip.start, clip.stop, clip.clip_length],
         "clip": _fingerprint(opened, clip_index),
-        "reference": opened.reference and opened.reference.header.get("fingerprint", ""),
+        "reference": opened.reference and opened.reference.header.fingerprint,
         "field": _fingerprint(opened, opened.last_trained) if config.field == "continue" else None,
         "metrics": scope.metrics,
         "precision": scope.precision,
@@ -222,7 +222,7 @@ class ClipMeasuring:
 
 
 def _fingerprint(opened: TrainedProject, clip_index: int) -> str:
-    return str(opened.header(clip_index).get("fingerprint", ""))
+    return opened.header(clip_index).fingerprint
 
 
 def _unknown(opened: TrainedProject, scope: Scope, clip_index: int, kept: KeptFigures) -> Frames:

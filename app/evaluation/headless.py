@@ -18,6 +18,7 @@ from app.training.messages import ClipTrained, Event, TrainingFailed, TrainingSt
 from app.training.service import TrainingService
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import ClipState, DamagedClip, look_at_clip, read_clip_state
 from engine.errors import ProjectError
 
@@ -177,8 +178,8 @@ class TrainedProject:
         """Index of the finished clip that comes last in the order of training."""
         return next(i for i in reversed(self.project.training_order(len(self.clips))) if i in self.trained)
 
-    def header(self, clip_index: int) -> dict[str, Any]:
-        """Header of a finished clip, see engine.clip_files.clip_state.
+    def header(self, clip_index: int) -> ClipHeader:
+        """Header of a finished clip.
 
         Raises:
             ProjectError: It is not trained or damaged.
@@ -210,7 +211,7 @@ class TrainedProject:
         model = load_clip_model(state, self.reference)
         if self.project.settings.config().field == "continue":  # one field for all clips: as the last one left it
             last = read_clip_state(self.project.clip_path(self.last_trained))
-            if last.header["field"] and model.field is not None:
+            if last.header.field and model.field is not None:
                 model.attach_field(read_field(last).requires_grad_(requires_grad=False))
         return TrainedClip(self.clips[clip_index], model, base)
 

@@ -8,12 +8,11 @@ from typing import Any
 from app.background.kernels import COMPILING
 from app.project.clip_catalog import ClipCatalog
 from app.project.project import Project
-from app.project.stage_seconds import stages_of
 from app.status import PlanStatus, SettingStatus
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.text import duration_text
-from engine.training.config import TrainConfig
+from engine.training.config import SETTINGS, TrainConfig
 from engine.training.plan.forecast import MeasuredClip, measured_clip
 from engine.training.plan.plan import StepTime, TrainingPlan, footage_of, make_plan, resumed_plan
 from engine.training.presets import PRESETS
@@ -60,7 +59,7 @@ def plan_clip(
         clip,
         config,
         is_source=base is not None,
-        reference=None if found is None or found.damage else found.header,
+        reference=None if found is None else found.header,
         history=history,
         step_time=step_time,
         is_still=base is not None and _looks_still(project, capture, clip, config),
@@ -84,24 +83,13 @@ def _looks_still(project: Project, capture: Capture, clip: Clip, config: TrainCo
 
 def _measured(project: Project, clip_index: int) -> MeasuredClip | None:
     found = project.headers.read(project.clip_path(clip_index))
-    if found is None or found.damage:
+    if found is None or found.header is None:
         return None
-    metrics = found.header.get("metrics")
-    stages_s = stages_of(metrics) if isinstance(metrics, dict) else {}
-    return measured_clip(found.header, disk_mb=found.n_bytes / 1e6, uncounted_s=stages_s.get(COMPILING, 0.0))
+    compiling_s = found.header.figures.stages_s.get(COMPILING, 0.0)
+    return measured_clip(found.header, disk_mb=found.n_bytes / 1e6, uncounted_s=compiling_s)
 
 
 # ---------------------------------------------------------------- for the window
-
-MAIN_SETTINGS = {
-    "static_steps": "Static steps",
-    "joint_steps": "Joint steps",
-    "source_steps": "Steps of later clips",
-    "gaussians_per_anchor": "Gaussians per anchor",
-    "max_static_points": "Static anchors, at most",
-    "max_moving_points": "Moving anchors, at most",
-}
-"""Name in TrainConfig to what the window calls it."""
 
 
 def plan_status(
@@ -116,7 +104,7 @@ def plan_status(
     """
     settings, config = project.settings, project.settings.config()
     n_cameras = len(capture.rig) - len(settings.holdout)
-    values = {name: getattr(config, name) for name in MAIN_SETTINGS} | {
+    derived: dict[str, int] = {
         "static_steps": config.n_static_steps(n_cameras),
         "joint_steps": config.n_joint_steps(n_cameras * clip.n_frames),
         "source_steps": config.n_source_steps(n_cameras * clip.n_frames),
@@ -129,8 +117,15 @@ def plan_status(
         presets=tuple(PRESETS),
         preset=closest_preset(settings.overrides),
         settings=tuple(
-            SettingStatus(name, label, int(values[name]), name in settings.overrides)
-            for name, label in MAIN_SETTINGS.items()
+            SettingStatus(
+                setting.name,
+                setting.label,
+                int(derived.get(setting.name) or getattr(config, setting.name)),
+                setting.name in settings.overrides,
+                f"{setting.meaning}\n{setting.span}",
+            )
+            for setting in SETTINGS.values()
+            if setting.label
         ),
         can_edit=can_edit,
     )

@@ -52,7 +52,7 @@ class AnchorArrays:
         inherited_positions: From the reference clip; empty in the reference clip itself. [A0, 3]
         own_positions: Trained by this clip: all of the reference clip, the residual ones of a source clip. [A, 3]
         key: Changes when the content does.
-        inherited_roles, own_roles: What each anchor is, in engine.model.roles.ROLES; None where unknown.
+        inherited_roles, own_roles: What each anchor is, in engine.clip_files.roles.ROLES; None where unknown.
             [A0], [A] uint8
         inherited_reasons, own_reasons: Why the gate decided so, codes of engine.gate.reasons. [A0], [A] uint8
         source: The frame they are of; unknown for all anchors of the clip.

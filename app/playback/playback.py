@@ -22,6 +22,7 @@ from app.playback.picture_source import UNKNOWN, PictureSource
 from engine.byte_cache import ByteCache
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, read_clip_state
+from engine.errors import ProjectError
 
 if TYPE_CHECKING:
     from engine.model.clip_model import AnchorView  # brings torch, which only the thread needs
@@ -179,7 +180,7 @@ class Playback:
         reference = None if state.is_reference else self._read_reference(request.reference_path)
         model = load_clip_model(state, reference)
         anchors = _anchor_arrays(model.anchors(), identity)
-        loaded = LoadedClip(model, anchors, float(state.header["near_plane"]), state.header.get("step"))
+        loaded = LoadedClip(model, anchors, state.header.near_plane, state.header.step)
         if request.generation != self.worker.generation:
             return loaded
         self._cache.drop(lambda key: key[2] == request.clip_index and key[3] != request.revision)
@@ -223,11 +224,14 @@ def static_points(path: Path, revision: str) -> PointArrays:
     """The still part of a reference clip as a coloured cloud.
 
     Raises:
-        ProjectError: The file is missing or damaged.
+        ProjectError: The file is missing or damaged, or not of a reference clip.
     """
     state = read_clip_state(path)
-    points = state.arrays["sets.static.positions"].astype(np.float32, copy=False)
-    logits = state.arrays["sets.static.color_logits"].astype(np.float32, copy=False)
+    record = state.anchors.get("static")
+    if record is None or record.own is None:
+        raise ProjectError("The clip file holds no static anchors.", hint="Train the clip again.", path=path)
+    points = record.own.positions.astype(np.float32, copy=False)
+    logits = record.own.color_logits.astype(np.float32, copy=False)
     colors = 1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0)))
     spacing = point_spacing(points)
     key = ("cloud", str(path), revision)

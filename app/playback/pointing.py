@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from app.playback.arrays import GaussianArrays
+from engine.camera.projection import camera_center
 from engine.conventions import ALPHA_MAX, ALPHA_MIN
 
 SEEN_TRANSMITTANCE = 0.5
@@ -24,9 +25,8 @@ def pixel_ray(world_to_camera: np.ndarray, K: np.ndarray, x: float, y: float) ->
     Returns:
         origin, direction: The camera's centre, and a direction of unit length. [3], [3]
     """
-    rotation, shift = world_to_camera[:3, :3], world_to_camera[:3, 3]
-    direction = rotation.T @ np.linalg.solve(K, np.array([x, y, 1.0]))
-    return -rotation.T @ shift, direction / np.linalg.norm(direction)
+    direction = world_to_camera[:3, :3].T @ np.linalg.solve(K, np.array([x, y, 1.0]))
+    return camera_center(world_to_camera), direction / np.linalg.norm(direction)
 
 
 def seen_point(gaussians: GaussianArrays, origin: np.ndarray, direction: np.ndarray) -> np.ndarray | None:

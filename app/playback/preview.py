@@ -18,6 +18,7 @@ from app.background.priority import lower_process
 from app.playback.arrays import PointArrays
 from app.playback.capture_pictures import downsized
 from app.playback.playback import point_spacing
+from engine.camera.projection import to_world
 from engine.capture.capture import Capture, open_capture
 from engine.errors import EngineError, PreparationError, ProjectError
 from engine.storage.array_files import ArraysError, read_arrays, write_arrays
@@ -50,8 +51,7 @@ def picture_hint(capture: Capture, frame_index: int) -> PointArrays:
         pixels = np.stack([u, v, np.ones_like(u)], axis=-1).reshape(-1, 3)
         depth = DEPTH_SHARE * float(np.linalg.norm(focus - rig.centers[camera]))
         p_camera = depth * pixels @ np.linalg.inv(rig.Ks[camera]).T
-        rotation, shift = rig.world_to_camera[camera, :3, :3], rig.world_to_camera[camera, :3, 3]
-        points.append((p_camera - shift) @ rotation)
+        points.append(to_world(p_camera, rig.world_to_camera[camera]))
         colors.append(image.reshape(-1, 3) / 255.0)
     return PointArrays(
         np.concatenate(points).astype(np.float32),

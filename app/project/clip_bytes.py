@@ -4,37 +4,36 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from engine.clip_files.array_names import DECODER, FIELD, GAINS, TABLES, is_said_of_anchors, own_kind
 from engine.clip_files.clip_state import read_clip_metadata, reason_of
 from engine.errors import ProjectError
 from engine.storage.array_files import ArraysError
 
-COMPONENTS = (
-    ("positions", "sets.", ".positions"),
-    ("features", "sets.", ".features"),
-    ("scales", "sets.", "_scales"),
-    ("colours", "sets.", ".color_logits"),
-    ("presence", "", ".presence"),
-    ("presence", "inherited.", ".is_hidden"),
-    ("presence", "gate.", ""),
-    ("field tables", "field.tables.", ""),
-    ("field network", "field.", ""),
-    ("decoder", "decoder.", ""),
-    ("gains", "gains", ""),
-)
-"""Name of each component, and how the names of its arrays begin and end; the first that fits counts. Presence is of
-inherited anchors too, and what the gate decided."""
+_OWN_COMPONENTS = {
+    "positions": "positions",
+    "features": "features",
+    "log_offset_scales": "scales",
+    "log_base_scales": "scales",
+    "color_logits": "colours",
+    "presence": "presence",
+}
+"""What anchors hold to the name of the component."""
+_PREFIXES = {TABLES: "field tables", FIELD: "field network", DECODER: "decoder", GAINS: "gains"}
+"""How the names of other arrays begin; the first that fits counts."""
 OTHER = "other arrays"
 HEADER = "header"
 """Names, shapes, settings and figures: everything that is not an array."""
-COMPONENT_NAMES = (*dict.fromkeys(name for name, _, _ in COMPONENTS), OTHER, HEADER)
+COMPONENT_NAMES = (*dict.fromkeys(_OWN_COMPONENTS.values()), *_PREFIXES.values(), OTHER, HEADER)
 
 
 def component_of(array_name: str) -> str:
-    """The component an array of a clip belongs to."""
-    for component, start, end in COMPONENTS:
-        if array_name.startswith(start) and array_name.endswith(end):
-            return component
-    return OTHER
+    """The component an array of a clip belongs to. Presence is of inherited anchors too, and what the gate decided."""
+    kind = own_kind(array_name)
+    if kind is not None:
+        return _OWN_COMPONENTS.get(kind, OTHER)
+    if is_said_of_anchors(array_name):
+        return "presence"
+    return next((name for prefix, name in _PREFIXES.items() if array_name.startswith(prefix)), OTHER)
 
 
 def storage_of(path: Path) -> dict[str, int]:

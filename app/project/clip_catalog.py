@@ -9,12 +9,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from app.project.header_cache import FoundHeader
 from app.project.project import Project
 from app.project.project_files import read_metrics
-from engine.model.roles import REFERENCE_ROLES
+from engine.clip_files.clip_header import ClipHeader
+from engine.clip_files.roles import REFERENCE_ROLES
 
 REPORT_EVERY = 32
 """Clips read between two reports of progress."""
@@ -125,7 +125,7 @@ class ClipCatalog:
         """
         for index in range(len(self)):
             if path is not None and self._good(index) is not None and path == self._project.clip_path(index):
-                self._clips[index] = FoundHeader({}, reason, 0)
+                self._clips[index] = FoundHeader(None, reason, 0)
                 self._records = self._judged()
                 self.revision += 1
                 return True
@@ -147,7 +147,7 @@ class ClipCatalog:
         self._clips[index] = clip = project.headers.read(project.clip_path(index))
         self._checkpoints[index] = kept = project.headers.read(project.checkpoint_path(index))
         self._curve_psnr.pop(index, None)
-        is_measured = clip is not None and not clip.damage and _psnr(clip.header) is not None
+        is_measured = clip is not None and clip.header is not None and clip.header.figures.held_out_psnr is not None
         if (clip is not None or kept is not None) and (kept is not None or not is_measured):
             path = project.curve_path(index, is_finished=kept is None)
             rows = [row["held_out_psnr"] for row in read_metrics(path) if _is_number(row.get("held_out_psnr"))]
@@ -155,10 +155,10 @@ class ClipCatalog:
 
     # ---------------------------------------------------------------- judging
 
-    def _good(self, index: int) -> dict[str, Any] | None:
+    def _good(self, index: int) -> ClipHeader | None:
         """Header of the finished clip, if it can be read."""
         found = self._clips[index]
-        return None if found is None or found.damage else found.header
+        return None if found is None else found.header
 
     def _bases(self, *, replaced: int | None = None) -> list[Basis]:
         """Whether each clip stands on what it was trained on: one pass in the order of training, so that a chain of
@@ -168,7 +168,7 @@ class ClipCatalog:
             replaced: Suppose that this clip had been trained again, with another result.
         """
         headers = [self._good(index) for index in range(len(self._clips))]
-        fingerprints = [None if header is None else header.get("fingerprint") for header in headers]
+        fingerprints = [None if header is None else header.fingerprint for header in headers]
         if replaced is not None:
             fingerprints[replaced] = "another"
         first = self.order[0] if self.order else 0
@@ -182,8 +182,8 @@ class ClipCatalog:
     def _basis(
         self,
         index: int,
-        header: dict[str, Any] | None,
-        fingerprints: Sequence[Any],
+        header: ClipHeader | None,
+        fingerprints: Sequence[str | None],
         bases: Sequence[Basis],
         *,
         first: int,
@@ -194,16 +194,16 @@ class ClipCatalog:
             needed += [before] if self._goes_on and before is not None else []
             blocker = next((found for other in needed if (found := self._blocker(other, bases)) is not None), None)
             return Basis(blocked_by=blocker)
-        if header.get("role") == "source":
+        if header.role == "source":
             if self._is_damaged(first):
                 return Basis(f"Clip {first}, which it was trained on, is damaged.", first)
-            if fingerprints[first] is None or fingerprints[first] != header.get("reference_fingerprint"):
+            if fingerprints[first] is None or fingerprints[first] != header.reference_fingerprint:
                 return Basis(f"Clip {first}, the reference it was trained on, was trained again or is gone.")
-        if "previous_fingerprint" not in header or before is None:
+        if header.previous_fingerprint is None or before is None:
             return Basis()
         if self._is_damaged(before):
             return Basis(f"Clip {before}, which it goes on from, is damaged.", before)
-        if fingerprints[before] is None or fingerprints[before] != header["previous_fingerprint"]:
+        if fingerprints[before] is None or fingerprints[before] != header.previous_fingerprint:
             return Basis(f"Clip {before}, which it goes on from, was trained again or is gone.")
         if bases[before].reason:
             return Basis(f"Clip {before}, which it goes on from, is out of date.", bases[before].blocked_by)
@@ -226,19 +226,24 @@ class ClipCatalog:
         found, kept = self._clips[index], self._checkpoints[index]
         resume_step, resume_n_steps, reason = None, 0, ""
         if kept is not None:
-            reason = self._lost_checkpoint(kept)
-            if not reason:
-                resume_step, resume_n_steps = kept.header["step"], kept.header["n_steps"]
+            reason = self._lost_checkpoint(kept.header)
+            if not reason and kept.header is not None:
+                resume_step, resume_n_steps = kept.header.step, kept.header.n_steps
         resume = {"resume_step": resume_step, "resume_n_steps": resume_n_steps, "blocked_by": basis.blocked_by}
         header = self._good(index)
-        if kept is not None and resume_step is not None and (found is None or (header is not None and basis.reason)):
+        if (
+            kept is not None
+            and kept.header is not None
+            and resume_step is not None
+            and (found is None or (header is not None and basis.reason))
+        ):
             return ClipRecord(
                 "stopped",
                 resume_step,
                 resume_n_steps,
                 self._curve_psnr.get(index),
                 self._project.checkpoint_path(index),
-                f"stopped-{resume_step}-{kept.header.get('fingerprint', '')}",
+                f"stopped-{resume_step}-{kept.header.fingerprint}",
                 n_anchors=anchor_counts(kept.header),
                 **resume,
             )
@@ -246,16 +251,17 @@ class ClipCatalog:
             return ClipRecord(reason=reason, **resume)
         if header is None:
             return ClipRecord("damaged", reason=found.damage, **resume)
-        psnr = _psnr(header) if _psnr(header) is not None or kept is not None else self._curve_psnr.get(index)
-        figures = {"held_out_psnr": psnr, "seconds": _seconds(header), "n_anchors": anchor_counts(header)}
+        psnr = header.figures.held_out_psnr
+        psnr = psnr if psnr is not None or kept is not None else self._curve_psnr.get(index)
+        figures = {"held_out_psnr": psnr, "seconds": header.figures.seconds, "n_anchors": anchor_counts(header)}
         if basis.reason:  # it cannot be shown without what it was trained on
-            return ClipRecord("stale", header["step"], header["n_steps"], reason=basis.reason, **figures, **resume)
-        revision = f"trained-{header.get('fingerprint', '')}"
+            return ClipRecord("stale", header.step, header.n_steps, reason=basis.reason, **figures, **resume)
+        revision = f"trained-{header.fingerprint}"
         path = self._project.clip_path(index)
         return ClipRecord(
             "trained",
-            header["step"],
-            header["n_steps"],
+            header.step,
+            header.n_steps,
             file=path,
             revision=revision,
             reason=reason,
@@ -263,41 +269,24 @@ class ClipCatalog:
             **resume,
         )
 
-    def _lost_checkpoint(self, kept: FoundHeader) -> str:
-        """Why the training cannot go on from a checkpoint; empty when it can."""
-        if kept.damage:
+    def _lost_checkpoint(self, kept: ClipHeader | None) -> str:
+        """Why the training cannot go on from a checkpoint; empty when it can. kept: None where it is damaged."""
+        if kept is None:
             return "What was learned before the stop cannot be read; training starts from the beginning."
         reference = None if not self.order else self._good(self.order[0])
-        known = kept.header.get("reference_fingerprint")
-        if known is not None and (reference is None or reference.get("fingerprint") != known):
+        known = kept.reference_fingerprint
+        if known is not None and (reference is None or reference.fingerprint != known):
             return "The reference was trained again after the stop; training starts from the beginning."
         return ""
 
 
-def anchor_counts(header: dict[str, Any]) -> tuple[int, int]:
+def anchor_counts(header: ClipHeader) -> tuple[int, int]:
     """Anchors of a clip by its header: those it inherits, and those it holds itself. Zeros where it does not say."""
-    sets = header.get("n_anchors")
-    numbers = {role: n for role, n in sets.items() if isinstance(n, int)} if isinstance(sets, dict) else {}
-    config = header.get("config")
-    is_shared = isinstance(config, dict) and config.get("inherit") in ("trainable", "off")
-    if header.get("role") != "source" or is_shared:
-        return 0, sum(numbers.values())
-    n_inherited = sum(n for role, n in numbers.items() if role in REFERENCE_ROLES)
-    return n_inherited, sum(numbers.values()) - n_inherited
-
-
-def _psnr(header: dict[str, Any]) -> float | None:
-    metrics = header.get("metrics")
-    value = metrics.get("held_out_psnr") if isinstance(metrics, dict) else None
-    return float(value) if _is_number(value) else None  # type: ignore[arg-type]
-
-
-def _seconds(header: dict[str, Any]) -> float | None:
-    metrics = header.get("metrics")
-    if not isinstance(metrics, dict):
-        return None
-    parts = [metrics.get(name) for name in ("preparation_s", "training_s")]
-    return float(sum(parts)) if all(_is_number(part) for part in parts) else None  # type: ignore[arg-type]
+    n_all = sum(header.n_anchors.values())
+    if header.role != "source" or header.config.get("inherit") in ("trainable", "off"):
+        return 0, n_all
+    n_inherited = sum(n for role, n in header.n_anchors.items() if role in REFERENCE_ROLES)
+    return n_inherited, n_all - n_inherited
 
 
 def _is_number(value: object) -> bool:

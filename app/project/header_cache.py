@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import look_at_clip
 
 
@@ -15,12 +15,12 @@ class FoundHeader:
     """What a clip file says of itself. Shared between readers: nobody changes it.
 
     Attributes:
-        header: See engine.clip_files.clip_state; empty when the file is damaged.
+        header: None when the file is damaged.
         damage: What is wrong with the file; empty for a good one.
         n_bytes: Size of the file.
     """
 
-    header: dict[str, Any]
+    header: ClipHeader | None
     damage: str
     n_bytes: int
 
@@ -38,7 +38,7 @@ class HeaderCache:
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
-            return FoundHeader({}, f"The file cannot be read ({error.strerror}).", 0)
+            return FoundHeader(None, f"The file cannot be read ({error.strerror}).", 0)
         identity = (status.st_mtime_ns, status.st_size, status.st_ino)
         known = self._known.get(path)
         if known is None or known[0] != identity:
@@ -49,7 +49,7 @@ class HeaderCache:
 
 def _read(path: Path, n_bytes: int) -> FoundHeader:
     found = look_at_clip(path)
-    if isinstance(found, dict):
+    if isinstance(found, ClipHeader):
         return FoundHeader(found, "", n_bytes)
     reason = "it is not there any more" if found is None else found.reason
-    return FoundHeader({}, f"The file is damaged ({reason}).", n_bytes)
+    return FoundHeader(None, f"The file is damaged ({reason}).", n_bytes)

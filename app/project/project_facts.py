@@ -6,12 +6,11 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from app.background.kernels import COMPILING
 from app.project.clip_bytes import storage_of
 from app.project.project import PROJECT_FILE, Project, ProjectSettings, open_project
-from app.project.stage_seconds import stages_of
+from engine.clip_files.clip_header import ClipHeader, Coverage
 from engine.clip_files.clip_state import DamagedClip, look_at_clip
 from engine.errors import ProjectError
 
@@ -32,7 +31,7 @@ class ClipFacts:
         stages_s: Wall seconds per stage, see app.training.stage_watch; empty when not recorded.
         preparation_s, training_s: Together all of it; None when not recorded.
         coverage: Of a clip that inherits: what moves and how much of it has an anchor near it, see
-            engine.training.preparation.building.Coverage; None when not recorded.
+            engine.clip_files.clip_header.Coverage; None when not recorded.
     """
 
     clip_index: int
@@ -45,7 +44,7 @@ class ClipFacts:
     stages_s: dict[str, float]
     preparation_s: float | None
     training_s: float | None
-    coverage: dict[str, Any] | None = None
+    coverage: Coverage | None = None
 
     @property
     def wall_s(self) -> float | None:
@@ -107,31 +106,24 @@ def read_facts(folder: Path, name: str, *, leave_out_damaged: bool = False) -> P
 
 def _read_clip(path: Path) -> ClipFacts | DamagedClip | None:
     header = look_at_clip(path)
-    if not isinstance(header, dict):
+    if not isinstance(header, ClipHeader):
         return header
-    metrics = header.get("metrics") or {}
     try:
         return ClipFacts(
-            clip_index=header["clip_index"],
-            start=header["start"],
-            n_frames=header["n_frames"],
-            role=header["role"],
-            n_steps=header["step"],
-            fingerprint=header.get("fingerprint", ""),
+            clip_index=header.clip_index,
+            start=header.start,
+            n_frames=header.n_frames,
+            role=header.role,
+            n_steps=header.step,
+            fingerprint=header.fingerprint,
             storage=storage_of(path),
-            stages_s=stages_of(metrics),
-            preparation_s=_seconds(metrics.get("preparation_s")),
-            training_s=_seconds(metrics.get("training_s")),
-            coverage=dict(header["coverage"]) if header.get("coverage") else None,
+            stages_s=header.figures.stages_s,
+            preparation_s=header.figures.preparation_s,
+            training_s=header.figures.training_s,
+            coverage=header.coverage,
         )
-    except KeyError as error:
-        return DamagedClip(path, f"its header has no {error}")
     except ProjectError as error:  # removed or replaced since
         return DamagedClip(path, error.message)
-
-
-def _seconds(value: Any) -> float | None:
-    return float(value) if isinstance(value, int | float) and 0 <= value < 1e9 else None
 
 
 # ---------------------------------------------------------------- which projects

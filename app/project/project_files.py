@@ -24,7 +24,7 @@ from engine.storage.json_files import (
     read_checked_lines,
     write_checked_json,
 )
-from engine.training.config import TrainConfig
+from engine.training.config import TrainConfig, config_of
 
 logger = logging.getLogger(__name__)
 
@@ -35,7 +35,6 @@ MAX_BYTES = 4 << 20
 """Of settings and of regions; both take some kilobytes."""
 _MAX_COUNT = 2**31
 """Frames and clips are fewer."""
-_DEFAULTS = TrainConfig()
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,16 +69,8 @@ class ProjectSettings:
         return split_clips(n_frames, n_frames if self.config().field == "joint" else self.clip_length)
 
     def config(self) -> TrainConfig:
-        """The training settings. Raises ProjectError for an unknown one or a value outside its range."""
-        unknown = sorted(set(self.overrides) - {item.name for item in fields(TrainConfig)})
-        if unknown:
-            raise ProjectError(f"There is no training setting called {', '.join(unknown)}.", hint="Take it out.")
-        for name, value in self.overrides.items():
-            expected = type(getattr(_DEFAULTS, name))
-            kinds = (float, int) if expected is float else (expected,)
-            if type(value) not in kinds:
-                raise ProjectError(f"{name} is {value!r:.60}; a value like {getattr(_DEFAULTS, name)!r} is expected.")
-        return TrainConfig(**self.overrides)
+        """The training settings. Raises ProjectError for an unknown one or a value that it may not have."""
+        return config_of(self.overrides)
 
 
 def read_settings(folder: Path) -> ProjectSettings:

@@ -6,6 +6,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import asdict
+
 from app.project.clip_bytes import COMPONENT_NAMES
 from app.project.opening import open_capture_of
 from app.project.project_facts import ClipFacts, read_facts
@@ -21,7 +23,7 @@ def describe_project(folder: Path) -> dict[str, Any]:
     Returns:
         schema; kind "project"; path; capture; fps (None when the capture is not there); clips, each with clip_index,
         role, start, n_frames, components (name to bytes), n_bytes and coverage (what moves and how much of it has an
-        anchor near it, see engine.training.preparation.building.Coverage; None where not known); damaged, files of
+        anchor near it, see engine.clip_files.clip_header.Coverage; None where not known); damaged, files of
         clips that cannot be read, each with path and reason; components and n_bytes of all clips;
         reference_bytes and reference_share, of the clip that others inherit from; bytes_per_frame and mb_per_minute,
         of all others: what video costs once the reference is there. None where there are none, or where the frame
@@ -52,7 +54,7 @@ def describe_project(folder: Path) -> dict[str, Any]:
                 "n_frames": clip.n_frames,
                 "components": clip.storage,
                 "n_bytes": sum(clip.storage.values()),
-                "coverage": clip.coverage,
+                "coverage": None if clip.coverage is None else asdict(clip.coverage),
             }
             for clip in facts.clips
         ],

@@ -45,6 +45,7 @@ from app.training.messages import (
 from app.training.rate import Rate
 from app.training.snapshots import Cadence, SnapshotWriter, is_finite, keep_clip
 from app.training.stage_watch import KEEPING, STARTING, TRAINING, StageWatch
+from engine.clip_files.clip_header import ClipFigures
 from engine.clip_files.clip_state import read_clip_header
 from engine.clip_files.compact import CompactClip
 from engine.errors import DiskError, EngineError, NonFiniteLoss, ProjectError
@@ -280,19 +281,20 @@ class TrainingRun:
         assert self._project is not None
         clip = training.finish()
         value = self._measure(training)
-        metrics = dict(clip.state.header.get("metrics") or {})
-        if value is not None:
-            metrics["held_out_psnr"] = value
-        if self._gradient_norms:
-            metrics["gradient_norm_median"] = statistics.median(self._gradient_norms)
-            metrics["gradient_norm_max"] = max(self._gradient_norms)
-            metrics["gradient_clipped_steps"] = self._n_clipped
-        times = self._watch.document()
-        metrics |= times
+        norms, times = self._gradient_norms, self._watch.document()
+        memory_mb = None
         with suppress(NotImplementedError):
-            metrics["memory_mb"] = round(peak_bytes() / 1e6, 1)
+            memory_mb = round(peak_bytes() / 1e6, 1)
         self._note({"step": training.steps_done, **times})
-        return clip.with_header(metrics=metrics)
+        figures = ClipFigures(
+            held_out_psnr=value,
+            gradient_norm_median=statistics.median(norms) if norms else None,
+            gradient_norm_max=max(norms, default=None),
+            gradient_clipped_steps=self._n_clipped if norms else None,
+            memory_mb=memory_mb,
+            **times,
+        )
+        return clip.with_figures(figures)
 
     def _keep(self, clip: CompactClip, training: Training) -> None:
         """Put the clip in its place, and what is not needed any more away.
@@ -317,9 +319,7 @@ class TrainingRun:
             logger.warning("clip %d: gradients were scaled down in %s", self._job.clip_index, found)
             title = f"Clip {self._job.clip_index} had gradients above max_gradient_norm"
             self._send(WarningRaised(title, f"They were scaled down in {found}."))
-        self._send(
-            ClipTrained(str(path), training.steps_done, (clip.state.header.get("metrics") or {}).get("held_out_psnr"))
-        )
+        self._send(ClipTrained(str(path), training.steps_done, clip.state.header.figures.held_out_psnr))
 
     # ---------------------------------------------------------------- commands
 
@@ -411,7 +411,7 @@ class TrainingRun:
         """Steps that the checkpoint on disk holds."""
         assert self._project is not None
         header = read_clip_header(self._project.checkpoint_path(self._job.clip_index))
-        return None if header is None else header.get("step")
+        return None if header is None else header.step
 
     def _check_folder(self) -> None:
         """Raises ProjectGone."""

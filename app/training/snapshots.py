@@ -67,7 +67,7 @@ class SnapshotWriter:
         write_clip_state(path, state)
         self.revision = revision  # one that could not be written is not waited for
         self._paths[revision] = path
-        return SnapshotWritten(self.revision, int(state.header["step"]), str(path))
+        return SnapshotWritten(self.revision, state.header.step, str(path))
 
     def consumed(self, revision: int) -> None:
         """The reader is done with a revision: older ones are deleted."""

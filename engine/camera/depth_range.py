@@ -1,8 +1,8 @@
 """How near and how far each camera has to look, derived from the rig and, where there are some, sparse points.
 
 No shape of the scene is assumed. Cameras may sit on the scene's own surface (a dome, the walls of a room), so the
-near plane is not a small constant: with 1 cm instead of a fifth of the focus distance, wall Gaussians beside an unseen
-camera covered its whole picture and cost 19 dB (measured 2026-11).
+near plane is not a small constant but a share of the focus distance: otherwise wall Gaussians beside an unseen camera
+cover its whole picture.
 """
 
 from __future__ import annotations

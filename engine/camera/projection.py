@@ -1,10 +1,47 @@
-"""Pinhole projections of numpy points for cloud building. Not differentiable; pixel centres lie at +0.5."""
+"""The pinhole camera for numpy points: world to camera to pixels and back. Not differentiable.
+
+OpenCV axes (x right, y down, z forward); pixel centres lie at +0.5; depths are camera z.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from engine.camera.rig import CameraRig
+
+
+def to_camera(points: np.ndarray, world_to_camera: np.ndarray) -> np.ndarray:
+    """World points [..., 3] in a camera's axes. [..., 3]"""
+    return points @ world_to_camera[:3, :3].T + world_to_camera[:3, 3]
+
+
+def to_world(points_camera: np.ndarray, world_to_camera: np.ndarray) -> np.ndarray:
+    """Points [..., 3] in a camera's axes as world points. [..., 3]"""
+    return (points_camera - world_to_camera[:3, 3]) @ world_to_camera[:3, :3]
+
+
+def camera_center(world_to_camera: np.ndarray) -> np.ndarray:
+    """Where a camera stands in the world. [3]"""
+    return -world_to_camera[:3, :3].T @ world_to_camera[:3, 3]
+
+
+def to_pixels(points_camera: np.ndarray, K: np.ndarray) -> np.ndarray:
+    """Pixels [P, 2] of points [P, 3] in a camera's axes; they mean nothing at depths <= 0 (they stay finite)."""
+    depths = np.maximum(points_camera[:, 2], 1e-9)
+    x, y = points_camera[:, 0], points_camera[:, 1]
+    return np.stack([K[0, 0] * x / depths + K[0, 2], K[1, 1] * y / depths + K[1, 2]], axis=-1)
+
+
+def focal_px(Ks: np.ndarray) -> np.ndarray:
+    """One focal length per camera: the geometric mean of fx and fy, px. [...]"""
+    return np.sqrt(Ks[..., 0, 0] * Ks[..., 1, 1])
+
+
+def relative_homography(rig: CameraRig, camera: int, other: int) -> tuple[np.ndarray, np.ndarray]:
+    """(matrix [3, 3], shift [3]) so that pixel p of `camera` at inverse depth q lies at matrix @ p + q shift."""
+    rotation = rig.world_to_camera[other, :3, :3] @ rig.world_to_camera[camera, :3, :3].T
+    translation = rig.world_to_camera[other, :3, 3] - rotation @ rig.world_to_camera[camera, :3, 3]
+    return rig.Ks[other] @ rotation @ np.linalg.inv(rig.Ks[camera]), rig.Ks[other] @ translation
 
 
 def projection_matrices(rig: CameraRig) -> np.ndarray:
@@ -29,7 +66,7 @@ def pixel_rays(K: np.ndarray, width: int, height: int) -> np.ndarray:
 def unproject(depths: np.ndarray, K: np.ndarray, world_to_camera: np.ndarray) -> np.ndarray:
     """World points of a depth picture [H, W] (camera z). [H, W, 3]"""
     points_camera = pixel_rays(K, depths.shape[1], depths.shape[0]) * depths[..., None]
-    return (points_camera - world_to_camera[:3, 3]) @ world_to_camera[:3, :3]
+    return to_world(points_camera, world_to_camera)
 
 
 def is_in_picture(pixels: np.ndarray, depths: np.ndarray, width: int, height: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The header of a clip file, looked at once when it is read: every entry that is there has a type that readers expect.
+"""The header of a clip file, declared once and looked at once, when it is read.
 
 A header of another kind is a damaged file; nothing behind this module looks at the type of an entry again.
 """
@@ -6,105 +6,266 @@ A header of another kind is a damaged file; nothing behind this module looks at 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta, Struct, to_builtins
+
+from engine.storage.json_files import json_text, parse_object
+from engine.storage.typed_json import EntryError, to_type
+from engine.text import shown
 
 SCHEMA = 2
 READABLE = (1, SCHEMA)
 """Schema 1 knew no compact form; its files are read like any other that holds its arrays as they are."""
-_MAX_INDEX = 2**31
-"""Frames, steps, clips and anchors are fewer."""
-_MAX_SIDE = 2**24
-"""Likewise cells, table entries and widths of layers."""
 _MAX_TABLE_VALUES = 2**28
-"""Likewise all values of a field's tables: its memory is taken before the arrays are compared with it."""
+"""All values of a field's tables are fewer: its memory is taken before the arrays are compared with it."""
+
+Count = Annotated[int, Meta(ge=0, lt=2**31)]
+"""Frames, steps, clips and anchors."""
+Size = Annotated[int, Meta(gt=0, le=2**24)]
+"""Cells, table entries and widths of layers."""
+Length = Annotated[float, Meta(gt=0, lt=1e30)]
+"""Scene units."""
+Figure = float | None
+"""None where it was not measured."""
 
 
-class HeaderError(ValueError):
-    """An entry of a header is missing or of the wrong kind. The text is a reason that fits into brackets."""
+class DecoderShape(Struct, frozen=True):
+    """Sizes of a decoder; what its constructor takes.
+
+    Attributes:
+        static_dim, dynamic_dim: Widths of the two features.
+        gaussians_per_anchor: K.
+        hidden: Width of the heads' hidden layers.
+    """
+
+    static_dim: Size
+    dynamic_dim: Size
+    gaussians_per_anchor: Size
+    hidden: Size
 
 
-def check_header(header: dict[str, Any]) -> dict[str, Any]:
-    """See that a header is one. Returns it.
+class FieldShape(Struct, frozen=True):
+    """Sizes of a field, saved beside it.
+
+    Attributes:
+        n_knots: Frames of the clip.
+        cells: Cells along the longest side per level.
+        n_entries: Table entries per level, a power of two.
+        channels: Values per entry.
+        hidden: Width of the network's hidden layer.
+        feature_dim: Width of the dynamic feature.
+        bounds_min: Lower corner of the cube, scene units. [3]
+        side: Length of the cube's side, scene units.
+        is_shared: Whether all knots share one table, as in the published 4D hash, instead of one each.
+    """
+
+    n_knots: Size
+    cells: tuple[Size, ...]
+    n_entries: Size
+    channels: Size
+    hidden: Size
+    feature_dim: Size
+    bounds_min: tuple[float, float, float]
+    side: Length
+    is_shared: bool = False
+
+    def __post_init__(self) -> None:
+        if self.n_knots * self.n_entries * self.channels * len(self.cells) > _MAX_TABLE_VALUES:
+            raise ValueError(f"more than {_MAX_TABLE_VALUES} values in its tables")
+        if not all(map(math.isfinite, self.bounds_min)):
+            raise ValueError(f"bounds_min {shown(self.bounds_min)}")
+
+    @property
+    def n_tables(self) -> int:
+        """Tables of the field."""
+        return 1 if self.is_shared else self.n_knots
+
+    @property
+    def n_table_values(self) -> int:
+        """Of all tables."""
+        return self.n_tables * len(self.cells) * self.n_entries * self.channels
+
+
+class Coverage(Struct, frozen=True):
+    """How much of what moves in a source clip has an anchor near it.
+
+    Attributes:
+        n_points: Moving points of the clip.
+        n_inherited: Of these, inside the spheres of inherited anchors.
+        n_residual: Anchors of the clip's own.
+        n_left_out: Points that would have become anchors beyond the budget.
+        share: Of the points that are within reach of an anchor of either kind; 1 where nothing moves.
+        reason: Where the budget comes from.
+    """
+
+    n_points: Count
+    n_inherited: Count
+    n_residual: Count
+    n_left_out: Count
+    share: float
+    reason: str
+
+    @property
+    def text(self) -> str:
+        """The text shown while the clip is prepared."""
+        n_outside = self.n_points - self.n_inherited
+        percent = 100 * n_outside / max(self.n_points, 1)
+        said = f"{n_outside} of {self.n_points} moving points ({percent:.0f} %) lie outside the inherited anchors; "
+        said += f"{self.n_residual} residual anchors ({self.reason})"
+        if self.n_left_out:
+            said += f", {self.n_left_out} points left to the anchors beside them"
+        return f"{said}; {100 * self.share:.1f} % of what moves is within reach of an anchor"
+
+
+class ClipFigures(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """What was measured of a finished clip and its training.
+
+    Attributes:
+        held_out_psnr: Of a few held-out pictures, dB.
+        gradient_norm_median, gradient_norm_max: Over all steps.
+        gradient_clipped_steps: Steps whose gradient was scaled down.
+        stages_s: Wall seconds per stage, in the order they were entered.
+        preparation_s, training_s: Together all of them.
+        memory_mb: Most memory of the training, 10^6 bytes.
+    """
+
+    held_out_psnr: Figure = None
+    gradient_norm_median: Figure = None
+    gradient_norm_max: Figure = None
+    gradient_clipped_steps: Count | None = None
+    stages_s: dict[str, float] = {}
+    preparation_s: Figure = None
+    training_s: Figure = None
+    memory_mb: Figure = None
+
+    @property
+    def seconds(self) -> float | None:
+        """All of the training; None where not recorded."""
+        if self.preparation_s is None or self.training_s is None:
+            return None
+        return self.preparation_s + self.training_s
+
+
+class Place(Struct, frozen=True, kw_only=True):
+    """Where a training stands.
+
+    Attributes:
+        phase_index: Phase that was begun last.
+        steps_in_phase: Steps done in it.
+        phases: Name and number of steps of every phase, as cut short by now.
+        order: State of the order in which pictures are drawn.
+        generator: State of the training's random numbers.
+        schedule: Where the present fall of the rates began; None in files of earlier versions.
+        patience: State of the early stop; None without one.
+    """
+
+    phase_index: Count
+    steps_in_phase: Count
+    phases: list[tuple[str, Count]]
+    order: dict[str, Any]
+    generator: list[Count]
+    schedule: list[float] | None = None
+    patience: dict[str, Any] | None = None
+
+    def __post_init__(self) -> None:
+        if self.phase_index >= len(self.phases):
+            raise ValueError(f"phase_index is {self.phase_index}, of {len(self.phases)} phases")
+
+
+class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """What a clip file says of itself. Entries with a default came later than the others, or not every clip has them.
+
+    Attributes:
+        role: Whether other clips can inherit from this one, or it inherits itself.
+        clip_length: M, the divisor of clip_time.
+        n_frames, start: Frames of this clip, and where in the capture they begin.
+        step, n_steps: Steps done, and those of the whole training.
+        config: Settings that differ from their defaults.
+        camera_names: Of the gains.
+        near_plane, spacing: Scene units; spacing is that of the static anchors.
+        moving_spacing: Voxels of the hulls, scene units; None or 0 where nothing moves.
+        n_anchors: Rows of each anchor set, inherited ones too, by role.
+        n_alive: Most moving anchors in one frame.
+        fingerprint: Of the arrays: names what a source clip was trained against.
+        reference_fingerprint: Of the clip that this one inherits from.
+        previous_fingerprint: Of the clip that this one goes on from.
+        metrics: Of a finished clip; see `figures`.
+        resume: Of a checkpoint: where the training stands.
+    """
+
+    schema: int
+    role: Literal["reference", "source"]
+    clip_index: Count
+    clip_length: Size
+    n_frames: Count
+    start: Count
+    step: Count
+    n_steps: Count
+    seed: int
+    config: dict[str, bool | int | float | str]
+    camera_names: list[str]
+    near_plane: Length
+    spacing: Length
+    decoder: DecoderShape
+    field: FieldShape | None
+    fingerprint: str
+    moving_spacing: Annotated[float, Meta(ge=0, lt=1e30)] | None = None
+    n_anchors: dict[str, Count] = {}
+    n_alive: Count | None = None
+    coverage: Coverage | None = None
+    reference_fingerprint: str | None = None
+    previous_fingerprint: str | None = None
+    metrics: ClipFigures | None = None
+    resume: Place | None = None
+
+    def __post_init__(self) -> None:
+        if self.role == "source" and self.reference_fingerprint is None:
+            raise ValueError("it has no reference_fingerprint")
+
+    @property
+    def figures(self) -> ClipFigures:
+        """Of a finished clip; all of them missing elsewhere."""
+        return self.metrics or ClipFigures()
+
+
+class NewerSchema(ValueError):
+    """A file of a newer version."""
+
+
+def parse_header(text: str) -> ClipHeader:
+    """The header of a clip file.
 
     Raises:
-        HeaderError: An entry is missing or of the wrong kind; names it.
+        JsonError, EntryError: It is damaged, or not a clip's; names the entry.
+        NewerSchema: This version cannot read it.
     """
-    missing = [name for name in ("role", "clip_index", "step", "n_steps") if name not in header]
-    if missing:
-        raise HeaderError(f"its header has no {missing[0]}")
-    for name, is_right in _ENTRIES.items():
-        if name in header and not is_right(header[name]):
-            raise HeaderError(f"its header has {name} {header[name]!r:.60}")
-    if header["role"] == "source" and "fingerprint" in header and "reference_fingerprint" not in header:
-        raise HeaderError("its header has no reference_fingerprint")
-    return header
+    values = parse_object(text, is_nan_allowed=True)
+    schema = values.get("schema")
+    if type(schema) is int and schema > SCHEMA:
+        raise NewerSchema(f"it has schema {schema}, this version reads 1 to {SCHEMA}")
+    if type(schema) is not int or schema not in READABLE:
+        raise EntryError(f"its header has schema {shown(schema)}")
+    _bring_up_to_date(values)
+    try:
+        return to_type(values, ClipHeader)
+    except EntryError as error:
+        raise EntryError(f"in its header {error}") from error
 
 
-def _is_count(value: Any) -> bool:
-    return type(value) is int and 0 <= value < _MAX_INDEX
+def header_text(header: ClipHeader) -> str:
+    """Inverse of `parse_header`."""
+    return json_text(to_builtins(header, builtin_types=()))
 
 
-def _is_size(value: Any) -> bool:
-    return type(value) is int and 0 < value <= _MAX_SIDE
+def _bring_up_to_date(values: dict[str, Any]) -> None:
+    """What earlier versions wrote in another way."""
+    if isinstance(values.get("resume"), str):
+        values["resume"] = parse_object(values["resume"])
+    figures = values.get("metrics")
+    if isinstance(figures, dict):  # NaN stood for what was not measured
+        values["metrics"] = {name: value for name, value in figures.items() if not _is_nan(value)}
 
 
-def _is_length(value: Any) -> bool:
-    return type(value) in (int, float) and 0 < value < 1e30
-
-
-def _is_text(value: Any) -> bool:
-    return type(value) is str
-
-
-def _is_texts(value: Any) -> bool:
-    return type(value) is list and all(map(_is_text, value))
-
-
-def _is_counts(value: Any) -> bool:
-    return type(value) is dict and all(map(_is_count, value.values()))
-
-
-def _is_plain(value: Any) -> bool:
-    """A flat table of numbers and texts."""
-    return type(value) is dict and not any(isinstance(item, list | dict) for item in value.values())
-
-
-def _is_coverage(value: Any) -> bool:
-    numbers = ("share", "n_residual", "n_left_out")
-    return _is_plain(value) and all(type(value.get(name, 0)) in (int, float) for name in numbers)
-
-
-def _is_field(value: Any) -> bool:
-    sizes = ("n_knots", "n_entries", "channels", "hidden", "feature_dim")
-    if type(value) is not dict or not all(_is_size(value.get(name)) for name in sizes):
-        return False
-    cells, corner = value.get("cells"), value.get("bounds_min")
-    if type(cells) is not list or not all(map(_is_size, cells)) or not _is_length(value.get("side")):
-        return False
-    if type(corner) is not list or len(corner) != 3 or not all(type(x) in (int, float) for x in corner):
-        return False
-    n_values = value["n_knots"] * value["n_entries"] * value["channels"] * len(cells)
-    return n_values <= _MAX_TABLE_VALUES and all(map(math.isfinite, corner))
-
-
-def _or_none(is_right: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    return lambda value: value is None or is_right(value)
-
-
-_ENTRIES: dict[str, Callable[[Any], bool]] = {
-    "role": lambda value: value in ("reference", "source"),
-    **dict.fromkeys(("clip_index", "n_frames", "start", "step", "n_steps", "n_alive"), _is_count),
-    "seed": lambda value: type(value) is int,
-    "clip_length": _is_size,
-    **dict.fromkeys(("near_plane", "spacing"), _is_length),
-    "moving_spacing": lambda value: value in (None, 0) or _is_length(value),
-    **dict.fromkeys(("fingerprint", "reference_fingerprint", "previous_fingerprint"), _is_text),
-    "camera_names": _is_texts,
-    "n_anchors": _is_counts,
-    "decoder": lambda value: type(value) is dict and all(map(_is_size, value.values())),
-    "field": _or_none(_is_field),
-    "coverage": _or_none(_is_coverage),
-    "config": lambda value: type(value) is dict,
-    "metrics": _or_none(lambda value: type(value) is dict),
-}
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and not math.isfinite(value)

@@ -5,25 +5,29 @@ safetensors; they appear under their final name only when complete. Source clips
 inherit; `reference_fingerprint` ties them to the reference they were trained on.
 
 A file holds its arrays as they are (snapshots, checkpoints) or compactly (finished clips, engine.clip_files.compact):
-then
-each is a run of bytes under its own name, and the metadata say how it is read. Readers of states see no difference.
+then each is a run of bytes under its own name, and the metadata say how it is read. Readers of states see no
+difference.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
-from engine.clip_files.clip_header import READABLE, SCHEMA, HeaderError, check_header
+from engine.clip_files.anchor_record import AnchorRecord, RecordError, read_records
+from engine.clip_files.clip_header import ClipHeader, NewerSchema, header_text, parse_header
 from engine.clip_files.coding import CodedArray, CodingError, decode_array
 from engine.errors import ProjectError
 from engine.storage.array_files import ArraysError, read_arrays, read_metadata, write_arrays
 from engine.storage.json_files import JsonError, parse_object
+from engine.storage.typed_json import EntryError
 
 _ENTRIES = ("header", "coding")
 """Texts of a file beside its checksum."""
@@ -33,29 +37,43 @@ _ENTRIES = ("header", "coding")
 class ClipState:
     """Named arrays and a header. A value.
 
-    Header keys: schema, role ("reference" or "source"), clip_index, clip_length, n_frames, start, step, n_steps,
-    seed, config (difference from defaults), camera_names (of the gains), near_plane, spacing, moving_spacing,
-    n_anchors (per set), n_alive (most moving anchors in one frame), fingerprint, reference_fingerprint,
-    field (FieldShape or None); a kept clip adds metrics.
+    Attributes:
+        arrays: By name. Those of anchors are described by `anchors`; others are the decoder's, the field's, and the
+            gains of the cameras.
+        header: Everything else that the file holds, checked.
     """
 
     arrays: dict[str, np.ndarray]
-    header: dict[str, Any]
+    header: ClipHeader
+
+    @property
+    def anchors(self) -> dict[str, AnchorRecord]:
+        """What the clip stores of anchors, by role. Raises RecordError where arrays do not fit together."""
+        return read_records(self.arrays)
 
     @property
     def is_reference(self) -> bool:
         """Whether other clips can inherit from this one."""
-        return self.header["role"] == "reference"
+        return self.header.role == "reference"
 
     @property
     def fingerprint(self) -> str:
-        """Hash of the arrays, 16 hexadecimal digits: names what a source clip was trained against."""
-        digest = hashlib.sha256()
-        for name in sorted(self.arrays):
-            array = np.ascontiguousarray(self.arrays[name])
-            digest.update(f"{name}{array.dtype}{array.shape}".encode())
-            digest.update(array.view(np.uint8).reshape(-1).data if array.size else b"")
-        return digest.hexdigest()[:16]
+        """Of the arrays as they are, see `fingerprint_of`."""
+        return fingerprint_of(self.arrays)
+
+    def stamped(self) -> ClipState:
+        """With the fingerprint of its arrays in its header."""
+        return ClipState(self.arrays, replace(self.header, fingerprint=self.fingerprint))
+
+
+def fingerprint_of(arrays: Mapping[str, np.ndarray]) -> str:
+    """Hash of named arrays, 16 hexadecimal digits: names what a source clip was trained against."""
+    digest = hashlib.sha256()
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"{name}{array.dtype}{array.shape}".encode())
+        digest.update(array.view(np.uint8).reshape(-1).data if array.size else b"")
+    return digest.hexdigest()[:16]
 
 
 def write_clip_state(path: Path | str, state: ClipState, *, is_durable: bool = False) -> None:
@@ -66,17 +84,17 @@ def write_clip_state(path: Path | str, state: ClipState, *, is_durable: bool = F
     Raises:
         DiskError: The disk refused.
     """
-    write_arrays(path, state.arrays, {"header": json.dumps(state.header)}, what="The clip", is_durable=is_durable)
+    write_arrays(path, state.arrays, {"header": header_text(state.header)}, what="The clip", is_durable=is_durable)
 
 
-def write_coded_arrays(path: Path | str, coded: dict[str, CodedArray], header: dict[str, Any]) -> None:
+def write_coded_arrays(path: Path | str, coded: dict[str, CodedArray], header: ClipHeader) -> None:
     """Likewise, with every array in its compact form; `read_clip_state` gives the arrays that these decode to.
 
     Raises:
         DiskError: The disk refused.
     """
     specs = {name: array.spec for name, array in coded.items()}
-    metadata = {"header": json.dumps(header), "coding": json.dumps(specs, separators=(",", ":"))}
+    metadata = {"header": header_text(header), "coding": json.dumps(specs, separators=(",", ":"))}
     write_arrays(path, {name: array.payload for name, array in coded.items()}, metadata, what="The clip")
 
 
@@ -92,9 +110,10 @@ def read_clip_state(path: Path | str) -> ClipState:
         header = _header_of(metadata)
         if "coding" in metadata:
             arrays = _decoded(arrays, parse_object(metadata["coding"]))
+        read_records(arrays)
     except FileNotFoundError as error:
         raise ProjectError("The clip file does not exist.", hint="Train the clip first.", path=path) from error
-    except _Unreadable as error:
+    except NewerSchema as error:
         hint = "Use the version that wrote it or train the clip again."
         raise ProjectError(f"The clip file cannot be read: {error}.", hint=hint, path=path) from error
     except _DAMAGE as error:
@@ -140,7 +159,7 @@ class DamagedClip:
         )
 
 
-def look_at_clip(path: Path) -> dict[str, Any] | DamagedClip | None:
+def look_at_clip(path: Path) -> ClipHeader | DamagedClip | None:
     """Header of a clip, checkpoint or snapshot; None when there is no such file, the reason when it cannot be read.
 
     Damage of arrays shows when they are read: `read_clip_state`.
@@ -153,10 +172,10 @@ def look_at_clip(path: Path) -> dict[str, Any] | DamagedClip | None:
         return DamagedClip(path, reason_of(error))
 
 
-def read_clip_header(path: Path) -> dict[str, Any] | None:
+def read_clip_header(path: Path) -> ClipHeader | None:
     """Header of a clip, checkpoint or snapshot without its arrays; None when there is none or it is damaged."""
     found = look_at_clip(path)
-    return found if isinstance(found, dict) else None
+    return found if isinstance(found, ClipHeader) else None
 
 
 def reason_of(error: BaseException) -> str:
@@ -164,11 +183,7 @@ def reason_of(error: BaseException) -> str:
     return (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
 
 
-class _Unreadable(ValueError):
-    """A file of a newer version."""
-
-
-_DAMAGE = (OSError, ArraysError, JsonError, HeaderError, CodingError, _Unreadable)
+_DAMAGE = (OSError, ArraysError, JsonError, EntryError, CodingError, RecordError, NewerSchema)
 
 
 def read_clip_metadata(path: Path) -> tuple[dict[str, str], dict[str, int]]:
@@ -176,19 +191,8 @@ def read_clip_metadata(path: Path) -> tuple[dict[str, str], dict[str, int]]:
     return read_metadata(path, _ENTRIES)
 
 
-def _header_of(metadata: dict[str, str]) -> dict[str, Any]:
-    """The header among the texts of a file.
-
-    Raises:
-        HeaderError, JsonError: There is none, or not a clip's.
-        _Unreadable: It is of a newer schema.
-    """
+def _header_of(metadata: Mapping[str, str]) -> ClipHeader:
+    """The header among the texts of a file. Raises: see engine.clip_files.clip_header.parse_header."""
     if "header" not in metadata:
-        raise HeaderError("it has no header")
-    header = parse_object(metadata["header"], is_nan_allowed=True)
-    schema = header.get("schema")
-    if type(schema) is int and schema > SCHEMA:
-        raise _Unreadable(f"it has schema {schema}, this version reads 1 to {SCHEMA}")
-    if type(schema) is not int or schema not in READABLE:
-        raise HeaderError(f"its header has schema {schema!r:.60}")
-    return check_header(header)
+        raise EntryError("it has no header")
+    return parse_header(metadata["header"])

@@ -1,7 +1,6 @@
 """One point cloud from many depth maps: trust in tiers, flatten onto local planes, average per voxel.
 
-Points that only one camera sees and nobody contradicts are kept: dropping them left black holes and cost 4 dB on
-views nobody had trained on (measured 2026-11 on a dome).
+Points that only one camera sees and that no other camera contradicts are kept: without them there are black holes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""AnchorSet: named rows of anchors that share a role (engine.model.roles).
+"""AnchorSet: named rows of anchors that share a role (engine.clip_files.roles).
 
 An anchor is a fixed position with a static feature and two sets of log scales; Gaussians are decoded from it. Sets
 are kept apart by name and never recovered by position in a concatenation. A set whose `presence` is None is static:

@@ -9,33 +9,26 @@ all clips. "replacing" ones are the same for one source clip: they take the plac
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, fields
 
 import numpy as np
 import torch
+from msgspec.structs import asdict
 from torch import Tensor, nn
 
+from engine.clip_files.anchor_record import AnchorRecord, StoredAnchors
+from engine.clip_files.array_names import DECODER, FIELD
+from engine.clip_files.clip_header import DecoderShape
 from engine.clip_files.clip_state import ClipState
+from engine.clip_files.roles import ROLES
 from engine.errors import ProjectError
 from engine.gate.reasons import NO_REASON
 from engine.model.anchors import AnchorSet
 from engine.model.decode.decoding import ChosenAnchors, decode_anchors
 from engine.model.decoder import Decoder
-from engine.model.field import FieldShape, SpatioTemporalField
+from engine.model.field import SpatioTemporalField
 from engine.model.grid import CornerTable
-from engine.model.roles import ROLES
 from engine.raster.gaussians import Gaussians
-
-_ANCHOR_ARRAYS = (
-    "positions",
-    "color_logits",
-    "features",
-    "log_offset_scales",
-    "log_base_scales",
-    "presence",
-)
-_HIDDEN = ".is_hidden"
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +38,7 @@ class AnchorView:
     Attributes:
         inherited_positions: Anchors of the reference clip in a source clip; empty in the reference clip. [A0, 3]
         own_positions: Anchors this clip trains. [A, 3]
-        own_roles: Role of each own anchor, in engine.model.roles.ROLES. [A] uint8
+        own_roles: Role of each own anchor, in engine.clip_files.roles.ROLES. [A] uint8
         inherited_roles: Likewise. [A0] uint8
         own_reasons: Why the gate decided so, a code of engine.gate.reasons. [A] uint8
         inherited_reasons: Likewise. [A0] uint8
@@ -238,32 +231,33 @@ class ClipModel(nn.Module):
         """Everything this clip must store; inherited sets leave only their presence in this clip. Copies."""
         arrays: dict[str, np.ndarray] = {}
         for role in self.roles():
-            anchors = self.anchor_set(role)
-            if not anchors.is_trainable:
-                if anchors.presence is not None:
-                    arrays[f"inherited.{role}.presence"] = anchors.presence.numpy().copy()
-                continue
-            for name in _ANCHOR_ARRAYS:
-                value = getattr(anchors, name)
-                if value is not None:
-                    arrays[f"sets.{role}.{name}"] = value.detach().numpy().copy()
-        for role, is_hidden in self.hidden.items():
-            arrays[f"inherited.{role}{_HIDDEN}"] = is_hidden.numpy().copy()
+            anchors, is_hidden = self.anchor_set(role), self.hidden.get(role)
+            presence = None if anchors.presence is None or anchors.is_trainable else _copy(anchors.presence)
+            record = AnchorRecord(
+                own=_stored(anchors) if anchors.is_trainable else None,
+                presence=presence,
+                is_hidden=None if is_hidden is None else _copy(is_hidden),
+            )
+            arrays |= record.arrays(role)
         if any(p.requires_grad for p in self.decoder.parameters()):
-            arrays |= {f"decoder.{k}": v.detach().numpy().copy() for k, v in self.decoder.state_dict().items()}
+            arrays |= {f"{DECODER}{name}": _copy(value) for name, value in self.decoder.state_dict().items()}
         if self.field is not None:
-            arrays |= {f"field.{k}": v.detach().numpy().copy() for k, v in self.field.state_dict().items()}
+            arrays |= {f"{FIELD}{name}": _copy(value) for name, value in self.field.state_dict().items()}
         return arrays
 
 
-def decoder_sizes(decoder: Decoder) -> dict[str, int]:
+def _copy(tensor: Tensor) -> np.ndarray:
+    return tensor.detach().numpy().copy()
+
+
+def _stored(anchors: AnchorSet) -> StoredAnchors:
+    tensors = {attribute.name: getattr(anchors, attribute.name) for attribute in fields(StoredAnchors)}
+    return StoredAnchors(**{kind: _copy(tensor) for kind, tensor in tensors.items() if tensor is not None})
+
+
+def decoder_shape(decoder: Decoder) -> DecoderShape:
     """Constructor arguments of a decoder, for a header."""
-    return {
-        "static_dim": decoder.static_dim,
-        "dynamic_dim": decoder.dynamic_dim,
-        "gaussians_per_anchor": decoder.gaussians_per_anchor,
-        "hidden": decoder.hidden,
-    }
+    return DecoderShape(decoder.static_dim, decoder.dynamic_dim, decoder.gaussians_per_anchor, decoder.hidden)
 
 
 def inherit(
@@ -284,8 +278,7 @@ def inherit(
     decoder = _read_decoder(reference)
     decoder.requires_grad_(requires_grad=False)
     sets = {}
-    for role in _roles(reference.arrays):
-        anchors = _read_set(reference.arrays, role, is_trainable=is_trainable)
+    for role, anchors in _read_sets(reference, is_trainable=is_trainable).items():
         if anchors.presence is not None:
             if role not in presence:
                 continue
@@ -312,7 +305,7 @@ def load_clip_model(state: ClipState, reference: ClipState | None, *, is_learnin
         model = _rebuild(state, reference)
     except (KeyError, TypeError, AttributeError, RuntimeError, ValueError) as error:  # arrays that do not fit together
         raise ProjectError(
-            f"The state of clip {state.header.get('clip_index')} is incomplete or inconsistent ({error}).",
+            f"The state of clip {state.header.clip_index} is incomplete or inconsistent ({error}).",
             hint="Train this clip again.",
         ) from error
     return model if is_learning else model.requires_grad_(requires_grad=False)
@@ -320,8 +313,9 @@ def load_clip_model(state: ClipState, reference: ClipState | None, *, is_learnin
 
 def read_field(state: ClipState) -> SpatioTemporalField:
     """The field of a clip that has one. A copy."""
-    field = SpatioTemporalField(FieldShape.from_dict(state.header["field"]))
-    field.load_state_dict(_strip(state.arrays, "field."))
+    assert state.header.field is not None
+    field = SpatioTemporalField(state.header.field)
+    field.load_state_dict(_strip(state.arrays, FIELD))
     return field
 
 
@@ -329,31 +323,31 @@ def _rebuild(state: ClipState, reference: ClipState | None) -> ClipModel:
     header = state.header
     hidden: dict[str, Tensor] = {}
     if state.is_reference:
-        roles = _roles(state.arrays)
-        sets = {role: _read_set(state.arrays, role, is_trainable=True) for role in roles}
+        sets = _read_sets(state, is_trainable=True)
         decoder = _read_decoder(state)
     else:
         if reference is None:
-            raise ProjectError(f"Clip {header['clip_index']} inherits from a reference clip that is not there.")
-        if reference.header["fingerprint"] != header["reference_fingerprint"]:
+            raise ProjectError(f"Clip {header.clip_index} inherits from a reference clip that is not there.")
+        if reference.header.fingerprint != header.reference_fingerprint:
             raise ProjectError(
-                f"Clip {header['clip_index']} was trained on reference {header['reference_fingerprint']}, "
-                f"the project now has {reference.header['fingerprint']}.",
+                f"Clip {header.clip_index} was trained on reference {header.reference_fingerprint}, "
+                f"the project now has {reference.header.fingerprint}.",
                 hint="Train this clip again.",
             )
-        hidden = _of_inherited(state, _HIDDEN)
-        sets, decoder = inherit(reference, _of_inherited(state, ".presence"), hidden=hidden)
-        sets |= {role: _read_set(state.arrays, role, is_trainable=True) for role in _roles(state.arrays)}
+        records = state.anchors.items()
+        hidden = {role: _tensor(record.is_hidden) for role, record in records if record.is_hidden is not None}
+        presence = {role: _tensor(record.presence) for role, record in records if record.presence is not None}
+        inherited, decoder = inherit(reference, presence, hidden=hidden)
+        sets = inherited | _read_sets(state, is_trainable=True)
         sets = {role: sets[role] for role in ROLES if role in sets}
-        if any(name.startswith("decoder.") for name in state.arrays):  # it went on learning in this clip
+        if any(name.startswith(DECODER) for name in state.arrays):  # it went on learning in this clip
             decoder = _read_decoder(state)
-    field = read_field(state) if header.get("field") else None
     model = ClipModel(
         sets=sets,
         decoder=decoder,
-        field=field,
-        clip_length=header["clip_length"],
-        n_frames=header["n_frames"],
+        field=read_field(state) if header.field else None,
+        clip_length=header.clip_length,
+        n_frames=header.n_frames,
         hidden=hidden,
     )
     model.reasons = _reasons(state, reference, model)
@@ -362,45 +356,44 @@ def _rebuild(state: ClipState, reference: ClipState | None) -> ClipModel:
 
 def _reasons(state: ClipState, reference: ClipState | None, model: ClipModel) -> dict[str, np.ndarray]:
     """What the gate said of each anchor, by role; the reference speaks where the clip itself was not asked."""
-    known = {} if state.is_reference or reference is None else dict(reference.arrays)
-    known |= state.arrays
-    reasons = {role: known[f"gate.{role}"] for role in model.roles() if f"gate.{role}" in known}
+    reasons: dict[str, np.ndarray] = {}
+    for known in (reference, state) if reference is not None and not state.is_reference else (state,):
+        reasons |= {role: record.reasons for role, record in known.anchors.items() if record.reasons is not None}
     is_hidden = model.hidden.get("static")
     if is_hidden is not None and "static" in reasons:  # the clip was asked about all rows of the reference
         if "replacing" in model.roles() and len(model.anchor_set("replacing")) == int(is_hidden.sum()):
             reasons["replacing"] = reasons["static"][is_hidden.numpy()]
         reasons["static"] = reasons["static"][~is_hidden.numpy()]
-    return {role: codes for role, codes in reasons.items() if len(codes) == len(model.anchor_set(role))}
+    return {role: reasons[role] for role in model.roles() if len(reasons.get(role, ())) == len(model.anchor_set(role))}
 
 
-def _of_inherited(state: ClipState, suffix: str) -> dict[str, Tensor]:
-    """What a source clip says of inherited sets, by role."""
-    prefix = "inherited."
-    return {
-        name.removeprefix(prefix).removesuffix(suffix): torch.from_numpy(array.copy())
-        for name, array in state.arrays.items()
-        if name.startswith(prefix) and name.endswith(suffix)
-    }
+def _read_sets(state: ClipState, *, is_trainable: bool) -> dict[str, AnchorSet]:
+    """Anchors that a clip stores itself. Copies."""
+    stored = {role: record.own for role, record in state.anchors.items() if record.own is not None}
+    return {role: _read_set(anchors, is_trainable=is_trainable) for role, anchors in stored.items()}
 
 
-def _roles(arrays: dict[str, np.ndarray]) -> list[str]:
-    return sorted(
-        {name.split(".")[1] for name in arrays if name.startswith("sets.")},
-        key=ROLES.index,
+def _read_set(stored: StoredAnchors, *, is_trainable: bool) -> AnchorSet:
+    return AnchorSet(
+        positions=_tensor(stored.positions),
+        color_logits=_tensor(stored.color_logits),
+        features=_tensor(stored.features),
+        log_offset_scales=_tensor(stored.log_offset_scales),
+        log_base_scales=_tensor(stored.log_base_scales),
+        presence=None if stored.presence is None else _tensor(stored.presence),
+        is_trainable=is_trainable,
     )
 
 
-def _read_set(arrays: dict[str, np.ndarray], role: str, *, is_trainable: bool) -> AnchorSet:
-    values: dict[str, Any] = {name: arrays.get(f"sets.{role}.{name}") for name in _ANCHOR_ARRAYS}
-    tensors = {name: None if value is None else torch.from_numpy(value.copy()) for name, value in values.items()}
-    return AnchorSet(**tensors, is_trainable=is_trainable)  # type: ignore[arg-type]
-
-
 def _read_decoder(state: ClipState) -> Decoder:
-    decoder = Decoder(**state.header["decoder"])
-    decoder.load_state_dict(_strip(state.arrays, "decoder."))
+    decoder = Decoder(**asdict(state.header.decoder))
+    decoder.load_state_dict(_strip(state.arrays, DECODER))
     return decoder
 
 
 def _strip(arrays: dict[str, np.ndarray], prefix: str) -> dict[str, Tensor]:
-    return {k.removeprefix(prefix): torch.from_numpy(v.copy()) for k, v in arrays.items() if k.startswith(prefix)}
+    return {name.removeprefix(prefix): _tensor(array) for name, array in arrays.items() if name.startswith(prefix)}
+
+
+def _tensor(array: np.ndarray) -> Tensor:
+    return torch.from_numpy(array.copy())

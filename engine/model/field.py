@@ -9,57 +9,15 @@ Source: ClipGStream, spatio-temporal field; sizes follow the number of anchors i
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
+from engine.clip_files.clip_header import FieldShape
 from engine.model.grid import CornerTable, corner_table, encode, time_keys
 
 _TABLE_INIT = 1e-3  # uniform half-width of the start; small enough that the field starts at zero look
-
-
-@dataclass(frozen=True, slots=True)
-class FieldShape:
-    """Sizes of a field, saved beside it.
-
-    Attributes:
-        n_knots: Frames of the clip.
-        cells: Cells along the longest side per level.
-        n_entries: Table entries per level, a power of two.
-        channels: Values per entry.
-        hidden: Width of the network's hidden layer.
-        feature_dim: Width of the dynamic feature.
-        bounds_min: Lower corner of the cube, scene units. [3]
-        side: Length of the cube's side, scene units.
-        is_shared: Whether all knots share one table, as in the published 4D hash, instead of one each.
-    """
-
-    n_knots: int
-    cells: tuple[int, ...]
-    n_entries: int
-    channels: int
-    hidden: int
-    feature_dim: int
-    bounds_min: tuple[float, float, float]
-    side: float
-    is_shared: bool = False
-
-    def as_dict(self) -> dict:
-        """JSON-able copy."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: dict) -> FieldShape:
-        """Inverse of `as_dict` after a trip through JSON."""
-        return cls(
-            **{
-                **values,
-                "cells": tuple(values["cells"]),
-                "bounds_min": tuple(values["bounds_min"]),
-            }
-        )
 
 
 class SpatioTemporalField(nn.Module):
@@ -75,8 +33,7 @@ class SpatioTemporalField(nn.Module):
         size = (len(shape.cells), shape.n_entries, shape.channels)
         # One parameter per knot: knots without gradient are left alone by the optimiser, which makes it lazy for free.
         self.tables = nn.ParameterList(
-            nn.Parameter((torch.rand(size, generator=generator) * 2 - 1) * _TABLE_INIT)
-            for _ in range(1 if shape.is_shared else shape.n_knots)
+            nn.Parameter((torch.rand(size, generator=generator) * 2 - 1) * _TABLE_INIT) for _ in range(shape.n_tables)
         )
         keys = np.zeros((shape.n_knots, len(shape.cells)), np.int32)
         self.keys = time_keys(shape.cells, shape.n_entries, shape.n_knots) if shape.is_shared else keys

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import torch
 
+from engine.clip_files.clip_header import FieldShape
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
 from engine.model.decode.joining import join_frozen
 from engine.model.decoder import Decoder
-from engine.model.field import FieldShape, SpatioTemporalField
+from engine.model.field import SpatioTemporalField
 
 
 def warm_up() -> None:

@@ -6,40 +6,17 @@ backgrounds as they are by now, and in its header where the training stands.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
+from engine.clip_files.clip_header import Place
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.errors import ProjectError
-from engine.storage.json_files import parse_object
 from engine.training.preparation.cloud_preparation import Backgrounds
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where a training stands. A value; JSON-able field by field.
-
-    Attributes:
-        phase_index: Phase that was begun last.
-        steps_in_phase: Steps done in it.
-        phases: Name and number of steps of every phase, as cut short by now.
-        order: State of the order in which pictures are drawn.
-        schedule: Where the present fall of the rates began; None in files of earlier versions.
-        patience: State of the early stop; None without one.
-        generator: State of the training's random numbers.
-    """
-
-    phase_index: int
-    steps_in_phase: int
-    phases: list[tuple[str, int]]
-    order: dict
-    schedule: list[float] | None
-    patience: dict | None
-    generator: list[int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,35 +42,36 @@ def write_checkpoint(path: Path | str, checkpoint: Checkpoint) -> None:
     Raises:
         DiskError: The disk refused.
     """
-    place, backgrounds = checkpoint.place, checkpoint.backgrounds
+    backgrounds = checkpoint.backgrounds
     arrays = dict(checkpoint.state.arrays)
     arrays["resume.gains"] = checkpoint.gains
     arrays["resume.backgrounds"] = backgrounds.images
     arrays["resume.is_stable"] = np.packbits(backgrounds.is_stable, axis=-1)
-    resume = {name: getattr(place, name) for name in Place.__dataclass_fields__}
-    write_clip_state(path, ClipState(arrays, checkpoint.state.header | {"resume": resume}), is_durable=True)
+    header = replace(checkpoint.state.header, resume=checkpoint.place)
+    write_clip_state(path, ClipState(arrays, header), is_durable=True)
 
 
-def read_checkpoint(path: Path | str, expected: Mapping[str, Any]) -> Checkpoint:
+def read_checkpoint(path: Path | str, *, clip_index: int, camera_names: Sequence[str], seed: int) -> Checkpoint:
     """Inverse of `write_checkpoint`.
 
     Args:
         path: The file.
-        expected: Entries that its header must have: clip_index, camera_names, seed.
+        clip_index, camera_names, seed: Of the training that goes on.
     Raises:
-        ProjectError: The file is damaged, or an entry differs.
+        ProjectError: The file is damaged, or of another training.
     """
     kept = read_clip_state(path)
-    for key, value in expected.items():
-        if kept.header.get(key) != value:
+    for name, value in (("clip_index", clip_index), ("camera_names", list(camera_names)), ("seed", seed)):
+        if getattr(kept.header, name) != value:
             raise ProjectError(
-                f"The checkpoint has {key} {kept.header.get(key)}, the training {value}.",
+                f"The checkpoint has {name} {getattr(kept.header, name)}, the training {value}.",
                 hint="Train the clip again.",
                 path=path,
             )
+    place = kept.header.resume
+    if place is None:
+        raise damaged_checkpoint(KeyError("resume"), path)
     try:
-        resume = kept.header["resume"]
-        place = _place(parse_object(resume) if isinstance(resume, str) else resume)  # a text in earlier versions
         gains, images, packed = (kept.arrays[f"resume.{name}"] for name in ("gains", "backgrounds", "is_stable"))
         if images.ndim != 4 or packed.ndim != 3 or (gains.ndim, gains.dtype) != (2, np.float32):
             raise ValueError(f"gains {gains.shape}, backgrounds {images.shape}, stable pixels {packed.shape}")
@@ -113,26 +91,3 @@ def damaged_checkpoint(error: Exception, path: Path | str) -> ProjectError:
     """What to raise when the content of a checkpoint cannot be used."""
     reason = f"no entry {error}" if isinstance(error, KeyError) else str(error)
     return ProjectError(f"The checkpoint is damaged or does not fit its clip ({reason}).", path=path)
-
-
-def _place(resume: Any) -> Place:
-    """Where a training stood, as the header has it.
-
-    Raises:
-        KeyError, TypeError, ValueError: An entry is missing or of the wrong kind.
-    """
-    phases = [(name, n) for name, n in resume["phases"]]
-    counts = [resume["phase_index"], resume["steps_in_phase"], *(n for _, n in phases), *resume["generator"]]
-    if not all(type(n) is int and n >= 0 for n in counts) or not all(type(name) is str for name, _ in phases):
-        raise ValueError("phases, steps or random numbers are not counts")
-    if resume["phase_index"] >= len(phases) or not isinstance(resume["order"], dict):
-        raise ValueError(f"phase {resume['phase_index']} of {len(phases)}, or an order of pictures that is none")
-    return Place(
-        phase_index=resume["phase_index"],
-        steps_in_phase=resume["steps_in_phase"],
-        phases=phases,
-        order=resume["order"],
-        schedule=resume.get("schedule"),
-        patience=resume.get("patience"),
-        generator=resume["generator"],
-    )

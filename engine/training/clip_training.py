@@ -17,17 +17,19 @@ from torch import nn
 from engine.camera.depth_range import near_plane
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.clip_files.clip_header import SCHEMA
-from engine.clip_files.clip_state import ClipState
+from engine.clip_files.anchor_record import AnchorRecord
+from engine.clip_files.array_names import GAINS
+from engine.clip_files.clip_header import SCHEMA, ClipHeader, Place
+from engine.clip_files.clip_state import ClipState, fingerprint_of
 from engine.clip_files.compact import CompactClip, compact_clip
 from engine.cloud.background.gains import in_gauge
 from engine.errors import NonFiniteLoss, PreparationError, ProjectError
 from engine.gate.regions import GateRegion
 from engine.images.psnr import psnr
-from engine.model.clip_model import ClipModel, decoder_sizes, load_clip_model
+from engine.model.clip_model import ClipModel, decoder_shape, load_clip_model
 from engine.model.clip_view import REACH_SPACINGS, View, render_gaussians, render_model
 from engine.progress import Progress, ReportProgress, StepStats
-from engine.training.checkpoint import Checkpoint, Place, damaged_checkpoint, read_checkpoint, write_checkpoint
+from engine.training.checkpoint import Checkpoint, damaged_checkpoint, read_checkpoint, write_checkpoint
 from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters
 from engine.training.phases import phase_at, phases_of
@@ -98,7 +100,7 @@ class ClipTraining:
         self.seed, self.prep_dir, self.report = seed, Path(prep_dir), report
         self.width, self.height = shared_image_size(capture)
         self.rig = capture.rig.subset(self.camera_indices)
-        self.near_plane = float(near_plane(self.rig)) if self._base is None else self._base.header["near_plane"]
+        self.near_plane = float(near_plane(self.rig)) if self._base is None else self._base.header.near_plane
         n_cameras = len(self.camera_indices)
         self.phases = phases_of(config, n_cameras=n_cameras, n_frames=clip.n_frames, is_source=self._base is not None)
         self.steps_done = 0
@@ -325,37 +327,36 @@ class ClipTraining:
         return self._state_of(self.model, self._reasons)
 
     def _state_of(self, model: ClipModel, reasons: dict[str, np.ndarray]) -> ClipState:
-        arrays = model.own_arrays() | reasons
-        header = {
-            "schema": SCHEMA,
-            "role": "reference" if self.reference is None else "source",
-            "clip_index": self.clip.clip_index,
-            "clip_length": self.clip.clip_length,
-            "n_frames": self.clip.n_frames,
-            "start": self.clip.start,
-            "step": self.steps_done,
-            "n_steps": self.n_steps,
-            "seed": self.seed,
-            "config": self._given_config.difference(),
-            "camera_names": list(self.rig.names),
-            "near_plane": self.near_plane,
-            "spacing": self.spacing,
-            "moving_spacing": self.moving_spacing,
-            "n_anchors": {role: len(model.anchor_set(role)) for role in model.roles()},
-            "n_alive": n_alive(model),
-            "coverage": self._coverage,
-            "decoder": decoder_sizes(model.decoder),
-            "field": None if model.field is None else model.field.shape.as_dict(),
-        }
+        arrays = model.own_arrays()
+        for role, codes in reasons.items():
+            arrays |= AnchorRecord(reasons=codes).arrays(role)
         if self.reference is None:
-            arrays["gains"] = self.gains.detach().numpy().copy()
-        else:
-            header["reference_fingerprint"] = self.reference.header["fingerprint"]
-        if self.previous is not None:
-            header["previous_fingerprint"] = self.previous.header["fingerprint"]
-        state = ClipState(arrays, header)
-        header["fingerprint"] = state.fingerprint
-        return state
+            arrays[GAINS] = self.gains.detach().numpy().copy()
+        header = ClipHeader(
+            schema=SCHEMA,
+            role="reference" if self.reference is None else "source",
+            clip_index=self.clip.clip_index,
+            clip_length=self.clip.clip_length,
+            n_frames=self.clip.n_frames,
+            start=self.clip.start,
+            step=self.steps_done,
+            n_steps=self.n_steps,
+            seed=self.seed,
+            config=self._given_config.difference(),
+            camera_names=list(self.rig.names),
+            near_plane=self.near_plane,
+            spacing=self.spacing,
+            moving_spacing=self.moving_spacing,
+            n_anchors={role: len(model.anchor_set(role)) for role in model.roles()},
+            n_alive=n_alive(model),
+            coverage=self._coverage,
+            decoder=decoder_shape(model.decoder),
+            field=None if model.field is None else model.field.shape,
+            fingerprint=fingerprint_of(arrays),
+            reference_fingerprint=None if self.reference is None else self.reference.header.fingerprint,
+            previous_fingerprint=None if self.previous is None else self.previous.header.fingerprint,
+        )
+        return ClipState(arrays, header)
 
     def finish(self) -> CompactClip:
         """The trained clip as it is stored. The model takes its values over: what is measured from here on is that.
@@ -374,7 +375,7 @@ class ClipTraining:
         if self.config.gate == "images" and self.config.field != "continue":
             state, said = demote(state, self.reference, self._training_views, reach=self._reach)
             self._say("Leaving out what is not needed", said)
-            self._reasons = {name: array for name, array in state.arrays.items() if name.startswith("gate.")}
+            self._reasons = _reasons_in(state)
             self.model = load_clip_model(state, self.reference, is_learning=True)
         # a field that goes on in the next clip, and may show this one then, keeps entries that only others read
         entries = None if self.config.field == "continue" else self.model.entries_in_use()
@@ -405,8 +406,7 @@ class ClipTraining:
         Raises:
             ProjectError: The checkpoint is damaged or belongs to another clip, reference or set of cameras.
         """
-        expected = {"clip_index": self.clip.clip_index, "camera_names": list(self.rig.names), "seed": self.seed}
-        kept = read_checkpoint(path, expected)
+        kept = read_checkpoint(path, clip_index=self.clip.clip_index, camera_names=self.rig.names, seed=self.seed)
         self.pictures = self._preparation.read_pictures()
         try:
             self._go_on(kept)
@@ -428,24 +428,29 @@ class ClipTraining:
         if kept.backgrounds.images.shape != (len(self.rig), height, width, 3) or kept.gains.shape != (len(self.rig), 3):
             found = f"{kept.backgrounds.images.shape} and {kept.gains.shape}"
             raise ValueError(f"backgrounds and gains are {found}, not of {len(self.rig)} cameras of {width}x{height}")
-        header, arrays, place = kept.state.header, kept.state.arrays, kept.place
+        header, place = kept.state.header, kept.place
         parts = ClipParts(
             load_clip_model(kept.state, self.reference, is_learning=True),
             nn.Parameter(torch.from_numpy(kept.gains)),
             kept.backgrounds,
-            header["spacing"],
-            moving_spacing=header["moving_spacing"],
-            reasons={name: array for name, array in arrays.items() if name.startswith("gate.")},
-            coverage=header.get("coverage"),
+            header.spacing,
+            moving_spacing=header.moving_spacing,
+            reasons=_reasons_in(kept.state),
+            coverage=header.coverage,
         )
         self._take(parts)
         self.phases = list(place.phases)
-        self.steps_done = header["step"]
+        self.steps_done = header.step
         self._start_phase(place.phase_index, place.steps_in_phase)
-        self._optimizer.restore(arrays, place.steps_in_phase)
+        self._optimizer.restore(kept.state.arrays, place.steps_in_phase)
         if place.schedule is not None:
             self._optimizer.schedule = place.schedule
         self._order.restore(place.order)
         if self._patience is not None and place.patience:
             self._patience.restore(place.patience)
         self._generator.set_state(torch.tensor(place.generator, dtype=torch.uint8))
+
+
+def _reasons_in(state: ClipState) -> dict[str, np.ndarray]:
+    """What the gate said, by role, as a clip stores it."""
+    return {role: record.reasons for role, record in state.anchors.items() if record.reasons is not None}

@@ -9,7 +9,6 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -22,10 +21,10 @@ from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_
 from engine.clip_files.compact import CompactClip, compact_clip
 from engine.errors import NonFiniteLoss, ProjectError
 from engine.progress import Progress, StepStats
+from tests.clip_headers import DECODER, make_header
 
 N_STEPS = 6
 N_ANCHORS = 12
-DECODER = {"static_dim": 2, "dynamic_dim": 2, "gaussians_per_anchor": 1, "hidden": 4}
 HEADS = {"opacity": 1, "color": 3, "shape": 7, "offset": 3}
 
 
@@ -130,33 +129,22 @@ class FakeTraining:
         )
 
     def state(self) -> ClipState:
-        header: dict[str, Any] = {
-            "schema": 1,
-            "role": "reference" if self.reference is None else "source",
-            "clip_index": self.clip.clip_index,
-            "clip_length": self.clip.clip_length,
-            "n_frames": self.clip.n_frames,
-            "start": self.clip.start,
-            "step": self.steps_done,
-            "n_steps": self.n_steps,
-            "near_plane": 0.1,
-            "spacing": 0.1,
-            "metrics": {},
-        }
-        header["n_anchors"] = {"static": N_ANCHORS}
-        if self.reference is not None:
-            header["n_anchors"]["residual"] = N_ANCHORS
-            header["reference_fingerprint"] = self.reference.header["fingerprint"]
-        if self.previous is not None:
-            header["previous_fingerprint"] = self.previous.header["fingerprint"]
-        role = "static" if self.reference is None else "residual"
-        arrays = {**anchor_arrays(role), "value": np.array([self.value], np.float32)}
-        if self.reference is None:
-            header["decoder"] = DECODER
-            arrays |= decoder_arrays()
-        state = ClipState(arrays, header)
-        header["fingerprint"] = state.fingerprint
-        return state
+        reference, previous = self.reference, self.previous
+        header = make_header(
+            role="reference" if reference is None else "source",
+            clip_index=self.clip.clip_index,
+            clip_length=self.clip.clip_length,
+            n_frames=self.clip.n_frames,
+            start=self.clip.start,
+            step=self.steps_done,
+            n_steps=self.n_steps,
+            n_anchors={"static": N_ANCHORS} | ({} if reference is None else {"residual": N_ANCHORS}),
+            reference_fingerprint=None if reference is None else reference.header.fingerprint,
+            previous_fingerprint=None if previous is None else previous.header.fingerprint,
+        )
+        arrays = anchor_arrays("static" if reference is None else "residual")
+        arrays["value"] = np.array([self.value], np.float32)
+        return ClipState(arrays | (decoder_arrays() if reference is None else {}), header).stamped()
 
     def finish(self) -> CompactClip:
         return compact_clip(self.state())
@@ -166,9 +154,9 @@ class FakeTraining:
 
     def restore_checkpoint(self, path: Path | str) -> None:
         kept = read_clip_state(path)
-        if kept.header["clip_index"] != self.clip.clip_index:
+        if kept.header.clip_index != self.clip.clip_index:
             raise ProjectError("The checkpoint belongs to another clip.", path=path)
-        self.steps_done, self.value = kept.header["step"], float(kept.arrays["value"][0])
+        self.steps_done, self.value = kept.header.step, float(kept.arrays["value"][0])
 
     def held_out_psnr(self) -> float:
         return 20.0 + self.steps_done

@@ -5,27 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from app.project.project import Project, ProjectSettings, create_project
+from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import ClipState, write_clip_state
+from tests.app.fakes import anchor_arrays
+from tests.clip_headers import make_header
 
 
-def clip_header(clip_index: int, **entries: Any) -> dict[str, Any]:
+def clip_header(clip_index: int, **entries: Any) -> ClipHeader:
     """Header of a finished reference clip; entries replace or add."""
-    header = {"schema": 1, "role": "reference", "clip_index": clip_index, "step": 6, "n_steps": 6}
-    header |= {"clip_length": 1, "n_frames": 1, "start": clip_index, "fingerprint": f"clip-{clip_index}"}
-    return (
-        header
-        | {"metrics": {"held_out_psnr": 20.0 + clip_index % 7, "preparation_s": 2.0, "training_s": 8.0}}
-        | entries
-    )
+    metrics = {"held_out_psnr": 20.0 + clip_index % 7, "preparation_s": 2.0, "training_s": 8.0}
+    own = {"clip_index": clip_index, "start": clip_index, "fingerprint": f"clip-{clip_index}", "metrics": metrics}
+    return make_header(**(own | entries))
 
 
-def write_header(path: Path, header: dict[str, Any]) -> None:
+def write_header(path: Path, header: ClipHeader) -> None:
     """A clip file, or a checkpoint, with this header and next to no arrays."""
-    points = np.zeros((3, 3), np.float32)
-    write_clip_state(path, ClipState({"sets.static.positions": points, "sets.static.color_logits": points}, header))
+    write_clip_state(path, ClipState(anchor_arrays("static"), header))
 
 
 def make_project(folder: Path, **settings: Any) -> Project:

@@ -100,7 +100,7 @@ def test_a_clip_that_cannot_be_put_in_its_place_is_a_checkpoint_until_it_can(ben
     disk = Disk(monkeypatch, "clips", number=number)
     assert it.steps(8) is True
     assert not it.project.is_trained(0)
-    assert read_clip_state(it.checkpoint).header["step"] == 5
+    assert read_clip_state(it.checkpoint).header.step == 5
     (told,) = it.of(m.WarningRaised)
     assert "trained, but could not be written" in told.title
     assert os.strerror(number) in told.detail
@@ -165,7 +165,7 @@ def test_a_failure_between_steps_keeps_what_was_learned(bench):
     assert it.steps(20) is False
     failed = it.events[-1]
     assert failed.kind == "CaptureError"
-    step = read_clip_state(it.checkpoint).header["step"]
+    step = read_clip_state(it.checkpoint).header.step
     assert step > 0
     assert f"Step {step} is kept" in failed.message
 
@@ -222,7 +222,7 @@ def test_a_new_project_in_which_something_was_learned_is_not_taken_back(run, cap
     code, _, err = run("train", capture_folder, "--project", tmp_path / "p", make_training=_breaks_at_the_end)
     assert code == 2
     assert "The picture is damaged" in err
-    assert read_clip_state(tmp_path / "p" / "checkpoints" / "0000.safetensors").header["step"] > 0
+    assert read_clip_state(tmp_path / "p" / "checkpoints" / "0000.safetensors").header.step > 0
 
 
 def test_nor_is_one_whose_checkpoint_could_not_be_written(run, capture_folder, tmp_path, monkeypatch):

@@ -4,6 +4,7 @@ import logging
 
 import numpy as np
 import pytest
+from msgspec import to_builtins
 
 from app.session import commands as c
 from app.training import run
@@ -38,7 +39,7 @@ def test_the_states_of_the_fake_training_are_those_of_a_clip(make_session):
         session.dispatch(c.TrainClip(index))
     poll_until(session, lambda: all(state.state == "trained" for state in session.clip_states))
     reference, source = (read_clip_state(session.project.clip_path(i)) for i in (0, 1))
-    assert reference.header["decoder"] == DECODER
+    assert to_builtins(reference.header.decoder) == DECODER
     for state, n_anchors in ((reference, N_ANCHORS), (source, 2 * N_ANCHORS)):
         gaussians = load_clip_model(state, reference).decode(0.0)
         assert len(gaussians.means) == n_anchors

@@ -19,6 +19,7 @@ from engine.clip_files.compact import compact_clip
 from engine.errors import NonFiniteLoss, ProjectError
 from engine.progress import Progress
 from tests.app.fakes import make_fake
+from tests.clip_headers import make_header
 
 
 class Bench:
@@ -92,7 +93,7 @@ def test_the_next_snapshot_waits_until_the_last_one_was_read(bench):
     it.steps(1, each_s=0.1)
     assert sorted(path.name for path in it.project.live_dir.iterdir()) == ["clip-0000-r0002.safetensors"]
     state = read_clip_state(it.of(m.SnapshotWritten)[1].path)
-    assert state.header["step"] == it.of(m.SnapshotWritten)[1].step
+    assert state.header.step == it.of(m.SnapshotWritten)[1].step
 
 
 def test_a_snapshot_on_demand_does_not_wait_for_its_time(bench):
@@ -108,7 +109,7 @@ def test_what_was_learned_is_kept_about_every_half_minute(bench):
     it.steps(int(CHECKPOINT_EVERY_S) - 1)
     assert not it.checkpoint.exists()
     it.steps(5)
-    assert read_clip_state(it.checkpoint).header["step"] >= CHECKPOINT_EVERY_S - 2
+    assert read_clip_state(it.checkpoint).header.step >= CHECKPOINT_EVERY_S - 2
 
 
 def test_stopping_while_preparing_ends_at_the_next_report(bench):
@@ -144,7 +145,7 @@ def test_stopping_in_a_change_of_phase_keeps_the_state_before_it(bench):
     it = bench(change=add_phase)
     assert it.steps(10) is False
     kept = read_clip_state(it.checkpoint)
-    assert kept.header["step"] == 5
+    assert kept.header.step == 5
     assert kept.arrays["value"][0] < 1e6
     assert it.events[-1] == m.TrainingStopped(str(it.checkpoint), 5)
 
@@ -154,7 +155,7 @@ def test_a_window_that_is_gone_ends_the_run_and_keeps_it(bench):
     it.steps(4)
     it.is_alone = True
     assert it.steps(1) is False
-    assert read_clip_state(it.checkpoint).header["step"] == 3
+    assert read_clip_state(it.checkpoint).header.step == 3
 
 
 def test_stopping_without_keeping_forgets(bench):
@@ -204,8 +205,8 @@ def test_clipped_steps_are_counted_and_told(bench, n_clipped):
 
     it = bench(n_steps=5, change=clip_some)
     assert it.steps(10) is False
-    metrics = read_clip_state(it.project.clip_path(0)).header["metrics"]
-    assert metrics["gradient_clipped_steps"] == n_clipped
+    figures = read_clip_state(it.project.clip_path(0)).header.figures
+    assert figures.gradient_clipped_steps == n_clipped
     told = [event.detail for event in it.of(m.WarningRaised)]
     assert told == (["They were scaled down in 2 of 5 steps, up to 5."] if n_clipped else [])
 
@@ -225,7 +226,7 @@ def test_a_loss_that_is_no_number_keeps_the_steps_before_and_says_so(bench):
         "The loss became nan at step 5. Step 4 is kept; training again with the same command goes on from there."
     )
     assert failed.hint == "Lower the rates."
-    assert read_clip_state(it.checkpoint).header["step"] == 4
+    assert read_clip_state(it.checkpoint).header.step == 4
 
 
 @pytest.mark.parametrize("has_older", [False, True])
@@ -256,7 +257,7 @@ def test_a_state_that_is_no_number_is_not_kept(bench):
     assert not it.checkpoint.exists()
 
 
-HEADER = {"schema": 1, "role": "reference", "clip_index": 0, "step": 1, "n_steps": 1}
+HEADER = make_header()
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
@@ -333,15 +334,15 @@ def test_a_finished_clip_says_how_long_its_stages_took_and_how_large_gradients_w
     it.now_s += 10_000.0
     it.commands.append(m.Resume())
     assert it.steps(10, each_s=0.0) is False
-    metrics = read_clip_state(it.project.clip_path(0)).header["metrics"]
-    assert metrics["stages_s"] == pytest.approx(
+    figures = read_clip_state(it.project.clip_path(0)).header.figures
+    assert figures.stages_s == pytest.approx(
         {"Starting": 2.0, "Carving": 30.0, "Sizing": 4.0, "Measuring and keeping": 0.0, "Training": 2.0}
     )
-    assert metrics["preparation_s"] == pytest.approx(36.0)
-    norms = range(1, read_clip_state(it.project.clip_path(0)).header["n_steps"] + 1)  # of the fake: its step
-    assert metrics["gradient_norm_median"] == pytest.approx(sum(norms) / len(norms))
-    assert metrics["gradient_norm_max"] == norms[-1]
-    assert metrics["training_s"] == pytest.approx(2.0)
+    assert figures.preparation_s == pytest.approx(36.0)
+    norms = range(1, read_clip_state(it.project.clip_path(0)).header.n_steps + 1)  # of the fake: its step
+    assert figures.gradient_norm_median == pytest.approx(sum(norms) / len(norms))
+    assert figures.gradient_norm_max == norms[-1]
+    assert figures.training_s == pytest.approx(2.0)
     assert read_metrics(it.project.metrics_path(0))[-1]["training_s"] == pytest.approx(2.0)
 
 
@@ -353,7 +354,7 @@ def test_the_times_of_a_training_that_was_stopped_add_up(bench):
     it.now_s += 10_000.0
     it.start()
     assert it.steps(20) is False  # from second 10 006: going on, three steps, the end
-    metrics = read_clip_state(it.project.clip_path(0)).header["metrics"]
+    figures = read_clip_state(it.project.clip_path(0)).header.figures
     assert it.now_s == 10_010.0
-    assert metrics["preparation_s"] + metrics["training_s"] == pytest.approx(4.0 + 4.0)
-    assert metrics["stages_s"].keys() >= {"Starting", "Training", "Measuring and keeping"}
+    assert figures.seconds == pytest.approx(4.0 + 4.0)
+    assert figures.stages_s.keys() >= {"Starting", "Training", "Measuring and keeping"}

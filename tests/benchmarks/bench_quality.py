@@ -36,7 +36,7 @@ from engine.progress import Progress
 from engine.synthetic.raycast import make_truth
 from engine.synthetic.scene import make_scene
 from engine.training.clip_training import ClipTraining
-from engine.training.config import TrainConfig, parse_overrides
+from engine.training.config import TrainConfig, config_of, parse_overrides
 from tests.benchmarks.options import ending_on_bad_input
 
 COLUMNS = (
@@ -110,7 +110,7 @@ def write_pictures(
     """Truth, render and four times the error, one row per camera."""
     model = load_clip_model(state, reference)
     frame = clip.start + clip.n_frames // 2
-    reach = REACH_SPACINGS * reference.header["spacing"]
+    reach = REACH_SPACINGS * reference.header.spacing
     rows = []
     for camera in cameras:
         view = _view(capture, camera, reference)
@@ -141,7 +141,7 @@ def new_object_psnr(
             mask = make_truth(scene, camera, frame).mask("gift")
             if mask.sum() < 50:  # hidden from this camera
                 continue
-            image = render_model(model, view, clip.clip_time(frame), reach=REACH_SPACINGS * reference.header["spacing"])
+            image = render_model(model, view, clip.clip_time(frame), reach=REACH_SPACINGS * reference.header.spacing)
             values.append(psnr(image.numpy(), capture.frame(camera, frame) / 255.0, mask))
     return float(np.mean(values)) if values else None
 
@@ -149,7 +149,7 @@ def new_object_psnr(
 def _view(capture: Capture, camera: int, reference: ClipState) -> View:
     width, height = (int(v) for v in capture.rig.image_sizes[camera])
     matrices = (capture.rig.world_to_camera[camera], capture.rig.Ks[camera])
-    return View.from_arrays(*matrices, width=width, height=height, near_plane=reference.header["near_plane"])
+    return View.from_arrays(*matrices, width=width, height=height, near_plane=reference.header.near_plane)
 
 
 def main() -> None:
@@ -170,7 +170,7 @@ def main() -> None:
         capture = open_capture(args.capture, scale=args.scale)
         names = args.holdout.split(",") if args.holdout else list(capture.default_holdout)
         holdout = capture.camera_indices(names)
-        config = TrainConfig(**parse_overrides(args.set))
+        config = config_of(parse_overrides(args.set))
     clips = split_clips(capture.n_frames, args.clip_length)[: args.clips]
     versions = f"torch {torch.__version__}, Python {platform.python_version()}, {torch.get_num_threads()} threads"
     versions += f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""

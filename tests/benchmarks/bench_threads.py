@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from engine.conventions import SPIN_COUNT
+from engine.kernels.threads import SPIN_COUNT
 
 ROOT = Path(__file__).resolve().parents[2]
 VARIABLES = ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY", "KMP_BLOCKTIME")

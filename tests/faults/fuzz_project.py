@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec import Struct, to_builtins
 
 from tests.faults.mutate import damaged_bytes, damaged_json, put_odd_file
 from tests.faults.tally import Case, Outcome, fuzz_main, judge, start_memory, take_outside, watch_files
@@ -85,6 +86,7 @@ def _states() -> tuple[Any, Any]:
 
     from engine.clip_files.clip_state import ClipState
     from engine.clip_files.compact import compact_clip
+    from tests.clip_headers import changed
     from tests.engine.model.test_clip_model import make_reference, make_source, state_of
 
     torch.manual_seed(0)
@@ -92,13 +94,14 @@ def _states() -> tuple[Any, Any]:
     entries |= {"camera_names": ["a", "b", "c"], "seed": 0, "n_steps": 8, "step": 8}
     known = state_of(make_reference(), role="reference")
     gains = {"gains": np.ones((3, 3), np.float32), "gate.static": np.zeros(20, np.uint8)}
-    reference = compact_clip(ClipState(known.arrays | gains, known.header | entries))
+    reference = compact_clip(ClipState(known.arrays | gains, changed(known.header, **entries)))
     known = state_of(make_source(reference.state), role="source", clip_index=1, reference=reference.state)
-    return reference, ClipState(known.arrays, known.header | entries | {"start": N_FRAMES})
+    return reference, ClipState(known.arrays, changed(known.header, **entries | {"start": N_FRAMES}))
 
 
 def _checkpoint(state: Any) -> Any:
-    from engine.training.checkpoint import Checkpoint, Place
+    from engine.clip_files.clip_header import Place
+    from engine.training.checkpoint import Checkpoint
     from engine.training.step.order import ShuffledOrder
 
     order = ShuffledOrder(6, 3)
@@ -135,6 +138,8 @@ def _plain(value: Any) -> Any:
         return value.dtype.str, value.shape, value.tobytes()
     if hasattr(value, "__dataclass_fields__"):
         return [_plain(getattr(value, name)) for name in value.__dataclass_fields__]
+    if isinstance(value, Struct):
+        return _plain(to_builtins(value, builtin_types=()))
     if isinstance(value, dict):
         return {name: _plain(item) for name, item in value.items()}
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
@@ -160,7 +165,7 @@ def _read_evaluation(project: Path, path: Path) -> Any:
 def _read_checkpoint(project: Path, path: Path) -> Any:
     from engine.training.checkpoint import read_checkpoint
 
-    return read_checkpoint(path, EXPECTED)
+    return read_checkpoint(path, **EXPECTED)
 
 
 def _read_settings(project: Path, path: Path) -> Any:

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+
+from msgspec.structs import replace
 
 from app.cli.cli import main
 from app.project.project import open_project
@@ -21,6 +22,7 @@ from app.training.interface import Training
 from app.training.messages import TrainJob
 from app.training.process import ProcessWorker
 from engine.assets import asset_path
+from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import EngineError
 from engine.progress import ReportProgress
@@ -39,7 +41,7 @@ class Kept:
     """A finished clip: everything in it that must not depend on how often it was interrupted."""
 
     fingerprint: str
-    header: dict[str, Any]
+    header: ClipHeader
 
 
 def kept_clips(project: Path) -> dict[int, Kept]:
@@ -52,8 +54,7 @@ def kept_clips(project: Path) -> dict[int, Kept]:
     for path in sorted((project / "clips").glob("*.safetensors")):
         state = read_clip_state(path)
         # what was measured holds times; the rest of the header is a result like the arrays
-        header = {name: value for name, value in state.header.items() if name != "metrics"}
-        found[int(path.stem)] = Kept(state.fingerprint, header)
+        found[int(path.stem)] = Kept(state.fingerprint, replace(state.header, metrics=None))
     return found
 
 

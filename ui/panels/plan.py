@@ -47,6 +47,7 @@ def _draw_settings(plan: Any, dispatch: Dispatch, ui: UiState) -> None:
         imgui.set_next_item_width(FIELD_WIDTH)
         flags = imgui.InputTextFlags_.enter_returns_true
         is_entered, typed = imgui.input_int(f"{setting.label}##{setting.name}", setting.value, 0, 0, flags)
+        imgui.set_item_tooltip(setting.help_text)
         ui.mark(f"plan.{setting.name}")
         if is_entered and typed != setting.value:
             dispatch(SetTrainSetting(setting.name, typed))

@@ -25,6 +25,7 @@ from app.session.commands import (
     UndoMark,
 )
 from app.status import COMPARE_MODES
+from engine.camera.projection import camera_center
 from ui.panels.regions import begin_choosing
 from ui.panels.state import REGIONS, Dispatch, UiState
 from ui.style.ui_scale import next_choice
@@ -143,8 +144,7 @@ def nearest_camera(session: Any) -> int:
     """The capture camera that looks most like the current view: near in place and direction."""
     rig = session.rig
     world_to_camera = np.asarray(session.view.world_to_camera(), dtype=np.float64)
-    center = -world_to_camera[:3, :3].T @ world_to_camera[:3, 3]
-    distances = np.linalg.norm(rig.centers - center, axis=1)
+    distances = np.linalg.norm(rig.centers - camera_center(world_to_camera), axis=1)
     spread = max(float(np.linalg.norm(rig.centers - rig.centers.mean(0), axis=1).max()), 1e-9)
     turns = 1.0 - rig.forwards @ world_to_camera[2, :3]
     return int(np.argmin(distances / spread + turns))

@@ -34,8 +34,8 @@ ROLE_COLORS = {
     "adapted": GREEN,
     "replacing": VERMILLION,
 }
-"""Anchors by what they are (engine.model.roles). Adapted and replacing ones are moving and promoted ones of one clip,
-drawn as diamonds."""
+"""Anchors by what they are (engine.clip_files.roles). Adapted and replacing ones are moving and promoted ones of one
+clip, drawn as diamonds."""
 REGION_COLORS = {"static": SKY, "dynamic": VERMILLION}
 """Regions that the user marks, like the anchors they make; drawn with whole lines and with dashes."""
 HELD_OUT = PURPLE

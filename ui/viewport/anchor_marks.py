@@ -1,6 +1,6 @@
 """Anchors as marks: which of them are shown, in which colour, and which one lies under the pointer. No GL.
 
-Colour says what an anchor is (engine.model.roles), shape whether this clip learned it.
+Colour says what an anchor is (engine.clip_files.roles), shape whether this clip learned it.
 """
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from engine.camera.projection import to_camera, to_pixels
+from engine.clip_files.roles import ROLES
 from engine.gate.reasons import NO_REASON, USER_DYNAMIC, USER_STATIC, reason_text
 from engine.gate.regions import GateRegion, marked
-from engine.model.roles import ROLES
 from ui.style.colors import ROLE_COLORS, Color
 from ui.viewport.region_tool import REGION_WORDS
 
@@ -35,7 +36,7 @@ class AnchorMarks:
     Attributes:
         positions: [N, 3]
         colors: [N, 4]
-        roles, reasons: Codes of engine.model.roles and engine.gate.reasons; None where unknown. [N] uint8
+        roles, reasons: Codes of engine.clip_files.roles and engine.gate.reasons; None where unknown. [N] uint8
         counts: Of all anchors, drawn or not, by role; empty where unknown.
     """
 
@@ -76,12 +77,10 @@ def nearest_under(
     positions: np.ndarray, world_to_camera: np.ndarray, K: np.ndarray, x: float, y: float, *, near: float
 ) -> int | None:
     """Row of the position under a pixel, see `AnchorMarks.at`. positions: [N, 3]"""
-    points = positions @ world_to_camera[:3, :3].T + world_to_camera[:3, 3]
-    depths = np.maximum(points[:, 2], 1e-9)
-    dx = K[0, 0] * points[:, 0] / depths + K[0, 2] - x
-    dy = K[1, 1] * points[:, 1] / depths + K[1, 2] - y
-    rows = np.flatnonzero((points[:, 2] > near) & (dx * dx + dy * dy <= REACH_PX**2))
-    return int(rows[np.argmin(depths[rows])]) if len(rows) else None
+    points = to_camera(positions, world_to_camera)
+    offsets = to_pixels(points, K) - (x, y)
+    rows = np.flatnonzero((points[:, 2] > near) & ((offsets * offsets).sum(axis=1) <= REACH_PX**2))
+    return int(rows[np.argmin(points[rows, 2])]) if len(rows) else None
 
 
 def anchor_marks(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from engine.camera.projection import to_camera, to_pixels
 from engine.camera.rig import CameraRig
 from ui.gl.lines import LINES_PER_FRUSTUM, frusta_lines
 from ui.viewport.region_tool import rig_radius
@@ -36,11 +37,9 @@ def camera_under(
         reach_px: How near to a line the pointer has to be.
     """
     corners = frusta_lines(rig, frustum_size(rig))[0].astype(np.float64)  # two per line
-    points = corners @ world_to_camera[:3, :3].T + world_to_camera[:3, 3]
+    points = to_camera(corners, world_to_camera)
     is_before = (points[:, 2] > near).reshape(-1, 2).all(axis=1)
-    depths = np.maximum(points[:, 2], 1e-9)
-    pixels = np.stack([K[0, 0] * points[:, 0] / depths + K[0, 2], K[1, 1] * points[:, 1] / depths + K[1, 2]], axis=-1)
-    starts, ends = pixels.reshape(-1, 2, 2).swapaxes(0, 1)  # [L, 2] each
+    starts, ends = to_pixels(points, K).reshape(-1, 2, 2).swapaxes(0, 1)  # [L, 2] each
     along = ends - starts
     lengths_squared = np.maximum((along * along).sum(axis=1), 1e-12)
     pointer = np.array([x, y])

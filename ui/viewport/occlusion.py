@@ -11,6 +11,7 @@ from collections.abc import Hashable
 import numpy as np
 
 from app.playback.arrays import GaussianArrays
+from engine.camera.projection import to_camera, to_pixels
 
 MAX_LOOKED_AT = 40_000
 CELLS_ACROSS = 72
@@ -81,11 +82,10 @@ def _cells(
     near: float,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rows of the points that lie in the picture, their depths, and their cells in a map with a rim of one cell."""
-    seen = points @ world_to_camera[:3, :3].T.astype(np.float32) + world_to_camera[:3, 3].astype(np.float32)
+    seen = to_camera(points, world_to_camera.astype(np.float32))
     rows = np.flatnonzero(seen[:, 2] > max(near, 1e-6))
     depths = seen[rows, 2]
-    x = ((K[0, 0] * seen[rows, 0] / depths + K[0, 2]) / cell_px).astype(np.float32)
-    y = ((K[1, 1] * seen[rows, 1] / depths + K[1, 2]) / cell_px).astype(np.float32)
+    x, y = (to_pixels(seen[rows], K) / cell_px).astype(np.float32).T
     is_inside = (x >= 0) & (x < n_cells[0]) & (y >= 0) & (y < n_cells[1])
     cells = (y[is_inside].astype(np.int64) + 1) * (n_cells[0] + 2) + x[is_inside].astype(np.int64) + 1
     return rows[is_inside], depths[is_inside], cells

@@ -12,8 +12,8 @@ import moderngl
 import numpy as np
 
 from app.playback.arrays import AnchorArrays
+from engine.clip_files.roles import ROLES
 from engine.gate.regions import GateRegion
-from engine.model.roles import ROLES
 from ui.gl import LineRenderer, PointRenderer, Target
 from ui.style.colors import CHOSEN
 from ui.viewport.anchor_marks import thinned

@@ -17,6 +17,7 @@ import numpy as np
 from app.playback.picture_source import PictureSource
 from app.playback.pointing import pixel_ray, seen_point
 from app.playback.render import BACKGROUND
+from engine.camera.projection import camera_center
 from ui.gl import (
     NEAR,
     ImageTexture,
@@ -58,7 +59,7 @@ class SceneView:
     @property
     def eye(self) -> np.ndarray:
         """Where from, scene units. [3]"""
-        return -self.world_to_camera[:3, :3].T @ self.world_to_camera[:3, 3]
+        return camera_center(self.world_to_camera)
 
     @property
     def key(self) -> Hashable:

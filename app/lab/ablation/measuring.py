@@ -105,7 +105,7 @@ def _key(project: Project, scope: Scope) -> dict[str, Any]:
     """Everything that the figures depend on."""
     headers = [read_clip_header(project.clip_path(i)) for i in scope.clips]
     return {
-        "clips": [None if header is None else header["fingerprint"] for header in headers],
+        "clips": [None if header is None else header.fingerprint for header in headers],
         "borders": list(scope.borders),
         "metrics": scope.metrics,
         "precision": scope.precision,

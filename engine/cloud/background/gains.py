@@ -1,15 +1,9 @@
 """Per-camera white balance: camera_colour = gain * scene_colour, one gain per channel.
 
-Not a full colour model (no offset, no cross terms; `TrainConfig.color` says what those are worth). The gauge is a
-median of 1 over the cameras, so scene colours are those of the median camera, and an unseen camera is shown in them.
-The median, because real rigs hold a crowd of like cameras and a few far off. Measured on a real dome (25 training
-cameras, 0.78 to 1.20, log spread 10 %), raw colours, against a geometric mean of 1: two validation cameras 27.6 to
-28.1 and 28.4 to 29.3 dB, which leaves 0.0 and 0.1 dB to a fitted gain; each training camera predicted from the other
-24 27.4 to 27.5 dB (difference 0.1 +- 0.2). The four held-out cameras of that dome, looked at once it was chosen, came
-out the other way: 29.3 dB against 29.8, and 30.8 with their own gains; so the choice is a matter of luck there.
-Neighbours tell nothing there: a predicted gain errs by 10 % from all other cameras, by 11 to 12 % from the six
-nearest, by 15 to 18 % from the nearest. Training puts its gains back into this gauge after every step: left alone they
-moved by 0.1 to 0.2 % together, and what is unseen is shown at gain 1.
+Not a full colour model: there is no offset and there are no cross terms, as they gain nothing. The gauge is a median
+of 1 over the cameras, so scene colours are those of the median camera, and an unseen camera is shown in them. The
+median, because real rigs hold a crowd of similar cameras and a few far off. Training puts its gains back into this
+gauge after every step, since what is unseen is shown at gain 1.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ import numpy as np
 from engine.images.image_filters import blurred_difference, dilate, erode, remove_small_blobs
 
 REFERENCE_WIDTH = 640.0
-"""Sizes below are pixels at this width (measured on 640 x 360 pictures of a dome, 2026-11)."""
+"""Sizes below are pixels at this width (chosen on 640 x 360 pictures of a dome)."""
 MIN_THRESHOLD = 20.0
 """Sum of RGB levels; below this even a noiseless camera shows compression and rounding."""
 NOISE_FACTOR = 5.0

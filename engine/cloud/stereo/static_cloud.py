@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from engine.camera.depth_range import MIN_POINTS, depth_ranges, focus_distances, near_plane
-from engine.camera.projection import is_in_picture, project, projection_matrices, unproject
+from engine.camera.projection import focal_px, is_in_picture, project, projection_matrices, unproject
 from engine.camera.rig import CameraRig
 from engine.cloud.background.gains import gain_spread, gains_from_observations, gains_from_pictures, scene_colors
 from engine.cloud.fusion import Samples, fuse_tiers, keep_inliers
@@ -32,7 +32,7 @@ from engine.parallel import map_ordered
 Report = Callable[[str], None]
 
 WORKING_PIXELS = 160 * 90
-"""Depth maps of about this many pixels: at twice the size the cloud was no better (measured 2026-11 on a dome)."""
+"""Depth maps of about this many pixels; larger ones make the cloud no better."""
 PROBE_PIXELS = 80 * 45
 """Size of the first look that finds the depth range where there are no sparse points."""
 PROBE_RANGE = (0.3, 12.0)
@@ -322,7 +322,7 @@ def _sweep_all(
 
 def _median_footprint(maps: DepthMaps) -> float:
     """Scene units per working pixel at the median depth."""
-    focal = np.sqrt(maps.rig.Ks[:, 0, 0] * maps.rig.Ks[:, 1, 1])[:, None, None]
+    focal = focal_px(maps.rig.Ks)[:, None, None]
     return float(np.median(maps.depths / focal))
 
 

@@ -12,7 +12,14 @@ import math
 import numpy as np
 from numba import njit
 
-from engine.camera.projection import is_in_picture, pixel_rays, project, projection_matrices
+from engine.camera.projection import (
+    is_in_picture,
+    pixel_rays,
+    project,
+    projection_matrices,
+    relative_homography,
+    to_world,
+)
 from engine.camera.rig import CameraRig
 
 N_SOURCES = 5
@@ -77,8 +84,7 @@ def _probe_points(rig: CameraRig, camera: int, near: float, far: float) -> np.nd
     rays = pixel_rays(coarse, 8, 6).reshape(-1, 3)
     inverse_depths = 1 / far + (1 / near - 1 / far) * np.array([0.0, 0.125, 0.25, 0.375, 0.625])
     points_camera = (rays[None] / inverse_depths[:, None, None]).reshape(-1, 3)
-    rotation, translation = rig.world_to_camera[camera, :3, :3], rig.world_to_camera[camera, :3, 3]
-    return (points_camera - translation) @ rotation
+    return to_world(points_camera, rig.world_to_camera[camera])
 
 
 def plane_inverse_depths(rig: CameraRig, camera: int, sources: list[int], near: float, far: float) -> np.ndarray:
@@ -102,13 +108,6 @@ def plane_inverse_depths(rig: CameraRig, camera: int, sources: list[int], near: 
         if len(usable):
             n_planes = max(n_planes, 32.0 * float(np.percentile(usable, 90)))
     return np.linspace(1 / far, 1 / near, int(np.clip(math.ceil(n_planes) + 1, 24, 192))).astype(np.float32)
-
-
-def relative_homography(rig: CameraRig, camera: int, other: int) -> tuple[np.ndarray, np.ndarray]:
-    """(matrix [3, 3], shift [3]) so that pixel p of `camera` at inverse depth q lies at matrix @ p + q shift."""
-    rotation = rig.world_to_camera[other, :3, :3] @ rig.world_to_camera[camera, :3, :3].T
-    translation = rig.world_to_camera[other, :3, 3] - rotation @ rig.world_to_camera[camera, :3, 3]
-    return rig.Ks[other] @ rotation @ np.linalg.inv(rig.Ks[camera]), rig.Ks[other] @ translation
 
 
 def matching_costs(

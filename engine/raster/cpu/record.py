@@ -29,7 +29,7 @@ RECORD_FLOATS = 16
 RECORD_BYTES = 64
 
 TILE = TILE_PX
-"""Edge of a tile, pixels. Large tiles win because blocks inside them are culled (measured 2026-11)."""
+"""Edge of a tile, pixels. Large tiles win because blocks inside them are culled."""
 BLOCK = 4
 """Edge of a block, pixels: one block is one vector."""
 BLOCKS_PER_ROW = TILE // BLOCK

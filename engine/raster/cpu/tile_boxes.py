@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import get_num_threads
 
-from engine.kernels.arrays import Floats1, Ints1, SmallInts2, job_reader, pack
-from engine.kernels.lanes import kernel_intrinsic
-from engine.kernels.routines import WORKER, routine, run
+from engine.kernels.jobs import Floats1, Ints1, SmallInts2, Workers, read
+from engine.kernels.launch import kernel, launch
 from engine.kernels.workspace import WorkspacePool
 from engine.raster.cpu import project
 from engine.raster.cpu import record as rec
@@ -33,13 +32,12 @@ class BoxJob(NamedTuple):
         packed: Records as int32. [>= N, 16]
         keys: Camera depth, or a number <= 0 for rows that are not drawn. [>= N]
         boxes: Written. [N, 2]
-        n_workers: How many workers share the rows.
     """
 
     packed: SmallInts2
     keys: Floats1
     boxes: SmallInts2
-    n_workers: int
+    n_workers: Workers = None
 
 
 class CoverJob(NamedTuple):
@@ -72,28 +70,10 @@ class MeetJob(NamedTuple):
     n_found: Ints1
 
 
-@kernel_intrinsic
-def _read_box_job(typing_context, address):
-    """The BoxJob at an address."""
-    return job_reader(BoxJob)
-
-
-@kernel_intrinsic
-def _read_cover_job(typing_context, address):
-    """The CoverJob at an address."""
-    return job_reader(CoverJob)
-
-
-@kernel_intrinsic
-def _read_meet_job(typing_context, address):
-    """The MeetJob at an address."""
-    return job_reader(MeetJob)
-
-
-@routine(WORKER)
+@kernel(BoxJob)
 def read_boxes(worker, arguments):
     """See BoxJob."""
-    job = _read_box_job(arguments)
+    job = read(BoxJob, arguments)
     packed, keys, boxes, n_rows = job.packed, job.keys, job.boxes, len(job.boxes)
     for row in range(n_rows * worker // job.n_workers, n_rows * (worker + 1) // job.n_workers):
         is_drawn = keys[row] > np.float32(0)
@@ -101,10 +81,10 @@ def read_boxes(worker, arguments):
         boxes[row, 1] = packed[row, rec.TILE_ROWS] if is_drawn else _NOWHERE
 
 
-@routine(WORKER)
+@kernel(CoverJob)
 def cover(_worker, arguments):
     """See CoverJob."""
-    job = _read_cover_job(arguments)
+    job = read(CoverJob, arguments)
     boxes, tiles = job.boxes, job.tiles
     for row in range(len(boxes)):
         columns, rows = boxes[row, 0], boxes[row, 1]
@@ -113,10 +93,10 @@ def cover(_worker, arguments):
                 tiles[tile_row, tile_column] = 1
 
 
-@routine(WORKER)
+@kernel(MeetJob)
 def find_meeting(_worker, arguments):
     """See MeetJob."""
-    job = _read_meet_job(arguments)
+    job = read(MeetJob, arguments)
     boxes, sums, rows, found = job.boxes, job.mask_sums, job.rows, job.found
     n_found = 0
     for row in range(len(boxes)):
@@ -153,11 +133,9 @@ def tile_boxes_cpu(gaussians: Gaussians, view: PinholeView) -> np.ndarray:
         packed,
         keys,
         _NO_CENTERS,
-        n_threads,
     )
-    run(project.project, pack(job), n_threads)
-    box_job = BoxJob(packed, keys, boxes, n_threads)
-    run(read_boxes, pack(box_job), n_threads)
+    launch(project.project, job, n_threads)
+    launch(read_boxes, BoxJob(packed, keys, boxes), n_threads)
     POOL.give_back(workspace)
     return boxes
 
@@ -165,14 +143,12 @@ def tile_boxes_cpu(gaussians: Gaussians, view: PinholeView) -> np.ndarray:
 def covered_tiles(boxes: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Tiles under a packed box. [rows, columns] bool"""
     tiles = np.zeros(shape, np.int32)
-    job = CoverJob(boxes, tiles)
-    run(cover, pack(job), 1)
+    launch(cover, CoverJob(boxes, tiles), 1)
     return tiles.astype(bool)
 
 
 def meeting_rows(boxes: np.ndarray, tile_mask: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """`rows` [N] int64 of the packed boxes that lie over a wanted tile, in order. [n] int64"""
     found, n_found = np.empty(len(boxes), np.int64), np.zeros(1, np.int64)
-    job = MeetJob(boxes, mask_sums(tile_mask), rows, found, n_found)  # holds the sums until the kernel is done
-    run(find_meeting, pack(job), 1)
+    launch(find_meeting, MeetJob(boxes, mask_sums(tile_mask), rows, found, n_found), 1)
     return found[: n_found[0]]

@@ -7,11 +7,11 @@ No torch, no clock, no files.
 
 from __future__ import annotations
 
-import math
 import statistics
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+
+from engine.clip_files.clip_header import ClipHeader
 
 _KEEPING_SHARE = 0.03
 """Of the steps' time: held-out figures, snapshots and checkpoints between them."""
@@ -46,37 +46,30 @@ class MeasuredClip:
         return None if self.training_s is None or not self.n_steps else self.training_s / self.n_steps
 
 
-def measured_clip(header: Mapping[str, Any], *, disk_mb: float | None, uncounted_s: float = 0.0) -> MeasuredClip | None:
+def measured_clip(header: ClipHeader, *, disk_mb: float | None, uncounted_s: float = 0.0) -> MeasuredClip:
     """What a clip's file says.
 
     Args:
         header: Of the finished clip.
         disk_mb: Its size, 10^6 bytes.
         uncounted_s: Part of its preparation that does not come again, such as compiling.
-    Returns:
-        None for a header that is not a clip's.
     """
-    metrics = header.get("metrics")
-    metrics = metrics if isinstance(metrics, Mapping) else {}
-    prepared_s = _positive(metrics.get("preparation_s"))
-    try:
-        return MeasuredClip(
-            clip_index=int(header["clip_index"]),
-            is_source=header["role"] == "source" or "previous_fingerprint" in header,
-            is_still=header.get("n_alive") == 0,
-            n_steps=int(header["step"]),
-            preparation_s=None if prepared_s is None else max(prepared_s - uncounted_s, 0.1),
-            training_s=_positive(metrics.get("training_s")),
-            memory_mb=_positive(metrics.get("memory_mb")),
-            disk_mb=disk_mb,
-        )
-    except (KeyError, TypeError, ValueError):
-        return None
+    figures = header.figures
+    prepared_s = _positive(figures.preparation_s)
+    return MeasuredClip(
+        clip_index=header.clip_index,
+        is_source=header.role == "source" or header.previous_fingerprint is not None,
+        is_still=header.n_alive == 0,
+        n_steps=header.step,
+        preparation_s=None if prepared_s is None else max(prepared_s - uncounted_s, 0.1),
+        training_s=_positive(figures.training_s),
+        memory_mb=_positive(figures.memory_mb),
+        disk_mb=disk_mb,
+    )
 
 
-def _positive(value: Any) -> float | None:
-    is_number = isinstance(value, int | float) and math.isfinite(value) and value > 0
-    return float(value) if is_number else None
+def _positive(value: float | None) -> float | None:
+    return value if value is not None and value > 0 else None
 
 
 @dataclass(frozen=True, slots=True)

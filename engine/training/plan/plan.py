@@ -6,12 +6,13 @@ is that of engine.training.plan.forecast. No clock, no files.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.clip_files.clip_header import ClipHeader
 from engine.errors import PreparationError
 from engine.training.config import JOINT_RULE, SOURCE_RULE, STATIC_RULE, StepRule, TrainConfig
 from engine.training.plan.forecast import (
@@ -214,7 +215,7 @@ def make_plan(
     config: TrainConfig,
     *,
     is_source: bool,
-    reference: Mapping[str, Any] | None = None,
+    reference: ClipHeader | None = None,
     history: Sequence[MeasuredClip] = (),
     step_time: StepTime = lambda sizes, phase: None,
     is_still: bool = False,
@@ -275,20 +276,13 @@ def _forecast_line(name: str, unit: str, expected: Expected) -> ForecastLine:
     return ForecastLine(name, None if expected.value is None else round(expected.value, 3), unit, expected.reason)
 
 
-def expected_anchors(footage: Footage, config: TrainConfig, reference: Mapping[str, Any] | None) -> tuple[int, int]:
+def expected_anchors(footage: Footage, config: TrainConfig, reference: ClipHeader | None) -> tuple[int, int]:
     """Static anchors, and moving ones alive in one frame: the reference clip's, or as many as pictures suggest."""
-    n_static, n_alive = _count(reference, "static"), None if reference is None else reference.get("n_alive")
-    if n_static is None:
-        n_static = min(round(_STATIC_PER_PIXEL * footage.n_pixels), config.max_static_points)
-    if not isinstance(n_alive, int):
-        n_alive = min(round(_ALIVE_PER_PIXEL * footage.n_pixels), config.max_moving_points)
-    return n_static, n_alive
-
-
-def _count(header: Mapping[str, Any] | None, role: str) -> int | None:
-    counted = None if header is None else header.get("n_anchors")
-    found = counted.get(role) if isinstance(counted, Mapping) else None
-    return found if isinstance(found, int) else None
+    n_static = min(round(_STATIC_PER_PIXEL * footage.n_pixels), config.max_static_points)
+    n_alive = min(round(_ALIVE_PER_PIXEL * footage.n_pixels), config.max_moving_points)
+    if reference is None:
+        return n_static, n_alive
+    return reference.n_anchors.get("static", n_static), n_alive if reference.n_alive is None else reference.n_alive
 
 
 # ---------------------------------------------------------------- lines
@@ -343,13 +337,13 @@ def _step_reason(given: int, passes: float, rule: StepRule, n_items: int, item: 
     return f"{rule.per_item} for each of {_plural(n_items, item)}{bound}"
 
 
-def _anchor_lines(config: TrainConfig, reference: Mapping[str, Any] | None, *, is_source: bool) -> list[PlanLine]:
+def _anchor_lines(config: TrainConfig, reference: ClipHeader | None, *, is_source: bool) -> list[PlanLine]:
     """Limits, and what a trained reference clip has; how many anchors a clip gets its pictures decide."""
     n_static, n_moving = f"<= {config.max_static_points:,}", f"<= {config.max_moving_points:,}"
     if not is_source:
         grows = "the voxel grows until there are no more"
         return [PlanLine("static anchors", n_static, "", grows), PlanLine("moving anchors", n_moving, "", grows)]
-    known = _count(reference, "static")
+    known = None if reference is None else reference.n_anchors.get("static")
     inherited = PlanLine("static anchors", n_static, "", "inherited; the reference clip is not trained yet")
     if known is not None:
         inherited = PlanLine("static anchors", known, "", "inherited, counted in the reference clip")

@@ -5,20 +5,23 @@ Sizes follow the data and the reasons are returned as lines to report. Nothing h
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import torch
+from msgspec.structs import asdict
 from scipy.spatial import KDTree
 
 from engine.capture.clip import Clip
+from engine.clip_files.anchor_record import AnchorRecord
+from engine.clip_files.clip_header import Coverage
 from engine.clip_files.clip_state import ClipState
 from engine.cloud.motion.budget import NOBODY, choose_within_budget
 from engine.cloud.motion.dedup import mean_neighbor_distance, residual_rows
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
 from engine.model.anchors import AnchorSet
-from engine.model.clip_model import ClipModel, decoder_sizes, inherit
+from engine.model.clip_model import ClipModel, decoder_shape, inherit
 from engine.model.decoder import Decoder
 from engine.training.config import TrainConfig
 
@@ -59,9 +62,9 @@ def inheriting_model(reference: ClipState, clip: Clip, config: TrainConfig) -> t
     """
     presence = {
         # promoted anchors are part of the still scene and exist at all times; what moves is not known yet
-        role: torch.full((len(reference.arrays[f"sets.{role}.positions"]), clip.n_frames), role == "promoted")
-        for role in ("static", "moving", "promoted")
-        if f"sets.{role}.presence" in reference.arrays
+        role: torch.full((len(record.own), clip.n_frames), role == "promoted")
+        for role, record in reference.anchors.items()
+        if record.own is not None and record.own.presence is not None
     }
     sets, decoder = inherit(reference, presence, is_trainable=config.inherit == "trainable")
     model = ClipModel(sets=sets, decoder=decoder, field=None, clip_length=clip.clip_length, n_frames=clip.n_frames)
@@ -82,19 +85,22 @@ def choose_decoder(model: ClipModel, config: TrainConfig, *, seed: int) -> None:
         seed: Of new heads, which have a generator of their own: what else starts at random is the same for any choice.
     """
     if config.decoder == "new":
-        model.decoder = Decoder(**decoder_sizes(model.decoder), generator=torch.Generator().manual_seed(seed))
+        model.decoder = Decoder(**asdict(decoder_shape(model.decoder)), generator=torch.Generator().manual_seed(seed))
     model.decoder.requires_grad_(config.decoder != "frozen")
 
 
 def merged(state: ClipState) -> ClipState:
     """A finished clip as a start for another: its residual anchors count among the moving ones from here on, its
     replacing ones among the promoted."""
+    own = {role: record.own for role, record in state.anchors.items() if record.own is not None}
     arrays = dict(state.arrays)
-    for own, inherited in (("residual", "moving"), ("replacing", "promoted")):
-        prefix = f"sets.{own}."
-        for name in [name for name in arrays if name.startswith(prefix)]:
-            array, target = arrays.pop(name), f"sets.{inherited}.{name.removeprefix(prefix)}"
-            arrays[target] = np.concatenate([arrays[target], array]) if target in arrays else array
+    for added, among in (("residual", "moving"), ("replacing", "promoted")):
+        if added not in own:
+            continue
+        for name in AnchorRecord(own=own[added]).arrays(added):
+            del arrays[name]
+        anchors = own[among].joined(own[added]) if among in own else own[added]
+        arrays |= AnchorRecord(own=anchors).arrays(among)
     return ClipState(arrays, state.header)
 
 
@@ -112,42 +118,6 @@ def moving_anchors(cloud: MovingCloud, rows: np.ndarray, config: TrainConfig) ->
         feature_dim=config.static_feature_dim,
         presence=torch.from_numpy(cloud.presence[rows]),
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Coverage:
-    """How much of what moves in a source clip has an anchor near it. A value.
-
-    Attributes:
-        n_points: Moving points of the clip.
-        n_inherited: Of these, inside the spheres of inherited anchors.
-        n_residual: Anchors of the clip's own.
-        n_left_out: Points that would have become anchors beyond the budget.
-        share: Of the points that are within reach of an anchor of either kind; 1 where nothing moves.
-        reason: Where the budget comes from.
-    """
-
-    n_points: int
-    n_inherited: int
-    n_residual: int
-    n_left_out: int
-    share: float
-    reason: str
-
-    @property
-    def text(self) -> str:
-        """The text shown while the clip is prepared."""
-        n_outside = self.n_points - self.n_inherited
-        percent = 100 * n_outside / max(self.n_points, 1)
-        said = f"{n_outside} of {self.n_points} moving points ({percent:.0f} %) lie outside the inherited anchors; "
-        said += f"{self.n_residual} residual anchors ({self.reason})"
-        if self.n_left_out:
-            said += f", {self.n_left_out} points left to the anchors beside them"
-        return f"{said}; {100 * self.share:.1f} % of what moves is within reach of an anchor"
-
-    def as_dict(self) -> dict[str, int | float | str]:
-        """JSON-able."""
-        return asdict(self)
 
 
 def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> Coverage:

@@ -6,10 +6,11 @@ import torch
 from torch import Tensor
 
 from engine.capture.clip import Clip
+from engine.clip_files.clip_header import FieldShape
 from engine.clip_files.clip_state import ClipState
 from engine.errors import ProjectError
 from engine.model.clip_model import ClipModel, read_field
-from engine.model.field import FieldShape, SpatioTemporalField
+from engine.model.field import SpatioTemporalField
 from engine.model.field_sizes import derive_cells, derive_log2_entries
 from engine.training.config import TrainConfig
 
@@ -62,7 +63,7 @@ def continue_field(model: ClipModel, previous: ClipState, clip: Clip) -> str:
     Raises:
         ProjectError: It has fewer frames than this clip.
     """
-    field, index = read_field(previous), previous.header["clip_index"]
+    field, index = read_field(previous), previous.header.clip_index
     if field.shape.n_knots < clip.n_frames:
         raise ProjectError(
             f"The field of clip {index} has {field.shape.n_knots} frames, clip {clip.clip_index} has "

@@ -17,7 +17,8 @@ from torch import nn
 
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.clip_files.clip_state import ClipState
+from engine.clip_files.clip_header import Coverage
+from engine.clip_files.clip_state import ClipState, fingerprint_of
 from engine.cloud.keeping import Keep
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
@@ -65,7 +66,7 @@ class ClipParts:
         backgrounds: What the training cameras see when nothing moves.
         spacing: Distance between static anchors, scene units.
         moving_spacing: Likewise of moving ones; None as long as nothing has moved.
-        reasons: Of the gate, by the name under which they are stored; empty without a decision.
+        reasons: Of the gate, by role; empty without a decision.
         coverage: How much of what moves in a source clip has an anchor near it; None for a reference clip.
     """
 
@@ -75,7 +76,7 @@ class ClipParts:
     spacing: float
     moving_spacing: float | None = None
     reasons: dict[str, np.ndarray] = field(default_factory=dict)
-    coverage: dict[str, int | float | str] | None = None
+    coverage: Coverage | None = None
 
 
 class ClipPreparation:
@@ -170,7 +171,7 @@ class ClipPreparation:
             ProjectError: The reference was trained with other cameras, or the field before cannot go on.
         """
         gains = nn.Parameter(torch.from_numpy(reference.arrays["gains"].copy()), requires_grad=False)
-        if list(reference.header["camera_names"]) != list(self._rig.names):
+        if reference.header.camera_names != list(self._rig.names):
             raise ProjectError(
                 "The training cameras differ from those of the reference clip.",
                 hint="Use the same hold-out for every clip of a project.",
@@ -187,12 +188,12 @@ class ClipPreparation:
             own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
             drop_inherited(model, own, self._config)
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
-        parts = ClipParts(model, gains, backgrounds, reference.header["spacing"])
+        parts = ClipParts(model, gains, backgrounds, reference.header.spacing)
         cloud, n_inside, moving_spacing = self._find_motion(parts, pictures)
         coverage = add_residual(model, cloud, self._config)
         self._say("Comparing with the reference", coverage.text)
         reasons = self._make_dynamic(parts, pictures, cloud, n_inside)
-        return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage.as_dict())
+        return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage)
 
     def keep_backgrounds(self, backgrounds: Backgrounds) -> None:
         """Keep a reference clip's corrected backgrounds for source clips, unless they are kept already.
@@ -211,7 +212,7 @@ class ClipPreparation:
         """What a preparation depends on, apart from what `_keep_after` adds."""
 
         def named(state: ClipState | None) -> str | None:
-            return None if state is None else state.header["fingerprint"]
+            return None if state is None else state.header.fingerprint
 
         return {
             "capture": self._capture.fingerprint,
@@ -228,7 +229,7 @@ class ClipPreparation:
     def _keep_after(self, model: ClipModel, gains: nn.Parameter, backgrounds: Backgrounds) -> Keep:
         """Keeps what follows from a model as it is now, the gains and the backgrounds."""
         arrays = model.own_arrays() | {"gains": gains.detach().numpy(), "backgrounds": backgrounds.images}
-        name = ClipState(arrays, {}).fingerprint
+        name = fingerprint_of(arrays)
         return lambda piece, work: self._stages.keep(f"{name} {piece}", work)
 
     # ---------------------------------------------------------------- what does not move
@@ -277,7 +278,7 @@ class ClipPreparation:
             inside = keep("frames inside", lambda: {"n": frames_inside(static_points, masks, self._rig)})
             n_inside = inside["n"]
         gains = parts.gains.detach().numpy()
-        voxel_size = None if self._base is None else self._base.header["moving_spacing"]
+        voxel_size = None if self._base is None else self._base.header.moving_spacing
         cloud = moving_cloud(
             pictures,
             masks,
@@ -298,14 +299,14 @@ class ClipPreparation:
         self, parts: ClipParts, pictures: TrainingPictures, cloud: MovingCloud, n_inside: np.ndarray
     ) -> dict[str, np.ndarray]:
         """Last step: the gate and the field. Returns the reasons of the gate."""
-        reasons = {}
+        reasons: dict[str, np.ndarray] = {}
         if self._config.gate == "off":
             remove_gate(parts.model)
         else:
             reasons = self._decide(parts, pictures, cloud, n_inside)
         if self._config.gate == "static":
             remove_gate(parts.model, in_time_only=True)
-        if self._config.field == "continue" and self._previous is not None and self._previous.header["field"]:
+        if self._config.field == "continue" and self._previous is not None and self._previous.header.field:
             made = continue_field(parts.model, self._previous, self._clip)
         else:
             has_promoted = {"promoted", "replacing"} & set(parts.model.roles())

@@ -67,15 +67,15 @@ def decide(
         regions: Where the user overrules it.
         is_source: Whether the clip inherits from another one.
     Returns:
-        Reasons by the name under which the clip stores them, and the decision in one line.
+        Reasons by role, and the decision in one line.
     """
     static = model.anchor_set("static")
     table = with_regions(table, static.positions.numpy(), regions)
-    reasons = {"gate.static": table.reasons}
+    reasons: dict[str, np.ndarray] = {"static": table.reasons}
     if not is_source or static.is_trainable:  # otherwise the inherited set keeps its rows, of which some are hidden
-        role = "replacing" if is_source else "promoted"
-        reasons = {"gate.static": table.reasons[~table.is_dynamic]}
-        reasons |= {f"gate.{role}": table.reasons[table.is_dynamic]} if table.is_dynamic.any() else {}
+        reasons = {"static": table.reasons[~table.is_dynamic]}
+        if table.is_dynamic.any():
+            reasons["replacing" if is_source else "promoted"] = table.reasons[table.is_dynamic]
     promote(model, table.is_dynamic, is_source=is_source)
     return reasons, table.summary()
 

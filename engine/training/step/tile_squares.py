@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.kernels.arrays import Bytes2, Doubles2, Floats1, Floats2, job_reader, pack
-from engine.kernels.lanes import kernel_intrinsic
-from engine.kernels.routines import WORKER, routine, run
+from engine.kernels.jobs import Bytes2, Doubles2, Floats1, Floats2, read
+from engine.kernels.launch import kernel, launch
 from engine.training.step.fused_loss import TILE_PX, tile_grid
 
 _BYTE = np.float32(1 / 255)
@@ -30,16 +29,10 @@ class SquareJob(NamedTuple):
     sums: Doubles2
 
 
-@kernel_intrinsic
-def _read_job(typing_context, address):
-    """The SquareJob at an address."""
-    return job_reader(SquareJob)
-
-
-@routine(WORKER, fastmath={"contract", "reassoc", "nsz"})
+@kernel(SquareJob, fastmath={"contract", "reassoc", "nsz"})
 def sum_squares(worker, arguments):
     """See SquareJob."""
-    job = _read_job(arguments)
+    job = read(SquareJob, arguments)
     image, truth, gains, sums = job.image, job.truth, job.gains, job.sums
     height, n_values = image.shape
     for y in range(worker * TILE_PX, min((worker + 1) * TILE_PX, height)):
@@ -71,5 +64,5 @@ def tile_squares(image: np.ndarray, truth: np.ndarray, gain: np.ndarray) -> np.n
     height, width = image.shape[:2]
     sums = np.zeros(tile_grid(height, width))
     job = SquareJob(image.reshape(height, -1), truth.reshape(height, -1), np.tile(gain, width), sums)
-    run(sum_squares, pack(job), len(sums))
+    launch(sum_squares, job, len(sums))
     return sums

@@ -11,6 +11,8 @@ from engine.clip_files.clip_state import ClipState, write_clip_state
 from engine.errors import ProjectError
 from engine.gate.reasons import LIGHT, STILL
 from engine.gate.regions import GateRegion
+from tests.app.fakes import anchor_arrays
+from tests.clip_headers import make_header
 
 SETTINGS = ProjectSettings(capture="somewhere", fingerprint="abc")
 BOX = GateRegion("static", (-1.0, 0.0, 0.0), (1.0, 2.0, 3.0))
@@ -68,11 +70,11 @@ def test_regions_are_marked_in_the_order_of_the_command_line(folder, capsys):
 
 def test_what_was_decided_is_counted_per_clip(folder, capsys):
     arrays = {
-        "sets.replacing.positions": np.zeros((2, 3), np.float32),
+        **{name: array[:2] for name, array in anchor_arrays("replacing").items()},
         "inherited.static.is_hidden": np.array([True, False, True, False]),
         "gate.static": np.array([LIGHT, STILL, LIGHT, STILL], np.uint8),
     }
-    header = {"schema": 2, "role": "source", "clip_index": 1, "step": 1, "n_steps": 1}
+    header = make_header(role="source", clip_index=1, reference_fingerprint="clip")
     (folder / "clips").mkdir()
     write_clip_state(folder / "clips" / "0001.safetensors", ClipState(arrays, header))
     code, out, _ = run(capsys, folder)

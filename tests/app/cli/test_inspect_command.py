@@ -7,7 +7,8 @@ import shutil
 
 import pytest
 
-from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
+from engine.clip_files.clip_state import read_clip_state, write_clip_state
+from tests.clip_headers import with_header
 
 
 def test_inspecting_prints_stable_json(run, capture_folder):
@@ -49,7 +50,7 @@ def test_inspecting_a_project_says_how_much_of_what_moves_is_within_reach_of_an_
     path = project / "clips" / "0001.safetensors"
     state = read_clip_state(path)
     coverage = {"n_points": 4000, "n_inherited": 500, "n_residual": 3000, "n_left_out": 500, "share": 0.9876}
-    write_clip_state(path, ClipState(state.arrays, state.header | {"coverage": coverage | {"reason": "at most 3500"}}))
+    write_clip_state(path, with_header(state, coverage=coverage | {"reason": "at most 3500"}))
     clips = json.loads(run("inspect", project, "--json")[1])["clips"]
     assert [clip["coverage"] and clip["coverage"]["share"] for clip in clips] == [None, 0.9876]
     said = "clip 1 98.8 % with 3,000 residual anchors, 500 points beyond the budget left to those beside them"

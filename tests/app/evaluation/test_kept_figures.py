@@ -34,7 +34,7 @@ def make_project(folder: Path, *, n_cameras: int, size: tuple[int, int] = (48, 3
     capture = write_capture(folder / "ring", n_cameras=n_cameras, size=size)
     project = train(folder / "p", capture)
     for path in (project / "clips").iterdir():
-        change_header(path, lambda header: header.update(HEADER))
+        change_header(path, **HEADER)
     return project
 
 
@@ -53,6 +53,7 @@ def lines_of(project: Path) -> list[bytes]:
     return [line for path in sorted((project / "evaluations").iterdir()) for line in path.read_bytes().splitlines()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM])  # SIGINT is ignored below a shell's "&"
 def test_an_evaluation_that_was_killed_goes_on_and_ends_the_same(tmp_path, sent):
     # so many and so large that it takes seconds: the signal is to come in the middle on any machine
@@ -139,10 +140,10 @@ def test_a_line_that_was_cut_off_spoils_no_other(project):
 
 def test_another_version_of_a_clip_or_of_its_reference_is_measured_again(project, capsys):
     evaluate(project, "--quiet")
-    change_header(project / "clips" / "0001.safetensors", lambda header: header.update(fingerprint="another"))
+    change_header(project / "clips" / "0001.safetensors", fingerprint="another")
     evaluate(project)
     assert "12/24" in capsys.readouterr().err
-    change_header(project / "clips" / "0000.safetensors", lambda header: header.update(near_plane=0.2))
+    change_header(project / "clips" / "0000.safetensors", near_plane=0.2)
     evaluate(project)
     assert "24/24" in capsys.readouterr().err  # the arrays are what counts
 

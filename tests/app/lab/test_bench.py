@@ -89,6 +89,7 @@ def prepare_allocation(n_mb: int):
     return lambda: np.ones(n_mb << 20, np.uint8)
 
 
+@pytest.mark.slow
 def test_peak_memory_sees_what_a_call_allocates():
     found = peak_extra_mb(prepare_allocation, 64)
     assert found is not None
@@ -100,6 +101,7 @@ def prepare_nothing_good():
     raise SystemExit(3)
 
 
+@pytest.mark.slow
 def test_peak_memory_of_a_process_that_dies_is_none():
     assert peak_extra_mb(prepare_nothing_good) is None
 
@@ -150,6 +152,7 @@ def test_the_decodes_row_has_speed_and_error():
     assert [mark.operation for mark in found] == ["decode", "decode"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_source", [False, True])
 def test_a_training_step_is_cut_into_stages(is_source):
     row, found = measure_iteration("tiny", is_source=is_source, n_runs=2, recipe=TINY_CLIP)
@@ -172,6 +175,7 @@ def test_cut_steps_learn_the_same_as_whole_ones():
     assert any(not np.array_equal(p.detach(), first[name].detach()) for name, p in moved.named_parameters())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_source", [False, True])
 def test_the_steps_row_has_speed_and_error(is_source):
     errors, found = measure_errors(replace(TINY_CLIP, is_source=is_source), scene="tiny")
@@ -231,6 +235,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_wrong_back_end_shows_in_its_column_and_in_no_other(fault, monkeypatch):
     table, name, spoil, expected = FAULTS[fault]
@@ -250,6 +255,7 @@ def test_the_limit_is_a_plausible_number_of_operations(monkeypatch):
 # ---------------------------------------------------------------- what comes of it
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_table_and_writes_document_and_picture(tiny_plan, tmp_path, capsys):
     out = tmp_path / "out"
     assert main(["bench", "--out", str(out), "--json", str(tmp_path / "b.json")]) == 0
@@ -320,6 +326,7 @@ def test_an_interrupt_is_told_in_one_line(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err.strip() == "clipgstream: Interrupted."
 
 
+@pytest.mark.slow
 def test_the_picture_shows_every_operation(tmp_path):
     for operations, height in ((("raster",), 400), (("raster", "decode"), 700), (("raster", "decode", "step"), 1000)):
         path = tmp_path / f"{len(operations)}.png"
@@ -334,6 +341,7 @@ def test_a_picture_of_nothing_is_refused(tmp_path):
         draw_speed_error([], tmp_path / "none.png", footer="")
 
 
+@pytest.mark.slow
 def test_errors_of_zero_have_a_place_in_the_picture(tmp_path):
     draw_speed_error([replace(mark, value_error=0.0) for mark in marks()], tmp_path / "zero.png", footer="")
     assert is_picture(tmp_path / "zero.png")

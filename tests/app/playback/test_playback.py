@@ -13,7 +13,8 @@ from app.playback.picture_source import PictureSource
 from app.playback.playback import FrameRequest, Playback
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, write_clip_state
-from tests.app.fakes import DECODER, anchor_arrays, decoder_arrays
+from tests.app.fakes import anchor_arrays, decoder_arrays
+from tests.clip_headers import make_header
 
 WAIT_S = 30.0
 
@@ -22,23 +23,8 @@ def write_clip(path: Path, *, shift: float, step: int = 1) -> Path:
     """A reference clip that can be decoded; its anchors are moved along x, to tell clips apart."""
     arrays = anchor_arrays("static") | decoder_arrays()
     arrays["sets.static.positions"] = arrays["sets.static.positions"] + np.array([shift, 0.0, 0.0], np.float32)
-    header = {
-        "schema": 2,
-        "role": "reference",
-        "clip_index": 0,
-        "clip_length": 3,
-        "n_frames": 3,
-        "start": 0,
-        "step": step,
-        "n_steps": 6,
-        "near_plane": 0.1,
-        "spacing": 0.1,
-        "decoder": DECODER,
-    }
-    state = ClipState(arrays, header)
-    header["fingerprint"] = state.fingerprint
     path.parent.mkdir(parents=True, exist_ok=True)
-    write_clip_state(path, state)
+    write_clip_state(path, ClipState(arrays, make_header(clip_length=3, n_frames=3, step=step)).stamped())
     return path
 
 

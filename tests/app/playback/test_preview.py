@@ -15,10 +15,10 @@ from tests.app.conftest import poll_until
 
 
 @pytest.mark.slow
-def test_the_cloud_of_the_sample_looks_like_the_sample(tmp_path):
-    capture = open_capture(asset_path("sample"))
+def test_the_cloud_of_a_capture_looks_like_the_capture(tiny_capture, tmp_path):
+    capture = open_capture(tiny_capture)
     camera = capture.rig.names.index(capture.default_holdout[0])  # not used for the cloud, so that it says something
-    path = make_cloud(asset_path("sample"), holdout=(camera,), path=tmp_path / "c.safetensors", context=JobContext("c"))
+    path = make_cloud(tiny_capture, holdout=(camera,), path=tmp_path / "c.safetensors", context=JobContext("c"))
     points, colors, _ = read_cloud(path)
     assert points.shape == colors.shape
     assert len(points) > 1000
@@ -36,6 +36,7 @@ def test_the_cloud_of_the_sample_looks_like_the_sample(tmp_path):
     assert error < 0.75 * shuffled  # most points lie where their colour is, some are hidden behind others
 
 
+@pytest.mark.slow
 def test_no_cloud_is_said_and_leaves_nothing(tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(PreparationError, match="exit code 1"):

@@ -13,7 +13,7 @@ from tests.app.made_projects import clip_header
     ("name", "component"),
     [
         ("sets.static.positions", "positions"),
-        ("sets.moving.log_scales", "scales"),
+        ("sets.moving.log_base_scales", "scales"),
         ("sets.moving.presence", "presence"),
         ("inherited.moving.presence", "presence"),
         ("field.tables.0", "field tables"),

@@ -12,8 +12,10 @@ from app.project.clip_catalog import ClipCatalog, anchor_counts
 from app.project.project import Project
 from app.training.service import TrainingService
 from engine.capture.clip import split_clips
+from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import DamagedClip, look_at_clip, read_clip_header
 from tests.app.made_projects import clip_header, make_chain, make_project, write_header
+from tests.clip_headers import changed, header_values, write_values
 
 
 def states(catalog: ClipCatalog) -> list[str]:
@@ -23,16 +25,16 @@ def states(catalog: ClipCatalog) -> list[str]:
 def state_by_definition(project: Project, clip_index: int) -> str:
     """What a state means, one clip at a time: the slow and recursive way."""
 
-    def is_stale(index: int, header: dict) -> bool:
-        if header["role"] == "source":
+    def is_stale(index: int, header: ClipHeader) -> bool:
+        if header.role == "source":
             reference = read_clip_header(project.reference_path)
-            if reference is None or reference["fingerprint"] != header["reference_fingerprint"]:
+            if reference is None or reference.fingerprint != header.reference_fingerprint:
                 return True
-        if "previous_fingerprint" not in header:
+        if header.previous_fingerprint is None:
             return False
         before = project.previous_index(index)
         previous = read_clip_header(project.clip_path(before))
-        if previous is None or previous["fingerprint"] != header["previous_fingerprint"]:
+        if previous is None or previous.fingerprint != header.previous_fingerprint:
             return True
         return is_stale(before, previous)
 
@@ -59,7 +61,7 @@ def test_every_state_is_the_one_by_definition(tmp_path: Path, seed: int) -> None
         if drawn.random() < 0.9:
             write_header(project.clip_path(index), clip_header(index, **entries))
         if drawn.random() < 0.2:  # of a training that can go on: those of an older reference are another test
-            entries.pop("reference_fingerprint", None)
+            entries = {name: value for name, value in entries.items() if name == "previous_fingerprint"}
             write_header(project.checkpoint_path(index), clip_header(index, **entries, step=3))
     expected = [state_by_definition(project, index) for index in range(n_clips)]
     assert states(ClipCatalog(project, n_clips)) == expected
@@ -86,7 +88,7 @@ def test_each_header_is_read_once_while_its_file_stays(tmp_path: Path, monkeypat
     project = make_chain(tmp_path, 20)
     read: list[str] = []
 
-    def counted(path: Path) -> dict | DamagedClip | None:
+    def counted(path: Path) -> ClipHeader | DamagedClip | None:
         read.append(path.name)
         return look_at_clip(path)
 
@@ -105,13 +107,13 @@ def spoil(path: Path) -> None:
 
 
 def without_steps(path: Path) -> None:
-    header = clip_header(0)
-    del header["step"]
-    write_header(path, header)
+    values = header_values()
+    del values["step"]
+    write_values(path, {}, values)
 
 
 def with_a_word_for_steps(path: Path) -> None:
-    write_header(path, clip_header(0, step="many"))
+    write_values(path, {}, header_values(step="many"))
 
 
 @pytest.mark.parametrize("damage", [spoil, without_steps, with_a_word_for_steps])
@@ -179,7 +181,7 @@ def test_anchors_of_clips_that_nobody_looked_at_are_known_from_their_headers(tmp
     write_header(project.clip_path(0), clip_header(0, n_anchors=reference))
     write_header(project.clip_path(1), clip_header(1, n_anchors=reference | {"residual": 7}, **source))
     write_header(project.checkpoint_path(2), clip_header(2, n_anchors=reference | {"residual": 9}, **source))
-    write_header(project.clip_path(3), clip_header(3, n_anchors="no numbers", **source))
+    write_header(project.clip_path(3), clip_header(3, **source))
     service = TrainingService(project, split_clips(5, 1), holdout=())
     counts = [(status.n_inherited, status.n_own) for status in service.clip_statuses(None)]
     assert counts == [(0, 340), (340, 7), (340, 9), (0, 0), (0, 0)]
@@ -187,7 +189,12 @@ def test_anchors_of_clips_that_nobody_looked_at_are_known_from_their_headers(tmp
 
 def test_anchors_that_a_clip_learns_on_are_its_own_as_in_the_picture(tmp_path: Path) -> None:
     """With inherit=trainable the file holds them, and the window draws them as the clip's own."""
-    header = clip_header(1, role="source", n_anchors={"static": 300, "residual": 7}, config={"inherit": "trainable"})
+    header = clip_header(
+        1,
+        role="source",
+        reference_fingerprint="clip-0",
+        n_anchors={"static": 300, "residual": 7},
+        config={"inherit": "trainable"},
+    )
     assert anchor_counts(header) == (0, 307)
-    header["config"] = {"inherit": "moving"}
-    assert anchor_counts(header) == (300, 7)
+    assert anchor_counts(changed(header, config={"inherit": "moving"})) == (300, 7)

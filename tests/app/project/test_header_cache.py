@@ -22,12 +22,14 @@ def test_a_header_is_read_again_only_where_its_file_has_changed(tmp_path, monkey
     for _ in range(3):
         found = cache.read(path)
         assert found is not None
-        assert (found.header["step"], found.n_bytes, found.damage) == (1, path.stat().st_size, "")
+        assert found.header is not None
+        assert (found.header.step, found.n_bytes, found.damage) == (1, path.stat().st_size, "")
     assert len(looked_at) == 1
     write(path, 2)
     found = cache.read(path)
     assert found is not None
-    assert found.header["step"] == 2
+    assert found.header is not None
+    assert found.header.step == 2
     assert len(looked_at) == 2
     path.unlink()
     assert cache.read(path) is None
@@ -38,6 +40,6 @@ def test_a_damaged_file_says_so_and_is_not_read_over_and_over(tmp_path):
     path.write_bytes(b"not a clip")
     found = cache.read(path)
     assert found is not None
-    assert found.header == {}
+    assert found.header is None
     assert found.damage.startswith("The file is damaged (")
     assert cache.read(path) is found

@@ -134,7 +134,7 @@ def test_metrics_survive_a_torn_last_line(tmp_path):
         ({"holdout": ("9",)}, "no camera called 9"),
         ({"holdout": ("0", "1", "2")}, "leaves 1 for training"),
         ({"seed": -1}, "seed is -1"),
-        ({"overrides": {"ssim_weight": 2.0}}, r"between 0\.0 and 1\.0"),
+        ({"overrides": {"ssim_weight": 2.0}}, "between 0 and 1"),
     ],
 )
 def test_settings_that_do_not_fit_are_refused_with_the_range(capture_folder, arguments, expected):

@@ -106,7 +106,7 @@ def test_another_folder_of_the_same_name_is_noticed(folder):
         watch.check()
 
 
-def test_a_folder_that_is_no_project_any_more_is_gone(folder):
+def test_a_folder_without_its_project_file_is_gone(folder):
     watch = FolderWatch(folder)
     (folder / PROJECT_FILE).unlink()
     with pytest.raises(ProjectGone):

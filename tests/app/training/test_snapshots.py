@@ -6,6 +6,7 @@ import pytest
 from app.training.snapshots import Cadence, SnapshotWriter, is_finite
 from engine.clip_files.clip_state import ClipState, read_clip_state
 from tests.app.made_projects import clip_header
+from tests.clip_headers import make_header
 
 
 def state(step: int) -> ClipState:
@@ -40,7 +41,7 @@ def test_there_is_one_unconsumed_snapshot_at_a_time_and_older_ones_go(tmp_path):
     assert len(list(tmp_path.iterdir())) == 2  # its reader may still look at the first
     writer.consumed(second.revision)
     (left,) = tmp_path.iterdir()
-    assert read_clip_state(left).header["step"] == 2
+    assert read_clip_state(left).header.step == 2
     writer.consumed(first.revision)  # late news changes nothing
     assert writer.is_free
     writer.clear()
@@ -48,6 +49,6 @@ def test_there_is_one_unconsumed_snapshot_at_a_time_and_older_ones_go(tmp_path):
 
 
 @pytest.mark.parametrize(("value", "expected"), [(1.0, True), (np.nan, False), (np.inf, False)])
-def test_a_state_with_a_number_that_is_none_is_not_finite(value, expected):
+def test_a_state_with_nan_or_infinity_is_not_finite(value, expected):
     arrays = {"a": np.array([1.0, value], np.float32), "b": np.array([True]), "c": np.array([1], np.int64)}
-    assert is_finite(ClipState(arrays, {})) is expected
+    assert is_finite(ClipState(arrays, make_header())) is expected

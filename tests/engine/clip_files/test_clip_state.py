@@ -5,7 +5,6 @@ import os
 import numpy as np
 import pytest
 
-from engine.clip_files.clip_header import SCHEMA
 from engine.clip_files.clip_state import (
     ClipState,
     DamagedClip,
@@ -16,11 +15,12 @@ from engine.clip_files.clip_state import (
 )
 from engine.errors import ProjectError
 from engine.storage.array_files import write_arrays
+from tests.clip_headers import header_values, make_header, write_values
 
 
 def make_state() -> ClipState:
     arrays = {"a": np.arange(6, dtype=np.float32).reshape(2, 3), "b": np.array([True, False]), "none": np.zeros((0, 3))}
-    return ClipState(arrays, {"schema": SCHEMA, "role": "reference", "clip_index": 0, "step": 3, "n_steps": 3})
+    return ClipState(arrays, make_header(step=3))
 
 
 def test_round_trip_keeps_arrays_and_header(tmp_path):
@@ -52,7 +52,7 @@ def test_a_missing_file_and_a_newer_schema_are_told_apart(tmp_path):
     with pytest.raises(ProjectError, match="does not exist"):
         read_clip_state(tmp_path / "none.safetensors")
     state = make_state()
-    write_clip_state(tmp_path / "new.safetensors", ClipState(state.arrays, state.header | {"schema": 99}))
+    write_values(tmp_path / "new.safetensors", state.arrays, header_values(schema=99))
     with pytest.raises(ProjectError, match="schema 99"):
         read_clip_state(tmp_path / "new.safetensors")
 
@@ -107,7 +107,7 @@ def test_missing_and_damaged_are_told_apart(tmp_path):
 )
 def test_headers_with_entries_of_another_kind_are_damage(tmp_path, change):
     state, path = make_state(), tmp_path / "0000.safetensors"
-    write_clip_state(path, ClipState(state.arrays, state.header | change))
+    write_values(path, state.arrays, header_values(**change))
     with pytest.raises(ProjectError, match="damaged") as caught:
         read_clip_state(path)
     assert next(iter(change)) in caught.value.message

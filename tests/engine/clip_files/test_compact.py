@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 import torch
+from msgspec.structs import replace
 from safetensors import safe_open
 from safetensors.numpy import save_file
 
@@ -15,6 +16,7 @@ from engine.clip_files.compact import compact_clip, write_compact_clip
 from engine.errors import NonFiniteLoss, ProjectError
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import load_clip_model
+from tests.clip_headers import with_header
 from tests.engine.model.test_clip_model import N_FRAMES, make_anchors, make_field, make_reference, state_of
 
 
@@ -40,13 +42,14 @@ def make_source(reference: ClipState, n: int = 300) -> ClipState:
     found = {f"sets.residual.{name}": array for name, array in arrays.items()}
     found |= {f"field.{name}": value.numpy().copy() for name, value in field.state_dict().items()}
     found["inherited.moving.presence"] = np.ones((10, N_FRAMES), bool)
-    header = reference.header | {
-        "role": "source",
-        "clip_index": 1,
-        "reference_fingerprint": reference.header["fingerprint"],
-        "field": field.shape.as_dict(),
-        "moving_spacing": 0.02,
-    }
+    header = replace(
+        reference.header,
+        role="source",
+        clip_index=1,
+        reference_fingerprint=reference.header.fingerprint,
+        field=field.shape,
+        moving_spacing=0.02,
+    )
     return ClipState(found, header)
 
 
@@ -55,8 +58,8 @@ def test_what_is_read_is_what_was_promised(reference, tmp_path):
         clip = compact_clip(state)
         write_compact_clip(tmp_path / f"{name}.safetensors", clip)
         found = read_clip_state(tmp_path / f"{name}.safetensors")
-        assert found.header == json.loads(json.dumps(clip.state.header))
-        assert found.fingerprint == clip.state.fingerprint == found.header["fingerprint"]
+        assert found.header == clip.state.header
+        assert found.fingerprint == clip.state.fingerprint == found.header.fingerprint
         for key, array in state.arrays.items():
             assert (found.arrays[key].shape, found.arrays[key].dtype) == (array.shape, array.dtype)
             error = np.abs(found.arrays[key].astype(np.float64) - array).max(initial=0.0)
@@ -98,7 +101,7 @@ def test_a_source_clip_knows_the_stored_reference_and_no_other(reference, tmp_pa
     write_compact_clip(tmp_path / "0000.safetensors", clip)
     stored = read_clip_state(tmp_path / "0000.safetensors")
     load_clip_model(make_source(stored), stored)
-    assert stored.header["fingerprint"] != reference.header["fingerprint"]
+    assert stored.header.fingerprint != reference.header.fingerprint
     with pytest.raises(ProjectError, match="was trained on reference"):
         load_clip_model(make_source(reference), stored)
 
@@ -122,7 +125,7 @@ def test_values_beyond_half_precision_and_positions_in_a_wide_world_stay_exact(r
 
 
 def test_files_of_the_first_schema_are_read(reference, tmp_path):
-    write_clip_state(tmp_path / "old.safetensors", ClipState(reference.arrays, reference.header | {"schema": 1}))
+    write_clip_state(tmp_path / "old.safetensors", with_header(reference, schema=1))
     found = read_clip_state(tmp_path / "old.safetensors")
     assert found.fingerprint == reference.fingerprint
     load_clip_model(found, None)

@@ -118,7 +118,7 @@ def real_kernel_files() -> list[str]:
     held = {
         path for path in engine.rglob("*.py") if any(f"\n@{name}" in path.read_text("utf-8") for name in decorators)
     }
-    for folder in ("kernels", "raster/cpu", "model/cpu"):
+    for folder in ("kernels", "raster/cpu", "model/decode/cpu"):
         held.update((engine / folder).glob("*.py"))
     return sorted(path.relative_to(engine).as_posix() for path in held)
 
@@ -225,6 +225,7 @@ print(engine.kernels.cache.current_key.cache_info().currsize)
 """
 
 
+@pytest.mark.slow
 def test_importing_engine_leaves_the_process_as_it_is():
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA", "GOMP"))}
     done = subprocess.run(

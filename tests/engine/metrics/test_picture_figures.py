@@ -24,7 +24,7 @@ from engine.metrics.pictures.flip import flip
 from engine.metrics.pictures.picture import measure_picture
 from engine.metrics.pictures.similarity import Similarity, dssim1, dssim_ms, dssim_range2, ssim
 from engine.training.step.losses import ssim_map
-from tests.engine.metrics.pictures import disturbed, scene
+from tests.engine.metrics.made_pictures import disturbed, scene
 
 SIZES = ((41, 60), (180, 240), (181, 333))
 

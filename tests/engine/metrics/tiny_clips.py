@@ -9,11 +9,13 @@ import numpy as np
 import torch
 
 from engine.capture.clip import Clip, split_clips
+from engine.clip_files.clip_header import FieldShape
 from engine.clip_files.clip_state import ClipState
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
 from engine.model.decoder import Decoder
-from engine.model.field import FieldShape, SpatioTemporalField
+from engine.model.field import SpatioTemporalField
+from tests.clip_headers import make_header
 
 N_FRAMES, CLIP_LENGTH, SIZE = 6, 3, (64, 48)
 
@@ -53,7 +55,7 @@ def clips() -> list[Clip]:
 def reference() -> ClipState:
     """Header and gains of a reference clip; camera b was held out."""
     arrays = {"gains": np.array([[0.5, 0.5, 0.5]], np.float32)}
-    return ClipState(arrays, {"near_plane": 0.1, "spacing": 0.2, "camera_names": ["a"]})
+    return ClipState(arrays, make_header(spacing=0.2, camera_names=["a"]))
 
 
 def make_model(*, has_motion: bool, seed: int = 0, color: float = 0.5, n_frames: int = CLIP_LENGTH) -> ClipModel:

@@ -3,16 +3,18 @@
 import numpy as np
 import pytest
 import torch
+from msgspec import to_builtins
 
-from engine.clip_files.clip_header import SCHEMA
+from engine.clip_files.clip_header import FieldShape
 from engine.clip_files.clip_state import ClipState
+from engine.clip_files.roles import ROLES
 from engine.errors import ProjectError
 from engine.gate.reasons import LIGHT, NO_REASON, STILL
 from engine.model.anchors import AnchorSet
-from engine.model.clip_model import ClipModel, decoder_sizes, inherit, load_clip_model
+from engine.model.clip_model import ClipModel, decoder_shape, inherit, load_clip_model
 from engine.model.decoder import HEADS, Decoder
-from engine.model.field import FieldShape, SpatioTemporalField
-from engine.model.roles import ROLES
+from engine.model.field import SpatioTemporalField
+from tests.clip_headers import make_header, with_header
 
 N_FRAMES = 4
 K = 3
@@ -59,22 +61,18 @@ def make_reference() -> ClipModel:
 
 def state_of(model: ClipModel, *, role: str, clip_index: int = 0, reference: ClipState | None = None) -> ClipState:
     assert model.field is not None
-    header = {
-        "schema": SCHEMA,
-        "role": role,
-        "clip_index": clip_index,
-        "step": 1,
-        "n_steps": 1,
-        "clip_length": N_FRAMES,
-        "n_frames": N_FRAMES,
-        "decoder": decoder_sizes(model.decoder),
-        "field": model.field.shape.as_dict(),
-    }
-    state = ClipState(model.own_arrays(), header)
-    header["fingerprint"] = state.fingerprint
-    if reference is not None:
-        header["reference_fingerprint"] = reference.header["fingerprint"]
-    return state
+    header = make_header(
+        role=role,
+        clip_index=clip_index,
+        step=1,
+        n_steps=1,
+        clip_length=N_FRAMES,
+        n_frames=N_FRAMES,
+        decoder=to_builtins(decoder_shape(model.decoder)),
+        field=to_builtins(model.field.shape),
+        reference_fingerprint=None if reference is None else reference.header.fingerprint,
+    )
+    return ClipState(model.own_arrays(), header).stamped()
 
 
 def make_source(reference: ClipState) -> ClipModel:
@@ -159,7 +157,7 @@ def test_a_source_clip_refuses_a_missing_or_another_reference():
     state = state_of(make_source(reference), role="source", clip_index=1, reference=reference)
     with pytest.raises(ProjectError, match="not there"):
         load_clip_model(state, None)
-    other = ClipState(reference.arrays, reference.header | {"fingerprint": "0" * 16})
+    other = with_header(reference, fingerprint="0" * 16)
     with pytest.raises(ProjectError, match="0000"):
         load_clip_model(state, other)
 

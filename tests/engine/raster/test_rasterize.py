@@ -64,6 +64,7 @@ def truth() -> tuple[Scene, Gaussians, Rendering]:
     return scene, gaussians, rendering
 
 
+@pytest.mark.slow
 def test_float32_matches_float64_forward_and_backward(truth):
     scene, exact, expected = truth
     gaussians = leaves(scene.gaussians, torch.float32)

@@ -8,7 +8,6 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import engine.raster.cpu.tile_boxes as kernels
 from engine.raster import TILE_PX, Gaussians, TileBoxes, rasterize, tile_boxes
 from engine.raster.pinhole_view import n_tiles
 from engine.synthetic.gaussian_scenes import Scene, layered_scene
@@ -25,6 +24,7 @@ def as_float32(gaussians: Gaussians) -> Gaussians:
     return Gaussians(*(tensor.float() for tensor in gaussians.tensors()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", BACKENDS)
 @settings(deadline=None, max_examples=20)
 @given(size_px=st.sampled_from([0.3, 3.0, 30.0]), seed=st.integers(0, 99), n_rows=st.integers(0, 40))
@@ -86,22 +86,6 @@ def test_meeting_rows_are_those_over_a_wanted_tile():
     assert 0 < len(expected) < 300
     assert boxes.meeting(tile_mask, rows).tolist() == expected
     assert not len(boxes.meeting(np.zeros(boxes.shape, bool), rows))
-
-
-def test_what_a_kernel_reads_lives_as_long_as_it_runs(monkeypatch):
-    scene = layered_scene(300, 300, 200, 6.0)
-    boxes = boxes_of(scene, as_float32(scene.gaussians), "cpu")
-    tile_mask = np.random.default_rng(0).random(boxes.shape) < 0.2
-    expected = boxes.meeting(tile_mask, np.arange(300))
-    run, kept = kernels.run, []
-
-    def run_in_full_memory(*arguments) -> None:
-        for n in range(1, 400):  # whatever was freed is taken and overwritten
-            kept.append(np.full(n, -1000, np.int32))
-        run(*arguments)
-
-    monkeypatch.setattr(kernels, "run", run_in_full_memory)
-    assert np.array_equal(boxes.meeting(tile_mask, np.arange(300)), expected)
 
 
 def test_arguments_are_checked():

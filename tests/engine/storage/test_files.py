@@ -14,6 +14,7 @@ from engine.errors import DiskError
 from engine.storage.array_files import write_arrays
 from engine.storage.files import checked_path
 from engine.training.preparation.cloud_preparation import BACKGROUNDS_FILE, Backgrounds, write_backgrounds
+from tests.clip_headers import make_header
 
 needs_full = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
 
@@ -28,7 +29,7 @@ def without_room(path: Path) -> Path:
 def test_a_clip_that_does_not_fit_is_a_typed_error_and_leaves_nothing(tmp_path):
     path = without_room(tmp_path / "0000.safetensors")
     with pytest.raises(DiskError, match=r"The clip could not be written \(No space left on device\)"):
-        write_clip_state(path, ClipState({"value": np.zeros(100_000, np.float32)}, {"schema": 1}))
+        write_clip_state(path, ClipState({"value": np.zeros(100_000, np.float32)}, make_header()))
     assert not list(tmp_path.iterdir())
 
 

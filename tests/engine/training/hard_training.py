@@ -127,7 +127,7 @@ class Trained:
             rig.Ks[camera],
             width=width,
             height=height,
-            near_plane=clip.base.header["near_plane"],
+            near_plane=clip.base.header.near_plane,
         )
         rows = {role: torch.zeros(0, dtype=torch.int64) for role in clip.model.roles()}
         rows["static"] = torch.arange(len(clip.model.anchor_set("static")))

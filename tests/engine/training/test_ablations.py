@@ -14,7 +14,10 @@ from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import named_parameters
 from engine.training.preparation.building import merged
+from tests.clip_headers import with_header
 from tests.engine.training.tiny_training import Tiny, finish, live_picture, picture, same_arrays, take_steps
+
+pytestmark = pytest.mark.slow
 
 SWITCHES: dict[str, dict[str, str]] = {
     "full": {},
@@ -97,8 +100,8 @@ def test_a_clip_stores_what_it_learned_and_nothing_it_inherits(source_clips, nam
 
 
 def test_no_switch_reaches_into_the_reference(tiny, source_clips):
-    assert tiny.reference.header["fingerprint"] == tiny.reference.fingerprint  # of the arrays as they are now
-    assert {state.header["reference_fingerprint"] for state in source_clips.values()} == {tiny.reference.fingerprint}
+    assert tiny.reference.header.fingerprint == tiny.reference.fingerprint  # of the arrays as they are now
+    assert {state.header.reference_fingerprint for state in source_clips.values()} == {tiny.reference.fingerprint}
 
 
 def test_every_switch_gives_a_clip_of_its_own(source_clips):
@@ -216,7 +219,7 @@ def test_without_inheritance_no_anchor_of_the_reference_is_shown(tiny, source_cl
 def test_a_continued_field_starts_as_the_clip_before_left_it(tiny, source_clips):
     training = tiny.prepared(2, field="continue", previous=source_clips["continue"])
     assert training.model.field is not None
-    assert training.model.field.shape.as_dict() == source_clips["continue"].header["field"]
+    assert training.model.field.shape == source_clips["continue"].header.field
     started, left = ({k: v for k, v in s.arrays.items() if k.startswith("field.")} for s in (
         training.state(), source_clips["continue"]))  # fmt: skip
     assert same_arrays(started, left)
@@ -231,7 +234,7 @@ def test_a_field_per_clip_starts_new(tiny, source_clips):
 
 def test_a_field_cannot_go_on_in_a_longer_clip(tiny, streamed):
     frame = streamed[0]
-    assert frame.header["field"]["n_knots"] == 1
+    assert frame.header.field.n_knots == 1
     training = tiny.training(1, field="continue", reference=frame, previous=frame)
     with pytest.raises(ProjectError, match="clip 0 has 1 frames, clip 1 has 4") as caught:
         training.prepare()
@@ -242,7 +245,7 @@ def test_a_field_cannot_go_on_in_a_longer_clip(tiny, streamed):
 def test_a_table_for_all_frames_or_one_for_each(tiny, tables, n_tables):
     state = tiny.prepared(1, field_tables=tables).state()
     assert sum(name.startswith("field.tables.") for name in state.arrays) == n_tables
-    assert state.header["field"]["is_shared"] == (tables == "shared")
+    assert state.header.field.is_shared == (tables == "shared")
 
 
 # ---------------------------------------------------------------- clips on their own
@@ -251,9 +254,9 @@ def test_a_table_for_all_frames_or_one_for_each(tiny, tables, n_tables):
 def test_an_independent_clip_is_a_reference_clip_and_loads_without_another(tiny, tmp_path):
     state = tiny.trained(0, is_source=False, independent=True, prep_dir=tmp_path)
     assert state.is_reference
-    assert "reference_fingerprint" not in state.header
+    assert state.header.reference_fingerprint is None
     assert same_arrays(state.arrays, tiny.reference.arrays)
-    other = ClipState(tiny.reference.arrays, tiny.reference.header | {"fingerprint": "another"})
+    other = with_header(tiny.reference, fingerprint="another")
     assert np.array_equal(picture(tiny, state, None), picture(tiny, state, other))  # it is not looked at
 
 
@@ -289,7 +292,7 @@ def test_streaming_goes_on_from_everything_the_frame_before_learned(tiny, stream
 def test_a_streamed_frame_needs_no_other_to_be_shown(streamed):
     for state in streamed:
         assert state.is_reference
-        assert state.header["config"]["start"] == "previous"  # as the project says, not as it is carried out
+        assert state.header.config["start"] == "previous"  # as the project says, not as it is carried out
         assert load_clip_model(state, None).n_frames == 1
 
 
@@ -337,7 +340,7 @@ def test_any_clip_can_be_the_reference(tiny, tmp_path):
     for order in ((0, 2), (2, 0)):
         for i in order:
             state = tiny.trained(i, reference=reference, prep_dir=tmp_path)
-            assert state.header["reference_fingerprint"] == reference.fingerprint
+            assert state.header.reference_fingerprint == reference.fingerprint
             assert states.setdefault(i, state).fingerprint == state.fingerprint  # the star holds: order is nothing
             assert np.isfinite(picture(tiny, state, reference)).all()
     with pytest.raises(ProjectError, match="was trained on reference"):

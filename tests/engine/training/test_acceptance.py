@@ -46,11 +46,13 @@ from engine.training.config import TrainConfig
 from engine.training.preparation.building import add_residual
 from tests.engine.training.tiny_training import Tiny, finish, live_picture, make_training, picture, take_steps
 
+pytestmark = pytest.mark.slow
+
 
 def first_view(tiny: Tiny, camera: int = 0) -> View:
     rig = tiny.capture.rig
     width, height = (int(v) for v in rig.image_sizes[camera])
-    near_plane = tiny.reference.header["near_plane"]
+    near_plane = tiny.reference.header.near_plane
     return View.from_arrays(
         rig.world_to_camera[camera], rig.Ks[camera], width=width, height=height, near_plane=near_plane
     )
@@ -58,7 +60,7 @@ def first_view(tiny: Tiny, camera: int = 0) -> View:
 
 def test_2_a_source_clip_starts_as_its_static_features_alone_show_it(tiny):
     training = tiny.prepared(1)
-    view, reach = first_view(tiny), REACH_SPACINGS * tiny.reference.header["spacing"]
+    view, reach = first_view(tiny), REACH_SPACINGS * tiny.reference.header.spacing
     times = [frame / training.clip.clip_length for frame in range(training.clip.n_frames)]
     assert _distance_from_static(training, times, view, reach) < 1 / 255
     take_steps(training, 6)  # the field has learned by then, so the comparison can fail
@@ -268,7 +270,7 @@ def test_8_a_reference_clip_shows_the_same_pixels_after_a_trip_to_the_disk(tiny,
 def test_10_gaussians_of_a_frame_taken_out_once_are_what_every_camera_sees(tiny, clip_index):
     state = tiny.reference if clip_index == 0 else tiny.trained(1)
     model = load_clip_model(state, tiny.reference)
-    reach = REACH_SPACINGS * tiny.reference.header["spacing"]
+    reach = REACH_SPACINGS * tiny.reference.header.spacing
     baked = model.decode(0.5)
     for camera in (0, 7, 13):
         view = first_view(tiny, camera)

@@ -85,9 +85,9 @@ def test_a_clip_in_which_nothing_moves_is_covered():
 def test_a_clip_keeps_its_coverage_through_a_checkpoint(tiny, tmp_path):
     said: list[str] = []
     first = tiny.prepared(1, max_moving_points=60, report=lambda progress: said.append(progress.message))
-    coverage = first.state().header["coverage"]
-    assert coverage["n_left_out"] > 0
-    assert coverage["n_residual"] == len(first.model.anchor_set("residual"))
+    coverage = first.state().header.coverage
+    assert coverage.n_left_out > 0
+    assert coverage.n_residual == len(first.model.anchor_set("residual"))
     assert any("within reach of an anchor" in line for line in said)
     first.step()
     first.write_checkpoint(tmp_path / "kept.safetensors")
@@ -95,6 +95,6 @@ def test_a_clip_keeps_its_coverage_through_a_checkpoint(tiny, tmp_path):
     again.restore_checkpoint(tmp_path / "kept.safetensors")
     first.step()
     again.step()
-    assert again.state().header["coverage"] == coverage
+    assert again.state().header.coverage == coverage
     assert same_arrays(first.state().arrays, again.state().arrays)
-    assert tiny.reference.header["coverage"] is None
+    assert tiny.reference.header.coverage is None

@@ -28,6 +28,7 @@ def calls(monkeypatch):
     return seen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [{}, SETTINGS])
 def test_plain_torch_learns_the_same_but_for_rounding(tiny, calls, settings):
     losses, arrays = {}, {}

@@ -10,6 +10,8 @@ from engine.clip_files.compact import write_compact_clip
 from engine.model.clip_model import load_clip_model
 from tests.engine.training.tiny_training import Tiny, finish, live_picture, picture, take_steps
 
+pytestmark = pytest.mark.slow
+
 
 def n_bytes(arrays: dict[str, np.ndarray]) -> int:
     return sum(array.nbytes for array in arrays.values())
@@ -32,7 +34,7 @@ def test_a_reference_and_a_clip_trained_on_it_show_the_stored_pixels(tiny: Tiny,
         # worst: 0.27 of the reference (16 bits a value), 0.13 of the source clip
         assert path.stat().st_size < (0.4 if clip_index == 0 else 0.25) * n_bytes(trained.arrays)
         if reference is not None:
-            assert again.header["reference_fingerprint"] == reference.fingerprint == reference.header["fingerprint"]
+            assert again.header.reference_fingerprint == reference.fingerprint == reference.header.fingerprint
         reference = reference or again
 
 

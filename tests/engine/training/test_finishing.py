@@ -13,6 +13,8 @@ from engine.training.clip_training import ClipTraining
 from engine.training.preparation.cloud_preparation import BACKGROUNDS_FILE
 from tests.engine.training.tiny_training import finish, same_arrays
 
+pytestmark = pytest.mark.slow
+
 
 def _reference(tiny, folder: Path) -> ClipTraining:
     return tiny.training(0, is_source=False, prep_dir=folder)

@@ -26,6 +26,8 @@ from tests.engine.training.hard_scenes import (
 from tests.engine.training.hard_stage import CLIP_LENGTH, HEIGHT, N_CAMERAS, WIDTH
 from tests.engine.training.hard_training import Trained, pooled_psnr, train_scene
 
+pytestmark = pytest.mark.slow
+
 FIRST, SECOND = range(CLIP_LENGTH), range(CLIP_LENGTH, 2 * CLIP_LENGTH)
 BEFORE, AFTER = SECOND[:2], SECOND[2:]
 """Frames of clip 1 before and after the late lamp is switched on."""

@@ -29,6 +29,8 @@ from tests.engine.training.hard_scenes import (
 from tests.engine.training.hard_stage import CLIP_LENGTH
 from tests.engine.training.hard_training import Trained, pooled_psnr, train_scene
 
+pytestmark = pytest.mark.slow
+
 FIRST, SECOND, THIRD = (range(clip * CLIP_LENGTH, (clip + 1) * CLIP_LENGTH) for clip in range(3))
 ROLLING = 1
 

@@ -9,6 +9,8 @@ from tests.engine.training.hard_scenes import all_still, one_frame_clips
 from tests.engine.training.hard_stage import HEIGHT, N_CAMERAS, WIDTH
 from tests.engine.training.hard_training import Trained, pooled_psnr, train_scene
 
+pytestmark = pytest.mark.slow
+
 MAX_BYTES = 2_000
 """Of a clip in which nothing is new: names and numbers of its header. It took 840."""
 
@@ -65,7 +67,7 @@ def test_clips_of_one_frame_are_trained_and_read_back(jumps):
 
         still = pooled_psnr(jumps, [frame], ball, static_only=True)
         assert pooled_psnr(jumps, [frame], ball) > still + 4.0
-        assert jumps.states[frame].header["n_frames"] == 1
+        assert jumps.states[frame].header.n_frames == 1
 
 
 def test_the_ball_is_only_where_it_is(jumps):

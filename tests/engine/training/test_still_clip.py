@@ -41,9 +41,9 @@ def test_it_stores_a_few_kilobytes_and_can_be_seen(still, tiny, tmp_path):
     write_compact_clip(path, still.finish())
     assert path.stat().st_size < MAX_BYTES
     state = read_clip_state(path)
-    assert state.header["n_alive"] == 0
+    assert state.header.n_alive == 0
     model = load_clip_model(state, tiny.reference)
-    static_alone = tiny.reference.header["n_anchors"]["static"] * model.decoder.gaussians_per_anchor
+    static_alone = tiny.reference.header.n_anchors["static"] * model.decoder.gaussians_per_anchor
     assert len(model.decode(0.0)) == static_alone  # inherited moving anchors are there and switched off
 
 

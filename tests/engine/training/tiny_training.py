@@ -113,7 +113,7 @@ def picture(tiny: Tiny, state: ClipState, reference: ClipState | None, *, frame:
     """What a training camera sees of a saved clip, by frame in the clip. [H, W, 3] float32"""
     model = load_clip_model(state, reference)
     base = state if reference is None or state.is_reference else reference
-    return _picture(tiny, TrainedClip(tiny.clips[state.header["clip_index"]], model, base), frame)
+    return _picture(tiny, TrainedClip(tiny.clips[state.header.clip_index], model, base), frame)
 
 
 def live_picture(tiny: Tiny, training: ClipTraining, *, frame: int = 1) -> np.ndarray:

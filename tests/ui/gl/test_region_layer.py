@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from app.playback.arrays import AnchorArrays
+from engine.clip_files.roles import ROLES
 from engine.gate.regions import sphere_region
-from engine.model.roles import ROLES
 from tests.ui.gl.keep import Keep
 from tests.ui.gl.pixels import read_color
 from tests.ui.gl.scenes import Camera, centered_camera

@@ -32,8 +32,8 @@ from app.session.commands import (
 from app.session.session import Session
 from app.session.settings import Settings
 from app.status import ClipStatus
+from engine.clip_files.roles import ROLES
 from engine.gate.reasons import LIGHT
-from engine.model.roles import ROLES
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from ui.gl import frusta_lines

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from engine.clip_files.roles import ROLES
 from engine.gate.reasons import LIGHT, NO_REASON, USER_DYNAMIC, USER_STATIC, reason_text
 from engine.gate.regions import sphere_region
-from engine.model.roles import ROLES
 from ui.style.colors import ROLE_COLORS, SKY
 from ui.viewport.anchor_marks import REACH_PX, anchor_marks
 

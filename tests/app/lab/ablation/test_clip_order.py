@@ -15,6 +15,7 @@ from app.training.messages import TrainJob
 from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import read_clip_state
 from engine.errors import ProjectError
+from tests.clip_headers import with_header
 
 
 def test_clips_are_trained_from_the_reference_on(tmp_path):
@@ -40,11 +41,11 @@ def test_a_reference_clip_that_is_none_is_refused(capture_folder):
 @pytest.fixture
 def continued(tmp_path, built_once) -> Iterator[tuple[Project, TrainJob]]:
     """A real project of the sample whose one field goes on: reference clip 1, then clip 0; and a job of it."""
-    from engine.clip_files.clip_state import ClipState, write_clip_state
+    from engine.clip_files.clip_state import write_clip_state
     from tests.engine.training.tiny_training import SIZES, make_tiny
 
     tiny = make_tiny(tmp_path / "tiny", built_once)
-    reference = ClipState(tiny.reference.arrays, tiny.reference.header | {"clip_index": 1, "start": 4})
+    reference = with_header(tiny.reference, clip_index=1, start=4)
     settings = default_settings(
         tiny.capture,
         clip_length=4,
@@ -64,6 +65,7 @@ def continued(tmp_path, built_once) -> Iterator[tuple[Project, TrainJob]]:
     project.close()
 
 
+@pytest.mark.slow
 def test_one_field_goes_on_in_training_order_and_shows_every_clip_as_it_ends(continued, monkeypatch):
     from app.training import build
     from engine.training.clip_training import ClipTraining
@@ -83,9 +85,9 @@ def test_one_field_goes_on_in_training_order_and_shows_every_clip_as_it_ends(con
     training = build.build_training(job, lambda _: None)
     assert isinstance(training, ClipTraining)
     assert training.previous is not None
-    assert training.previous.header["clip_index"] == 0
+    assert training.previous.header.clip_index == 0
     assert training.reference is not None
-    assert training.reference.header["clip_index"] == 1
+    assert training.reference.header.clip_index == 1
     with pytest.raises(ProjectError, match="goes on where clip 2 ends, which is not trained"):
         build.build_training(replace(job, clip_index=3), lambda _: None)
     alone = build.build_training(replace(job, clip_index=1), lambda _: None)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -15,11 +15,12 @@ from app.evaluation.headless import TrainedProject
 from app.lab.report.write import write_report
 from app.project.project import create_project, default_settings
 from engine.capture.capture import open_capture
-from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
+from engine.clip_files.clip_state import read_clip_state, write_clip_state
 from engine.metrics.clips.seams import PairRow, SeamMaps
 from engine.metrics.clips.summary import EvalRow
 from engine.metrics.columns import COLUMNS
 from tests.app.fakes import N_STEPS, FakeTraining
+from tests.clip_headers import with_header
 
 ODD_NAME = "a <i>&\"'$x$ é"
 CAMERAS = ("0", "1", "2", "3")
@@ -141,10 +142,8 @@ def train(
     return folder
 
 
-def change_header(path: Path, change: Callable[[dict[str, Any]], None]) -> None:
-    state = read_clip_state(path)
-    change(state.header)
-    write_clip_state(path, ClipState(state.arrays, state.header))
+def change_header(path: Path, **entries: Any) -> None:
+    write_clip_state(path, with_header(read_clip_state(path), **entries))
 
 
 def report(project: Path, measure: Measure | None = None, **options: Any) -> Path:

@@ -35,7 +35,7 @@ def test_without_held_out_cameras_the_page_says_so(tmp_path, capture_folder, qui
 
 def test_a_training_without_recorded_times_is_not_drawn(project):
     for path in (project / "clips").iterdir():
-        change_header(path, lambda header: header.update(metrics={}))
+        change_header(path, metrics={})
     page = Page(report(project).read_text(encoding="utf-8"))
     assert "Not recorded when it was trained: clip 0, 1" in page.text
     assert "no wall time was recorded when it was trained: p" in page.text
@@ -99,7 +99,7 @@ def test_a_second_report_measures_nothing(project):
 def test_a_clip_that_changed_is_measured_again_and_no_other(project):
     measure = Measure()
     report(project, measure)
-    change_header(project / "clips" / "0001.safetensors", lambda header: header.update(fingerprint="another"))
+    change_header(project / "clips" / "0001.safetensors", fingerprint="another")
     report(project, measure)
     assert measure.asked[2:] == [("p", "all", 1)]
     assert measure.n_rows == 24 + 12
@@ -129,7 +129,7 @@ def test_of_a_clip_behind_one_that_changed_only_the_boundary_is_measured_again(p
 def rows_fingerprint(project) -> str:
     header = read_clip_header(project / "clips" / "0000.safetensors")
     assert header is not None
-    return header["fingerprint"]
+    return header.fingerprint
 
 
 def test_rounded_pictures_are_measured_and_kept_by_themselves(project):

@@ -39,8 +39,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for project, factor in ((folder / ODD_NAME, 1.0), (folder / "others" / "fast", 0.1)):
             metrics = {"stages_s": {"Carving": seconds * factor, "Training": 60.0 * factor}}
             metrics |= {"preparation_s": seconds * factor, "training_s": 60.0 * factor}
-            change_header(project / "clips" / f"{clip:04d}.safetensors", lambda h, m=metrics: h.update(metrics=m))
-    change_header(folder / ODD_NAME / "clips" / "0001.safetensors", lambda h: h.update(coverage=COVERAGE))
+            change_header(project / "clips" / f"{clip:04d}.safetensors", metrics=metrics)
+    change_header(folder / ODD_NAME / "clips" / "0001.safetensors", coverage=COVERAGE)
     report(folder / ODD_NAME, compare=[folder / "others"])
     return folder
 
@@ -55,6 +55,7 @@ def numbers(made: Path) -> dict[str, Any]:
     return json.loads((made / ODD_NAME / "reports" / "report.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_the_page_needs_nothing_but_itself(page):
     names = {name for name, _ in page.tags}
     assert not names & {"script", "link", "iframe", "object", "base", "form", "i"}

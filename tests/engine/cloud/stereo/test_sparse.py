@@ -66,6 +66,7 @@ def test_a_child_that_stands_still_is_ended_and_tried_again(monkeypatch, scratch
     assert not list(scratch.iterdir())
 
 
+@pytest.mark.slow
 def test_a_slow_child_is_waited_for(scratch) -> None:
     pictures, rig = wall_views()
     n_looks = []

@@ -13,6 +13,8 @@ from engine.cloud.stereo.static_cloud import StaticCloud, build_static_cloud, es
 from engine.errors import PreparationError
 from engine.synthetic import SceneCamera, make_scene, make_truth
 
+pytestmark = pytest.mark.slow
+
 Room = tuple[CameraRig, np.ndarray, np.ndarray, np.ndarray]
 
 

@@ -18,7 +18,7 @@ def test_every_level_comes_back_as_itself():
     assert np.array_equal(as_shown(levels / 255.0, "8bit"), levels / np.float32(255.0))
 
 
-def test_floats_are_clamped_only_and_what_is_no_number_stays_so():
+def test_floats_are_clamped_only_and_nan_stays_nan():
     image = np.array([[[-1.0, 0.123456, 2.0], [np.nan, 0.0, 1.0]]])
     shown = as_shown(image, "float")
     assert shown[0, 0].tolist() == pytest.approx([0.0, 0.123456, 1.0])
@@ -38,7 +38,7 @@ def test_a_channel_of_one_colour_only_gets_an_offset(rng):
     assert np.allclose(fitted, truth.mean((0, 1)))
 
 
-def test_the_mean_over_no_pixel_is_no_number():
+def test_the_mean_over_no_pixel_is_nan():
     values = np.array([[1.0, 3.0], [5.0, 7.0]], np.float32)
     assert masked_mean(values, None) == 4.0
     assert masked_mean(values, np.array([[True, False], [False, True]])) == 4.0

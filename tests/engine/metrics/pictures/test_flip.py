@@ -9,7 +9,7 @@ from numba import get_num_threads, set_num_threads
 
 from engine.metrics.pictures.flip import flip, flip_map
 from engine.metrics.pictures.flip_lanes import PIXELS_PER_DEGREE
-from tests.engine.metrics.pictures import disturbed, scene
+from tests.engine.metrics.made_pictures import disturbed, scene
 
 PIXEL_ERROR = 5e-4
 """Largest seen 1.1e-4 where the features of both pictures are equal, else 2.2e-5: they enter by the square root of

@@ -46,6 +46,7 @@ def run(parameters, optimizer: PhaseOptimizer, steps: Iterable[int] = range(100)
     return norms
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("max_gradient_norm", [0.0, 3.0])
 def test_fused_follows_the_float64_reference(max_gradient_norm):
     fast, slow = make_parameters(), make_parameters(torch.float64)

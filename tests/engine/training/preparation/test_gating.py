@@ -30,6 +30,8 @@ from tests.engine.training.tiny_training import (
     take_steps,
 )
 
+pytestmark = pytest.mark.slow
+
 STATIC = ("positions", "color_logits", "features", "log_offset_scales", "log_base_scales")
 
 
@@ -225,7 +227,7 @@ def test_the_published_method_knows_no_regions(tiny: Tiny, tmp_path):
 
 def demoted(tiny: Tiny, training: ClipTraining, state: ClipState) -> tuple[ClipState, str]:
     views = [training._views[camera] for camera in training.camera_indices]
-    return demotion.demote(state, training.reference, views, reach=REACH_SPACINGS * state.header["spacing"])
+    return demotion.demote(state, training.reference, views, reach=REACH_SPACINGS * state.header.spacing)
 
 
 def test_what_nobody_sees_goes(tiny: Tiny, monkeypatch):

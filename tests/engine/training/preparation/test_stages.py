@@ -14,6 +14,8 @@ from engine.training.preparation import stages
 from engine.training.preparation.stages import Stages, remove_stages, stage_files
 from tests.engine.training.tiny_training import finish, same_arrays
 
+pytestmark = pytest.mark.slow
+
 
 class Killed(BaseException):
     """In place of a kill: nothing handles it."""
@@ -119,7 +121,6 @@ def test_a_finished_clip_forgets_its_own_pieces_only(tmp_path, slow):
     assert (len(stage_files(tmp_path, 0)), len(stage_files(tmp_path, 1))) == (0, 1)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["reference", "source", "gate=images", "inherit=off"])
 def test_interrupted_anywhere_the_clip_is_the_same_bit_for_bit(tiny, tmp_path, monkeypatch, kind):
     """Interrupted after every piece in turn, in the preparation and in the change of phase."""

@@ -16,6 +16,8 @@ from engine.training.step.active_tiles import ActivePicture, ActiveTiles
 from engine.training.step.order import ErrorOrder, ShuffledOrder
 from tests.engine.training.tiny_training import Tiny, finish, make_tiny, same_arrays, take_steps
 
+pytestmark = pytest.mark.slow
+
 N_STEPS = 12
 
 

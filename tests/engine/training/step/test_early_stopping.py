@@ -119,7 +119,7 @@ def test_a_stalled_clip_ends_early_with_all_of_the_schedule(tiny, often):
     assert stats.n_steps == 5
     finish(training)
     assert training.steps_done == 5
-    assert training.state().header["n_steps"] == 5
+    assert training.state().header.n_steps == 5
     assert training._optimizer.share_done == pytest.approx(1.0)
     assert any(progress.stage == "Early stop" and "instead of 36" in progress.message for progress in said)
 

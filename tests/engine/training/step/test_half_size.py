@@ -12,6 +12,8 @@ from engine.training.config import TrainConfig
 from engine.training.step.half_size import HalfSize
 from tests.engine.training.tiny_training import same_arrays, take_steps
 
+pytestmark = pytest.mark.slow
+
 
 def rig(width: int, height: int) -> CameraRig:
     K = np.array([[50.0, 1.0, 7.5], [0.0, 60.0, 4.5], [0.0, 0.0, 1.0]])
