@@ -26,6 +26,8 @@ Size = Annotated[int, Meta(gt=0, le=2**24)]
 """Cells, table entries and widths of layers."""
 Length = Annotated[float, Meta(gt=0, lt=1e30)]
 """Scene units."""
+SettingValue = bool | int | float | str
+"""Of one training setting."""
 Figure = float | None
 """None where it was not measured."""
 
@@ -203,7 +205,7 @@ class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
     step: Count
     n_steps: Count
     seed: int
-    config: dict[str, bool | int | float | str]
+    config: dict[str, SettingValue]
     camera_names: list[str]
     near_plane: Length
     spacing: Length

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from app.project.opened_project import OpenedProject
 from app.project.project import open_project
 from app.training.messages import TrainJob
 from engine.capture.capture import Capture, open_capture
@@ -160,6 +161,18 @@ class FakeTraining:
 
     def held_out_psnr(self) -> float:
         return 20.0 + self.steps_done
+
+
+def write_trained(opened: OpenedProject, clip_index: int, *, n_steps: int = N_STEPS) -> Path:
+    """A finished clip of an open project, as the fake trains it."""
+    reference = None if clip_index == 0 else read_clip_state(opened.project.clip_path(0))
+    training = FakeTraining(opened.capture, opened.clips[clip_index], reference, lambda _: None, n_steps=n_steps)
+    for _ in range(n_steps):
+        training.step()
+    path = opened.project.clip_path(clip_index)
+    path.parent.mkdir(exist_ok=True)
+    write_clip_state(path, training.state())
+    return path
 
 
 def make_fake(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:

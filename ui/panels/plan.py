@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import SetPreset, SetTrainSetting
+from app.status import PlanStatus
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import text_wrapped_dim
 
@@ -14,7 +13,7 @@ LINES_HEIGHT = 170.0
 FIELD_WIDTH = 110.0
 
 
-def draw_plan(plan: Any, dispatch: Dispatch, ui: UiState) -> None:
+def draw_plan(plan: PlanStatus, dispatch: Dispatch, ui: UiState) -> None:
     """The forecast in one sentence, and below a header that folds out: settings, then every line with its reason.
 
     Args:
@@ -34,7 +33,7 @@ def draw_plan(plan: Any, dispatch: Dispatch, ui: UiState) -> None:
     _draw_lines(plan)
 
 
-def _draw_settings(plan: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_settings(plan: PlanStatus, dispatch: Dispatch, ui: UiState) -> None:
     imgui.set_next_item_width(FIELD_WIDTH)
     if imgui.begin_combo("Preset", plan.preset):
         for name in plan.presets:
@@ -56,7 +55,7 @@ def _draw_settings(plan: Any, dispatch: Dispatch, ui: UiState) -> None:
             imgui.text_disabled("set")
 
 
-def _draw_lines(plan: Any) -> None:
+def _draw_lines(plan: PlanStatus) -> None:
     flags = imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.scroll_y | imgui.TableFlags_.row_bg
     if not plan.lines or not imgui.begin_table("plan", 2, flags, ImVec2(0, LINES_HEIGHT)):
         return

@@ -28,7 +28,7 @@ def test_a_fresh_session_is_empty_but_answers(make_session):
     session = make_session(is_open=False)
     assert session.capture is None
     assert session.poll() is False
-    assert (session.clips, session.clip_states, session.training.state) == ([], [], "idle")
+    assert (session.clips, session.clip_states, session.training.state) == ((), [], "idle")
     assert session.shown_gaussians() is None
     assert session.shown_points() is None
     assert session.request_render(10, 10) is None
@@ -52,7 +52,7 @@ def test_opening_makes_a_project_and_frames_the_rig(make_session, tmp_path):
     assert np.allclose(session.view.pivot, session.rig.focus_point())
     assert session.training.can_train_next
     assert session.training.next_clip_index == 0
-    (recent,) = session.settings.recent
+    (recent,) = session.recent.entries
     assert (recent.folder, recent.capture) == (tmp_path / "p", str(session.capture.path.resolve()))
 
 
@@ -445,7 +445,7 @@ def test_opening_another_capture_keeps_a_running_training(make_session, tmp_path
     session.dispatch(c.TrainNextClip())
     poll_until(session, lambda: session.training.step >= 2)
     first = session.project
-    session._project_dir = tmp_path / "q"
+    session.opener.project_dir = tmp_path / "q"
     session.dispatch(c.OpenCapture(capture_folder))
     poll_until(session, lambda: session.project.folder.name == "q" and not session.jobs)
     assert session.clip_states[0].state == "untrained"
