@@ -19,7 +19,6 @@ from app.session.settings import Settings
 from app.training.interface import MakeTraining
 from app.training.messages import TrainJob
 from engine.capture.capture import open_capture
-from engine.training.plan.forecasting import MachineSpeed
 from tests.app.fakes import make_fake, write_capture
 from tests.app.inline_worker import InlineWorker
 
@@ -42,7 +41,8 @@ def own_user_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(autouse=True)
 def known_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """No test measures how fast this machine is."""
-    monkeypatch.setattr(speed, "machine_speed", lambda: MachineSpeed(2.0, "made up for a test"))
+    monkeypatch.setattr(speed, "is_cache_warm", lambda: True)
+    monkeypatch.setattr(speed, "_timed_once", lambda sizes, phase: 0.0123)
 
 
 def inline(job: TrainJob, project: Project, make_training: MakeTraining = make_fake) -> InlineWorker:

@@ -11,13 +11,13 @@ from functools import partial
 import torch
 from torch import Tensor
 
-from app.lab.bench.clips import ClipRecipe, chosen_anchors, make_clip
 from app.lab.bench.raster import relative_errors
 from app.lab.bench.rows import KernelRow, SpeedError, kernel_row
 from app.lab.bench.timing import interleaved, peak_extra_mb
 from engine.model.clip_model import ClipModel
 from engine.model.decode.decoding import decode_anchors
 from engine.raster.gaussians import Gaussians
+from engine.training.plan.synthetic_clip import ClipRecipe, chosen_anchors, make_clip
 
 FRAME = 4
 """Frame of the clip that is decoded."""

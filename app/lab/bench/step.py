@@ -14,12 +14,12 @@ from itertools import pairwise
 import torch
 from torch import Tensor, nn
 
-from app.lab.bench.clips import N_FRAMES, ClipRecipe, make_clip, make_truth, make_view
 from engine.model.clip_view import View, render_gaussians
 from engine.raster.gaussians import Gaussians
 from engine.raster.rasterize import BackendName
 from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters
+from engine.training.plan.synthetic_clip import N_FRAMES, ClipRecipe, make_clip, make_truth, make_view
 from engine.training.step.losses import LossWorkspace, photometric_loss
 
 STAGES = ("decode forward", "raster forward", "loss", "raster backward", "decode backward", "optimiser")

@@ -18,7 +18,6 @@ from PIL import Image
 from app.cli.cli import main
 from app.lab.bench import chart, raster, suite
 from app.lab.bench.chart import draw_speed_error
-from app.lab.bench.clips import ClipRecipe
 from app.lab.bench.command import CHART_FILE, DEFAULT_OUT
 from app.lab.bench.field import SCENES, DecodeScene, measure_decode
 from app.lab.bench.fma_limit import measure_fma_limit
@@ -37,6 +36,7 @@ from engine.raster import Rendering
 from engine.raster.rasterize import BACKENDS as RASTERIZERS
 from engine.training.optimizer import adam
 from engine.training.optimizer.adam import FusedAdam
+from engine.training.plan.synthetic_clip import ClipRecipe
 from engine.training.step import losses
 
 ROOT = Path(__file__).resolve().parents[3]

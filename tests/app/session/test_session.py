@@ -349,7 +349,7 @@ def test_what_was_learned_fixes_the_training_settings(make_session):
     poll_until(session, lambda: session.clip_states[0].state == "trained", what="the clip")
     found = planned(session)
     assert (found.clip_index, found.can_edit) == (1, False)
-    assert any("as measured on clip 0" in reason for _, _, reason in found.lines)
+    assert any("inherited" in reason for _, _, reason in found.lines)
     session.dispatch(c.SetPreset("toy"))
     assert "fixed" in session.notices[-1].title
     assert session.project.settings.overrides == {}
