@@ -185,13 +185,14 @@ def make_fake(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining
     reference = None if job.clip_index == first else read_clip_state(project.clip_path(first))
     goes_on = job.clip_index > 0 and job.overrides.get("field") == "continue"
     previous = read_clip_state(project.clip_path(project.previous_index(job.clip_index))) if goes_on else None
+    fails_at = job.overrides.get("static_steps")
     return FakeTraining(
         capture,
         clip,
         reference,
         report,
-        n_steps=job.overrides.get("joint_steps") or N_STEPS,
-        fails_at=job.overrides.get("static_steps"),
+        n_steps=int(job.overrides.get("joint_steps") or N_STEPS),
+        fails_at=None if fails_at is None else int(fails_at),
         previous=previous,
     )
 
