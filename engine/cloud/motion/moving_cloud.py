@@ -88,7 +88,7 @@ def build_moving_cloud(
     started = time.perf_counter()
     n_frames, n_cameras = masks.shape[:2]
     projections, near = projection_matrices(rig), 0.5 * near_plane(rig)
-    min_hits, n_misses = _hull_votes(n_cameras)
+    min_hits, n_misses = hull_votes(n_cameras)
     n_hidden = 0
 
     def surface(frame_in_clip: int, grid: Grid) -> np.ndarray:
@@ -151,7 +151,7 @@ def build_moving_cloud(
     return MovingCloud(points.astype(np.float32), colors, presence, float(size))
 
 
-def _hull_votes(n_cameras: int) -> tuple[int, int]:
+def hull_votes(n_cameras: int) -> tuple[int, int]:
     """Cameras that must see a place of the hull inside their mask, and how many of those that look there may not."""
     min_hits = min(max(MIN_HITS, int(np.ceil(MIN_HITS_SHARE * n_cameras))), n_cameras)
     return min_hits, 1 if n_cameras >= MISSES_FROM_CAMERAS else 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from typing import Any
 
 import pytest
 
@@ -56,9 +57,9 @@ def measured(**changes) -> MeasuredClip:
     return measured_clip(header(**changes), disk_mb=2.36, uncounted_s=2.5)
 
 
-def plan(footage=BASKETBALL, clip=CLIP, *, is_source=False, config=None, **arguments):
+def plan(footage=BASKETBALL, clip=CLIP, *, is_source=False, config=None, **arguments: Any):
     """A plan with the default settings unless said otherwise."""
-    arguments = {"step_time": lambda sizes, phase: STEP_S[phase]} | arguments
+    arguments.setdefault("step_time", lambda sizes, phase: STEP_S[phase])
     return make_plan(footage, clip, config or TrainConfig(), is_source=is_source, **arguments)
 
 
