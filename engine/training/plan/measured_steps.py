@@ -60,7 +60,7 @@ class _Steps:
         self._tiles = ActiveTiles(self._model) if phase == "source" and ActiveTiles.applies(self._model) else None
         self._workspace = LossWorkspace(recipe.height, recipe.width)
         parameters = named_parameters(self._model, self._gain, config)
-        self._optimizer = PhaseOptimizer(parameters, n_steps=10_000, config=config)
+        self._optimizer = PhaseOptimizer(parameters, n_steps=10_000, config=config, final_ratios={})
         self._frame = 0
 
     def step(self) -> None:
