@@ -162,12 +162,14 @@ class SettingStatus:
         name: In TrainConfig.
         value: What it is, or is derived to be.
         is_set: Whether the user has set it; else it is derived or the default.
+        help_text: What it does and what it may be.
     """
 
     name: str
     label: str
     value: int
     is_set: bool = False
+    help_text: str = ""
 
 
 @dataclass(frozen=True, slots=True)

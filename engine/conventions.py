@@ -20,8 +20,3 @@ EPS2D_PX2 = 0.3
 """Low-pass added to both diagonal entries of the projected covariance, square pixels."""
 FRUSTUM_MARGIN = 0.15
 """The slope x/z used in the projection Jacobian is clamped this share of the image beyond its borders."""
-SPIN_COUNT = 2_000
-"""Rounds an idle OpenMP thread spins before it sleeps (GOMP_SPINCOUNT). Median ms of a step by
-tests.benchmarks.bench_threads alone, beside one busy process and beside two, on two cores with nothing else running
-(AMD EPYC, Zen 5, 2026-11-21): 200 rounds 13.9, 25.0, 32.2; 2,000 rounds 14.2, 24.4, 25.6; 20,000 rounds 14.9, 35.3,
-32.3; 200,000 rounds 14.5, 24.2, 33.3; libgomp's own 300,000 13.8, 25.4, 96.7; sleeping at once 16.1, 22.9, 32.1."""

@@ -10,18 +10,21 @@ import ctypes
 import math
 import mmap
 import multiprocessing
+import sys
 from collections.abc import Callable, Iterable
 from multiprocessing.connection import Connection
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pytest
 
 if TYPE_CHECKING:
     from torch import Tensor
 
 SEGMENTATION_FAULT = -11
 """Exit code of a process that touched a forbidden page."""
+needs_page_rights = pytest.mark.skipif(sys.platform != "linux", reason="page rights are set through Linux's mprotect")
 _ALLOCATING = ("empty", "zeros", "ones", "full", "tile", "array", "arange", "concatenate", "ascontiguousarray")
 """Functions of numpy with which callers of kernels make arrays."""
 _ALLOCATING_TENSORS = ("empty", "empty_like", "zeros", "zeros_like", "ones", "ones_like")

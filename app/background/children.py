@@ -1,10 +1,16 @@
-"""Child processes that Ctrl+C does not reach: a terminal sends it to all of them, the parent decides what it means."""
+"""Child processes: a number from one of their own, and how Ctrl+C does not reach them.
+
+A terminal sends Ctrl+C to all of them; the parent decides what it means.
+"""
 
 from __future__ import annotations
 
+import multiprocessing
 import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing.connection import Connection
+from typing import Any
 
 
 @contextmanager
@@ -22,3 +28,34 @@ def undisturbed() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def in_fresh_process(call: Callable[..., float], *arguments: Any, timeout_s: float) -> float | None:
+    """What a call returns in a process of its own; None if it fails or takes too long.
+
+    Args:
+        call: Importable function that returns a number.
+        arguments: Its arguments.
+        timeout_s: The process is ended after that.
+    """
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=_send_result, args=(theirs, call, arguments), daemon=True)
+    with undisturbed():
+        process.start()
+    theirs.close()
+    try:
+        with suppress(EOFError, OSError):
+            if ours.poll(timeout_s):
+                return float(ours.recv_bytes())
+        return None
+    finally:
+        process.kill()
+        process.join()
+        ours.close()
+
+
+def _send_result(pipe: Connection, call: Callable[..., float], arguments: tuple[Any, ...]) -> None:
+    number = call(*arguments)
+    with suppress(OSError):  # whoever asked has gone
+        pipe.send_bytes(str(number).encode())

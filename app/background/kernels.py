@@ -7,11 +7,10 @@ Compiling holds the interpreter lock for seconds, so it happens in processes of 
 from __future__ import annotations
 
 import logging
-import os
 
-from engine.conventions import SPIN_COUNT
 from engine.kernels.cache import is_cache_warm
 from engine.kernels.compile_ahead import compile_all, warm_up_all
+from engine.kernels.threads import configure_threads
 from engine.progress import Progress, ReportProgress
 
 logger = logging.getLogger(__name__)
@@ -44,14 +43,7 @@ def warm_up_reporting(report: ReportProgress) -> None:
 
 
 def use_threads(n_threads: int | None) -> int:
-    """Set how many threads the calling thread computes with; None for every core. Returns how many it will be.
-
-    To be called before torch is imported where that is possible: OpenMP reads its environment when it is loaded, so
-    the spin count is set here and not only in configure_threads, whose module imports torch.
-    """
-    os.environ.setdefault("GOMP_SPINCOUNT", str(SPIN_COUNT))
-    from engine.kernels.threads import configure_threads
-
+    """Set how many threads the calling thread computes with; None for every core. Returns how many it will be."""
     return configure_threads(n_threads)
 
 

@@ -77,9 +77,9 @@ class LatestWorker(Generic[Request, Result]):
         return self._finished
 
     @property
-    def generation(self) -> int:
-        """Goes up with every `forget`. A request that carries it is never equal to one from before."""
-        return self._generation
+    def is_still_wanted(self) -> bool:
+        """For `compute`: whether what it works on was not forgotten meanwhile, so that something may be kept of it."""
+        return self._running_generation == self._generation
 
     def forget(self) -> None:
         """Drop the last result, what waits, and what comes of the request that runs."""

@@ -1,4 +1,4 @@
-"""What subcommands share: argparse that says what is wrong in one line, training settings, ranges, cameras, codes."""
+"""What subcommands share: argparse that says what is wrong in one line, ranges, cameras, codes."""
 
 from __future__ import annotations
 
@@ -110,30 +110,6 @@ def add_follow_links(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="read files outside of the capture folder if it names some",
     )
-
-
-def add_training_settings(command: argparse.ArgumentParser) -> None:
-    """Arguments of every subcommand that trains."""
-    command.add_argument("--holdout", metavar="NAMES", help="cameras to leave out, or 'none' (default: the capture's)")
-    command.add_argument("--scale", type=float, help="working size, share of the original in (0, 1] (default: 1)")
-    command.add_argument("--clip-length", type=int, metavar="M", help="frames per clip (default: 10)")
-    command.add_argument("--preset", metavar="NAME", help="toy, small (the default), medium or paper")
-    command.add_argument(
-        "--set",
-        dest="assignments",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change a training setting, also one of the preset; may be given several times",
-    )
-
-
-def overrides_of(options: argparse.Namespace) -> dict[str, Any]:
-    """Training settings of the arguments: the preset, and what was set beside it."""
-    from engine.training.config import parse_overrides
-    from engine.training.presets import preset
-
-    return (preset(options.preset) if options.preset else {}) | parse_overrides(options.assignments)
 
 
 def parse_range(text: str, n: int, *, option: str, what: str) -> range:

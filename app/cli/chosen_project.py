@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.cli.arguments import overrides_of, parse_cameras, parse_range
+from app.cli.arguments import parse_cameras, parse_range
+from app.cli.training_settings import overrides_of
 from app.project.project import (
     PROJECT_FILE,
     Project,

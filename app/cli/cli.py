@@ -53,6 +53,8 @@ def main(argv: Sequence[str] | None = None, *, launch: Launch = ProcessWorker) -
         options = parse(build_parser(used=arguments[:1]), arguments)
     except SystemExit as error:  # argparse has said what is wrong
         return int(error.code or 0)
+    except BrokenPipeError:  # whoever read the help has left
+        return EXIT_FAILED
     log_file = start_logging()
     try:
         with _terminating_like_ctrl_c(), contextlib.redirect_stdout(PrintableStream(sys.stdout)):

@@ -134,12 +134,11 @@ def vector_width(features: set[str], machine: str) -> tuple[str, int]:
 
 def _threads() -> Finding:
     n_threads = use_threads(None)
-    from numba.np.ufunc.parallel import threading_layer
-
-    from engine.kernels.threads import parallel_guard
+    from engine.kernels.launch import parallel_guard
+    from engine.kernels.numba_internals import layer as layer_of_threads
 
     with parallel_guard():  # starts the threads, so that the layer is known
-        layer = threading_layer()
+        layer = layer_of_threads()
     spin = os.environ["GOMP_SPINCOUNT"]
     policy = os.environ.get("OMP_WAIT_POLICY")
     waits = f"; OMP_WAIT_POLICY={policy}" if policy else ""

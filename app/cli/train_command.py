@@ -10,7 +10,6 @@ from app.cli.arguments import (
     EXIT_FAILED,
     EXIT_OK,
     add_follow_links,
-    add_training_settings,
     fail,
     parse_range,
     path_argument,
@@ -18,9 +17,10 @@ from app.cli.arguments import (
 from app.cli.chosen_project import open_for_training, project_to_plan
 from app.cli.progress import ProgressLine
 from app.cli.training_lines import PlanLines, show_event, show_outcome, show_status
+from app.cli.training_settings import add_training_settings
 from app.evaluation.headless import train_clips, train_document
-from app.plan.planning import clip_history, plan_clip, plan_document, plan_text, totals
-from app.plan.speed import known_machine_speed
+from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
+from app.plan.speed import step_time
 from app.project.clip_catalog import ClipCatalog
 from app.project.project import PROJECT_FILE
 from app.training.service import Launch, TrainingService
@@ -79,7 +79,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             project,
             capture,
             catalog=service.catalog,
-            measure_machine=known_machine_speed,
+            step_time=step_time,
             is_quiet=options.quiet,
         )
         outcomes = train_clips(
@@ -128,7 +128,7 @@ def _plan(options: argparse.Namespace) -> int:
     damaged = [i for i in order if catalog[i].state == "damaged" or catalog[i].blocked_by is not None]
     history = clip_history(project, len(clips))
     plans = [
-        plan_clip(project, capture, clips[i], measure_machine=known_machine_speed, history=history, catalog=catalog)
+        plan_clip(project, capture, clips[i], step_time=step_time, history=history, catalog=catalog)
         for i in order
         if i not in trained and i not in damaged
     ]
@@ -144,8 +144,10 @@ def _plan(options: argparse.Namespace) -> int:
         print(f"Left alone, because they are damaged or need one that is: clip {listed}")
     if len(plans) > 1:
         sums = totals(plans)
+        times = (sums["preparation_s"], sums["training_s"])
+        seconds = None if None in times else sum(value or 0.0 for value in times)
+        stored = "" if sums["disk_mb"] is None else f", {sums['disk_mb']:.2g} MB stored"
         print(
-            f"All {len(plans)} clips: about {duration_text(sums['preparation_s'] + sums['training_s'])}, "
-            f"at most {sums['memory_mb'] / 1e3:.1f} GB of memory, {sums['disk_mb']:.2g} MB stored"
+            f"All {len(plans)} clips: about {duration_text(seconds)}, at most {memory_text(sums['memory_mb'])}{stored}"
         )
     return EXIT_OK

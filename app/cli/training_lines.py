@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from app.cli.progress import ProgressLine
 from app.evaluation.headless import ClipOutcome
 from app.plan.planning import begin_text, compared_text, plan_clip
@@ -15,8 +13,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import EngineError
 from engine.text import duration_text
-from engine.training.plan.forecasting import MachineSpeed
-from engine.training.plan.plan import TrainingPlan
+from engine.training.plan.plan import StepTime, TrainingPlan
 
 
 def show_status(line: ProgressLine, status: TrainingStatus) -> None:
@@ -65,7 +62,7 @@ class PlanLines:
         line: Where to say it.
         project, capture: What is trained.
         catalog: Says which trainings were stopped and go on.
-        measure_machine: Asked where no clip of the project says how long training takes.
+        step_time: Asked where no clip of the same kind says how long training takes.
         is_quiet: Plan nothing.
     """
 
@@ -76,11 +73,11 @@ class PlanLines:
         capture: Capture,
         *,
         catalog: ClipCatalog,
-        measure_machine: Callable[[], MachineSpeed],
+        step_time: StepTime,
         is_quiet: bool,
     ) -> None:
         self._line, self._project, self._capture, self._is_quiet = line, project, capture, is_quiet
-        self._catalog, self._measure_machine = catalog, measure_machine
+        self._catalog, self._step_time = catalog, step_time
         self._plan: TrainingPlan | None = None
 
     def begin(self, clip: Clip) -> None:
@@ -93,7 +90,7 @@ class PlanLines:
                 self._project,
                 self._capture,
                 clip,
-                measure_machine=self._measure_machine,
+                step_time=self._step_time,
                 catalog=self._catalog,
             )
         except EngineError:

@@ -19,6 +19,7 @@ from engine.metrics.clips.summary import EvalRow
 from engine.metrics.columns import COLUMNS
 from engine.storage.files import atomic_path
 from engine.storage.json_files import checked_line, read_checked_lines
+from engine.storage.typed_json import to_type
 
 logger = logging.getLogger(__name__)
 
@@ -129,11 +130,11 @@ class KeptFigures:
 
     def _take(self, line: dict[str, Any]) -> None:
         if "row" in line:
-            row = EvalRow(**line["row"])
-            if row.figures.keys() != COLUMNS.keys() or not isinstance(row.missing, dict):
+            row = to_type(line["row"], EvalRow)
+            if row.figures.keys() != COLUMNS.keys():
                 raise ValueError("other columns")
             self.rows[row.camera, row.frame_index] = replace(row, figures={name: row.figures[name] for name in COLUMNS})
             return
-        pair = PairRow(**line["pair"])
+        pair = to_type(line["pair"], PairRow)
         if not pair.is_boundary or line["before"] == self._before:
             self.pairs[pair.camera, pair.frame_index] = pair

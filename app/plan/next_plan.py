@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from app.background.latest import LatestWorker
 from app.plan.planning import plan_clip, plan_status
-from app.plan.speed import known_machine_speed
+from app.plan.speed import step_time
 from app.project.clip_catalog import ClipCatalog
 from app.project.project import Project
 from app.status import PlanStatus
@@ -15,7 +15,6 @@ from app.training.service import TrainingService
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import EngineError
-from engine.training.plan.forecasting import UNKNOWN_MACHINE
 from engine.training.plan.plan import TrainingPlan
 
 logger = logging.getLogger(__name__)
@@ -77,11 +76,9 @@ class NextPlan:
 
 
 def _compute(request: PlanRequest) -> TrainingPlan | None:
-    measure = known_machine_speed if request.can_measure else lambda: UNKNOWN_MACHINE
+    timed = step_time if request.can_measure else lambda sizes, phase: None
     try:
-        return plan_clip(
-            request.project, request.capture, request.clip, measure_machine=measure, catalog=request.catalog
-        )
+        return plan_clip(request.project, request.capture, request.clip, step_time=timed, catalog=request.catalog)
     except EngineError as error:  # training will say the same
         logger.info("the next clip cannot be planned: %s", error)
         return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from app.background.kernels import COMPILING
@@ -12,13 +12,12 @@ from app.status import PlanStatus, SettingStatus
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.text import duration_text
-from engine.training.config import TrainConfig
-from engine.training.plan.expected_sizes import footage_of
-from engine.training.plan.forecasting import UNKNOWN_MACHINE, MachineSpeed, MeasuredClip, measured_clip
-from engine.training.plan.plan import TrainingPlan, make_plan, resumed_plan
+from engine.training.config import SETTINGS, TrainConfig
+from engine.training.plan.forecast import MeasuredClip, measured_clip
+from engine.training.plan.plan import StepTime, TrainingPlan, footage_of, make_plan, resumed_plan
 from engine.training.presets import PRESETS
 
-PLAN_SCHEMA = 1
+PLAN_SCHEMA = 2
 
 
 def clip_history(project: Project, n_clips: int) -> list[MeasuredClip]:
@@ -32,7 +31,7 @@ def plan_clip(
     capture: Capture,
     clip: Clip,
     *,
-    measure_machine: Callable[[], MachineSpeed] = lambda: UNKNOWN_MACHINE,
+    step_time: StepTime,
     history: Sequence[MeasuredClip] | None = None,
     catalog: ClipCatalog | None = None,
 ) -> TrainingPlan:
@@ -42,7 +41,7 @@ def plan_clip(
         project: Its folder need not exist yet.
         capture: At the project's scale.
         clip: One of its clips.
-        measure_machine: Asked where no other clip of the project says how long training takes.
+        step_time: Asked where no other clip of this kind says how long training takes.
         history: Of all its clips, for callers that plan many; read here when None.
         catalog: Says whether the training was stopped and goes on; when None, the whole of it is planned.
     Raises:
@@ -54,8 +53,6 @@ def plan_clip(
         base, config = project.previous_index(clip.clip_index), config.going_on()
     if history is None:
         history = clip_history(project, len(project.clips(capture.n_frames)))
-    history = [known for known in history if known.clip_index != clip.clip_index]
-    is_measured = any(known.training_s for known in history)
     found = None if base is None else project.headers.read(project.clip_path(base))
     plan = make_plan(
         footage_of(capture, capture.camera_indices(settings.holdout)),
@@ -64,7 +61,7 @@ def plan_clip(
         is_source=base is not None,
         reference=None if found is None else found.header,
         history=history,
-        machine=UNKNOWN_MACHINE if is_measured else measure_machine(),
+        step_time=step_time,
         is_still=base is not None and _looks_still(project, capture, clip, config),
     )
     record = None if catalog is None else catalog[clip.clip_index]
@@ -94,16 +91,6 @@ def _measured(project: Project, clip_index: int) -> MeasuredClip | None:
 
 # ---------------------------------------------------------------- for the window
 
-MAIN_SETTINGS = {
-    "static_steps": "Static steps",
-    "joint_steps": "Joint steps",
-    "source_steps": "Steps of later clips",
-    "gaussians_per_anchor": "Gaussians per anchor",
-    "max_static_points": "Static anchors, at most",
-    "max_moving_points": "Moving anchors, at most",
-}
-"""Name in TrainConfig to what the window calls it."""
-
 
 def plan_status(
     project: Project, capture: Capture, clip: Clip, plan: TrainingPlan | None, *, can_edit: bool
@@ -117,7 +104,7 @@ def plan_status(
     """
     settings, config = project.settings, project.settings.config()
     n_cameras = len(capture.rig) - len(settings.holdout)
-    values = {name: getattr(config, name) for name in MAIN_SETTINGS} | {
+    derived: dict[str, int] = {
         "static_steps": config.n_static_steps(n_cameras),
         "joint_steps": config.n_joint_steps(n_cameras * clip.n_frames),
         "source_steps": config.n_source_steps(n_cameras * clip.n_frames),
@@ -130,8 +117,15 @@ def plan_status(
         presets=tuple(PRESETS),
         preset=closest_preset(settings.overrides),
         settings=tuple(
-            SettingStatus(name, label, int(values[name]), name in settings.overrides)
-            for name, label in MAIN_SETTINGS.items()
+            SettingStatus(
+                setting.name,
+                setting.label,
+                int(derived.get(setting.name) or getattr(config, setting.name)),
+                setting.name in settings.overrides,
+                f"{setting.meaning}\n{setting.span}",
+            )
+            for setting in SETTINGS.values()
+            if setting.label
         ),
         can_edit=can_edit,
     )
@@ -146,8 +140,14 @@ def closest_preset(overrides: dict[str, Any]) -> str:
 # ---------------------------------------------------------------- as text and JSON
 
 
+def memory_text(memory_mb: float | None) -> str:
+    """Memory as part of a sentence."""
+    return f"{(memory_mb or 0.0) / 1e3:.1f} GB of memory"
+
+
 def short_text(plan: TrainingPlan) -> str:
     """The forecast as one line."""
+    stored = "" if plan.disk_mb.value is None else f", {plan.disk_mb.text} stored"
     steps = f"{plan.n_steps:,} steps" if plan.n_steps else "no steps"
     times = f"about {duration_text(plan.seconds)} ({duration_text(plan.preparation_s.value)} preparation)"
     if plan.steps_done:
@@ -155,7 +155,7 @@ def short_text(plan: TrainingPlan) -> str:
             f"goes on at step {plan.steps_done:,}, {plan.n_steps - plan.steps_done:,} of {plan.n_steps:,} steps left"
         )
         times = f"about {duration_text(plan.seconds)}"
-    return f"{steps}, {times}, {plan.memory_mb.value / 1e3:.1f} GB of memory, {plan.disk_mb.text} stored"
+    return f"{steps}, {times}, {memory_text(plan.memory_mb.value)}{stored}"
 
 
 def plan_text(plan: TrainingPlan) -> list[str]:
@@ -186,7 +186,7 @@ def compared_text(plan: TrainingPlan, project: Project) -> str:
     parts = [
         f"{name} {line.value:.3g} against {measured:.3g} {unit}"
         for name, line, measured, unit in pairs
-        if measured is not None
+        if measured is not None and line.value is not None
     ]
     return f"  Forecast against measured: {', '.join(parts)}" if parts else ""
 
@@ -220,11 +220,16 @@ def plan_document(
     }
 
 
-def totals(plans: Sequence[TrainingPlan]) -> dict[str, float]:
-    """Of all planned clips: seconds and bytes add up, memory is that of the largest."""
+def totals(plans: Sequence[TrainingPlan]) -> dict[str, float | None]:
+    """Of all planned clips: seconds and bytes add up, memory is that of the largest. None where one is not known."""
     return {
-        "preparation_s": round(sum(plan.preparation_s.value for plan in plans), 1),
-        "training_s": round(sum(plan.training_s.value for plan in plans), 1),
-        "memory_mb": max((plan.memory_mb.value for plan in plans), default=0.0),
-        "disk_mb": round(sum(plan.disk_mb.value for plan in plans), 3),
+        "preparation_s": _sum([plan.preparation_s.value for plan in plans], 1),
+        "training_s": _sum([plan.training_s.value for plan in plans], 1),
+        "memory_mb": max((plan.memory_mb.value or 0.0 for plan in plans), default=0.0),
+        "disk_mb": _sum([plan.disk_mb.value for plan in plans], 3),
     }
+
+
+def _sum(values: Sequence[float | None], digits: int) -> float | None:
+    known = [value for value in values if value is not None]
+    return round(sum(known), digits) if len(known) == len(values) else None

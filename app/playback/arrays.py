@@ -10,6 +10,9 @@ import numpy as np
 
 from app.playback.picture_source import UNKNOWN, PictureSource
 
+BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
+"""Behind everything; the viewport takes its dark grey from here."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GaussianArrays:

@@ -23,7 +23,7 @@ class PictureRequest:
     """One camera at one frame, at most this wide.
 
     Attributes:
-        generation: Of the pictures that were asked. Two takes with the same cameras have the same fingerprint.
+        generation: Of the open project. Two takes with the same cameras have the same fingerprint.
     """
 
     generation: int
@@ -32,6 +32,11 @@ class PictureRequest:
     frame_index: int
     max_width: int
     capture: Capture = field(compare=False)
+
+    @property
+    def is_thumbnail(self) -> bool:
+        """Whether it goes to the thread of the thumbnails."""
+        return self.max_width <= THUMBNAIL_WIDTH_PX
 
 
 class CapturedPictures:
@@ -43,22 +48,25 @@ class CapturedPictures:
         self.viewing: LatestWorker[PictureRequest, Picture] = LatestWorker("captured picture", self._compute)
         self.thumbnails: LatestWorker[PictureRequest, Picture] = LatestWorker("thumbnails", self._compute)
 
-    def picture(self, capture: Capture, camera_index: int, frame_index: int, max_width: int) -> Picture | None:
+    def picture(
+        self, capture: Capture, generation: int, camera_index: int, frame_index: int, max_width: int
+    ) -> Picture | None:
         """The picture if it was decoded; otherwise it is asked for.
 
         Meanwhile the last picture of the same camera is returned as stale, except for thumbnails: None.
         """
-        generation = self.viewing.generation
         request = PictureRequest(generation, capture.fingerprint, camera_index, frame_index, max_width, capture)
         known = self._cache.get(request)
-        is_thumbnail = max_width <= THUMBNAIL_WIDTH_PX
         if known is None:
-            (self.thumbnails if is_thumbnail else self.viewing).request(request)
-            last = None if is_thumbnail else self._last.get(camera_index)
+            self._worker(request).request(request)
+            last = None if request.is_thumbnail else self._last.get(camera_index)
             return None if last is None else replace(last, is_stale=True)
-        if not is_thumbnail:
+        if not request.is_thumbnail:
             self._last[camera_index] = known
         return known
+
+    def _worker(self, request: PictureRequest) -> LatestWorker[PictureRequest, Picture]:
+        return self.thumbnails if request.is_thumbnail else self.viewing
 
     def clear(self) -> None:
         """Forget everything, as when another capture was opened; what is being decoded is dropped."""
@@ -79,7 +87,7 @@ class CapturedPictures:
             request_key(request),
             source=PictureSource(frame_index=request.frame_index, camera_index=request.camera_index),
         )
-        if request.generation == self.viewing.generation:
+        if self._worker(request).is_still_wanted:
             self._cache.put(request, picture, picture.image.nbytes)
         return picture
 

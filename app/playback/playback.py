@@ -1,241 +1,209 @@
-"""Playback: a frame of a trained clip as arrays to draw. Loads states and decodes on one thread; keeps results by key.
-
-A key is (generation, path, clip_index, revision, frame_index). The generation goes up when another project is opened:
-what the thread finishes for the one before is dropped. A new revision of a live clip makes its older frames worthless.
+"""Playback: everything that prepares what is shown of the open project. Frames of clips as arrays, clouds where nothing
+is trained, captured pictures, and pictures drawn on the processor.
 """
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Hashable
-from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
-import numpy as np
-from scipy.spatial import KDTree
-
-from app.background.kernels import prepare_decoding
+from app.background.jobs import Jobs
 from app.background.latest import LatestWorker
-from app.playback.arrays import AnchorArrays, GaussianArrays, PointArrays
-from app.playback.picture_source import UNKNOWN, PictureSource
-from engine.backends.table import backend_called
-from engine.byte_cache import ByteCache
-from engine.capture.clip import Clip
-from engine.clip_files.clip_state import ClipState, read_clip_state
-from engine.errors import ProjectError
+from app.playback.arrays import AnchorArrays, Picture, PointArrays
+from app.playback.capture_pictures import CapturedPictures
+from app.playback.clouds import CloudRequest, Clouds
+from app.playback.frame_decoder import FrameDecoder, FrameRequest, ShownFrame
+from app.playback.orbit_view import OrbitView
+from app.playback.render import Renderer
+from app.playback.timeline import Timeline
+from app.project.opened_project import OpenedProject
+from app.status import WantedFrame
+from app.training.service import ShownState
 
-if TYPE_CHECKING:
-    from engine.model.clip_model import AnchorView  # brings torch, which only the thread needs
-
-CACHE_BYTES = 384 << 20
-"""Decoded frames kept in memory."""
-SPACING_SAMPLE = 2000
-"""Points that are asked for their nearest neighbour to learn how dense a cloud is."""
-MAX_MODELS = 3
-"""Loaded clips kept in memory: the shown one, its reference, and the one shown before."""
-
-
-ModelKey = tuple[int, str, int, str]
-"""generation, path, clip_index, revision"""
-FrameKey = tuple[int, str, int, str, int]
-"""A ModelKey and frame_index"""
+StateOf = Callable[[int], ShownState | None]
+"""The state of a clip to look at; None where it has none."""
 
 
 @dataclass(frozen=True, slots=True)
-class FrameRequest:
-    """A frame of one state of a clip.
+class Failure:
+    """Something that could not be shown.
 
     Attributes:
-        revision: Names the state; with the file, clip and frame it is the identity of the result.
-        path, reference_path: Files to load when the model is not loaded yet.
-        clip: For the conversion to clip time.
-        is_live: Whether the file is a snapshot of a running training: it may be gone before it is read, and another
-            one follows soon.
-        generation: Of the playback that was asked; set by it.
+        title: What the user is told.
+        is_of_clip: Whether it came of the file of a clip.
+        is_live: Whether that file is a snapshot of a running training: it may be gone before it is read, and another
+            one follows.
     """
 
-    clip_index: int
-    revision: str
-    frame_index: int
-    path: Path
-    reference_path: Path | None = field(compare=False)
-    clip: Clip = field(compare=False)
-    is_live: bool = field(default=False, compare=False)
-    generation: int = 0
-
-    @property
-    def model_key(self) -> ModelKey:
-        """Identity of the model."""
-        return self.generation, str(self.path), self.clip_index, self.revision
-
-    @property
-    def key(self) -> FrameKey:
-        """Identity of the result."""
-        return *self.model_key, self.frame_index
-
-
-@dataclass(frozen=True, slots=True)
-class LoadedClip:
-    """A model in memory and what is shown of it."""
-
-    model: Any
-    anchors: AnchorArrays
-    near_plane: float
-    step: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class ShownFrame:
-    """What is drawn of a frame: Gaussians, and the anchors that exist then."""
-
-    gaussians: GaussianArrays
-    anchors: AnchorArrays
+    title: str
+    error: Exception
+    is_of_clip: bool = False
+    is_live: bool = False
 
 
 class Playback:
-    """Frames to arrays on one thread; the newest request wins. Methods are for one other thread."""
+    """What is to be seen of the open project at a playhead and from a view. For one thread, and nothing here waits:
+    what is not there yet is asked for, and comes at a later call.
 
-    def __init__(self, *, cache_bytes: int = CACHE_BYTES) -> None:
-        self._cache: ByteCache[FrameKey, ShownFrame] = ByteCache(cache_bytes)
-        self._models: OrderedDict[ModelKey, LoadedClip] = OrderedDict()
-        self._reference: tuple[tuple[str, int], ClipState] | None = None
-        self._last: ShownFrame | None = None
-        self.worker: LatestWorker[FrameRequest, ShownFrame] = LatestWorker(
-            "playback", self._compute, prepare=prepare_decoding
+    Args:
+        state_of: Of the clips of the open project.
+    """
+
+    def __init__(self, state_of: StateOf) -> None:
+        self.decoder, self.renderer = FrameDecoder(), Renderer()
+        self.captured, self.clouds = CapturedPictures(), Clouds()
+        self._opened: OpenedProject | None = None
+        self._state_of = state_of
+
+    def start(self) -> None:
+        """Start the threads now rather than with the first request, and load what they need."""
+        for worker in self.workers:
+            worker.start()
+
+    def show(self, opened: OpenedProject) -> None:
+        """Take up what is open. What was made of another project is forgotten."""
+        if self._opened is not None and self._opened.generation != opened.generation:
+            for store in (self.decoder, self.renderer, self.captured, self.clouds):
+                store.clear()
+        self._opened = opened
+
+    def build_first_cloud(self, jobs: Jobs) -> None:
+        """Make something to look at until the reference clip has a state, unless there is one."""
+        if self._opened is not None and self._state_of(self._opened.reference_index) is None:
+            self.clouds.build_first(self._opened, jobs)
+
+    # ---------------------------------------------------------------- frames of clips
+
+    def frame(self, timeline: Timeline) -> ShownFrame | None:
+        """What is drawn of the frame under the playhead, or the newest there is until that was decoded; None where
+        nothing is trained. It says itself what it is of."""
+        request = self._request(timeline)
+        return None if request is None else self.decoder.frame(request)
+
+    def live_anchors(self, timeline: Timeline) -> AnchorArrays | None:
+        """All anchors of the clip under the playhead while it trains; None before a state of it was loaded."""
+        request = self._request(timeline)
+        return None if request is None or not request.is_live else self.decoder.anchors(request)
+
+    def is_loaded(self, timeline: Timeline) -> bool:
+        """Whether the file of the clip under the playhead is not needed any more. Asks for what is missing."""
+        request = self._request(timeline)
+        if request is None:
+            return False
+        self.decoder.frame(request)
+        return self.decoder.is_loaded(request)
+
+    def wanted(self, timeline: Timeline, view: OrbitView) -> WantedFrame | None:
+        """What ought to be on screen; None without a project."""
+        clip, request = timeline.clip, self._request(timeline)
+        if clip is None:
+            return None
+        wanted = WantedFrame(clip.clip_index, timeline.frame_index, camera_index=view.look_through, look=view.look_key)
+        if request is None:
+            return wanted
+        return replace(
+            wanted,
+            revision=request.revision,
+            is_loaded=self.decoder.is_loaded(request),
+            has_failed=self.decoder.has_failed(request) or self.renderer.has_failed,
         )
 
-    def frame(self, request: FrameRequest) -> ShownFrame | None:
-        """The frame if it is ready; otherwise it is asked for and the newest finished one is returned.
+    def render(self, timeline: Timeline, view: OrbitView, width: int, height: int) -> Picture | None:
+        """The rasterizer's picture of the frame and view; None where nothing is trained or ready.
 
-        What comes back says itself which frame of which clip it is.
+        Stale where it is of another frame, view, size or state of the clip; it says of which.
         """
-        request = self._of_now(request)
-        known = self._cache.get(request.key)
-        if known is not None:
-            self._last = known
-            return known
-        self.worker.request(request)
-        newest = self.worker.newest
-        if newest is not None:
-            self._last = newest[1]
-        return self._last
+        request = self._request(timeline)
+        shown = None if request is None else self.decoder.frame(request)
+        if request is None or shown is None:
+            return None
+        picture = self.renderer.picture(shown.gaussians, view, width, height)
+        if picture is None or picture.is_stale:
+            return picture
+        source = picture.source
+        is_of_now = (source.clip_index, source.frame_index, source.revision) == (
+            request.clip_index,
+            request.frame_index,
+            request.revision,
+        )
+        return picture if is_of_now else replace(picture, is_stale=True)
 
-    def anchors(self, request: FrameRequest) -> AnchorArrays | None:
-        """All anchors of a state; None until it was loaded."""
-        loaded = self._models.get(self._of_now(request).model_key)
-        return None if loaded is None else loaded.anchors
+    def _request(self, timeline: Timeline) -> FrameRequest | None:
+        """What is to be decoded for the playhead; None where nothing is trained."""
+        opened, clip = self._opened, timeline.clip
+        state = None if opened is None or clip is None else self._state_of(clip.clip_index)
+        if opened is None or clip is None or state is None:
+            return None
+        return FrameRequest(
+            clip_index=clip.clip_index,
+            revision=state.revision,
+            frame_index=timeline.frame_index,
+            path=state.file,
+            generation=opened.generation,
+            reference_path=opened.inherited_path(clip.clip_index),
+            clip=clip,
+            is_live=state.is_live,
+        )
 
-    def is_loaded(self, request: FrameRequest) -> bool:
-        """Whether the file of this state is not needed any more."""
-        return self._of_now(request).model_key in self._models
+    # ---------------------------------------------------------------- beside them
 
-    def has_failed(self, request: FrameRequest) -> bool:
-        """Whether this frame could not be made, so that it is not on its way."""
-        return self.worker.has_failed(self._of_now(request))
+    def cloud(self, view: OrbitView) -> PointArrays | None:
+        """A cloud for frames that are not trained; None until it is made, and through a capture camera while there is
+        only the hint: the captured picture itself says more there."""
+        opened = self._opened
+        if opened is None:
+            return None
+        cloud = self.clouds.cloud(opened, self._state_of(opened.reference_index))
+        return None if cloud is None or (cloud.is_hint and view.look_through is not None) else cloud
 
-    def _of_now(self, request: FrameRequest) -> FrameRequest:
-        return replace(request, generation=self.worker.generation)
+    def captured_picture(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None:
+        """The captured picture, at most `max_width` pixels wide; None until it was decoded."""
+        opened = self._opened
+        if opened is None:
+            return None
+        return self.captured.picture(opened.capture, opened.generation, camera_index, frame_index, max_width)
 
-    def clear(self) -> None:
-        """Forget everything, as when another capture was opened."""
-        self.worker.forget()  # first: from here on the thread keeps nothing of what it is working on
-        self._cache.clear()
-        self._models = OrderedDict()
-        self._reference = self._last = None
+    # ---------------------------------------------------------------- threads
+
+    @property
+    def workers(self) -> tuple[LatestWorker[Any, Any], ...]:
+        """Every thread of it."""
+        return (
+            self.captured.viewing,
+            self.captured.thumbnails,
+            self.clouds.worker,
+            self.renderer.worker,
+            self.decoder.worker,
+        )
+
+    @property
+    def finished(self) -> tuple[object, ...]:
+        """Identities of the newest results. Another value means that there is something new to see."""
+        return tuple(None if worker.newest is None else worker.newest[0] for worker in self.workers)
+
+    def take_failures(self) -> list[Failure]:
+        """What could not be made since the last call."""
+        found = []
+        for worker, title in zip(self.workers, _TITLES, strict=True):
+            failure = worker.take_error()
+            if failure is not None:
+                request, error = failure
+                is_of_clip = isinstance(request, FrameRequest | CloudRequest)
+                found.append(Failure(title, error, is_of_clip, is_of_clip and request.is_live))
+        return found
 
     def close(self) -> None:
-        """End the thread."""
-        self.worker.close()
-
-    # ---------------------------------------------------------------- on the thread
-
-    def _compute(self, request: FrameRequest) -> ShownFrame:
-        import torch
-
-        from engine.model.host_array import host_array
-
-        loaded = self._load(request)
-        clip_time = request.clip.clip_time(request.frame_index)
-        with torch.no_grad():
-            gaussians = loaded.model.decode(clip_time)
-        source = PictureSource(
-            request.clip_index, request.frame_index, request.revision, loaded.step, loaded.model.field is None
-        )
-        anchors = _anchor_arrays(loaded.model.anchors(clip_time), request.key, source)
-        values = [np.ascontiguousarray(host_array(tensor)) for tensor in gaussians.tensors()]
-        arrays = GaussianArrays(*values, key=request.key, near_plane=loaded.near_plane, source=source)
-        shown = ShownFrame(arrays, anchors)
-        if request.generation == self.worker.generation:
-            n_bytes = arrays.n_bytes + anchors.inherited_positions.nbytes + anchors.own_positions.nbytes
-            self._cache.put(request.key, shown, n_bytes)
-        return shown
-
-    def _load(self, request: FrameRequest) -> LoadedClip:
-        identity = request.model_key
-        models = self._models
-        if identity in models:
-            models.move_to_end(identity)
-            return models[identity]
-        from engine.model.clip_model import load_clip_model
-
-        state = read_clip_state(request.path)
-        reference = None if state.is_reference else self._read_reference(request.reference_path)
-        model = load_clip_model(state, reference, backend=backend_called())
-        anchors = _anchor_arrays(model.anchors(), identity)
-        loaded = LoadedClip(model, anchors, state.header.near_plane, state.header.step)
-        if request.generation != self.worker.generation:
-            return loaded
-        self._cache.drop(lambda key: key[2] == request.clip_index and key[3] != request.revision)
-        kept = [(key, value) for key, value in models.items() if key[2] != request.clip_index]
-        # replaced as a whole, so that the other thread never sees it half changed
-        self._models = OrderedDict([*kept[-(MAX_MODELS - 1) :], (identity, loaded)])
-        return loaded
-
-    def _read_reference(self, path: Path | None) -> ClipState | None:
-        if path is None or not path.is_file():
-            return None
-        identity = (str(path), path.stat().st_mtime_ns)
-        if self._reference is None or self._reference[0] != identity:
-            self._reference = (identity, read_clip_state(path))
-        return self._reference[1]
+        """End the threads."""
+        for store in (self.decoder, self.renderer, self.captured, self.clouds):
+            store.close()
 
 
-def _anchor_arrays(view: AnchorView, key: Hashable, source: PictureSource = UNKNOWN) -> AnchorArrays:
-    return AnchorArrays(
-        np.ascontiguousarray(view.inherited_positions, np.float32),
-        np.ascontiguousarray(view.own_positions, np.float32),
-        key,
-        inherited_roles=view.inherited_roles,
-        own_roles=view.own_roles,
-        inherited_reasons=view.inherited_reasons,
-        own_reasons=view.own_reasons,
-        source=source,
-    )
-
-
-def point_spacing(points: np.ndarray) -> float:
-    """Usual distance from a point to its nearest neighbour, from a sample of them; 0 for fewer than two points."""
-    if len(points) < 2:
-        return 0.0
-    sample = points[:: max(len(points) // SPACING_SAMPLE, 1)]
-    distances, _ = KDTree(points).query(sample, k=2)
-    return float(np.median(distances[:, 1]))
-
-
-def static_points(path: Path, revision: str) -> PointArrays:
-    """The still part of a reference clip as a coloured cloud.
-
-    Raises:
-        ProjectError: The file is missing or damaged, or not of a reference clip.
-    """
-    state = read_clip_state(path)
-    record = state.anchors.get("static")
-    if record is None or record.own is None:
-        raise ProjectError("The clip file holds no static anchors.", hint="Train the clip again.", path=path)
-    points = record.own.positions.astype(np.float32, copy=False)
-    logits = record.own.color_logits.astype(np.float32, copy=False)
-    colors = 1.0 / (1.0 + np.exp(-np.clip(logits, -30.0, 30.0)))
-    spacing = point_spacing(points)
-    key = ("cloud", str(path), revision)
-    return PointArrays(np.ascontiguousarray(points), colors.astype(np.float32), key, spacing=spacing)
+_TITLES = (
+    "A captured picture cannot be shown",
+    "A captured picture cannot be shown",
+    "The cloud cannot be shown",
+    "The picture could not be drawn",
+    "The clip cannot be shown",
+)
+"""In the order of the workers."""

@@ -17,7 +17,7 @@ from app.background.jobs import JobContext
 from app.background.priority import lower_process
 from app.playback.arrays import PointArrays
 from app.playback.capture_pictures import downsized
-from app.playback.playback import point_spacing
+from app.playback.point_spacing import point_spacing
 from engine.camera.projection import to_world
 from engine.capture.capture import Capture, open_capture
 from engine.errors import EngineError, PreparationError, ProjectError

@@ -9,13 +9,10 @@ import numpy as np
 
 from app.background.kernels import prepare_drawing
 from app.background.latest import LatestWorker
-from app.playback.arrays import GaussianArrays, Picture
+from app.playback.arrays import BACKGROUND, GaussianArrays, Picture
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from engine.backends.table import backend_called
-
-BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
-"""Behind everything; the viewport takes its dark grey from here."""
 
 
 @dataclass(frozen=True, slots=True)

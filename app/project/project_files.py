@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from msgspec import Meta
 
 from engine.capture.clip import Clip, split_clips
+from engine.clip_files.clip_header import SettingValue
 from engine.errors import ProjectError
 from engine.gate.regions import GateRegion, parse_region
 from engine.storage.files import disk_error
@@ -24,7 +27,9 @@ from engine.storage.json_files import (
     read_checked_lines,
     write_checked_json,
 )
-from engine.training.config import TrainConfig
+from engine.storage.typed_json import EntryError, to_type
+from engine.training.config import TrainConfig, config_of
+from engine.training.retired_settings import without_retired
 
 logger = logging.getLogger(__name__)
 
@@ -35,7 +40,6 @@ MAX_BYTES = 4 << 20
 """Of settings and of regions; both take some kilobytes."""
 _MAX_COUNT = 2**31
 """Frames and clips are fewer."""
-_DEFAULTS = TrainConfig()
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,14 +58,14 @@ class ProjectSettings:
         follow_links: Whether the user allowed the capture's files to lie outside of its folder.
     """
 
-    capture: str
+    capture: Annotated[str, Meta(pattern=r"\A[^\0]*\Z")]
     fingerprint: str
-    scale: float = 1.0
-    clip_length: int = 10
+    scale: Annotated[float, Meta(gt=0, le=1)] = 1.0
+    clip_length: Annotated[int, Meta(ge=1, lt=2**31)] = 10
     holdout: tuple[str, ...] = ()
-    seed: int = 0
-    overrides: dict[str, Any] = field(default_factory=dict)
-    reference_clip: int = 0
+    seed: Annotated[int, Meta(ge=0, lt=2**32)] = 0
+    overrides: dict[str, SettingValue] = field(default_factory=dict)
+    reference_clip: Annotated[int, Meta(ge=0, lt=2**31)] = 0
     follow_links: bool = False
     schema: int = SCHEMA
 
@@ -70,16 +74,8 @@ class ProjectSettings:
         return split_clips(n_frames, n_frames if self.config().field == "joint" else self.clip_length)
 
     def config(self) -> TrainConfig:
-        """The training settings. Raises ProjectError for an unknown one or a value outside its range."""
-        unknown = sorted(set(self.overrides) - {item.name for item in fields(TrainConfig)})
-        if unknown:
-            raise ProjectError(f"There is no training setting called {', '.join(unknown)}.", hint="Take it out.")
-        for name, value in self.overrides.items():
-            expected = type(getattr(_DEFAULTS, name))
-            kinds = (float, int) if expected is float else (expected,)
-            if type(value) not in kinds:
-                raise ProjectError(f"{name} is {value!r:.60}; a value like {getattr(_DEFAULTS, name)!r} is expected.")
-        return TrainConfig(**self.overrides)
+        """The training settings. Raises ProjectError for an unknown one or a value that it may not have."""
+        return config_of(self.overrides)
 
 
 def read_settings(folder: Path) -> ProjectSettings:
@@ -113,23 +109,12 @@ def read_settings(folder: Path) -> ProjectSettings:
             f"The project file has unknown entries: {', '.join(unknown):.200}.", hint=HAND_EDITED, path=path
         )
     try:
-        settings = ProjectSettings(
-            capture=_text(content["capture"]),
-            fingerprint=_text(content["fingerprint"]),
-            scale=_number(content.get("scale", 1.0)),
-            clip_length=_count(content.get("clip_length", 10)),
-            holdout=tuple(map(_text, _list(content.get("holdout", [])))),
-            seed=_count(content.get("seed", 0), 2**32),
-            overrides=_table(content.get("overrides", {})),
-            reference_clip=_count(content.get("reference_clip", 0)),
-            follow_links=_flag(content.get("follow_links", False)),
-        )
-        if not (0.0 < settings.scale <= 1.0 and settings.clip_length >= 1):
-            raise ValueError(f"scale {settings.scale:g} or clip_length {settings.clip_length} is out of range")
+        settings = to_type(content, ProjectSettings)
+        settings = replace(settings, overrides=without_retired(settings.overrides))
         settings.config()
     except ProjectError as error:
         raise ProjectError(error.message, hint="Correct it or restore the file from a copy.", path=path) from error
-    except (KeyError, TypeError, ValueError) as error:
+    except EntryError as error:
         raise ProjectError(
             f"The project file has a missing or wrong entry ({error}).", hint="Restore it from a copy.", path=path
         ) from error
@@ -203,39 +188,3 @@ def _unreadable(what: str, error: Exception, hint: str, path: Path) -> ProjectEr
     return ProjectError(
         f"{what} cannot be read ({reason}).", hint=HAND_EDITED if isinstance(error, ChecksumError) else hint, path=path
     )
-
-
-def _text(value: Any) -> str:
-    if type(value) is not str or "\0" in value:
-        raise TypeError(f"{value!r:.60} is not a text")
-    return value
-
-
-def _list(value: Any) -> list[Any]:
-    if type(value) is not list:
-        raise TypeError(f"{value!r:.60} is not a list")
-    return value
-
-
-def _table(value: Any) -> dict[str, Any]:
-    if type(value) is not dict:
-        raise TypeError(f"{value!r:.60} is not a table of settings")
-    return value
-
-
-def _count(value: Any, below: int = _MAX_COUNT) -> int:
-    if type(value) is not int or not 0 <= value < below:
-        raise TypeError(f"{value!r:.60} is not a whole number from 0 to {below - 1}")
-    return value
-
-
-def _flag(value: Any) -> bool:
-    if type(value) is not bool:
-        raise TypeError(f"{value!r:.60} is neither true nor false")
-    return value
-
-
-def _number(value: Any) -> float:
-    if type(value) not in (int, float):
-        raise TypeError(f"{value!r:.60} is not a number")
-    return float(value)

@@ -173,6 +173,12 @@ class DismissNotice:
     index: int
 
 
+EditCommand = MarkRegion | RemoveRegion | UndoMark | RedoMark
+"""What changes the project's content, and can be taken back."""
+
+SettingCommand = SetHoldout | SetClipLength | SetTrainSetting | SetPreset
+"""What changes settings that all clips share."""
+
 Command = (
     OpenCapture
     | OpenProject
@@ -186,14 +192,8 @@ Command = (
     | LookThrough
     | SetCompare
     | ToggleOverlay
-    | SetHoldout
-    | SetClipLength
-    | SetTrainSetting
-    | SetPreset
-    | MarkRegion
-    | RemoveRegion
-    | UndoMark
-    | RedoMark
+    | SettingCommand
+    | EditCommand
     | HomeView
     | CloseQuestion
     | ForgetRecent

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from app.background.latest import LatestWorker
 from app.project.project import Project
+from app.session.commands import EditCommand, MarkRegion, RedoMark, RemoveRegion, UndoMark
 from app.status import ClipStatus, RegionsStatus
 from engine.errors import EngineError, ProjectError
 from engine.gate.regions import GateRegion, sphere_region
@@ -108,6 +109,22 @@ class Marking:
         self._awaited, self._problem = None, ""
 
     # ---------------------------------------------------------------- changes
+
+    def apply(self, command: EditCommand) -> None:
+        """Carry out a command.
+
+        Raises:
+            ProjectError: It cannot be done now, or makes no sense.
+        """
+        match command:
+            case MarkRegion(treat=treat, center=center, radius=radius):
+                self.mark(treat, center, radius)
+            case RemoveRegion(index=index):
+                self.remove(index)
+            case UndoMark():
+                self.undo()
+            case RedoMark():
+                self.redo()
 
     def mark(self, treat: str, center: Sequence[float], radius: float) -> None:
         """Mark a sphere.

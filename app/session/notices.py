@@ -1,11 +1,14 @@
-"""Notices: what the user has to know, until it is dismissed. Draws nothing, logs nothing."""
+"""Notices: what the user has to know, until it is dismissed. Draws nothing."""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from engine.errors import EngineError
+
+logger = logging.getLogger(__name__)
 
 MAX_NOTICES = 50
 """Older ones make room; the log keeps everything."""
@@ -60,6 +63,18 @@ class Notices:
     def add_error(self, title: str, error: EngineError) -> Notice:
         """A failure the user can act on; every problem of a capture is listed."""
         return self.add("error", title, *error.told_apart())
+
+    def add_failure(self, title: str, error: Exception) -> Notice:
+        """A failure of any kind; one that the user cannot act on is a fault of the program, and is logged."""
+        if isinstance(error, EngineError):
+            return self.add_error(title, error)
+        logger.error("%s", title, exc_info=error)
+        detail = f"{type(error).__name__}: {error}"
+        return self.add("error", title, detail, "This is a fault of the program; the log has more.")
+
+    def has_told(self, error: Exception) -> bool:
+        """Whether a notice names this cause already."""
+        return isinstance(error, EngineError) and any(error.message in notice.detail for notice in self._notices)
 
     def withdraw(self, notice: Notice) -> None:
         """Remove a notice that does not hold any more; one that is gone already is ignored."""

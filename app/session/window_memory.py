@@ -10,11 +10,14 @@ import logging
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from app.status import COMPARE_MODES, OVERLAY_NAMES
+from app.playback.orbit_view import OrbitView
+from app.playback.timeline import Timeline
+from app.status import COMPARE_MODES, OVERLAY_NAMES, Overlays
+from engine.camera.rig import CameraRig
 from engine.errors import EngineError
 from engine.storage.json_files import read_checked_json, write_checked_json
 from engine.user_folders import config_dir
@@ -111,7 +114,23 @@ def read_window_memory(path: Path | None = None) -> WindowMemory:
     return memory
 
 
-def view_of(session: Any) -> dict[str, Any]:
+class Viewed(Protocol):
+    """What is remembered of a session, and given back to it."""
+
+    @property
+    def view(self) -> OrbitView: ...
+
+    @property
+    def overlays(self) -> Overlays: ...
+
+    @property
+    def timeline(self) -> Timeline: ...
+
+    @property
+    def rig(self) -> CameraRig: ...
+
+
+def view_of(session: Viewed) -> dict[str, Any]:
     """Frame, view and overlays of the open capture, as plain values."""
     view, overlays = session.view, session.overlays
     return {
@@ -129,7 +148,7 @@ def view_of(session: Any) -> dict[str, Any]:
     }
 
 
-def show_again(session: Any, kept: dict[str, Any]) -> None:
+def show_again(session: Viewed, kept: dict[str, Any]) -> None:
     """Go back to what `view_of` has kept. What makes no sense for this capture stays as it is."""
     view, overlays, timeline = session.view, session.overlays, session.timeline
     frame_index = _number(kept.get("frame_index"), 0, timeline.last_frame)

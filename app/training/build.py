@@ -13,7 +13,7 @@ from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.errors import ProjectError
 from engine.progress import Progress, ReportProgress
-from engine.training.config import TrainConfig
+from engine.training.config import config_of
 
 
 def build_training(job: TrainJob, report: ReportProgress) -> Training:
@@ -23,6 +23,7 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
         CaptureError, ProjectError: Files are missing, damaged or do not fit together.
     """
     from engine.training.clip_training import ClipTraining  # torch takes a second to import
+    from engine.training.variants.variant_method import method_of
 
     report(Progress("Starting", 0.0))
     warm_up_reporting(report)
@@ -39,7 +40,7 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
         raise ProjectError(f"There is no clip {job.clip_index}; the capture has {len(clips)}.", path=job.project)
     base = project.inherited_index(job.clip_index)
     reference = None if base is None else read_clip_state(project.clip_path(base))
-    config = TrainConfig(**job.overrides)
+    config = config_of(job.overrides)
     previous = None
     is_first = job.clip_index == project.settings.reference_clip
     if not is_first and (config.field == "continue" or config.start == "previous"):
@@ -48,6 +49,7 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
         capture,
         clips[job.clip_index],
         config=config,
+        method=method_of(config, previous=previous),
         backend=backend_called(config.backend),
         holdout=job.holdout,
         reference=reference,

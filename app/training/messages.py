@@ -9,7 +9,9 @@ from __future__ import annotations
 import json
 import typing
 from dataclasses import asdict, dataclass, field, fields
-from typing import Any
+
+from engine.clip_files.clip_header import SettingValue
+from engine.storage.typed_json import to_type
 
 # ---------------------------------------------------------------- the job
 
@@ -35,7 +37,7 @@ class TrainJob:
     clip_index: int
     holdout: tuple[int, ...] = ()
     seed: int = 0
-    overrides: dict[str, Any] = field(default_factory=dict)
+    overrides: dict[str, SettingValue] = field(default_factory=dict)
     is_window_open: bool = True
     follow_links: bool = False
 
@@ -226,9 +228,9 @@ def decode(data: bytes) -> Message:
     try:
         name, values = json.loads(data)
         kind = MESSAGE_TYPES[name]
-        for item in fields(kind):
-            if isinstance(values.get(item.name), list):
-                values[item.name] = tuple(values[item.name])
-        return kind(**values)
+        unknown = values.keys() - {item.name for item in fields(kind)}
+        if unknown:
+            raise ValueError(f"unknown entries: {unknown}")
+        return to_type(values, kind)
     except (KeyError, TypeError, AttributeError, ValueError, UnicodeDecodeError) as error:
         raise ValueError(f"not a message: {data[:80]!r}") from error

@@ -79,3 +79,7 @@ class CameraRig:
         system = projectors.sum(0) + damping * np.eye(3)
         rhs = np.einsum("cij,cj->i", projectors, centers) + damping * prior
         return np.linalg.solve(system, rhs)
+
+
+NO_CAMERAS = CameraRig((), np.zeros((0, 4, 4)), np.zeros((0, 3, 3)), np.zeros((0, 2), np.int64))
+"""The rig of no capture."""

@@ -26,6 +26,8 @@ Size = Annotated[int, Meta(gt=0, le=2**24)]
 """Cells, table entries and widths of layers."""
 Length = Annotated[float, Meta(gt=0, lt=1e30)]
 """Scene units."""
+SettingValue = bool | int | float | str
+"""Of one training setting."""
 Figure = float | None
 """None where it was not measured."""
 
@@ -153,11 +155,9 @@ class Place(Struct, frozen=True, kw_only=True):
     Attributes:
         phase_index: Phase that was begun last.
         steps_in_phase: Steps done in it.
-        phases: Name and number of steps of every phase, as cut short by now.
+        phases: Name and number of steps of every phase; none of a phase that had nothing to learn.
         order: State of the order in which pictures are drawn.
         generator: State of the training's random numbers.
-        schedule: Where the present fall of the rates began; None in files of earlier versions.
-        patience: State of the early stop; None without one.
     """
 
     phase_index: Count
@@ -165,8 +165,6 @@ class Place(Struct, frozen=True, kw_only=True):
     phases: list[tuple[str, Count]]
     order: dict[str, Any]
     generator: list[Count]
-    schedule: list[float] | None = None
-    patience: dict[str, Any] | None = None
 
     def __post_init__(self) -> None:
         if self.phase_index >= len(self.phases):
@@ -203,7 +201,7 @@ class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
     step: Count
     n_steps: Count
     seed: int
-    config: dict[str, bool | int | float | str]
+    config: dict[str, SettingValue]
     camera_names: list[str]
     near_plane: Length
     spacing: Length

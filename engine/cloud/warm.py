@@ -12,7 +12,6 @@ from engine.cloud.motion.hull import Grid, carve, hull_colors, hull_visibility
 from engine.cloud.stereo.consistency import check_depths
 from engine.cloud.stereo.smoothing import smooth_inverse_depth
 from engine.cloud.stereo.sweep import matching_costs
-from engine.gate.image_gate import measure_gate
 from engine.images.image_filters import dilate
 
 _SIZE_PX = 16
@@ -42,19 +41,6 @@ def warm_up() -> None:
     voxels = carve(is_usable, projections, grid, near=0.1, n_misses=0, min_hits=1)
     pixel, is_visible = hull_visibility(grid.centers(voxels), grid.size, is_usable, projections, near=0.1)
     hull_colors(frames[:2], pixel, is_visible, np.ones((2, 3)))
-
-    points, nothing = np.array([[0.0, 0.0, 2.0]]), np.zeros((1, 1), dtype=bool)
-    measure_gate(
-        lambda camera, _: frames[camera],
-        1,
-        frames[:2],
-        rig,
-        points,
-        spacing=0.1,
-        moving_points=points,
-        presence=nothing,
-        moving_spacing=0.1,
-    )
 
 
 def _two_cameras() -> CameraRig:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-STILL, CHANGES, LIGHT, ONE_VIEW, UNSEEN, NEAR_MOTION = range(6)
-USER_STATIC, USER_DYNAMIC, LEARNED_NOTHING, ALONE, INSIDE = range(6, 11)
 REASONS = (
     "still",
     "changes in several views",
@@ -17,9 +15,11 @@ REASONS = (
     "changes, but nothing beside it does",
     "something else is seen in its place from all sides",
 )
-"""In words, by code."""
+"""In words, by code. Clips that are trained today have the three codes below; the others stand in clips of projects
+whose gate also looked at the pictures."""
+STILL, USER_STATIC, USER_DYNAMIC = 0, 6, 7
 NO_REASON = 255
-"""Of an anchor about which the gate was not asked: those of hulls, and clips trained without a look at the pictures."""
+"""Of an anchor about which the gate was not asked: those of hulls, and clips without a marked region."""
 
 
 def reason_text(code: int) -> str:

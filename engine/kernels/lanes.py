@@ -9,12 +9,15 @@ compiled; nothing of it exists at run time. No knowledge of Gaussians lives here
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import wraps
 from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils
 from numba.extending import intrinsic
+
+from engine.kernels.numba_internals import no_value
 
 N_LANES = 16
 VECTOR_BYTES = 4 * N_LANES
@@ -32,8 +35,22 @@ _FLAGS = ("contract", "nsz", "arcp")
 
 
 def kernel_intrinsic(function: Callable[..., Any]) -> Any:
-    """numba's `intrinsic`, typed by what it makes: kernels call the result without the leading typing context."""
-    return intrinsic(function)
+    """numba's `intrinsic`, typed by what it makes: kernels call the result without the leading typing context.
+
+    What generates the code may return None where there is no value.
+    """
+
+    @wraps(function)
+    def describe(*arguments: Any) -> Any:
+        signature, generate = function(*arguments)
+
+        def generate_value(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            value = generate(context, builder, signature, arguments)
+            return no_value(context) if value is None else value
+
+        return signature, generate_value
+
+    return intrinsic(describe)
 
 
 class LaneBuilder:

@@ -35,17 +35,14 @@ from engine.training.checkpoint import Checkpoint, damaged_checkpoint, read_chec
 from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters
 from engine.training.phases import phase_at, phases_of
-from engine.training.preparation.building import merged
 from engine.training.preparation.clip_field import n_alive
 from engine.training.preparation.clip_preparation import ClipParts, ClipPreparation
+from engine.training.preparation.method import Method
 from engine.training.preparation.training_pictures import shared_image_size
 from engine.training.step.active_tiles import ActivePicture, ActiveTiles
-from engine.training.step.demotion import demote
-from engine.training.step.early_stopping import MEASURE_EVERY, Patience, held_in_items, steps_to_finish
-from engine.training.step.half_size import HalfSize
 from engine.training.step.losses import photometric_loss
 from engine.training.step.nonfinite import gradient_not_finite, loss_not_finite
-from engine.training.step.order import ErrorOrder, Order, ShuffledOrder
+from engine.training.step.order import ShuffledOrder
 from engine.training.step.visible_anchors import Sight, camera_views
 
 
@@ -56,11 +53,12 @@ class ClipTraining:
         capture: The capture at working resolution.
         clip: Frames to train on.
         config: All numbers.
+        method: All decisions.
         backend: What it is computed with.
         holdout: Camera indices never looked at in training.
         reference: Finished reference clip for a source clip, None to train the reference clip itself, or a clip that
             shares nothing.
-        previous: The clip before, finished: its field goes on with field=continue, all of it with start=previous.
+        previous: The clip before, finished, for a method that goes on from it.
         seed: Fixes initial values and the order of pictures.
         prep_dir: Folder that keeps backgrounds between clips.
         report: Receives progress of the preparation stages.
@@ -73,6 +71,7 @@ class ClipTraining:
         clip: Clip,
         *,
         config: TrainConfig,
+        method: Method,
         backend: Backend,
         holdout: Sequence[int],
         reference: ClipState | None,
@@ -82,15 +81,9 @@ class ClipTraining:
         previous: ClipState | None = None,
         regions: Sequence[GateRegion] = (),
     ) -> None:
-        self.backend = backend
-        self.previous = previous
-        is_streaming = reference is None and previous is not None and config.start == "previous"
-        # what a clip begins with: the reference it inherits from, or the clip before when it goes on from there
-        self._base = merged(previous) if is_streaming and previous is not None else reference
-        self._given_config = config
-        if is_streaming:  # everything that a source clip can take over, and all of it learns
-            config = config.going_on()
-        self.capture, self.clip, self.config, self.reference = (capture, clip, config, reference)
+        self.capture, self.clip, self.config, self.method = capture, clip, config, method
+        self.reference, self.previous, self.backend = reference, previous, backend
+        self._base = method.base(reference, previous)
         self.regions = tuple(regions)
         self.holdout = sorted(set(holdout))
         self.camera_indices = capture.training_cameras(self.holdout)
@@ -114,6 +107,7 @@ class ClipTraining:
             capture,
             clip,
             config,
+            method,
             backend=backend,
             camera_indices=self.camera_indices,
             views=self._training_views,
@@ -126,10 +120,8 @@ class ClipTraining:
             report=report,
         )
         self._tiles: ActiveTiles | None = None
-        self._held_in = held_in_items(n_cameras, clip.n_frames, seed) if config.patience else []
-        self._trained: tuple[ClipModel, dict[str, np.ndarray]] | None = None
-        """Model and reasons of the gate before they took over the values that are stored."""
-        self._patience: Patience | None = None
+        self._trained: ClipModel | None = None
+        """The model before it took over the values that are stored."""
 
     # ---------------------------------------------------------------- where we are
 
@@ -179,30 +171,21 @@ class ClipTraining:
         has_gains = bool((self.gains != 1.0).any())  # all 1 where the cameras do not differ: nothing to learn
         self.gains.requires_grad_(self.reference is None and has_gains)
         parameters = named_parameters(self.model, self.gains, self.config)
-        self._optimizer = PhaseOptimizer(parameters, n_steps=n_steps, config=self.config, backend=self.backend)
+        ratios = self.method.final_ratios(parameters, self.config)
+        self._optimizer = PhaseOptimizer(
+            parameters, n_steps=n_steps, config=self.config, final_ratios=ratios, backend=self.backend
+        )
         self._optimizer.steps_done = steps_in_phase
-        is_static = name == "static"
-        kept_out = set() if is_static else set(self._held_in)
-        n_all = len(self.camera_indices) if is_static else len(self.pictures)
-        self._items = [item for item in range(n_all) if item not in kept_out]
-        self._patience = Patience(self.config.patience) if kept_out else None
-        is_by_error = name == "source" and self.config.sampling == "error"
-        self._order: Order = (ErrorOrder if is_by_error else ShuffledOrder)(len(self._items), seed=self.seed + index)
+        n_items = len(self.camera_indices) if name == "static" else len(self.pictures)
+        self._order = ShuffledOrder(n_items, seed=self.seed + index)
         self._phase_index = index
         self._sight = Sight(self.model, self._training_views, reach=self._reach)  # a set may have become dynamic
-        self._set_size(is_half=steps_in_phase < self.config.n_coarse_steps(n_steps))
+        has_rest = name == "source" and self.method.has_active_tiles and not self.gains.requires_grad
+        has_rest = has_rest and ActiveTiles.applies(self.model)
+        self._tiles = ActiveTiles(self.model, backend=self.backend) if has_rest else None
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self._say("Nothing to learn", f"Nothing moves in this clip: no steps instead of {n_steps}")
             self.phases[index] = (name, steps_in_phase)
-
-    def _set_size(self, *, is_half: bool) -> None:
-        """Pictures are drawn and compared at this size from here on; `config.coarse_share`."""
-        self._half = HalfSize(self.capture.rig, near_plane=self.near_plane) if is_half else None
-        is_source = self.phases[self._phase_index][0] == "source"
-        has_rest = is_source and self.config.tiles == "active" and not self.gains.requires_grad
-        self._tiles = (
-            ActiveTiles(self.model, backend=self.backend) if has_rest and ActiveTiles.applies(self.model) else None
-        )
 
     def step(self) -> StepStats:
         """Draw a picture, render it, compare, update.
@@ -210,15 +193,11 @@ class ClipTraining:
         Raises:
             NonFiniteLoss: The loss or a gradient is not finite; names it. The model is as it was before this step.
         """
-        index, in_phase = phase_at(self.phases, self.steps_done)
+        index, _ = phase_at(self.phases, self.steps_done)
         if index != self._phase_index:
             self._add_moving()
             self._start_phase(index, 0)
-        stage, n_steps = self.phases[index]
-        if self._half is not None and in_phase >= self.config.n_coarse_steps(n_steps):
-            self._set_size(is_half=False)
-        drawn, weight = self._order.draw()
-        item = self._items[drawn]
+        stage, item = self.phases[index][0], self._order.draw()
         if stage == "static":
             camera_row, clip_time = item, 0.0
             truth, is_counted = self.backgrounds.images[camera_row], self.backgrounds.is_stable[camera_row]
@@ -226,11 +205,7 @@ class ClipTraining:
             camera_row, frame = divmod(item, self.clip.n_frames)
             clip_time = frame / self.clip.clip_length
             truth, is_counted = self.pictures.raw(camera_row, frame), None
-        views = self._views
-        if self._half is not None:
-            views = self._half.views
-            truth, is_counted = self._half.truth(item, truth, is_counted)
-        view = views[self.camera_indices[camera_row]]
+        view = self._training_views[camera_row]
         active = self._active_picture(camera_row, view, clip_time)
         image = render_gaussians(active.gaussians, view, backend=self.backend, tile_mask=active.tile_mask).image[0]
         pixels = self._tensor(truth)
@@ -259,9 +234,8 @@ class ClipTraining:
         if not np.isfinite(value):
             terms = {"photometric": float(compared.loss.detach()), "volume": float(volume.detach())}
             raise loss_not_finite(image=image.detach(), **terms, where=where, config=self.config)
-        self._order.saw(drawn, value)
         if loss.requires_grad:
-            (loss if weight == 1.0 else loss * weight).backward()
+            loss.backward()
         try:
             gradient_norm = self._optimizer.step()
         except NonFiniteLoss as error:
@@ -270,7 +244,6 @@ class ClipTraining:
             with torch.no_grad():
                 self.gains.copy_(self._tensor(in_gauge(host_array(self.gains))))
         self.steps_done += 1
-        self._look_for_stall()
         return StepStats(
             step=self.steps_done,
             n_steps=self.n_steps,
@@ -284,34 +257,6 @@ class ClipTraining:
 
     def _tensor(self, array: np.ndarray) -> Tensor:
         return torch.from_numpy(array).to(self.backend.device)
-
-    def _look_for_stall(self) -> None:
-        """Now and then, see whether the pictures kept out of training still gain; else cut the phase short."""
-        name, n_steps = self.phases[self._phase_index]
-        done = self._optimizer.steps_done
-        if self._patience is None or self._half is not None or done % MEASURE_EVERY or done >= n_steps:
-            return
-        if not self._patience.saw(self.held_in_psnr()):
-            return
-        n_left = steps_to_finish(done, n_steps)
-        if n_left < n_steps - done:
-            self._optimizer.finish_within(n_left)
-            self.phases[self._phase_index] = (name, done + n_left)
-            gained = f"{len(self._held_in)} pictures kept out of training stay at {self._patience.best:.2f} dB"
-            self._say("Early stop", f"{gained}: {n_left} steps to the end instead of {n_steps - done}")
-
-    def held_in_psnr(self) -> float:
-        """Mean PSNR of the pictures of training cameras that are kept out of training, dB; NaN without patience."""
-        values = []
-        for item in self._held_in:
-            camera_row, frame = divmod(item, self.clip.n_frames)
-            clip_time = frame / self.clip.clip_length
-            view = self._training_views[camera_row]
-            with torch.no_grad():
-                gaussians = self.model.decode(clip_time, self._sight.rows(camera_row, clip_time))
-                image = render_gaussians(gaussians, view, backend=self.backend).image[0] * self.gains[camera_row]
-            values.append(psnr(host_array(image), self.pictures.raw(camera_row, frame) / 255.0))
-        return float(np.mean(values)) if values else float("nan")
 
     def _active_picture(self, camera_row: int, view: View, clip_time: float) -> ActivePicture:
         rows = self._sight.rows(camera_row, clip_time)
@@ -337,11 +282,11 @@ class ClipTraining:
 
     def state(self) -> ClipState:
         """Snapshot of everything the clip owns. Copies, so that training can go on."""
-        return self._state_of(self.model, self._reasons)
+        return self._state_of(self.model)
 
-    def _state_of(self, model: ClipModel, reasons: dict[str, np.ndarray]) -> ClipState:
+    def _state_of(self, model: ClipModel) -> ClipState:
         arrays = model.own_arrays()
-        for role, codes in reasons.items():
+        for role, codes in self._reasons.items():
             arrays |= AnchorRecord(reasons=codes).arrays(role)
         if self.reference is None:
             arrays[GAINS] = host_array(self.gains).copy()
@@ -355,7 +300,7 @@ class ClipTraining:
             step=self.steps_done,
             n_steps=self.n_steps,
             seed=self.seed,
-            config=self._given_config.difference(),
+            config=self.config.difference(),
             camera_names=list(self.rig.names),
             near_plane=self.near_plane,
             spacing=self.spacing,
@@ -383,15 +328,8 @@ class ClipTraining:
         if self._base is None and self.phases[self._phase_index][0] != "static":
             self._preparation.keep_backgrounds(self.backgrounds)
         state = self.state()
-        self._trained = self.model, self._reasons
-        # another clip's field may show this one where fields go on: what it would show is not known yet
-        if self.config.gate == "images" and self.config.field != "continue":
-            state, said = demote(state, self.reference, self._training_views, backend=self.backend, reach=self._reach)
-            self._say("Leaving out what is not needed", said)
-            self._reasons = _reasons_in(state)
-            self.model = load_clip_model(state, self.reference, backend=self.backend, is_learning=True)
-        # a field that goes on in the next clip, and may show this one then, keeps entries that only others read
-        entries = None if self.config.field == "continue" else self.model.entries_in_use()
+        self._trained = self.model
+        entries = None if self.method.keeps_unread_entries else self.model.entries_in_use()
         compact = compact_clip(state, entries)
         self.model = load_clip_model(compact.state, self.reference, backend=self.backend, is_learning=True)
         self._sight = Sight(self.model, self._training_views, reach=self._reach)
@@ -405,11 +343,9 @@ class ClipTraining:
             steps_in_phase=in_phase if index == self._phase_index else self.phases[self._phase_index][1],
             phases=self.phases,
             order=self._order.state(),
-            schedule=self._optimizer.schedule,
-            patience=None if self._patience is None else self._patience.state(),
             generator=self._generator.get_state().tolist(),
         )
-        state = self._state_of(*(self._trained or (self.model, self._reasons)))
+        state = self._state_of(self._trained or self.model)
         state = ClipState(state.arrays | self._optimizer.arrays(), state.header)
         write_checkpoint(path, Checkpoint(state, host_array(self.gains).copy(), self.backgrounds, place))
 
@@ -456,11 +392,7 @@ class ClipTraining:
         self.steps_done = header.step
         self._start_phase(place.phase_index, place.steps_in_phase)
         self._optimizer.restore(kept.state.arrays, place.steps_in_phase)
-        if place.schedule is not None:
-            self._optimizer.schedule = place.schedule
         self._order.restore(place.order)
-        if self._patience is not None and place.patience:
-            self._patience.restore(place.patience)
         self._generator.set_state(torch.tensor(place.generator, dtype=torch.uint8))
 
 

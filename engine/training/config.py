@@ -1,17 +1,22 @@
-"""TrainConfig: every number of a clip's training, with unit and reason. Free of torch so that a window can import it.
+"""TrainConfig: every setting of a clip's training, each declared once. Free of torch, so that a window can import it.
 
-Saved as the difference from the defaults; unknown keys and values outside their range are errors.
+Stored as the difference from the defaults; unknown names and values outside their range are errors.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import MISSING, asdict, dataclass, fields, replace
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, NamedTuple
+
+import msgspec
 
 from engine.backends.table import BACKENDS, DEFAULT
 from engine.errors import ProjectError
+from engine.training.setting import Value, setting, settings_of
+
+MODEL, CLOUDS, COLORS, LENGTH = "Model", "Point clouds", "Camera colours", "Length of the training"
+RATES, LOSS, GATE, STEP, SHARING = "Learning rates", "Loss", "Gate", "Training step", "What a source clip takes over"
 
 
 class StepRule(NamedTuple):
@@ -30,201 +35,293 @@ class StepRule(NamedTuple):
         """Steps for so many items."""
         return min(max(self.per_item * n_items, self.lowest), self.highest)
 
+    def text(self, item: str) -> str:
+        """The rule in words."""
+        return f"0 derives {self.per_item} per {item}, {self.lowest:,} to {self.highest:,}"
+
 
 STATIC_RULE = StepRule(30, 300, 1000)
 JOINT_RULE = StepRule(20, 1200, 6000)
 SOURCE_RULE = StepRule(24, 1200, 6000)
 
 
-@dataclass(frozen=True, slots=True)
-class TrainConfig:
-    """All settings of one clip's training.
+def _size(meaning: str, low: float, high: float, unit: str = "", label: str = "") -> msgspec.Meta:
+    return setting(MODEL, meaning, low=low, high=high, unit=unit, label=label)
 
-    Defaults follow the small preset: features 16/16, five Gaussians per anchor, a field of at most seven levels
-    whose knots lie on the frames. Step counts of 0 mean "derived from the number of training pictures".
+
+def _points(meaning: str, label: str) -> msgspec.Meta:
+    return setting(CLOUDS, meaning, low=1, high=1_000_000, unit="anchors", label=label)
+
+
+def _steps(meaning: str, label: str) -> msgspec.Meta:
+    return setting(LENGTH, meaning, low=0, high=1_000_000, unit="steps", label=label)
+
+
+def _rate(learned: str) -> msgspec.Meta:
+    return setting(RATES, f"Learning rate of {learned} at the start of a phase.", low=0.0, high=1.0)
+
+
+def _final(learned: str) -> msgspec.Meta:
+    meaning = f"Share of the rate of {learned} that is left at the end of a phase; 0 takes final_lr_ratio."
+    return setting(RATES, meaning, low=0.0, high=1.0)
+
+
+def _choice(group: str, meaning: str, choices: Mapping[str, str]) -> msgspec.Meta:
+    return setting(group, meaning, choices=choices)
+
+
+class TrainConfig(msgspec.Struct, frozen=True):
+    """All settings of one clip's training. Raises ProjectError for a value that a setting may not have.
+
+    The defaults are the small preset. Steps and sizes of 0 are derived from the capture.
     """
 
-    # sizes of the model
-    static_feature_dim: int = 16
-    """Width of the static feature f_s of an anchor."""
-    dynamic_feature_dim: int = 16
-    """Width of the dynamic feature f_d that the field gives."""
-    gaussians_per_anchor: int = 5
-    """K; 4 to 6 once anchors are two to three pixels apart."""
-    head_hidden: int = 64
-    """Hidden width of each decoder head."""
-    field_hidden: int = 64
-    """Hidden width of the field's network."""
-    field_channels: int = 4
-    """Values per hash table entry."""
-    field_base_cells: int = 8
-    """Cells along the longest side at the coarsest level."""
-    field_growth: float = 1.6
-    """Ratio of cells between levels."""
-    field_max_levels: int = 7
-    """Levels are added until a cell is about 1.5 anchor spacings, at most this many."""
-    field_levels: int = 0
-    """Number of levels; 0 derives it as said above."""
-    field_log2_entries: int = 0
-    """log2 of the entries per level and table; 0 derives it from the anchors alive in a frame."""
-    field_tables: str = "shared"
-    """shared: one table for all frames, with time as fourth coordinate of the hash, as published. per_frame: a table
-    for every frame, of which a step touches one. Moving pixels of validation cameras after 1000 steps, shared against
-    per_frame: half-size sample, two seeds, reference clip 22.1 against 21.8 dB, source clip 19.7 against 19.1;
-    basketball, one seed, 25.5 against 25.2 and 23.5 against 22.7."""
+    static_feature_dim: Annotated[int, _size("Width of the static feature of an anchor.", 1, 256, "values")] = 16
+    dynamic_feature_dim: Annotated[
+        int, _size("Width of the dynamic feature that the field gives an anchor.", 1, 256, "values")
+    ] = 16
+    gaussians_per_anchor: Annotated[
+        int, _size("Gaussians that each anchor is decoded to.", 1, 32, "Gaussians", "Gaussians per anchor")
+    ] = 5
+    head_hidden: Annotated[int, _size("Hidden width of each decoder head.", 4, 1024, "values")] = 64
+    field_hidden: Annotated[int, _size("Hidden width of the field's network.", 4, 1024, "values")] = 64
+    field_channels: Annotated[int, _size("Values per entry of the field's hash table.", 1, 16, "values")] = 4
+    field_base_cells: Annotated[
+        int, _size("Cells of the field along the longest side of the scene at the coarsest level.", 2, 64, "cells")
+    ] = 8
+    field_growth: Annotated[
+        float, _size("Ratio of the cells along a side between one level and the next.", 1.1, 4.0)
+    ] = 1.6
+    field_max_levels: Annotated[
+        int,
+        _size(
+            "Levels of the field at most; they are added until a cell is about 1.5 anchor spacings.", 1, 16, "levels"
+        ),
+    ] = 7
+    field_levels: Annotated[int, _size("Levels of the field; 0 derives them.", 0, 16, "levels")] = 0
+    field_log2_entries: Annotated[
+        int, _size("log2 of the entries per level and table; 0 derives it from the anchors alive in a frame.", 0, 20)
+    ] = 0
+    field_tables: Annotated[
+        str,
+        _choice(
+            MODEL,
+            "Hash tables of the field.",
+            {
+                "shared": "one for all frames, with time as fourth coordinate, as published",
+                "per_frame": "one for every frame, of which a step touches one",
+            },
+        ),
+    ] = "shared"
 
-    # sizes of the clouds
-    max_static_points: int = 22_000
-    """Anchors of the static part; the voxel grows until they fit."""
-    max_moving_points: int = 32_000
-    """Anchors of the moving part over the whole clip. In a reference clip the voxel grows until they fit. A source clip
-    keeps that voxel; where its own anchors and the inherited ones in use would be more, some points are left to the
-    anchors beside them (engine.cloud.motion.budget). Basketball, clip 3, validation cameras, 1500 steps, one seed:
-    42,960
-    residual anchors gave 29.04 dB and 25.35 on moving pixels in 1.20 MB, 30,139 of them, as by this number, 29.05 and
-    25.35 in 1.00 MB, 20,000 gave 28.94 and 25.04 in 0.83 MB."""
-    background_frames: int = 50
-    """Frames, spread over the capture, from which each camera's background is estimated."""
+    max_static_points: Annotated[
+        int, _points("Anchors of the static part at most; the voxel grows until they fit.", "Static anchors, at most")
+    ] = 22_000
+    max_moving_points: Annotated[
+        int,
+        _points(
+            "Anchors of the moving part over the whole clip at most. In a reference clip the voxel grows until they "
+            "fit; a source clip keeps that voxel and leaves some points to the anchors beside them.",
+            "Moving anchors, at most",
+        ),
+    ] = 32_000
+    background_frames: Annotated[
+        int,
+        setting(
+            CLOUDS,
+            "Frames, spread over the capture, from which each camera's background is estimated.",
+            low=2,
+            high=1000,
+            unit="frames",
+        ),
+    ] = 50
 
-    # colours of the cameras
-    color: str = "auto"
-    """What a training camera's colours are against the scene's: `engine.cloud.background.gains` estimates it, the
-    reference clip
-    trains it, later clips keep it. auto: a gain per channel where the cameras differ, nothing where they do not.
-    gain: always a gain per channel. off: never; every camera shows the scene's own colours.
+    color: Annotated[
+        str,
+        _choice(
+            COLORS,
+            "What a training camera's colours are against the scene's: estimated first, trained with the reference "
+            "clip, kept by later clips.",
+            {
+                "auto": "a gain per channel where the cameras differ",
+                "gain": "always a gain per channel",
+                "off": "every camera shows the scene's own colours",
+            },
+        ),
+    ] = "auto"
 
-    There is no offset and no matrix because they give nothing: basketball, reference clip of 1500 steps, gain against
-    gain + offset against matrix + offset (3 x 4), training pictures 31.37, 31.46, 31.51 dB, two validation cameras in
-    raw colours of the mean camera 28.19, 28.16, 28.18. Fitted to renders of the first, gain, offset and 3 x 4 give the
-    validation cameras 28.75, 28.77, 28.81 dB."""
+    static_steps: Annotated[
+        int,
+        _steps(
+            f"Steps on the backgrounds before the moving part is added; {STATIC_RULE.text('training camera')}.",
+            "Static steps",
+        ),
+    ] = 0
+    joint_steps: Annotated[
+        int, _steps(f"Steps of the reference clip after that; {JOINT_RULE.text('training picture')}.", "Joint steps")
+    ] = 0
+    source_steps: Annotated[
+        int, _steps(f"Steps of a source clip; {SOURCE_RULE.text('training picture')}.", "Steps of later clips")
+    ] = 0
+    passes: Annotated[
+        float,
+        setting(
+            LENGTH,
+            "Passes over the training pictures of a clip, whatever its kind; 0 keeps the steps derived above.",
+            low=0.0,
+            high=1000.0,
+            unit="passes",
+        ),
+    ] = 0.0
 
-    # length of the training, steps; one step renders one picture
-    static_steps: int = 0
-    """Steps on the backgrounds before the moving part is added; 0 derives 30 per training camera, 300 to 1000."""
-    joint_steps: int = 0
-    """Steps of the reference clip after that; 0 derives 20 per training picture, 1200 to 6000. Validation cameras of
-    the basketball, one seed: 2000 steps gave 29.3 dB and 26.4 on moving pixels, 6000 gave 29.7 and 27.1."""
-    source_steps: int = 0
-    """Steps of a source clip; 0 derives 24 per training picture, 1200 to 6000: frozen heads learn more slowly.
-    The same cameras: 3000 steps gave 29.2 dB and 24.8 on moving pixels, 6000 gave 29.3 and 25.3."""
+    feature_lr: Annotated[float, _rate("the anchors' static features")] = 7.5e-3
+    scale_lr: Annotated[float, _rate("the anchors' scales")] = 7e-3
+    table_lr: Annotated[float, _rate("the field's hash tables")] = 0.04
+    field_mlp_lr: Annotated[float, _rate("the field's network")] = 8e-3
+    opacity_head_lr: Annotated[float, _rate("the head of opacities")] = 2e-3
+    shape_head_lr: Annotated[float, _rate("the head of scales and rotations")] = 4e-3
+    color_head_lr: Annotated[float, _rate("the head of colours")] = 4e-3
+    offset_head_lr: Annotated[float, _rate("the head of offsets")] = 4e-3
+    gain_lr: Annotated[float, _rate("the cameras' colour gains in the reference clip")] = 3e-4
+    final_lr_ratio: Annotated[
+        float,
+        setting(
+            RATES,
+            "Share of a rate that is left at the end of a phase, for everything without a share of its own; rates fall "
+            "log-linearly.",
+            low=1e-6,
+            high=1.0,
+        ),
+    ] = 0.02
+    feature_final_ratio: Annotated[float, _final("static features")] = 0.0
+    scale_final_ratio: Annotated[float, _final("scales")] = 0.0
+    field_final_ratio: Annotated[float, _final("the field's tables and network")] = 0.0
+    opacity_head_final_ratio: Annotated[float, _final("the head of opacities")] = 0.0
+    shape_head_final_ratio: Annotated[float, _final("the head of scales and rotations")] = 0.0
+    color_head_final_ratio: Annotated[float, _final("the head of colours")] = 0.0
+    offset_head_final_ratio: Annotated[float, _final("the head of offsets")] = 0.0
 
-    passes: float = 0.0
-    """Passes over the training pictures of a clip, for clips of both kinds; 0 keeps the derived steps above."""
+    ssim_weight: Annotated[
+        float, setting(LOSS, "w in the loss (1 - w) L1 + w (1 - SSIM) + volume term.", low=0.0, high=1.0)
+    ] = 0.2
+    volume_weight: Annotated[
+        float,
+        setting(
+            LOSS, "Weight of the mean volume of the Gaussians, in cubes of the anchor spacing.", low=0.0, high=10.0
+        ),
+    ] = 1e-3
+    max_gradient_norm: Annotated[
+        float,
+        setting(
+            LOSS,
+            "Gradients with a larger norm, which only accidents have, are scaled down to it; 0 switches it off.",
+            low=0.0,
+            high=1e6,
+        ),
+    ] = 2.0
 
-    coarse_share: float = 0.0
-    """Coarse to fine: share of the steps of every phase, the first ones, that look at pictures of half size. Off, as
-    it gives nothing: such a step still has all Gaussians and takes 0.75 to 0.85 of the time of another. Validation
-    cameras, all and moving pixels, against no such steps in as many steps, 1200 to 2000, one seed: sample, 0.25,
-    reference clip -0.08 and -0.18 dB, source clip -0.04 and -0.37; at half its size, 0.4, reference clip -0.8 and -1.1;
-    basketball, reference clip, 0.3, -0.02 and -0.06, source clip, 0.2, -0.02 and -0.04, 0.4, -0.03 and -0.05, and in as
-    much time +0.03 and +0.11."""
+    gate: Annotated[
+        str,
+        _choice(
+            GATE,
+            "Which anchors may change over time, and when they are there.",
+            {
+                "hull": "static anchors never change; moving ones are decoded only where a frame has its visual hull",
+                "static": "static anchors never change; moving ones are decoded in every frame",
+                "off": "every anchor is evaluated in every frame, as published",
+            },
+        ),
+    ] = "hull"
 
-    patience: int = 0
-    """Early stop. 0: never. Else 2 % of the training pictures, at least four, are not trained on; when their mean PSNR
-    has not risen by 0.02 dB over so many looks, 150 steps apart, the rates fall to their end within a fifth of the
-    steps done. Off because it saves little and costs: source clip of the basketball, validation cameras, patience=3,
-    5,400 instead of 6,000 steps, 94 s instead of 104, 29.33 to 29.26 dB, 25.29 to 25.04 on moving pixels."""
+    tiles: Annotated[
+        str,
+        _choice(
+            STEP,
+            "What a step of a source clip draws and compares; what is learned is the same.",
+            {"active": "only tiles that a learning Gaussian touches", "all": "whole pictures"},
+        ),
+    ] = "active"
+    backend: Annotated[
+        str,
+        _choice(
+            STEP,
+            "What a training is computed with; what is learned is the same but for rounding.",
+            {name: entry.words for name, entry in BACKENDS.items()},
+        ),
+    ] = DEFAULT
 
-    # learning rates; all fall log-linearly over the phase, to `final_lr_ratio` of their start
-    feature_lr: float = 7.5e-3
-    scale_lr: float = 7e-3
-    table_lr: float = 0.04
-    field_mlp_lr: float = 8e-3
-    """Table and network of the field. Frozen heads leave all change over time to it. Moving pixels of a validation
-    camera in the sample's source clip, 1440 steps, one seed: 5e-3 and 2e-3 gave 19.1 dB, 0.02 and 4e-3 20.7, 0.06 and
-    4e-3 21.8, 0.05 and 1e-2 21.9. These two lie a little below the best, for both kinds of clip."""
-    opacity_head_lr: float = 2e-3
-    shape_head_lr: float = 4e-3
-    color_head_lr: float = 4e-3
-    offset_head_lr: float = 4e-3
-    gain_lr: float = 3e-4
-    """Per-camera colour gains, reference clip only; not trained where `color` found none."""
-    final_lr_ratio: float = 0.02
-    """Of every group without a ratio of its own below, where 0 stands for this one and 1 for a constant rate."""
-    feature_final_ratio: float = 0.0
-    scale_final_ratio: float = 0.0
-    field_final_ratio: float = 0.0
-    """Table and network of the field."""
-    opacity_head_final_ratio: float = 0.0
-    shape_head_final_ratio: float = 0.0
-    color_head_final_ratio: float = 0.0
-    offset_head_final_ratio: float = 0.0
-
-    # loss
-    ssim_weight: float = 0.2
-    """Loss = (1 - w) L1 + w (1 - SSIM) + volume term."""
-    volume_weight: float = 1e-3
-    """Weight of the mean Gaussian volume, measured in cubes of the anchor spacing so that no scene scale enters."""
-    max_gradient_norm: float = 2.0
-    """Norm over all gradients above which they are scaled down to it; 0 switches it off. Far above what a good training
-    has, so that it acts on accidents alone: medians are 0.002 to 0.04, the largest norm in a whole training was 0.09 on
-    the basketball and 0.12 on the sample. Steps that were clipped are counted in the clip's metrics."""
-
-    # gate
-    gate: str = "hull"
-    """hull: static anchors have no dynamic feature, moving ones are decoded only at times where that frame's hull
-    has them. images: likewise, but static anchors that two or more cameras see change where no hull is (lamps, soft
-    shadows), and those inside a hull (of what rested and was taken away), get a dynamic feature, and once a clip is
-    trained, anchors that nobody sees and dynamic ones that learned no change are left out. Where it finds none of
-    these, the result is that of hull, bit for bit. Not the default: held-out cameras, passes=8, one seed, hull against
-    images, sample 27.85 and 27.87 dB, basketball 28.75 and 28.89, but what stands still changes twice as much at the
-    borders of its clips, 0.14 of 1/255 instead of 0.07. static: static anchors have no dynamic feature, moving ones
-    are decoded at all times; what the gate in time is worth. off: the published method, every anchor is evaluated at
-    every time."""
-
-    # what a step of a source clip looks at
-    tiles: str = "active"
-    """active: only tiles that a learning Gaussian touches are drawn, compared and differentiated. all: whole pictures.
-    What is learned is the same, bit for bit. Basketball, 640 x 360, a fifth of the tiles active, two shared cores:
-    kernels of a step 9 ms instead of 14, the fastest tenth of the steps 13 ms instead of 19."""
-    backend: str = DEFAULT
-    """What a clip is trained with. cpu: compiled kernels. reference: plain torch, a hundred times slower and for very
-    small pictures only, to compare with; what is learned is the same but for rounding."""
-    sampling: str = "even"
-    """even: every picture once a pass. error: half of the draws go to pictures by their loss, and a picture's loss
-    weighs the less the more often it is drawn, so that on average the gradient is that of even passes. It gives nothing
-    that could be told from chance (one seed): moving pixels of validation cameras, even against error, basketball after
-    1500 steps 24.02 and 24.06 dB, sample 23.31 and 23.28."""
-
-    # what a source clip takes over; every value but the first is an ablation (ClipGStream, ablation studies)
-    decoder: str = "frozen"
-    """frozen: the heads of the reference clip as they are. finetune: they go on learning in every source clip.
-    new: they start afresh in every source clip."""
-    residual: str = "dedup"
-    """dedup: residual anchors where the inherited ones leave space uncovered. none: inherited anchors only. full: all
-    moving points of the clip become residual anchors, beside the inherited ones that cover them."""
-    inherit: str = "frozen"
-    """frozen: inherited anchors keep feature and scales. moving: static ones do, and those moving ones that the clip
-    uses go on learning as its own. trainable: they all start from them and learn. off: the clip builds static and
-    moving anchors of its own; only the decoder is taken over.
-
-    moving against frozen, held-out cameras, later clips: basketball, default steps, moving pixels 26.92 and 26.70 dB,
-    all 29.27 and 29.24, an eighth more bytes; sample, passes=8, 23.1 and 22.4, 27.8 and 27.6, a quarter more bytes.
-    Not the default, since the method freezes all anchors and the gain is smallest where trainings are long."""
-    field: str = "per_clip"
-    """per_clip: every clip learns a field from nothing. continue: the field of the clip before goes on learning, and
-    its last state shows all clips. joint: one clip, and so one field, for the whole capture."""
-    independent: bool = False
-    """Every clip is trained as a reference clip is, and shares nothing with the others."""
-    start: str = "scratch"
-    """Where an independent clip begins. previous: with everything the clip before has learned, and all of it goes on
-    learning; with clips of one frame this streams frame by frame."""
+    decoder: Annotated[
+        str,
+        _choice(
+            SHARING,
+            "Heads of the reference clip in a source clip.",
+            {
+                "frozen": "as they are",
+                "finetune": "they go on learning in every source clip",
+                "new": "they start afresh in every source clip",
+            },
+        ),
+    ] = "frozen"
+    residual: Annotated[
+        str,
+        _choice(
+            SHARING,
+            "Anchors that a source clip adds.",
+            {
+                "dedup": "where the inherited ones leave space uncovered",
+                "none": "none",
+                "full": "all moving points of the clip, beside the inherited ones that cover them",
+            },
+        ),
+    ] = "dedup"
+    inherit: Annotated[
+        str,
+        _choice(
+            SHARING,
+            "Anchors of the reference clip in a source clip.",
+            {
+                "frozen": "they keep feature and scales",
+                "moving": "static ones do, and moving ones that the clip uses go on learning",
+                "trainable": "all of them are a start to learn from",
+                "off": "none; the clip builds its own, and only the decoder is taken over",
+            },
+        ),
+    ] = "frozen"
+    field: Annotated[
+        str,
+        _choice(
+            SHARING,
+            "The field that gives dynamic features.",
+            {
+                "per_clip": "every clip learns its own from nothing",
+                "continue": "one goes on learning from clip to clip, and its last state shows all of them",
+                "joint": "one clip, and so one field, for the whole capture",
+            },
+        ),
+    ] = "per_clip"
+    independent: Annotated[
+        bool, setting(SHARING, "Every clip is trained as a reference clip is, and shares nothing with the others.")
+    ] = False
+    start: Annotated[
+        str,
+        _choice(
+            SHARING,
+            "Where an independent clip begins.",
+            {
+                "scratch": "with nothing learned",
+                "previous": "with all that the clip before has learned, and all of it goes on learning",
+            },
+        ),
+    ] = "scratch"
 
     def __post_init__(self) -> None:
-        for name, (low, high) in _RANGES.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ProjectError(f"{name} is {value}; it has to lie between {low} and {high}.")
-        for name, allowed in _CHOICES.items():
-            value = getattr(self, name)
-            if value not in allowed:
-                listed = f"{', '.join(repr(item) for item in allowed[:-1])} or {allowed[-1]!r}"
-                raise ProjectError(f"{name} is {value!r}; it has to be {listed}.")
+        for name, declared in SETTINGS.items():
+            declared.check(getattr(self, name))
         if self.independent and self.field == "continue":
             raise ProjectError(
                 "independent clips cannot continue each other's field.", hint="Leave out field=continue."
             )
-        shared = [name for name in _SHARING if getattr(self, name) != _CHOICES[name][0]]
+        shared = [name for name in ("decoder", "residual", "inherit") if name in self.difference()]
         if self.independent and shared:
             listed = ", ".join(f"{name}={getattr(self, name)}" for name in shared)
             raise ProjectError(
@@ -238,15 +335,14 @@ class TrainConfig:
         if self.start == "previous" and not self.independent:
             raise ProjectError("start=previous needs independent=true.", hint="Add it, or leave out start=previous.")
 
-    def difference(self) -> dict[str, Any]:
+    def difference(self) -> dict[str, Value]:
         """Only the values that differ from the defaults."""
-        default = TrainConfig()
-        return {name: value for name, value in asdict(self).items() if value != getattr(default, name)}
+        return {name: value for name, s in SETTINGS.items() if (value := getattr(self, name)) != s.default}
 
     def going_on(self) -> TrainConfig:
         """Settings of a clip with start=previous: those of a source clip, and everything inherited learns."""
         learning = {"inherit": "trainable", "decoder": "finetune", "field": "continue"}
-        return replace(self, independent=False, start="scratch", **learning)
+        return msgspec.structs.replace(self, independent=False, start="scratch", **learning)
 
     @property
     def keeps_static(self) -> bool:
@@ -265,106 +361,38 @@ class TrainConfig:
         """Steps of a source clip with this many training pictures."""
         return self.source_steps or self._n_pass_steps(n_pictures) or SOURCE_RULE.steps(n_pictures)
 
-    def n_coarse_steps(self, n_steps: int) -> int:
-        """How many of the steps of a phase, the first ones, look at pictures of half size."""
-        return int(self.coarse_share * n_steps)
-
     def _n_pass_steps(self, n_pictures: int) -> int:
         return math.ceil(self.passes * n_pictures)
 
 
-_RANGES: dict[str, tuple[float, float]] = {
-    "static_feature_dim": (1, 256),
-    "dynamic_feature_dim": (1, 256),
-    "gaussians_per_anchor": (1, 32),
-    "head_hidden": (4, 1024),
-    "field_hidden": (4, 1024),
-    "field_channels": (1, 16),
-    "field_base_cells": (2, 64),
-    "field_growth": (1.1, 4.0),
-    "field_max_levels": (1, 16),
-    "field_log2_entries": (0, 20),
-    "max_static_points": (1, 1_000_000),
-    "max_moving_points": (1, 1_000_000),
-    "background_frames": (2, 1000),
-    "static_steps": (0, 1_000_000),
-    "joint_steps": (0, 1_000_000),
-    "source_steps": (0, 1_000_000),
-    "passes": (0.0, 1000.0),
-    "coarse_share": (0.0, 1.0),
-    "patience": (0, 1000),
-    "field_levels": (0, 16),
-    "feature_lr": (0.0, 1.0),
-    "scale_lr": (0.0, 1.0),
-    "table_lr": (0.0, 1.0),
-    "field_mlp_lr": (0.0, 1.0),
-    "opacity_head_lr": (0.0, 1.0),
-    "shape_head_lr": (0.0, 1.0),
-    "color_head_lr": (0.0, 1.0),
-    "offset_head_lr": (0.0, 1.0),
-    "gain_lr": (0.0, 1.0),
-    "final_lr_ratio": (1e-6, 1.0),
-    "feature_final_ratio": (0.0, 1.0),
-    "scale_final_ratio": (0.0, 1.0),
-    "field_final_ratio": (0.0, 1.0),
-    "opacity_head_final_ratio": (0.0, 1.0),
-    "shape_head_final_ratio": (0.0, 1.0),
-    "color_head_final_ratio": (0.0, 1.0),
-    "offset_head_final_ratio": (0.0, 1.0),
-    "ssim_weight": (0.0, 1.0),
-    "volume_weight": (0.0, 10.0),
-    "max_gradient_norm": (0.0, 1e6),
-}
+SETTINGS = settings_of(TrainConfig)
+"""Every setting by name, in the order of their declaration."""
 
 
-_CHOICES: dict[str, tuple[str, ...]] = {
-    "color": ("auto", "gain", "off"),
-    "gate": ("hull", "images", "static", "off"),
-    "field_tables": ("shared", "per_frame"),
-    "decoder": ("frozen", "finetune", "new"),
-    "residual": ("dedup", "none", "full"),
-    "inherit": ("frozen", "moving", "trainable", "off"),
-    "field": ("per_clip", "continue", "joint"),
-    "start": ("scratch", "previous"),
-    "tiles": ("active", "all"),
-    "backend": tuple(BACKENDS),
-    "sampling": ("even", "error"),
-}
-_SHARING = ("decoder", "residual", "inherit")
-"""Settings of what a source clip takes over. The first choice of each is the default."""
-_BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
-
-_WORDS = {bool: "true or false", float: "a number", int: "a whole number"}
-
-
-def _parse_bool(text: str) -> bool:
-    try:
-        return _BOOLEANS[text.lower()]
-    except KeyError as error:
-        raise ValueError(text) from error
-
-
-def parse_overrides(assignments: Sequence[str]) -> dict[str, Any]:
-    """Turn ["key=value", ...] into keyword arguments of TrainConfig.
+def config_of(values: Mapping[str, Any]) -> TrainConfig:
+    """The settings with these values, all others at their defaults.
 
     Raises:
-        ProjectError: An assignment is malformed, a key is unknown or a value has the wrong type.
+        ProjectError: A setting does not exist, or may not have its value.
     """
-    kinds: dict[str, type] = {f.name: type(f.default) for f in fields(TrainConfig) if f.default is not MISSING}
-    values: dict[str, Any] = {}
+    unknown = sorted(values.keys() - SETTINGS.keys())
+    if unknown:
+        raise ProjectError(f"There is no training setting called {', '.join(unknown)}.", hint="Take it out.")
+    return TrainConfig(**values)
+
+
+def parse_overrides(assignments: Sequence[str]) -> dict[str, Value]:
+    """Turn ["key=value", ...] into values of settings, as far as each can be checked by itself.
+
+    Raises:
+        ProjectError: An assignment is malformed, a setting does not exist, or it may not have its value.
+    """
+    values: dict[str, Value] = {}
     for assignment in assignments:
-        key, separator, text = assignment.partition("=")
-        key = key.strip()
+        name, separator, text = (part.strip() for part in assignment.partition("="))
         if not separator:
             raise ProjectError(f"Setting '{assignment}' has no '='.", hint="Write it as key=value.")
-        if key not in kinds:
-            raise ProjectError(
-                f"Setting '{key}' does not exist.",
-                hint=f"Known settings: {', '.join(sorted(kinds))}.",
-            )
-        try:
-            parse: Callable[[str], Any] = _parse_bool if kinds[key] is bool else kinds[key]
-            values[key] = parse(text.strip())
-        except ValueError as error:
-            raise ProjectError(f"Setting '{key}' is '{text}', which is not {_WORDS[kinds[key]]}.") from error
+        if name not in SETTINGS:
+            raise ProjectError(f"Setting '{name}' does not exist.", hint=f"Known settings: {', '.join(SETTINGS)}.")
+        values[name] = SETTINGS[name].parse(text)
     return values

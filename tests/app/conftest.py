@@ -11,13 +11,14 @@ import pytest
 
 from app.cli.cli import main
 from app.plan import speed
-from app.project.project import Project
+from app.project.opened_project import OpenedProject, opened_project
+from app.project.project import Project, create_project, default_settings
 from app.session.commands import OpenCapture
 from app.session.session import Session
 from app.session.settings import Settings
 from app.training.interface import MakeTraining
 from app.training.messages import TrainJob
-from engine.training.plan.forecasting import MachineSpeed
+from engine.capture.capture import open_capture
 from tests.app.fakes import make_fake, write_capture
 from tests.app.inline_worker import InlineWorker
 
@@ -40,7 +41,8 @@ def own_user_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(autouse=True)
 def known_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     """No test measures how fast this machine is."""
-    monkeypatch.setattr(speed, "machine_speed", lambda: MachineSpeed(2.0, "made up for a test"))
+    monkeypatch.setattr(speed, "is_cache_warm", lambda: True)
+    monkeypatch.setattr(speed, "_timed_once", lambda sizes, phase: 0.0123)
 
 
 def inline(job: TrainJob, project: Project, make_training: MakeTraining = make_fake) -> InlineWorker:
@@ -67,6 +69,23 @@ def poll_until(session: Session, is_done: Callable[[], bool], *, what: str = "th
         assert time.monotonic() < until_s, f"{what} did not come; {session.training} {list(session.notices)}"
         session.poll()
         time.sleep(0)  # lets threads run; nothing is awaited by it
+
+
+@pytest.fixture
+def make_opened(tmp_path: Path, capture_folder: Path) -> Iterator[Callable[..., OpenedProject]]:
+    """Opens new projects of the tiny capture in clips of three frames, nothing trained; closes them in the end."""
+    made: list[OpenedProject] = []
+
+    def make(name: str = "p", *, generation: int = 1) -> OpenedProject:
+        capture = open_capture(capture_folder)
+        project = create_project(tmp_path / name, default_settings(capture, clip_length=3))
+        made.append(opened_project(capture, project, generation))
+        return made[-1]
+
+    yield make
+    for opened in made:
+        opened.project.close()
+        opened.capture.close()
 
 
 @pytest.fixture

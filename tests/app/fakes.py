@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from app.project.opened_project import OpenedProject
 from app.project.project import open_project
 from app.training.messages import TrainJob
 from engine.capture.capture import Capture, open_capture
@@ -162,6 +163,18 @@ class FakeTraining:
         return 20.0 + self.steps_done
 
 
+def write_trained(opened: OpenedProject, clip_index: int, *, n_steps: int = N_STEPS) -> Path:
+    """A finished clip of an open project, as the fake trains it."""
+    reference = None if clip_index == 0 else read_clip_state(opened.project.clip_path(0))
+    training = FakeTraining(opened.capture, opened.clips[clip_index], reference, lambda _: None, n_steps=n_steps)
+    for _ in range(n_steps):
+        training.step()
+    path = opened.project.clip_path(clip_index)
+    path.parent.mkdir(exist_ok=True)
+    write_clip_state(path, training.state())
+    return path
+
+
 def make_fake(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining:
     """Builds a FakeTraining from a job as the real builder would. Overrides go unused but `joint_steps` sets n_steps
     and `static_steps` the step that fails."""
@@ -172,13 +185,14 @@ def make_fake(job: TrainJob, report: Callable[[Progress], None]) -> FakeTraining
     reference = None if job.clip_index == first else read_clip_state(project.clip_path(first))
     goes_on = job.clip_index > 0 and job.overrides.get("field") == "continue"
     previous = read_clip_state(project.clip_path(project.previous_index(job.clip_index))) if goes_on else None
+    fails_at = job.overrides.get("static_steps")
     return FakeTraining(
         capture,
         clip,
         reference,
         report,
-        n_steps=job.overrides.get("joint_steps") or N_STEPS,
-        fails_at=job.overrides.get("static_steps"),
+        n_steps=int(job.overrides.get("joint_steps") or N_STEPS),
+        fails_at=None if fails_at is None else int(fails_at),
         previous=previous,
     )
 

@@ -26,7 +26,7 @@ def live_session(make_session, monkeypatch):
 
 
 def revision_of(session) -> str:
-    shown = session._service.shown_state(0)
+    shown = session.live_training.service.shown_state(0)
     return "" if shown is None else shown.revision
 
 
@@ -49,7 +49,7 @@ def test_the_states_of_the_fake_training_are_those_of_a_clip(make_session):
 
 def test_a_live_state_is_shown_and_given_back(live_session, caplog):
     session = live_session
-    caplog.set_level(logging.INFO, logger="app.session.session")
+    caplog.set_level(logging.INFO, logger="app.session.live_training")
     shown = []
 
     def is_another_shown() -> bool:
@@ -77,17 +77,17 @@ def test_a_live_state_is_given_back_when_nobody_looks_at_its_clip(make_session, 
     session.dispatch(c.SetFrame(4))
     session.dispatch(c.TrainNextClip())
     poll_until(session, lambda: revision_of(session) == "live-1-3", what="snapshots that nobody waits for")
-    assert session._playback.worker.newest is None
+    assert session.playback.decoder.worker.newest is None
 
 
 def test_a_live_state_that_is_gone_costs_no_notice_and_the_next_one_is_shown(live_session, monkeypatch):
     session = live_session
     poll_until(session, lambda: revision_of(session) != "")
     poll_until(session, lambda: session.shown_gaussians() is not None, what="the first live state")
-    session._playback.clear()  # so that the snapshot is read from its file again
-    snapshot = session._service.shown_state(0).file
+    session.playback.decoder.clear()  # so that the snapshot is read from its file again
+    snapshot = session.live_training.service.shown_state(0).file
     snapshot.unlink()
-    poll_until(session, lambda: session._service.shown_state(0).file != snapshot, what="the next snapshot")
+    poll_until(session, lambda: session.live_training.service.shown_state(0).file != snapshot, what="the next snapshot")
     poll_until(session, lambda: session.wanted_frame().is_loaded, what="a live state after that")
     assert len(session.notices) == 0
 
@@ -96,7 +96,7 @@ def test_a_trained_state_that_is_gone_is_told(make_session):
     session = make_session()
     session.dispatch(c.TrainNextClip())
     poll_until(session, lambda: session.clip_states[0].state == "trained")
-    session._playback.clear()
+    session.playback.decoder.clear()
     session.project.clip_path(0).unlink()
     session.shown_gaussians()
     poll_until(session, lambda: any(notice.kind == "error" for notice in session.notices))

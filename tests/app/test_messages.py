@@ -18,7 +18,9 @@ _VALUES = {
     "int | None": st.none() | st.integers(-255, 255),
     "float | None": st.none() | st.floats(allow_nan=False),
     "tuple[int, ...]": st.lists(st.integers(0, 100), max_size=5).map(tuple),
-    "dict[str, Any]": st.dictionaries(st.text(), st.integers() | st.text() | st.floats(allow_nan=False), max_size=4),
+    "dict[str, SettingValue]": st.dictionaries(
+        st.text(), st.integers() | st.text() | st.floats(allow_nan=False), max_size=4
+    ),
 }
 
 

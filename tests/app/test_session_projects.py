@@ -48,10 +48,10 @@ def test_recent_lists_the_project_and_how_far_it_is_trained(open_session, make_s
     session = make_session(name="own")
     session.dispatch(c.SetClipLength(3))
     train_next(session)
-    assert (session.opened.name, session.opened.trained_text) == ("own", "1 of 2 clips trained")
+    assert (session.project_status.name, session.project_status.trained_text) == ("own", "1 of 2 clips trained")
     session.close()
     again = open_session(None)
-    (entry,) = again.settings.recent
+    (entry,) = again.recent.entries
     assert (entry.folder, entry.n_trained, entry.n_clips) == (tmp_path / "own", 1, 2)
     again.dispatch(c.OpenProject(entry.folder))
     poll_until(again, lambda: again.capture is not None, what="the project")
@@ -112,9 +112,9 @@ def test_what_is_gone_is_known_and_can_be_removed(open_session, make_session, tm
     make_session(name="own").close()
     (tmp_path / "own" / "project.json").unlink()
     session = open_session(None)
-    poll_until(session, lambda: session.missing == {tmp_path / "own"}, what="a look at the disk")
+    poll_until(session, lambda: session.recent.missing == {tmp_path / "own"}, what="a look at the disk")
     session.dispatch(c.ForgetRecent(tmp_path / "own"))
-    assert Settings(session.settings.path).recent == []
+    assert Settings(tmp_path / "settings.json").recent == []
 
 
 def test_training_a_finished_clip_again_is_asked_first(make_session):
@@ -148,7 +148,7 @@ def test_a_damaged_clip_is_shown_as_such_and_only_trained_again_when_confirmed(m
     session = make_session(name="own")
     assert [state.state for state in session.clip_states] == ["trained", "damaged", "untrained"]
     assert "damaged" in session.clip_states[1].reason
-    assert session.opened.n_trained == 1
+    assert session.project_status.n_trained == 1
     train_next(session)  # the one after it
     assert [state.state for state in session.clip_states] == ["trained", "damaged", "trained"]
     train_next(session)

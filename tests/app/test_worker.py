@@ -14,8 +14,8 @@ from app.training.process import ProcessWorker
 from app.training.service import TrainingService
 from app.training.worker import n_training_threads
 from engine.clip_files.clip_state import read_clip_state
-from engine.conventions import SPIN_COUNT
 from engine.kernels.cache import kernel_folder
+from engine.kernels.threads import SPIN_COUNT
 from tests.app.conftest import DEADLINE_S, poll_until
 from tests.app.fakes import N_STEPS, make_crashing, make_fake, make_slow, make_telling
 
@@ -61,7 +61,7 @@ def test_a_killed_worker_is_told_and_training_goes_on_from_what_was_kept(make_se
     kept = session.project.checkpoint_path(0)
     poll_until(session, kept.is_file, what="the checkpoint")
     step = read_clip_state(kept).header.step
-    session._service.worker.process.kill()
+    session.live_training.service.worker.process.kill()
     poll_until(session, lambda: session.training.state == "failed")
     assert "signal 9" in session.notices[-1].detail
     assert session.clip_states[0].state == "failed"
@@ -86,7 +86,7 @@ def test_closing_ends_the_process_and_keeps_what_it_learned(make_session, monkey
     session = make_session(launch=launch(make_slow))
     session.dispatch(c.TrainNextClip())
     poll_until(session, lambda: session.training.step >= 1)
-    child = session._service.worker.process
+    child = session.live_training.service.worker.process
     project = session.project
     session.close()
     assert not child.is_alive()

@@ -105,7 +105,7 @@ def measure(folder: Path, n_clips: int) -> tuple[float, Calls]:
         turn("scrubbing")
     calls.time("asking before training again", lambda: session.dispatch(commands.TrainClip(0)))
     session.dispatch(commands.CloseQuestion())
-    service = session._service
+    service = session.live_training.service
     assert service is not None
     calls.time("the end of a training: states", lambda: service.catalog.update(n_clips // 2))
     calls.time("the end of a training: refresh", lambda: session.dispatch(commands.SetFrame(0)))

@@ -37,7 +37,8 @@ from engine.progress import Progress
 from engine.synthetic.raycast import make_truth
 from engine.synthetic.scene import make_scene
 from engine.training.clip_training import ClipTraining
-from engine.training.config import TrainConfig, parse_overrides
+from engine.training.config import TrainConfig, config_of, parse_overrides
+from engine.training.variants.variant_method import method_of
 from tests.benchmarks.options import ending_on_bad_input
 
 COLUMNS = (
@@ -72,6 +73,7 @@ def train(
         capture,
         clip,
         config=config,
+        method=method_of(config, previous=None),
         holdout=holdout,
         reference=reference,
         seed=0,
@@ -172,7 +174,7 @@ def main() -> None:
         capture = open_capture(args.capture, scale=args.scale)
         names = args.holdout.split(",") if args.holdout else list(capture.default_holdout)
         holdout = capture.camera_indices(names)
-        config = TrainConfig(**parse_overrides(args.set))
+        config = config_of(parse_overrides(args.set))
     clips = split_clips(capture.n_frames, args.clip_length)[: args.clips]
     versions = f"torch {torch.__version__}, Python {platform.python_version()}, {torch.get_num_threads()} threads"
     versions += f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""

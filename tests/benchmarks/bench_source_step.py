@@ -33,6 +33,7 @@ from engine.capture.clip import Clip, split_clips
 from engine.raster.gaussians import Gaussians
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
+from engine.training.variants.variant_method import method_of
 from tests.benchmarks.options import ending_on_bad_input
 
 SCHEMES = {
@@ -75,7 +76,8 @@ def make_source(capture: Capture, clips: list[Clip], holdout: list[int], overrid
         make = partial(
             ClipTraining,
             capture,
-            config=TrainConfig(**(overrides | REFERENCE_STEPS)),
+            config=(config := TrainConfig(**(overrides | REFERENCE_STEPS))),
+            method=method_of(config, previous=None),
             backend=backend_called(),
             holdout=holdout,
             seed=0,

@@ -22,7 +22,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from engine.backends.table import backend_called
-from engine.conventions import SPIN_COUNT
+from engine.kernels.threads import SPIN_COUNT
 
 ROOT = Path(__file__).resolve().parents[2]
 VARIABLES = ("GOMP_SPINCOUNT", "OMP_WAIT_POLICY", "KMP_BLOCKTIME")

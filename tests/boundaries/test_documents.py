@@ -8,6 +8,7 @@ import pytest
 from tests.documents.blocks import GENERATORS, block_names, documents, filled
 from tests.documents.commands import command_sections
 from tests.documents.keys import key_tables
+from tests.documents.settings import presets_table, settings_tables
 from tests.documents.table import table
 from tests.documents.tree import ROOT
 
@@ -59,6 +60,10 @@ def test_blocks_hold_what_they_are_for() -> None:
     assert "### `clipgstream eval PROJECT --json OUT [options]`" in sections
     assert "| `--size WxH` | window size in pixels, for example 1440x900 |" in sections
     assert r"| `--metrics quick\|all` |" in sections
+    assert "| `gaussians_per_anchor` | `5` | 1 to 32 Gaussians | Gaussians that each anchor is decoded to. |" in (
+        settings_tables()
+    )
+    assert "| `passes` | 4 | 0 | 16 | 34 |" in presets_table()
 
 
 def test_bars_inside_cells_do_not_end_them() -> None:

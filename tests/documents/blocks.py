@@ -8,12 +8,15 @@ from pathlib import Path
 
 from tests.documents.commands import command_sections
 from tests.documents.keys import key_tables
+from tests.documents.settings import presets_table, settings_tables
 from tests.documents.tree import ROOT, tree_block
 
 GENERATORS: dict[str, Callable[[], str]] = {
     "tree": tree_block,
     "keys": key_tables,
     "commands": command_sections,
+    "settings": settings_tables,
+    "presets": presets_table,
 }
 """What each block is filled with."""
 _BLOCK = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)

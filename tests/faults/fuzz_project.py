@@ -107,7 +107,7 @@ def _checkpoint(state: Any) -> Any:
 
     order = ShuffledOrder(6, 3)
     order.draw()
-    place = Place(order=order.state(), schedule=[1.0, 0.5], patience=None, **PLACE)
+    place = Place(order=order.state(), **PLACE)
     return Checkpoint(state, np.ones((2, 3), np.float32), _backgrounds(), place)
 
 

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
@@ -32,8 +30,8 @@ from app.status import (
     TrainingStatus,
     WantedFrame,
 )
-from engine.camera.rig import CameraRig
-from engine.capture.clip import split_clips
+from engine.camera.rig import NO_CAMERAS, CameraRig
+from engine.capture.clip import Clip, split_clips
 from engine.gate.regions import GateRegion, sphere_region
 
 
@@ -69,23 +67,31 @@ class FakeCapture:
     fps: float = 30.0
 
 
+@dataclass
+class FakeRecent:
+    """What the panels read of RecentProjects."""
+
+    entries: list[RecentProject]
+    missing: frozenset[Path]
+
+
 class FakeSession:
     """See the module docstring. `has_capture=False` starts empty."""
 
     def __init__(self, *, has_capture: bool = True, seed: int = 0) -> None:
-        self.commands: list[Any] = []
+        self.commands: list[commands.Command] = []
         self.notices = Notices()
         self.jobs: list[JobStatus] = []
         self.overlays = Overlays()
-        self.settings = SimpleNamespace(
-            recent=[
+        self.recent = FakeRecent(
+            entries=[
                 RecentProject("/projects/kitchen-toy", "/captures/kitchen", "kitchen-toy", 2, 3),
                 RecentProject("/projects/gone", "/captures/dance_floor", "gone", 1, 70),
                 RecentProject("", "/captures/dance_floor", "dance_floor"),
-            ]
+            ],
+            missing=frozenset({Path("/projects/gone")}),
         )
-        self.missing = frozenset({Path("/projects/gone")})
-        self.opened: ProjectStatus | None = None
+        self.project_status: ProjectStatus | None = None
         self.question: Question | None = None
         self.training = TrainingStatus(can_train_next=True, next_clip_index=0)
         self.plan: PlanStatus | None = PlanStatus(
@@ -116,8 +122,8 @@ class FakeSession:
         )
         self.regions = RegionsStatus(why_not="Open a capture first.")
         self.capture: FakeCapture | None = None
-        self.rig: CameraRig | None = None
-        self.clips: list[Any] = []
+        self.rig: CameraRig = NO_CAMERAS
+        self.clips: list[Clip] = []
         self.clip_states: list[ClipStatus] = []
         self.project = None
         self.timeline = Timeline()
@@ -129,12 +135,12 @@ class FakeSession:
         self.capture, self.rig = capture, capture.rig
         self.clips = split_clips(capture.n_frames, 10)
         self.clip_states = [ClipStatus() for _ in self.clips]
-        self.opened = ProjectStatus("juggling", Path("/projects/juggling"), 1, len(self.clips))
+        self.project_status = ProjectStatus("juggling", Path("/projects/juggling"), 1, len(self.clips))
         self.timeline = Timeline(self.clips, fps=capture.fps)
         self.view = OrbitView(capture.rig)
         self.regions = RegionsStatus(can_mark=True, effect="Marks apply to clips whose training starts from now on.")
 
-    def dispatch(self, command: Any) -> None:
+    def dispatch(self, command: commands.Command) -> None:
         """Record the command; carry out what needs no worker."""
         self.commands.append(command)
         match command:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from pyglet.window import key
 
-import app.playback.playback
+import app.playback.frame_decoder
 from app.session import commands as c
 from app.session.session import Session
 from app.session.settings import Settings
@@ -67,14 +67,14 @@ class Reader:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.may_go_on = threading.Event()
         self.may_go_on.set()
-        read = app.playback.playback.read_clip_state
+        read = app.playback.frame_decoder.read_clip_state
 
         def read_and_wait(path: Path) -> ClipState:
             state = read(path)
             assert self.may_go_on.wait(WAIT_S)
             return state
 
-        monkeypatch.setattr(app.playback.playback, "read_clip_state", read_and_wait)
+        monkeypatch.setattr(app.playback.frame_decoder, "read_clip_state", read_and_wait)
 
 
 @pytest.fixture
@@ -154,7 +154,7 @@ def test_a_cloud_stands_in_for_a_clip_that_loads_and_says_what_is_missing(window
     window.key(key._4)
     show_frame(window, 0)
     reader.may_go_on.clear()
-    window.session._playback.clear()  # as when the project was just opened
+    window.session.playback.decoder.clear()  # as when the project was just opened
     window.draw(3)
     assert scene.shows == CLOUD
     assert hud(window).pending == "loading clip 0"

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
+from app.playback.arrays import Picture
+from app.playback.orbit_view import OrbitView
 from app.session.commands import LookThrough
+from engine.camera.rig import CameraRig
+from engine.capture.clip import Clip
+from ui.gl.image import ImageTexture
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import elided, pop_bold, push_bold, text_wrapped_dim
 from ui.style import theme
@@ -20,6 +27,43 @@ HELD_OUT_WORDS = ("held out", "test")
 """The longest that there is room for."""
 
 
+class CaptureFacts(Protocol):
+    """What the summary shows of a capture."""
+
+    @property
+    def path(self) -> Path: ...
+
+    @property
+    def format(self) -> str: ...
+
+    @property
+    def rig(self) -> CameraRig: ...
+
+    @property
+    def n_frames(self) -> int: ...
+
+    @property
+    def fps(self) -> float: ...
+
+
+class CaptureNeeds(Protocol):
+    """What this panel reads."""
+
+    @property
+    def capture(self) -> CaptureFacts | None: ...
+
+    @property
+    def clips(self) -> Sequence[Clip]: ...
+
+    @property
+    def view(self) -> OrbitView: ...
+
+    @property
+    def holdout(self) -> tuple[int, ...]: ...
+
+    def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None: ...
+
+
 class CapturePanel:
     """Draws the list; owns the thumbnail textures and nothing else.
 
@@ -27,10 +71,10 @@ class CapturePanel:
         make_texture: Makes an empty texture with `set(image)`, `texture` and `release()` (ui.gl.ImageTexture).
     """
 
-    def __init__(self, make_texture: Any) -> None:
+    def __init__(self, make_texture: Callable[[], ImageTexture]) -> None:
         self._make_texture = make_texture
-        self._thumbnails: dict[int, Any] = {}
-        self._capture_path: Any = None
+        self._thumbnails: dict[int, ImageTexture] = {}
+        self._capture_path: Path | None = None
         self._filter = ""
         self._shown_camera: int | None = None
         self.is_waiting = False
@@ -42,7 +86,7 @@ class CapturePanel:
             texture.release()
         self._thumbnails.clear()
 
-    def draw(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: CaptureNeeds, dispatch: Dispatch, ui: UiState) -> None:
         """Summary, then one row per camera."""
         capture = session.capture
         if capture is None:
@@ -51,18 +95,17 @@ class CapturePanel:
         if capture.path != self._capture_path:
             self.release()
             self._capture_path = capture.path
-        self._draw_summary(session, ui)
+        self._draw_summary(capture, session, ui)
         is_free = session.view.look_through is None
         if imgui.selectable(f"{Icon.EYE}  Free view", is_free, 0, ImVec2(0, 24))[0] and not is_free:
             dispatch(LookThrough(None))
         ui.mark("capture.free")
         imgui.separator()
         if imgui.begin_child("cameras"):
-            self._draw_cameras(session, dispatch, ui)
+            self._draw_cameras(capture.rig, session, dispatch, ui)
         imgui.end_child()
 
-    def _draw_summary(self, session: Any, ui: UiState) -> None:
-        capture = session.capture
+    def _draw_summary(self, capture: CaptureFacts, session: CaptureNeeds, ui: UiState) -> None:
         push_bold(ui, ui.fonts.body_size + 1)
         imgui.text(elided(capture.path.name, imgui.get_content_region_avail().x))
         pop_bold(ui)
@@ -70,14 +113,13 @@ class CapturePanel:
         seconds = capture.n_frames / max(capture.fps, 1e-6)
         n_cameras, n_frames = format_count(len(capture.rig)), format_count(capture.n_frames)
         text_wrapped_dim(f"{n_cameras} cameras, {n_frames} frames, {seconds:.1f} s")
-        held_out = held_out_cameras(session)
+        held_out = frozenset(session.holdout)
         measured = f" - {len(held_out)} held out for measuring" if held_out else ""
         text_wrapped_dim(f"{format_count(len(session.clips))} clips{measured}")
         imgui.spacing()
 
-    def _draw_cameras(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
-        rig = session.capture.rig
-        held_out = held_out_cameras(session)
+    def _draw_cameras(self, rig: CameraRig, session: CaptureNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        held_out = frozenset(session.holdout)
         shown = session.view.look_through
         has_asked = False
         self.is_waiting = False
@@ -103,7 +145,7 @@ class CapturePanel:
         if shown is None:
             self._shown_camera = None
 
-    def _ask_thumbnail(self, session: Any, index: int, has_asked: bool, ui: UiState) -> bool:
+    def _ask_thumbnail(self, session: CaptureNeeds, index: int, has_asked: bool, ui: UiState) -> bool:
         """One missing thumbnail is asked for per frame, so that decoding never crowds out the viewport."""
         if index in self._thumbnails or has_asked:
             return has_asked
@@ -116,7 +158,9 @@ class CapturePanel:
         ui.redraw_within(0.1)
         return True
 
-    def _draw_row(self, ui: UiState, row: Rect, index: int, rig: Any, is_held_out: bool, *, is_shown: bool) -> bool:
+    def _draw_row(
+        self, ui: UiState, row: Rect, index: int, rig: CameraRig, is_held_out: bool, *, is_shown: bool
+    ) -> bool:
         """Picture, name and size of a camera. Whether its name had to be cut."""
         draw = imgui.get_window_draw_list()
         if is_shown:
@@ -164,8 +208,3 @@ def crop_to(image_aspect: float, box_aspect: float) -> tuple[ImVec2, ImVec2]:
     share_x = min(box_aspect / image_aspect, 1.0)
     share_y = min(image_aspect / box_aspect, 1.0)
     return ImVec2(0.5 - share_x / 2, 0.5 - share_y / 2), ImVec2(0.5 + share_x / 2, 0.5 + share_y / 2)
-
-
-def held_out_cameras(session: Any) -> frozenset[int]:
-    """Camera indices that training never sees."""
-    return frozenset(int(index) for index in getattr(session, "holdout", ()) or ())

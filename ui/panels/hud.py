@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
+from app.playback.orbit_view import OrbitView
+from app.playback.timeline import Timeline
+from app.status import ClipStatus, Overlays, RegionsStatus, WantedFrame
+from engine.camera.rig import CameraRig
 from ui.panels.regions import draw_region_mark
 from ui.panels.state import Rect, UiState
 from ui.panels.timeline import STATE_WORDS
@@ -26,6 +30,33 @@ LINE_HEIGHT, GAP, MARGIN = 24.0, 8.0, 12.0
 BUSY_WIDTH = 20.0
 LEGEND_WIDTH = 760.0
 """In a picture at least this wide, units, the legend stands beside what is being chosen."""
+
+
+class HudNeeds(Protocol):
+    """What the words over the picture depend on."""
+
+    @property
+    def timeline(self) -> Timeline: ...
+
+    @property
+    def view(self) -> OrbitView: ...
+
+    @property
+    def overlays(self) -> Overlays: ...
+
+    @property
+    def clip_states(self) -> Sequence[ClipStatus]: ...
+
+    @property
+    def rig(self) -> CameraRig: ...
+
+    @property
+    def holdout(self) -> tuple[int, ...]: ...
+
+    @property
+    def regions(self) -> RegionsStatus: ...
+
+    def wanted_frame(self) -> WantedFrame | None: ...
 
 
 def wrapped(text: str, width: float, measure: Callable[[str], float]) -> list[str]:
@@ -48,7 +79,7 @@ class Hud:
         self.text: HudText | None = None
         """What the newest frame says."""
 
-    def draw(self, session: Any, ui: UiState, area: Rect, scene: Scene) -> None:
+    def draw(self, session: HudNeeds, ui: UiState, area: Rect, scene: Scene) -> None:
         """Everything that stands over the picture."""
         self.text = self._text(session, scene)
         if self.text is not None:
@@ -58,7 +89,7 @@ class Hud:
         if not ui.regions.is_active or area.width >= LEGEND_WIDTH:  # what is being chosen needs the room
             self._draw_legend(session, ui, scene, area)
 
-    def _text(self, session: Any, scene: Scene) -> HudText | None:
+    def _text(self, session: HudNeeds, scene: Scene) -> HudText | None:
         wanted, timeline, shown = session.wanted_frame(), session.timeline, scene.shown
         shown_frame = shown.source.frame_index
         if wanted is None:
@@ -119,7 +150,7 @@ class Hud:
             x, row_height = plate.x1 + GAP, max(row_height, height)
         ui.mark_rect("viewport.free", Rect(area.x0, area.y0, area.x1, bottom - row_height))
 
-    def _draw_legend(self, session: Any, ui: UiState, scene: Scene, area: Rect) -> None:
+    def _draw_legend(self, session: HudNeeds, ui: UiState, scene: Scene, area: Rect) -> None:
         draw = imgui.get_window_draw_list()
         is_labelled = session.overlays.compare == "wipe" and session.view.look_through is not None
         y = (ui.rects["viewport.rendered"].y0 + 44) if is_labelled else area.y0 + 12
@@ -139,14 +170,14 @@ class Hud:
             y += 28
 
 
-def _draw_busy(draw: Any, middle: ImVec2, color: theme.Color) -> None:
+def _draw_busy(draw: imgui.ImDrawList, middle: ImVec2, color: theme.Color) -> None:
     """Three quarters of a circle that turns in eighths."""
     turn = math.tau * int(time.perf_counter() / BUSY_REDRAW_S) / 8
     draw.path_arc_to(middle, 5.5, turn, turn + 0.75 * math.tau, 16)
     draw.path_stroke(theme.u32(color), 2.0)
 
 
-def legend_rows(session: Any, scene: Scene) -> list[tuple[str, theme.Color, str]]:
+def legend_rows(session: HudNeeds, scene: Scene) -> list[tuple[str, theme.Color, str]]:
     """Shape, colour and words of what is marked."""
     counts, rows = scene.counts, []
     clip_index, frame_index = counts.source.clip_index, counts.source.frame_index

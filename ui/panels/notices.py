@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.commands import DismissNotice
+from app.session.notices import Notice, Notices
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.style import theme
 from ui.style.theme import Icon
@@ -26,7 +27,14 @@ _LOOKS = {
 }
 
 
-def notice_text(notice: Any) -> str:
+class NoticesNeeds(Protocol):
+    """What the toasts read."""
+
+    @property
+    def notices(self) -> Notices: ...
+
+
+def notice_text(notice: Notice) -> str:
     """Everything a notice says, for the clipboard."""
     return "\n".join(part for part in (notice.title, notice.detail, notice.hint) if part)
 
@@ -37,7 +45,7 @@ class NoticesPanel:
     def __init__(self) -> None:
         self._seen_s: dict[int, float] = {}
 
-    def draw(self, session: Any, dispatch: Dispatch, ui: UiState, area: Rect) -> None:
+    def draw(self, session: NoticesNeeds, dispatch: Dispatch, ui: UiState, area: Rect) -> None:
         """Newest at the bottom, at most MAX_TOASTS, stacked up from the lower right corner of the area."""
         notices = list(session.notices)
         now_s = time.monotonic()
@@ -55,7 +63,7 @@ class NoticesPanel:
                 ui.redraw_within(max(lifetime_s - age_s, 0.05))
             y -= self._draw_toast(index, notice, dispatch, ui, ImVec2(right, y)) + 8
 
-    def _draw_toast(self, index: int, notice: Any, dispatch: Dispatch, ui: UiState, corner: ImVec2) -> float:
+    def _draw_toast(self, index: int, notice: Notice, dispatch: Dispatch, ui: UiState, corner: ImVec2) -> float:
         icon, color = _LOOKS.get(notice.kind, _LOOKS["info"])
         imgui.set_next_window_pos(corner, imgui.Cond_.always, ImVec2(1.0, 1.0))
         imgui.set_next_window_size(ImVec2(TOAST_WIDTH, 0))

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import SetPreset, SetTrainSetting
+from app.status import PlanStatus
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import text_wrapped_dim
 
@@ -14,7 +13,7 @@ LINES_HEIGHT = 170.0
 FIELD_WIDTH = 110.0
 
 
-def draw_plan(plan: Any, dispatch: Dispatch, ui: UiState) -> None:
+def draw_plan(plan: PlanStatus, dispatch: Dispatch, ui: UiState) -> None:
     """The forecast in one sentence, and below a header that folds out: settings, then every line with its reason.
 
     Args:
@@ -34,7 +33,7 @@ def draw_plan(plan: Any, dispatch: Dispatch, ui: UiState) -> None:
     _draw_lines(plan)
 
 
-def _draw_settings(plan: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_settings(plan: PlanStatus, dispatch: Dispatch, ui: UiState) -> None:
     imgui.set_next_item_width(FIELD_WIDTH)
     if imgui.begin_combo("Preset", plan.preset):
         for name in plan.presets:
@@ -47,6 +46,7 @@ def _draw_settings(plan: Any, dispatch: Dispatch, ui: UiState) -> None:
         imgui.set_next_item_width(FIELD_WIDTH)
         flags = imgui.InputTextFlags_.enter_returns_true
         is_entered, typed = imgui.input_int(f"{setting.label}##{setting.name}", setting.value, 0, 0, flags)
+        imgui.set_item_tooltip(setting.help_text)
         ui.mark(f"plan.{setting.name}")
         if is_entered and typed != setting.value:
             dispatch(SetTrainSetting(setting.name, typed))
@@ -55,7 +55,7 @@ def _draw_settings(plan: Any, dispatch: Dispatch, ui: UiState) -> None:
             imgui.text_disabled("set")
 
 
-def _draw_lines(plan: Any) -> None:
+def _draw_lines(plan: PlanStatus) -> None:
     flags = imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.scroll_y | imgui.TableFlags_.row_bg
     if not plan.lines or not imgui.begin_table("plan", 2, flags, ImVec2(0, LINES_HEIGHT)):
         return

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.commands import RedoMark, RemoveRegion, UndoMark
+from app.status import RegionsStatus
+from engine.gate.regions import GateRegion
 from ui.panels.state import REGIONS, Dispatch, Rect, UiState
 from ui.panels.widgets import chip, primary_button, text_right, text_wrapped_dim
 from ui.style import theme
@@ -19,7 +21,17 @@ MEANINGS = {"static": "Nothing moves or changes in here.", "dynamic": "Everythin
 ROW_HEIGHT = 44.0
 
 
-def begin_choosing(session: Any, ui: UiState) -> None:
+class RegionsNeeds(Protocol):
+    """What this panel reads."""
+
+    @property
+    def capture(self) -> object | None: ...
+
+    @property
+    def regions(self) -> RegionsStatus: ...
+
+
+def begin_choosing(session: RegionsNeeds, ui: UiState) -> None:
     """Start choosing a sphere, or switch what it means; where nothing can be marked the panel says why."""
     ui.wanted_panel = REGIONS
     if session.regions.can_mark:
@@ -28,7 +40,7 @@ def begin_choosing(session: Any, ui: UiState) -> None:
         ui.regions.leave()
 
 
-def draw_regions(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def draw_regions(session: RegionsNeeds, dispatch: Dispatch, ui: UiState) -> None:
     """Choosing, the list, the way back, and in which clips all of it takes effect."""
     status = session.regions
     if session.capture is None:
@@ -118,7 +130,7 @@ def _draw_choice(ui: UiState) -> None:
     text_wrapped_dim("Point at the scene; a click fixes the place. Ctrl + arrows, Page Up and Page Down move it.")
 
 
-def _draw_list(status: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_list(status: RegionsStatus, dispatch: Dispatch, ui: UiState) -> None:
     """One row per region, the newest last: it overrules the others."""
     if not status.regions:
         text_wrapped_dim("Nothing is marked: what is static and what moves is decided from the pictures alone.")
@@ -139,7 +151,7 @@ def _draw_list(status: Any, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(RemoveRegion(removed))
 
 
-def _draw_row(index: int, region: Any, can_mark: bool, ui: UiState) -> bool:
+def _draw_row(index: int, region: GateRegion, can_mark: bool, ui: UiState) -> bool:
     """Returns whether the region is to be removed."""
     tool = ui.regions
     imgui.push_id(index)
@@ -167,7 +179,7 @@ def _draw_row(index: int, region: Any, can_mark: bool, ui: UiState) -> bool:
     return is_clicked
 
 
-def draw_region_mark(draw: Any, middle: ImVec2, treat: str) -> None:
+def draw_region_mark(draw: imgui.ImDrawList, middle: ImVec2, treat: str) -> None:
     """The small sign of a treatment: a whole ring for static, a dashed one for moving."""
     color = theme.u32(theme.REGION_COLORS[treat])
     if treat == "static":
@@ -179,7 +191,7 @@ def draw_region_mark(draw: Any, middle: ImVec2, treat: str) -> None:
         draw.path_stroke(color, thickness=2)
 
 
-def draw_chosen_sphere(ui: UiState, draw: Any, area: Rect, counts: dict[str, int]) -> None:
+def draw_chosen_sphere(ui: UiState, draw: imgui.ImDrawList, area: Rect, counts: dict[str, int]) -> None:
     """Over the picture, from the upper left corner of an area: what is being chosen, what it holds, and the keys."""
     tool = ui.regions
     text = f"      Mark as {REGION_WORDS[tool.treat]}:  radius {tool.radius:.3g}{_held_text(counts)}"

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from imgui_bundle import imgui
 
+from app.playback.orbit_view import OrbitView
+from app.playback.timeline import Timeline
 from app.session.commands import (
     HomeView,
     LookThrough,
@@ -24,17 +26,39 @@ from app.session.commands import (
     TrainNextClip,
     UndoMark,
 )
-from app.status import COMPARE_MODES
+from app.status import COMPARE_MODES, Overlays, TrainingStatus, WantedFrame
 from engine.camera.projection import camera_center
-from ui.panels.regions import begin_choosing
+from engine.camera.rig import CameraRig
+from ui.panels.regions import RegionsNeeds, begin_choosing
 from ui.panels.state import REGIONS, Dispatch, UiState
 from ui.style.ui_scale import next_choice
 from ui.viewport.region_tool import GROWTH
 
-Action = Callable[[Any, Dispatch, UiState], None]
+Action = Callable[["ShortcutNeeds", Dispatch, UiState], None]
 
 MARK_NAMES = ("show_frusta", "show_inherited", "show_residual")
 """The overlays that Tab shows or hides together."""
+
+
+class ShortcutNeeds(RegionsNeeds, Protocol):
+    """What keys act on."""
+
+    @property
+    def timeline(self) -> Timeline: ...
+
+    @property
+    def view(self) -> OrbitView: ...
+
+    @property
+    def overlays(self) -> Overlays: ...
+
+    @property
+    def rig(self) -> CameraRig: ...
+
+    @property
+    def training(self) -> TrainingStatus: ...
+
+    def wanted_frame(self) -> WantedFrame | None: ...
 
 
 @dataclass(frozen=True)
@@ -63,11 +87,11 @@ class Shortcut:
     needs_choosing: bool = False
     repeats: bool = False
     is_any_shift: bool = False
-    is_on: Callable[[Any], bool] | None = None
+    is_on: Callable[[ShortcutNeeds], bool] | None = None
     is_listed: bool = True
 
     @property
-    def key(self) -> Any:
+    def key(self) -> imgui.Key:
         """The ImGui key."""
         return getattr(imgui.Key, self.key_name)
 
@@ -75,57 +99,56 @@ class Shortcut:
 # ---- actions ---------------------------------------------------------------------------------------------------
 
 
-def go_to_frame(session: Any, dispatch: Dispatch, frame_index: int) -> None:
+def go_to_frame(timeline: Timeline, dispatch: Dispatch, frame_index: int) -> None:
     """Move the playhead, held inside the capture."""
-    last = max(session.timeline.n_frames - 1, 0)
-    dispatch(SetFrame(int(np.clip(frame_index, 0, last))))
+    dispatch(SetFrame(int(np.clip(frame_index, 0, timeline.last_frame))))
 
 
 def _step_by(n: int) -> Action:
-    def step(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-        go_to_frame(session, dispatch, session.timeline.frame_index + n)
+    def step(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        go_to_frame(session.timeline, dispatch, session.timeline.frame_index + n)
 
     return step
 
 
 def _step_second(sign: int) -> Action:
-    def step(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    def step(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
         n = max(1, round(session.timeline.fps))
-        go_to_frame(session, dispatch, session.timeline.frame_index + sign * n)
+        go_to_frame(session.timeline, dispatch, session.timeline.frame_index + sign * n)
 
     return step
 
 
-def _first_frame(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    go_to_frame(session, dispatch, 0)
+def _first_frame(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    go_to_frame(session.timeline, dispatch, 0)
 
 
-def _last_frame(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    go_to_frame(session, dispatch, session.timeline.n_frames - 1)
+def _last_frame(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    go_to_frame(session.timeline, dispatch, session.timeline.n_frames - 1)
 
 
-def _previous_clip(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    go_to_frame(session, dispatch, session.timeline.previous_clip_start(session.timeline.frame_index))
+def _previous_clip(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    go_to_frame(session.timeline, dispatch, session.timeline.previous_clip_start(session.timeline.frame_index))
 
 
-def _next_clip(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    go_to_frame(session, dispatch, session.timeline.next_clip_start(session.timeline.frame_index))
+def _next_clip(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    go_to_frame(session.timeline, dispatch, session.timeline.next_clip_start(session.timeline.frame_index))
 
 
-def _toggle_play(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_play(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(TogglePlay())
 
 
-def _toggle_every_frame(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_every_frame(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     session.timeline.is_every_frame = not session.timeline.is_every_frame
 
 
-def _toggle_loop(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_loop(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     session.timeline.is_looping = not session.timeline.is_looping
 
 
 def _camera_by(step: int) -> Action:
-    def hop(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    def hop(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
         n_cameras = len(session.rig)
         shown = session.view.look_through
         if shown is None:
@@ -136,11 +159,11 @@ def _camera_by(step: int) -> Action:
     return hop
 
 
-def _home(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _home(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(HomeView())
 
 
-def nearest_camera(session: Any) -> int:
+def nearest_camera(session: ShortcutNeeds) -> int:
     """The capture camera that looks most like the current view: near in place and direction."""
     rig = session.rig
     world_to_camera = np.asarray(session.view.world_to_camera(), dtype=np.float64)
@@ -150,19 +173,19 @@ def nearest_camera(session: Any) -> int:
     return int(np.argmin(distances / spread + turns))
 
 
-def set_compare(session: Any, dispatch: Dispatch, mode: str) -> None:
+def set_compare(session: ShortcutNeeds, dispatch: Dispatch, mode: str) -> None:
     """Compare with the captured picture; needs a capture camera, so the nearest one is taken from a free view."""
     if mode != "off" and session.view.look_through is None:
         dispatch(LookThrough(nearest_camera(session)))
     dispatch(SetCompare(mode))
 
 
-def shown_compare(session: Any) -> str:
+def shown_compare(session: ShortcutNeeds) -> str:
     """The comparison on screen: none from a free view, where no camera took a picture."""
     return "off" if session.view.look_through is None else session.overlays.compare
 
 
-def _cycle_compare(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _cycle_compare(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     shown = COMPARE_MODES.index(shown_compare(session))
     set_compare(session, dispatch, COMPARE_MODES[(shown + 1) % len(COMPARE_MODES)])
 
@@ -171,11 +194,11 @@ def _is_shown(name: str) -> Callable[[Any], bool]:
     return lambda session: bool(getattr(session.overlays, name))
 
 
-def _are_marks_shown(session: Any) -> bool:
+def _are_marks_shown(session: ShortcutNeeds) -> bool:
     return all(getattr(session.overlays, name) for name in MARK_NAMES)
 
 
-def _toggle_overlays(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_overlays(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     is_all_shown = _are_marks_shown(session)
     for name in MARK_NAMES:
         if getattr(session.overlays, name) == is_all_shown:
@@ -183,27 +206,27 @@ def _toggle_overlays(session: Any, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _toggle_overlay(name: str) -> Action:
-    def toggle(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    def toggle(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(ToggleOverlay(name))
 
     return toggle
 
 
-def cloud_overlay(session: Any) -> str:
+def cloud_overlay(session: ShortcutNeeds) -> str:
     """The overlay that shows or hides the point cloud: in place of a trained picture, or where there is none."""
     wanted = session.wanted_frame()
     return "show_points" if wanted is None or not wanted.revision else "show_cloud"
 
 
-def _is_cloud_shown(session: Any) -> bool:
+def _is_cloud_shown(session: ShortcutNeeds) -> bool:
     return bool(getattr(session.overlays, cloud_overlay(session)))
 
 
-def _toggle_cloud(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _toggle_cloud(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(ToggleOverlay(cloud_overlay(session)))
 
 
-def train_or_pause(session: Any, dispatch: Dispatch) -> None:
+def train_or_pause(session: ShortcutNeeds, dispatch: Dispatch) -> None:
     """One key for the whole loop: start the next clip, pause what runs, resume what is paused."""
     status = session.training
     if status.state in ("starting", "preparing", "running"):
@@ -214,52 +237,52 @@ def train_or_pause(session: Any, dispatch: Dispatch) -> None:
         dispatch(TrainNextClip())
 
 
-def _train(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _train(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     train_or_pause(session, dispatch)
 
 
-def _stop_training(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _stop_training(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     if session.training.state not in ("idle", "failed", "stopping"):
         dispatch(StopTraining())
 
 
-def _choose_region(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _choose_region(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     begin_choosing(session, ui)
 
 
-def _mark_chosen(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _mark_chosen(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.regions.is_accepted = True  # the viewport marks it, once it knows where the pointer is
 
 
-def _leave_choosing(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _leave_choosing(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.regions.leave()
 
 
 def _grow_by(factor: float) -> Action:
-    def grow(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    def grow(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
         ui.regions.set_radius(ui.regions.radius * factor)
 
     return grow
 
 
 def _shift_by(right: float, down: float, forward: float) -> Action:
-    def shift(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    def shift(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
         ui.regions.shift(session.view.world_to_camera(), right, down, forward)
 
     return shift
 
 
-def _next_region(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _next_region(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.wanted_panel = REGIONS
     ui.regions.highlight_next(len(session.regions.regions))
 
 
-def _remove_region(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _remove_region(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     if ui.regions.highlighted is not None and session.regions.can_mark:
         dispatch(RemoveRegion(ui.regions.highlighted))
 
 
-def _undo_mark(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _undo_mark(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     if session.regions.can_undo:
         dispatch(UndoMark())
 
@@ -271,34 +294,34 @@ def choose_scale(ui: UiState, scale: float | None) -> None:
 
 
 def _scale_by(step: int) -> Action:
-    def change(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    def change(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
         choose_scale(ui, next_choice(ui.scale.wanted, step))
 
     return change
 
 
-def _reset_scale(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _reset_scale(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     choose_scale(ui, None)
 
 
-def _menu(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _menu(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_menu_wanted = True
 
 
-def _redo_mark(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _redo_mark(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     if session.regions.can_redo:
         dispatch(RedoMark())
 
 
-def _help(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _help(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_help_open = not ui.is_help_open
 
 
-def _open(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _open(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_open_requested = True
 
 
-def _quit(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _quit(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.quit_requested = True
 
 
@@ -401,7 +424,7 @@ MOUSE_HELP: tuple[tuple[str, str], ...] = (
 )
 
 
-def handle_shortcuts(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def handle_shortcuts(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     """Run the actions of keys pressed since the last frame. Text fields keep their keys."""
     io = imgui.get_io()
     if ui.is_help_open and imgui.is_key_pressed(imgui.Key.escape, False):

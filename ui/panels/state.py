@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 from imgui_bundle import ImVec2, imgui
 
+from app.session.commands import Command
 from ui.gl.image import Rect as PixelRect
 from ui.style.theme import Fonts
 from ui.style.ui_scale import UiScale
@@ -18,7 +19,7 @@ from ui.viewport.region_tool import RegionTool
 VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
 PANELS = (CAPTURE, TRAINING, REGIONS, TIMELINE)
 """Titles of the panels around the picture."""
-Dispatch = Callable[[object], None]
+Dispatch = Callable[[Command], None]
 """Takes one command of app.session.commands."""
 
 

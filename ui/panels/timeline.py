@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
+from app.playback.timeline import Timeline
 from app.session.commands import SetFrame, TogglePlay, TrainClip
+from app.status import ClipStatus, TrainingStatus
+from engine.capture.clip import Clip
 from ui.panels.shortcuts import go_to_frame
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import text_right
@@ -37,7 +41,29 @@ STATE_WORDS: dict[str, str] = {
 }
 
 
-def state_note(status: Any) -> str:
+class TimelineNeeds(Protocol):
+    """What this panel reads."""
+
+    @property
+    def capture(self) -> object | None: ...
+
+    @property
+    def timeline(self) -> Timeline: ...
+
+    @property
+    def clips(self) -> Sequence[Clip]: ...
+
+    @property
+    def clip_states(self) -> Sequence[ClipStatus]: ...
+
+    @property
+    def training(self) -> TrainingStatus: ...
+
+    @property
+    def reference_index(self) -> int: ...
+
+
+def state_note(status: ClipStatus) -> str:
     """What there is to say of a clip's state beyond its word; empty where that says it all."""
     texts = [status.reason]
     if status.resume_step is not None and status.state in ("trained", "stale", "damaged"):
@@ -70,7 +96,7 @@ def cell_left(frame_index: float, track: Rect, n_frames: int) -> float:
     return track.x0 + track.width * frame_index / max(n_frames, 1)
 
 
-def draw_timeline(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def draw_timeline(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
     """Transport row, then the track."""
     if session.capture is None:
         imgui.text_disabled("Frames and clips appear here when a capture is open.")
@@ -92,19 +118,19 @@ def _icon_button(ui: UiState, name: str, icon: str, tooltip: str, *, is_on: bool
     return is_clicked
 
 
-def _draw_transport(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_transport(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
     timeline = session.timeline
     if _icon_button(ui, "first", Icon.FIRST, "First frame (Home)"):
-        go_to_frame(session, dispatch, 0)
+        go_to_frame(timeline, dispatch, 0)
     if _icon_button(ui, "back", Icon.STEP_BACK, "One frame back (Left)"):
-        go_to_frame(session, dispatch, timeline.frame_index - 1)
+        go_to_frame(timeline, dispatch, timeline.frame_index - 1)
     icon, tooltip = (Icon.PAUSE, "Pause (Space)") if timeline.is_playing else (Icon.PLAY, "Play (Space)")
     if _icon_button(ui, "play", icon, tooltip, is_on=timeline.is_playing):
         dispatch(TogglePlay())
     if _icon_button(ui, "forward", Icon.STEP_FORWARD, "One frame forward (Right)"):
-        go_to_frame(session, dispatch, timeline.frame_index + 1)
+        go_to_frame(timeline, dispatch, timeline.frame_index + 1)
     if _icon_button(ui, "last", Icon.LAST, "Last frame (End)"):
-        go_to_frame(session, dispatch, timeline.n_frames - 1)
+        go_to_frame(timeline, dispatch, timeline.n_frames - 1)
     if _icon_button(ui, "loop", Icon.LOOP, "Loop (L)", is_on=timeline.is_looping):
         timeline.is_looping = not timeline.is_looping
     imgui.same_line(0, 16)
@@ -117,7 +143,7 @@ def _draw_transport(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     imgui.pop_item_flag()
     ui.mark("timeline.frame")
     if is_edited:
-        go_to_frame(session, dispatch, typed)
+        go_to_frame(timeline, dispatch, typed)
     imgui.same_line()
     imgui.text_disabled(f"of 0 to {format_count(timeline.last_frame)}")
     imgui.same_line(0, 18)
@@ -131,11 +157,11 @@ def _draw_transport(session: Any, dispatch: Dispatch, ui: UiState) -> None:
         text_right(label)
 
 
-def _clip_title(clip_index: int, session: Any) -> str:
+def _clip_title(clip_index: int, session: TimelineNeeds) -> str:
     return f"Clip {clip_index}" + (", reference" if clip_index == session.reference_index else "")
 
 
-def _draw_track(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_track(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
     timeline = session.timeline
     origin = imgui.get_cursor_screen_pos()
     size = imgui.get_content_region_avail()
@@ -174,7 +200,7 @@ def _draw_track(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     draw.pop_clip_rect()
 
 
-def band_runs(session: Any, track: Rect) -> list[tuple[int, int]]:
+def band_runs(session: TimelineNeeds, track: Rect) -> list[tuple[int, int]]:
     """First and last clip of every band: one clip each, or where that is too narrow to see, a run in one state."""
     n_clips = min(len(session.clips), len(session.clip_states))
     if n_clips and track.width / n_clips >= MIN_BAND_WIDTH:
@@ -187,7 +213,7 @@ def band_runs(session: Any, track: Rect) -> list[tuple[int, int]]:
     return [(first, after - 1) for first, after in zip(starts, [*starts[1:], n_clips], strict=True)]
 
 
-def _draw_run(draw: Any, band: Rect, first: int, last: int, state: str) -> None:
+def _draw_run(draw: imgui.ImDrawList, band: Rect, first: int, last: int, state: str) -> None:
     """Many clips in one state as one band."""
     color = theme.status_color(state)
     draw.add_rect_filled(band.low, band.high, theme.u32(theme.RAISED), 3)
@@ -203,7 +229,7 @@ def _draw_run(draw: Any, band: Rect, first: int, last: int, state: str) -> None:
     draw.pop_clip_rect()
 
 
-def _draw_note(session: Any, frame_index: int) -> None:
+def _draw_note(session: TimelineNeeds, frame_index: int) -> None:
     """The reason of a clip's state, where the pointer is over its band."""
     clip = session.timeline.clip_of(frame_index)
     note = "" if clip is None else state_note(session.clip_states[clip.clip_index])
@@ -216,7 +242,7 @@ def _draw_note(session: Any, frame_index: int) -> None:
         imgui.end_tooltip()
 
 
-def _draw_menu(session: Any, dispatch: Dispatch, ui: UiState, track: Rect) -> None:
+def _draw_menu(session: TimelineNeeds, dispatch: Dispatch, ui: UiState, track: Rect) -> None:
     imgui.open_popup_on_item_click("clip menu", imgui.PopupFlags_.mouse_button_right)
     if not imgui.begin_popup("clip menu"):
         return
@@ -242,7 +268,9 @@ def _draw_menu(session: Any, dispatch: Dispatch, ui: UiState, track: Rect) -> No
     imgui.end_popup()
 
 
-def _draw_band(draw: Any, band: Rect, session: Any, clip: Any, status: Any, ui: UiState) -> None:
+def _draw_band(
+    draw: imgui.ImDrawList, band: Rect, session: TimelineNeeds, clip: Clip, status: ClipStatus, ui: UiState
+) -> None:
     state = status.state
     color = theme.status_color(state)
     draw.add_rect_filled(band.low, band.high, theme.u32(theme.RAISED), 3)
@@ -267,7 +295,9 @@ def _draw_band(draw: Any, band: Rect, session: Any, clip: Any, status: Any, ui: 
     draw.pop_clip_rect()
 
 
-def _draw_band_text(draw: Any, band: Rect, session: Any, clip: Any, status: Any, ui: UiState) -> None:
+def _draw_band_text(
+    draw: imgui.ImDrawList, band: Rect, session: TimelineNeeds, clip: Clip, status: ClipStatus, ui: UiState
+) -> None:
     state = status.state
     icon = theme.CLIP_ICONS.get(state, "")
     title = _clip_title(clip.clip_index, session)
@@ -288,7 +318,7 @@ def _draw_band_text(draw: Any, band: Rect, session: Any, clip: Any, status: Any,
         draw.add_text(ImVec2(x, y + 19), theme.u32(theme.TEXT if state != "untrained" else theme.TEXT_DIM), line_two)
 
 
-def _hatch(draw: Any, rect: Rect, color: theme.Color, spacing: float, *, is_crossed: bool = False) -> None:
+def _hatch(draw: imgui.ImDrawList, rect: Rect, color: theme.Color, spacing: float, *, is_crossed: bool = False) -> None:
     """Diagonal lines, one way or both; clipped to the rectangle."""
     if rect.width < 1:
         return
@@ -303,7 +333,7 @@ def _hatch(draw: Any, rect: Rect, color: theme.Color, spacing: float, *, is_cros
     draw.pop_clip_rect()
 
 
-def _draw_ruler(draw: Any, track: Rect, n_frames: int, shown_frame: int) -> None:
+def _draw_ruler(draw: imgui.ImDrawList, track: Rect, n_frames: int, shown_frame: int) -> None:
     flag = _flag_rect(track, shown_frame, n_frames)
     step = tick_step(n_frames, track.width)
     is_each_frame_wide = track.width / max(n_frames, 1) >= 7
@@ -320,12 +350,12 @@ def _draw_ruler(draw: Any, track: Rect, n_frames: int, shown_frame: int) -> None
             draw.add_text(ImVec2(x + 4, track.y0 + 2), theme.u32(theme.TEXT_DIM), label)
 
 
-def _draw_hover(draw: Any, track: Rect, frame_index: int, n_frames: int) -> None:
+def _draw_hover(draw: imgui.ImDrawList, track: Rect, frame_index: int, n_frames: int) -> None:
     x = (cell_left(frame_index, track, n_frames) + cell_left(frame_index + 1, track, n_frames)) / 2
     draw.add_line_v(x, track.y0, track.y1, theme.u32(theme.faded(theme.TEXT, 0.25)))
 
 
-def _draw_playhead(draw: Any, track: Rect, frame_index: int, n_frames: int, ui: UiState) -> None:
+def _draw_playhead(draw: imgui.ImDrawList, track: Rect, frame_index: int, n_frames: int, ui: UiState) -> None:
     left = cell_left(frame_index, track, n_frames)
     right = cell_left(frame_index + 1, track, n_frames)
     x = (left + right) / 2

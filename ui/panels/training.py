@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
 from app.session.commands import PauseTraining, ResumeTraining, StopTraining, TrainNextClip
+from app.status import ClipStatus, PlanStatus, TrainingStatus
+from engine.capture.clip import Clip
 from engine.text import duration_text
 from ui.panels.plan import draw_plan
 from ui.panels.state import Dispatch, UiState
@@ -29,6 +31,28 @@ Reference clip: reference anchors, which later clips inherit.
 Later clips: inherited + residual anchors."""
 
 
+class TrainingNeeds(Protocol):
+    """What this panel reads."""
+
+    @property
+    def capture(self) -> object | None: ...
+
+    @property
+    def training(self) -> TrainingStatus: ...
+
+    @property
+    def clips(self) -> Sequence[Clip]: ...
+
+    @property
+    def clip_states(self) -> Sequence[ClipStatus]: ...
+
+    @property
+    def plan(self) -> PlanStatus | None: ...
+
+    @property
+    def reference_index(self) -> int: ...
+
+
 def plot_arrays(history: Sequence[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
     """(step, value) pairs as two contiguous float64 arrays, finite rows only, thinned to MAX_PLOT_POINTS."""
     pairs = np.asarray(list(history), dtype=np.float64).reshape(-1, 2)
@@ -39,7 +63,7 @@ def plot_arrays(history: Sequence[tuple[float, float]]) -> tuple[np.ndarray, np.
     return np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
 
 
-def draw_training(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def draw_training(session: TrainingNeeds, dispatch: Dispatch, ui: UiState) -> None:
     """Buttons, progress, curves, then one row per clip."""
     if session.capture is None:
         text_wrapped_dim("Training starts from here when a capture is open.")
@@ -54,7 +78,7 @@ def draw_training(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     _draw_clips(session)
 
 
-def next_label(session: Any) -> str:
+def next_label(session: TrainingNeeds) -> str:
     """What starts the next clip, with its icon: a clip that was stopped goes on where that was."""
     index, step = session.training.next_clip_index, session.training.resume_step
     if index is None:
@@ -65,7 +89,7 @@ def next_label(session: Any) -> str:
     return f"{Icon.TRAIN}  Train next clip"
 
 
-def _draw_buttons(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_buttons(session: TrainingNeeds, dispatch: Dispatch, ui: UiState) -> None:
     status = session.training
     width = imgui.get_content_region_avail().x
     if status.state in ("idle", "failed"):
@@ -110,7 +134,7 @@ def _draw_buttons(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     imgui.set_item_tooltip("Ends this clip now and keeps what it learned")
 
 
-def _draw_progress(status: Any, ui: UiState) -> None:
+def _draw_progress(status: TrainingStatus, ui: UiState) -> None:
     is_stepping = status.n_steps > 0 and status.state in ("running", "paused", "stopping")
     share = status.step / status.n_steps if is_stepping else float(getattr(status, "progress", 0.0) or 0.0)
     words = {"starting": "Starting", "preparing": "Preparing", "running": "Training"}
@@ -140,7 +164,7 @@ def _pair(left: str, right: str) -> None:
     text_right(right)
 
 
-def _draw_curves(status: Any, ui: UiState) -> None:
+def _draw_curves(status: TrainingStatus, ui: UiState) -> None:
     height = min(max((imgui.get_content_region_avail().y - 190) / 2, 84.0), 150.0)
     n_steps = 0 if status.state in ("idle", "failed") else status.n_steps
     of_clip = "" if status.curve_clip_index is None else f" of clip {status.curve_clip_index}"
@@ -153,7 +177,14 @@ def _draw_curves(status: Any, ui: UiState) -> None:
 
 
 def _draw_curve(
-    title: str, history: Any, color: theme.Color, height: float, n_steps: int, *, has_markers: bool, digits: int
+    title: str,
+    history: Sequence[tuple[int, float]],
+    color: theme.Color,
+    height: float,
+    n_steps: int,
+    *,
+    has_markers: bool,
+    digits: int,
 ) -> None:
     """One curve over the steps of the whole clip, so that it also shows how far the training has come."""
     steps, values = plot_arrays(history)
@@ -198,7 +229,7 @@ def anchors_text(n_inherited: int, n_own: int) -> str:
     return f"{format_count(n_inherited)} + {format_count(n_own)}" if n_inherited else format_count(n_own)
 
 
-def _draw_clips(session: Any) -> None:
+def _draw_clips(session: TrainingNeeds) -> None:
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.borders_inner_h | imgui.TableFlags_.scroll_y
     flags |= imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.pad_outer_x
     if not imgui.begin_table("clips", 3, flags, ImVec2(0, max(imgui.get_content_region_avail().y - 4, 90))):
@@ -218,7 +249,7 @@ def _draw_clips(session: Any) -> None:
     imgui.end_table()
 
 
-def _draw_clip_row(clip: Any, status: Any) -> None:
+def _draw_clip_row(clip: Clip, status: ClipStatus) -> None:
     imgui.table_next_row()
     imgui.table_next_column()
     icon = theme.CLIP_ICONS.get(status.state, "")

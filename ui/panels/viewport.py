@@ -8,25 +8,25 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.commands import LookThrough, ToggleOverlay
 from app.status import COMPARE_MODES
-from ui.panels.hud import Hud
+from ui.panels.hud import Hud, HudNeeds
 from ui.panels.regions import begin_choosing, draw_chosen_sphere
-from ui.panels.shortcuts import cloud_overlay, set_compare, shown_compare
+from ui.panels.shortcuts import ShortcutNeeds, cloud_overlay, set_compare, shown_compare
 from ui.panels.state import Dispatch, Rect, UiState
-from ui.panels.welcome import draw_welcome
+from ui.panels.welcome import WelcomeNeeds, draw_welcome
 from ui.panels.widgets import chip
 from ui.style import theme
 from ui.style.theme import Icon
 from ui.viewport.hud_text import pane_text
 from ui.viewport.region_layer import ShownRegions
 from ui.viewport.region_tool import GROWTH
-from ui.viewport.scene import Scene, SceneView
+from ui.viewport.scene import Scene, SceneNeeds, SceneView
 
 MOVING_S = 0.22
 """The view counts as moving for this long after the last change of it."""
@@ -39,6 +39,10 @@ TOOLBAR_WIDTH = 610.0
 """With less room, words give way to symbols."""
 MARK_SLIDER = imgui.SliderFlags_.always_clamp
 COMPARE_WORDS = {"off": "Off", "wipe": "Wipe", "side": "Side by side"}
+
+
+class ViewportNeeds(SceneNeeds, HudNeeds, ShortcutNeeds, WelcomeNeeds, Protocol):
+    """What the picture, and everything that lies over it, is made from."""
 
 
 @dataclass(frozen=True)
@@ -97,16 +101,16 @@ class ViewportPanel:
         """The view was changed by something else than the pointer here."""
         self._moved_s = time.perf_counter()
 
-    def has_news(self, session: Any) -> bool:
+    def has_news(self, session: ViewportNeeds) -> bool:
         """Did a picture arrive that the window does not show yet? Cheap; asked at every tick."""
         return session.capture is not None and self.scene.has_news(session)
 
-    def shows_playhead(self, session: Any) -> bool:
+    def shows_playhead(self, session: ViewportNeeds) -> bool:
         """Is the frame under the playhead on screen, in every picture that is compared?"""
         wanted = session.wanted_frame()
         return wanted is None or (self.scene.shown.is_of(wanted) and self._captured_frame in (None, wanted.frame_index))
 
-    def draw(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: ViewportNeeds, dispatch: Dispatch, ui: UiState) -> None:
         """Toolbar, picture, HUD."""
         status = session.regions
         ui.regions.follow(session.rig, len(status.regions), can_mark=status.can_mark)
@@ -146,7 +150,7 @@ class ViewportPanel:
 
     # ---- toolbar ---------------------------------------------------------------------------------------------
 
-    def _draw_toolbar(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    def _draw_toolbar(self, session: ViewportNeeds, dispatch: Dispatch, ui: UiState) -> None:
         imgui.set_cursor_pos(ImVec2(imgui.get_cursor_pos_x() + 8, imgui.get_cursor_pos_y() + 6))
         shown = session.view.look_through
         names = session.rig.names
@@ -201,7 +205,7 @@ class ViewportPanel:
         if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
             imgui.set_tooltip(words)
 
-    def _draw_compare_box(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    def _draw_compare_box(self, session: ViewportNeeds, dispatch: Dispatch, ui: UiState) -> None:
         """All ways to compare in one place, where there is no room for buttons."""
         shown = shown_compare(session)
         imgui.set_next_item_width(118)
@@ -214,7 +218,7 @@ class ViewportPanel:
         ui.mark("viewport.compare")
         imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")
 
-    def _draw_overlay_menu(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    def _draw_overlay_menu(self, session: ViewportNeeds, dispatch: Dispatch, ui: UiState) -> None:
         if not imgui.begin_popup("overlays"):
             return
         rows = (
@@ -245,7 +249,7 @@ class ViewportPanel:
 
     # ---- pointer ---------------------------------------------------------------------------------------------
 
-    def _navigate(self, session: Any, dispatch: Dispatch, ui: UiState, panes: Panes) -> None:
+    def _navigate(self, session: ViewportNeeds, dispatch: Dispatch, ui: UiState, panes: Panes) -> None:
         io = imgui.get_io()
         view, tool = session.view, ui.regions
         if imgui.is_item_hovered() and io.mouse_wheel != 0.0:
@@ -299,11 +303,11 @@ class ViewportPanel:
             view.orbit(dx, dy)
         self.note_moved()
 
-    def _leave_camera(self, session: Any, dispatch: Dispatch) -> None:
+    def _leave_camera(self, session: ViewportNeeds, dispatch: Dispatch) -> None:
         if session.view.look_through is not None:
             dispatch(LookThrough(None))
 
-    def _is_on_wipe(self, session: Any, panes: Panes, pointer: ImVec2) -> bool:
+    def _is_on_wipe(self, session: ViewportNeeds, panes: Panes, pointer: ImVec2) -> bool:
         if session.overlays.compare != "wipe" or panes.captured is None:
             return False
         x = panes.rendered.x0 + panes.rendered.width * session.overlays.wipe_position
@@ -311,7 +315,7 @@ class ViewportPanel:
 
     # ---- picture ---------------------------------------------------------------------------------------------
 
-    def _draw_picture(self, session: Any, dispatch: Dispatch, ui: UiState, area: Rect, panes: Panes) -> None:
+    def _draw_picture(self, session: ViewportNeeds, dispatch: Dispatch, ui: UiState, area: Rect, panes: Panes) -> None:
         draw = imgui.get_window_draw_list()
         draw.push_clip_rect(area.low, area.high, True)
         pane = panes.rendered
@@ -356,7 +360,9 @@ class ViewportPanel:
             self._draw_captured(session, draw, panes)
         draw.pop_clip_rect()
 
-    def _point_at_camera(self, session: Any, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
+    def _point_at_camera(
+        self, session: ViewportNeeds, ui: UiState, view: SceneView, pane: Rect, density: float
+    ) -> None:
         """The camera under the pointer stands out; one that was pressed is remembered for the click."""
         is_free = imgui.is_item_hovered() and not ui.regions.is_active
         is_pressing = imgui.is_item_activated() and self._button == imgui.MouseButton_.left
@@ -371,7 +377,7 @@ class ViewportPanel:
             marks.pointed_anchor = None
             imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
 
-    def _aim(self, session: Any, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
+    def _aim(self, session: ViewportNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """Lead the sphere that is being chosen: to the middle at first, then by the pointer, until a click fixes it."""
         tool, pointer = ui.regions, imgui.get_io().mouse_pos
         is_click, self._is_click = self._is_click, False
@@ -390,7 +396,7 @@ class ViewportPanel:
         tool.place(self.scene.point_under(session, view, *pixels, depth), eye=view.eye)
         tool.is_placed |= is_click
 
-    def _draw_captured(self, session: Any, draw: Any, panes: Panes) -> None:
+    def _draw_captured(self, session: ViewportNeeds, draw: imgui.ImDrawList, panes: Panes) -> None:
         area = panes.captured
         assert area is not None
         captured = self.scene.captured(session, round(area.width))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.project.recents import RecentProject
 from app.session.commands import ForgetRecent, OpenCapture, OpenProject
+from app.status import JobStatus
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import elided_path, pop_bold, primary_button, push_bold, text_wrapped_dim
 from ui.style import theme
@@ -20,7 +22,27 @@ MAX_RECENT = 4
 RECENT_HEIGHT = 34.0
 
 
-def draw_welcome(session: Any, dispatch: Dispatch, ui: UiState, area: Rect) -> None:
+class RecentList(Protocol):
+    """What was opened lately."""
+
+    @property
+    def entries(self) -> Sequence[RecentProject]: ...
+
+    @property
+    def missing(self) -> frozenset[Path]: ...
+
+
+class WelcomeNeeds(Protocol):
+    """What the first screen reads."""
+
+    @property
+    def jobs(self) -> Sequence[JobStatus]: ...
+
+    @property
+    def recent(self) -> RecentList: ...
+
+
+def draw_welcome(session: WelcomeNeeds, dispatch: Dispatch, ui: UiState, area: Rect) -> None:
     """A card in the middle of the area."""
     x, y = area.center
     width, height = min(CARD_SIZE[0], area.width - 24), min(CARD_SIZE[1], area.height - 24)
@@ -65,14 +87,14 @@ def open_recent(entry: RecentProject) -> OpenProject | OpenCapture:
     return OpenProject(entry.folder) if entry.project else OpenCapture(entry.folder)
 
 
-def _draw_recent(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_recent(session: WelcomeNeeds, dispatch: Dispatch, ui: UiState) -> None:
     """One row per project: its name and how far it is trained, its path; those that are gone can be removed."""
-    for index, entry in enumerate(session.settings.recent[:MAX_RECENT]):
+    for index, entry in enumerate(session.recent.entries[:MAX_RECENT]):
         _draw_recent_row(index, entry, session, dispatch, ui)
 
 
-def _draw_recent_row(index: int, entry: RecentProject, session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    is_gone = entry.folder in session.missing
+def _draw_recent_row(index: int, entry: RecentProject, session: WelcomeNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    is_gone = entry.folder in session.recent.missing
     start, width = imgui.get_cursor_pos(), imgui.get_content_region_avail().x
     row = ImVec2(width - (34 if is_gone else 0), RECENT_HEIGHT)
     imgui.begin_disabled(is_gone)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
@@ -49,7 +48,9 @@ def pop_bold(ui: UiState) -> None:
     imgui.pop_font()
 
 
-def chip(draw: Any, x: float, y: float, text: str, *, color: theme.Color = theme.TEXT, is_right: bool = False) -> float:
+def chip(
+    draw: imgui.ImDrawList, x: float, y: float, text: str, *, color: theme.Color = theme.TEXT, is_right: bool = False
+) -> float:
     """Text on a dark plate over a picture; returns its right edge. With is_right, x is the right edge."""
     width = imgui.calc_text_size(text).x + 18
     left = x - width if is_right else x

@@ -59,7 +59,6 @@ def run_demo(capture_path: Path, out_dir: Path, quick: bool = False) -> int:
     try:
         if not _open(session, capture_path, line):
             return EXIT_BAD_INPUT
-        assert session.rig is not None
         assert session.capture is not None
         capture_path = session.capture.path
         n_clips = min(2, len(session.clips))

@@ -9,30 +9,32 @@ import logging
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 import moderngl
 from imgui_bundle import ImVec2, ImVec4, imgui
+from pyglet.window import BaseWindow
 
+from app.session.commands import Command
 from app.session.window_memory import WindowMemory
 from ui.gl import ImageTexture, free_dropped, n_changes
-from ui.panels.capture import CapturePanel
-from ui.panels.notices import NoticesPanel
+from ui.panels.capture import CaptureNeeds, CapturePanel
+from ui.panels.notices import NoticesNeeds, NoticesPanel
 from ui.panels.regions import draw_regions
 from ui.panels.shortcuts import handle_shortcuts
 from ui.panels.state import CAPTURE, REGIONS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
-from ui.panels.timeline import draw_timeline
+from ui.panels.timeline import TimelineNeeds, draw_timeline
 from ui.panels.training import draw_training
-from ui.panels.viewport import ViewportPanel
+from ui.panels.viewport import ViewportNeeds, ViewportPanel
 from ui.shell.dialogs import OpenFolderDialog, draw_help
 from ui.shell.imgui_backend import ImGuiBackend
 from ui.shell.layout import hold_sizes, is_laid_out, lay_out
-from ui.shell.menu_bar import draw_menu_bar
-from ui.shell.questions import QuestionDialogs
+from ui.shell.menu_bar import MenuNeeds, draw_menu_bar
+from ui.shell.questions import QuestionDialogs, QuestionNeeds
 from ui.shell.redraw import FRAMES_AFTER_INPUT, RedrawPlan
-from ui.shell.remembering import Remembering
+from ui.shell.remembering import Remembering, RememberNeeds
 from ui.shell.status_bar import HEIGHT as STATUS_BAR_HEIGHT
-from ui.shell.status_bar import draw_status_bar
+from ui.shell.status_bar import StatusNeeds, draw_status_bar
 from ui.style import theme
 from ui.style.ui_scale import UiScale
 from ui.viewport.scene import Scene
@@ -51,7 +53,25 @@ SESSION = "Session"
 """Stands for the session among the panels that failed."""
 
 
-def _recover(stack: Any) -> None:
+class FrameNeeds(
+    ViewportNeeds,
+    CaptureNeeds,
+    TimelineNeeds,
+    MenuNeeds,
+    StatusNeeds,
+    QuestionNeeds,
+    RememberNeeds,
+    NoticesNeeds,
+    Protocol,
+):
+    """Everything that the window and its panels use of a session."""
+
+    def dispatch(self, command: Command) -> None: ...
+
+    def poll(self) -> bool: ...
+
+
+def _recover(stack: imgui.internal.ErrorRecoveryState) -> None:
     """End windows, tables and groups that the failed part left open."""
     io = imgui.get_io()
     is_assert_on = io.config_error_recovery_enable_assert
@@ -77,9 +97,9 @@ class Frame:
 
     def __init__(
         self,
-        window: Any,
+        window: BaseWindow,
         ctx: moderngl.Context,
-        session: Any,
+        session: FrameNeeds,
         *,
         fixed_delta_s: float | None = None,
         on_input: Callable[[], None] = lambda: None,
@@ -111,7 +131,7 @@ class Frame:
         self._failed_panels: set[str] = set()
         self._floating_panels: set[str] = set()
         self._dock_ids: dict[str, int] = {}
-        self._panels: tuple[tuple[str, Callable[[Any, Dispatch, UiState], None], bool], ...] = (
+        self._panels: tuple[tuple[str, Callable[[FrameNeeds, Dispatch, UiState], None], bool], ...] = (
             (VIEWPORT, self.viewport.draw, False),
             (CAPTURE, self.capture.draw, True),
             (TRAINING, draw_training, True),
@@ -229,7 +249,7 @@ class Frame:
         toast_area = ui.rects.get("viewport.free", whole)
         self._guard("Notices", lambda: self.notices.draw(session, dispatch, ui, toast_area))
 
-    def dispatch(self, command: object) -> None:
+    def dispatch(self, command: Command) -> None:
         """Hand a command to the session and plan a redraw."""
         self.session.dispatch(command)
         self.request_redraw()

@@ -14,7 +14,7 @@ from typing import Any
 import pyglet
 from imgui_bundle import ImVec2, imgui, implot
 from pyglet.event import EVENT_HANDLED
-from pyglet.window import key, mouse
+from pyglet.window import BaseWindow, key, mouse
 
 from ui.shell.redraw import fingerprint
 from ui.style.ui_scale import UiScale
@@ -153,7 +153,7 @@ class ImGuiBackend:
 
     def __init__(
         self,
-        window: Any,
+        window: BaseWindow,
         *,
         on_input: Callable[[], None] = lambda: None,
         fixed_delta_s: float | None = None,
@@ -171,7 +171,7 @@ class ImGuiBackend:
         self._fixed_delta_s = fixed_delta_s
         self._last_frame_s = time.perf_counter()
         self._keys_pressed_since_frame = False
-        self._held_releases: list[Any] = []
+        self._held_releases: list[imgui.Key] = []
         self._shown_cursor = -2
         # On X11 and headless, rows count 0..height-1 upwards; Win32 and Cocoa report height - y.
         self._row_offset = 1.0 if (pyglet.options.headless or sys.platform.startswith("linux")) else 0.0
@@ -344,13 +344,13 @@ class ImGuiBackend:
             self._add_key(imgui_key, False)
         self._on_input()
 
-    def _is_only_text(self, imgui_key: Any) -> bool:
+    def _is_only_text(self, imgui_key: imgui.Key) -> bool:
         """Is this key of interest only for the character it types? ImGui takes in one key per frame but any number of
         characters: without this what is typed fast would appear slowly."""
         is_chord = bool(self._held_modifiers - _SHIFT)
         return imgui.get_io().want_text_input and not is_chord and int(imgui_key) in _TYPING
 
-    def _add_key(self, imgui_key: Any, is_down: bool) -> None:
+    def _add_key(self, imgui_key: imgui.Key, is_down: bool) -> None:
         io = imgui.get_io()
         modifier = _MODIFIER_OF.get(int(imgui_key))
         if modifier is not None:
@@ -379,7 +379,7 @@ class ImGuiBackend:
             return
         self._shown_cursor = wanted
         window = self._window
-        names = {
+        names: dict[int, str | None] = {
             int(imgui.MouseCursor_.text_input): window.CURSOR_TEXT,
             int(imgui.MouseCursor_.resize_all): window.CURSOR_SIZE,
             int(imgui.MouseCursor_.resize_ns): window.CURSOR_SIZE_UP_DOWN,
@@ -388,4 +388,5 @@ class ImGuiBackend:
             int(imgui.MouseCursor_.resize_nwse): window.CURSOR_SIZE_DOWN_RIGHT,
             int(imgui.MouseCursor_.hand): window.CURSOR_HAND,
         }
-        window.set_mouse_cursor(window.get_system_mouse_cursor(names.get(wanted, window.CURSOR_DEFAULT)))
+        name = names.get(wanted)
+        window.set_mouse_cursor(None if name is None else window.get_system_mouse_cursor(name))

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Protocol
 
 from imgui_bundle import imgui
 
 from app.session.commands import ForgetRecent, OpenCapture
-from ui.panels.shortcuts import COMPARE, MARK, SHORTCUTS, TIME, VIEW, choose_scale, train_or_pause
+from app.status import ProjectStatus
+from ui.panels.shortcuts import COMPARE, MARK, SHORTCUTS, TIME, VIEW, ShortcutNeeds, choose_scale, train_or_pause
 from ui.panels.state import PANELS, Dispatch, UiState
-from ui.panels.training import next_label
-from ui.panels.welcome import SAMPLE_PATH, open_recent
+from ui.panels.training import TrainingNeeds, next_label
+from ui.panels.welcome import SAMPLE_PATH, WelcomeNeeds, open_recent
 from ui.panels.widgets import elided_path
 from ui.style.theme import Icon
 from ui.style.ui_scale import CHOICES, scale_text
@@ -20,7 +21,14 @@ MIN_PATH_WIDTH = 60.0
 """Less of a path says nothing."""
 
 
-def draw_menu_bar(session: Any, dispatch: Dispatch, ui: UiState) -> None:
+class MenuNeeds(ShortcutNeeds, TrainingNeeds, WelcomeNeeds, Protocol):
+    """What the menus read."""
+
+    @property
+    def project_status(self) -> ProjectStatus | None: ...
+
+
+def draw_menu_bar(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
     """All menus, and the name of what is open at the right end."""
     if not imgui.begin_main_menu_bar():
         return
@@ -84,7 +92,7 @@ def _item(ui: UiState, label: str, key_label: str = "", *, is_on: bool = False) 
 
 
 def _draw_rows(
-    groups: tuple[str, ...], session: Any, dispatch: Dispatch, ui: UiState, *, is_on_only: bool = False
+    groups: tuple[str, ...], session: MenuNeeds, dispatch: Dispatch, ui: UiState, *, is_on_only: bool = False
 ) -> None:
     """Rows of the table of keys. is_on_only: Those only that can be on or off."""
     for shortcut in SHORTCUTS:
@@ -127,18 +135,18 @@ def _draw_window_menu(ui: UiState) -> None:
         ui.is_help_open = not ui.is_help_open
 
 
-def _draw_recent_menu(session: Any, dispatch: Dispatch, ui: UiState) -> None:
-    if not imgui.begin_menu("Open a recent project", bool(session.settings.recent)):
+def _draw_recent_menu(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    if not imgui.begin_menu("Open a recent project", bool(session.recent.entries)):
         ui.mark("menu.recent")
         return
-    for index, entry in enumerate(session.settings.recent):
-        is_gone = entry.folder in session.missing
+    for index, entry in enumerate(session.recent.entries):
+        is_gone = entry.folder in session.recent.missing
         words = "not found" if is_gone else entry.trained_text
         if imgui.menu_item(f"{entry.name}##{index}", words, False, not is_gone)[0]:
             dispatch(open_recent(entry))
         ui.mark(f"menu.recent{index}")
         imgui.set_item_tooltip(str(entry.folder))
-    gone = [entry.folder for entry in session.settings.recent if entry.folder in session.missing]
+    gone = [entry.folder for entry in session.recent.entries if entry.folder in session.recent.missing]
     if gone:
         imgui.separator()
         if _item(ui, "Remove those that were not found"):
@@ -147,9 +155,9 @@ def _draw_recent_menu(session: Any, dispatch: Dispatch, ui: UiState) -> None:
     imgui.end_menu()
 
 
-def _draw_name(session: Any, ui: UiState) -> None:
+def _draw_name(session: MenuNeeds, ui: UiState) -> None:
     """What is open: name, how far it is trained and where it lies, as much of it as there is room for."""
-    opened = session.opened
+    opened = session.project_status
     name = "no project open" if opened is None else f"{opened.name} - {opened.trained_text}"
     room = imgui.get_window_width() - imgui.get_cursor_pos_x() - 40
     if opened is not None:

@@ -6,12 +6,12 @@ A dialog is up as long as the session has the question. Enter says yes, Escape n
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
-from app.session.commands import CloseQuestion, OpenCapture, OpenProject, TrainClip
-from app.session.questions import ProjectQuestion, RetrainQuestion
+from app.session.commands import CloseQuestion, Command, OpenCapture, OpenProject, TrainClip
+from app.session.questions import ProjectQuestion, Question, RetrainQuestion
 from engine.text import duration_text
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, primary_button, text_wrapped_dim
@@ -25,14 +25,21 @@ ROW_HEIGHT = 44.0
 MAX_LISTED = 12
 
 
+class QuestionNeeds(Protocol):
+    """What the dialogs read."""
+
+    @property
+    def question(self) -> Question | None: ...
+
+
 class QuestionDialogs:
     """Owns which row is chosen; the question itself is the session's."""
 
     def __init__(self) -> None:
-        self._asked: Any = None
+        self._asked: Question | None = None
         self._chosen = 0
 
-    def draw(self, session: Any, dispatch: Dispatch, ui: UiState) -> None:
+    def draw(self, session: QuestionNeeds, dispatch: Dispatch, ui: UiState) -> None:
         """Draw the dialog of the session's question, if there is one."""
         question = session.question
         is_new, self._asked = question is not self._asked, question
@@ -68,14 +75,14 @@ class QuestionDialogs:
         if answer is not None:
             dispatch(answer)
 
-    def _draw_projects(self, question: ProjectQuestion, ui: UiState, is_agreed: bool) -> object | None:
+    def _draw_projects(self, question: ProjectQuestion, ui: UiState, is_agreed: bool) -> Command | None:
         imgui.text_wrapped(f"This capture has {len(question.choices)} projects. Which one do you want to open?")
         text_wrapped_dim(question.capture)
         imgui.spacing()
         n_rows = len(question.choices) + 1
         self._chosen += imgui.is_key_pressed(imgui.Key.down_arrow) - imgui.is_key_pressed(imgui.Key.up_arrow)
         self._chosen %= n_rows
-        answer: object | None = None
+        answer: Command | None = None
         width = imgui.get_content_region_avail().x
         for index, choice in enumerate(question.choices):
             if self._draw_row(index, f"{Icon.FOLDER}  {choice.name}", choice.trained_text, choice.project, width):
@@ -113,13 +120,13 @@ class QuestionDialogs:
         return is_taken
 
 
-def _title(question: Any) -> str:
+def _title(question: Question) -> str:
     if isinstance(question, RetrainQuestion):
         return f"Train clip {question.clip_index} again?###question"
     return "Several projects###question"
 
 
-def _draw_retrain(question: RetrainQuestion, ui: UiState, is_agreed: bool) -> object | None:
+def _draw_retrain(question: RetrainQuestion, ui: UiState, is_agreed: bool) -> Command | None:
     for text in retrain_texts(question):
         imgui.text_wrapped(text)
         imgui.spacing()

@@ -6,16 +6,28 @@ Written a while after something changed and when the window closes, so that a ki
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import Protocol
 
 from imgui_bundle import imgui
 
-from app.session.window_memory import WindowMemory, show_again, view_of
+from app.project.project import Project
+from app.session.window_memory import Viewed, WindowMemory, show_again, view_of
+from ui.panels.capture import CaptureFacts
 from ui.panels.state import UiState
 
 SAVE_AFTER_S = 5.0
 LAYOUT_VERSION = "; panels of ClipGStream Studio, version 1\n"
 """Comes first in the kept layout; another version has other panels and is not taken."""
+
+
+class RememberNeeds(Viewed, Protocol):
+    """What is remembered of a session."""
+
+    @property
+    def capture(self) -> CaptureFacts | None: ...
+
+    @property
+    def project(self) -> Project | None: ...
 
 
 class Remembering:
@@ -31,7 +43,7 @@ class Remembering:
         if self._memory is not None and self._memory.layout.startswith(LAYOUT_VERSION):
             imgui.load_ini_settings_from_memory(self._memory.layout)
 
-    def restore_marks(self, session: Any) -> None:
+    def restore_marks(self, session: RememberNeeds) -> None:
         """Size and opacity of anchor marks, which are the same in all projects."""
         if self._memory is None:
             return
@@ -40,7 +52,7 @@ class Remembering:
         if self._memory.mark_opacity is not None:
             session.overlays.mark_opacity = self._memory.mark_opacity
 
-    def follow(self, session: Any) -> None:
+    def follow(self, session: RememberNeeds) -> None:
         """Once per turn of the loop: shows a project that was just opened as it was left, and keeps what changes."""
         memory = self._memory
         if memory is None:
@@ -55,7 +67,7 @@ class Remembering:
         elif folder is not None:
             memory.keep_view(folder, view_of(session))
 
-    def save(self, session: Any) -> None:
+    def save(self, session: RememberNeeds) -> None:
         """Keep everything now."""
         memory = self._memory
         if memory is None:
@@ -69,7 +81,7 @@ class Remembering:
         memory.save()
 
 
-def _folder_of(session: Any) -> str | None:
+def _folder_of(session: RememberNeeds) -> str | None:
     if session.capture is None:
         return None
     return str(session.capture.path if session.project is None else session.project.folder)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
+from app.session.notices import Notices
+from app.status import JobStatus, ProjectStatus, TrainingStatus
 from engine.text import duration_text
 from ui.panels.state import UiState
 from ui.panels.widgets import elided
@@ -17,7 +20,26 @@ from ui.style.theme import Icon
 HEIGHT = 28.0
 
 
-def draw_status_bar(session: Any, ui: UiState, *, is_software: bool) -> None:
+class StatusNeeds(Protocol):
+    """What the lowest line reads."""
+
+    @property
+    def capture(self) -> object | None: ...
+
+    @property
+    def jobs(self) -> Sequence[JobStatus]: ...
+
+    @property
+    def training(self) -> TrainingStatus: ...
+
+    @property
+    def project_status(self) -> ProjectStatus | None: ...
+
+    @property
+    def notices(self) -> Notices: ...
+
+
+def draw_status_bar(session: StatusNeeds, ui: UiState, *, is_software: bool) -> None:
     """Work and its progress on the left; notices and the kind of drawing on the right."""
     flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_docking
     imgui.push_style_color(imgui.Col_.window_bg, ImVec4(*theme.BACKDROP))
@@ -36,7 +58,7 @@ def draw_status_bar(session: Any, ui: UiState, *, is_software: bool) -> None:
     imgui.pop_style_color(2)
 
 
-def status_text(session: Any) -> str:
+def status_text(session: StatusNeeds) -> str:
     """What goes on, in one line."""
     if session.jobs:
         job = session.jobs[0]
@@ -51,10 +73,10 @@ def status_text(session: Any) -> str:
         return f"{words[status.state]} clip {status.clip_index}  {stage_words(status)}  {status.message or ''}"
     if session.capture is None:
         return "Open a capture or a project to begin"
-    return "" if session.opened is None else session.opened.trained_text
+    return "" if session.project_status is None else session.project_status.trained_text
 
 
-def _right_text(session: Any, *, is_software: bool) -> str:
+def _right_text(session: StatusNeeds, *, is_software: bool) -> str:
     worst = [notice for notice in session.notices if notice.kind != "info"]
     notices = f"{Icon.WARNING} {len(worst)}    " if worst else ""
     return f"{notices}{'software drawing' if is_software else 'graphics card'}"

@@ -10,7 +10,7 @@ import signal
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import moderngl
 import pyglet
@@ -18,7 +18,7 @@ from pyglet.event import EVENT_HANDLED
 
 from app.session.window_memory import WindowMemory
 from ui.gl import free_dropped
-from ui.shell.frame import Frame
+from ui.shell.frame import Frame, FrameNeeds
 from ui.style.ui_scale import MIN_UNITS, UiScale
 
 logger = logging.getLogger(__name__)
@@ -29,6 +29,12 @@ DEFAULT_SIZE = (1440, 900)
 FRAME_PX, TASK_BAR_PX = 16, 120
 """How much of the screen borders, title bar and task bars take from a maximised window."""
 TITLE = "ClipGStream Studio"
+
+
+class WindowNeeds(FrameNeeds, Protocol):
+    """What a window needs of a session."""
+
+    def close(self) -> None: ...
 
 
 def make_window(width: int, height: int, *, is_visible: bool = True) -> Any:
@@ -65,9 +71,9 @@ def make_window(width: int, height: int, *, is_visible: bool = True) -> Any:
     return window
 
 
-def window_title(session: Any) -> str:
+def window_title(session: WindowNeeds) -> str:
     """The open project, how far it is trained and where it lies."""
-    opened = session.opened
+    opened = session.project_status
     return TITLE if opened is None else f"{opened.name} - {opened.trained_text} - {opened.folder} - {TITLE}"
 
 
@@ -94,7 +100,7 @@ class StudioWindow:
 
     def __init__(
         self,
-        session: Any,
+        session: WindowNeeds,
         *,
         width: int | None = None,
         height: int | None = None,

@@ -12,7 +12,7 @@ from pathlib import Path
 import imgui_bundle
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
-from app.playback.render import BACKGROUND
+from app.playback.arrays import BACKGROUND
 from ui.style.colors import GREEN, ORANGE, SKY, VERMILLION, YELLOW, Color, rgb
 from ui.style.colors import HELD_OUT as HELD_OUT  # looked up as theme.HELD_OUT by the panels, as all colours are
 from ui.style.colors import INHERITED as INHERITED

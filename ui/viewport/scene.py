@@ -9,14 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal, Protocol
 
 import moderngl
 import numpy as np
 
+from app.playback.arrays import BACKGROUND, GaussianArrays, Picture, PointArrays
 from app.playback.picture_source import PictureSource
 from app.playback.pointing import pixel_ray, seen_point
-from app.playback.render import BACKGROUND
+from app.playback.timeline import Timeline
+from app.status import RegionsStatus, WantedFrame
 from engine.camera.projection import camera_center
 from ui.gl import (
     NEAR,
@@ -28,7 +30,7 @@ from ui.gl import (
 )
 from ui.viewport.anchor_marks import nearest_under
 from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
-from ui.viewport.mark_layer import AnchorCounts, MarkLayer
+from ui.viewport.mark_layer import AnchorCounts, MarkLayer, MarkNeeds
 from ui.viewport.picture_size import MAX_PICTURE_WIDTH, MOVING_SHARES, moving_share, picture_size
 from ui.viewport.region_layer import RegionLayer, ShownRegions
 
@@ -38,6 +40,26 @@ HINT_NEAR_SHARE = 0.4
 """Pictures in space nearer than this share of the way to the pivot are left out."""
 _CLOUD_KINDS = {"static": CLOUD, "moment": FIRST_CLOUD, "pictures": HINT}
 NO_REGIONS = ShownRegions()
+
+
+class SceneNeeds(MarkNeeds, Protocol):
+    """What the picture is made from."""
+
+    @property
+    def timeline(self) -> Timeline: ...
+
+    @property
+    def regions(self) -> RegionsStatus: ...
+
+    def wanted_frame(self) -> WantedFrame | None: ...
+
+    def shown_gaussians(self) -> GaussianArrays | None: ...
+
+    def shown_points(self) -> PointArrays | None: ...
+
+    def request_render(self, width: int, height: int) -> Picture | None: ...
+
+    def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None: ...
 
 
 @dataclass(frozen=True)
@@ -138,7 +160,7 @@ class Scene:
 
     # ---- what arrived ----------------------------------------------------------------------------------------
 
-    def has_news(self, session: Any) -> bool:
+    def has_news(self, session: SceneNeeds) -> bool:
         """Did a picture arrive since the last compose? Asks again for what was asked last."""
         if self._asked_size is not None:
             picture = session.request_render(*self._asked_size)
@@ -152,7 +174,7 @@ class Scene:
 
     # ---- the picture -----------------------------------------------------------------------------------------
 
-    def compose(self, session: Any, view: SceneView, regions: ShownRegions = NO_REGIONS) -> Composed:
+    def compose(self, session: SceneNeeds, view: SceneView, regions: ShownRegions = NO_REGIONS) -> Composed:
         """Draw what belongs to the session's frame from this view, unless it is drawn already."""
         self._target.resize(view.width, view.height)
         is_cloud_chosen = bool(session.overlays.show_cloud)
@@ -191,7 +213,7 @@ class Scene:
             self.shown = shown = replace(shown, is_on_its_way=True)
         return Composed(self._target.texture, shown)
 
-    def captured(self, session: Any, width_px: int) -> CapturedPicture | None:
+    def captured(self, session: SceneNeeds, width_px: int) -> CapturedPicture | None:
         """What the camera looked through took at the playhead's frame, or at another one until that was decoded; None
         until anything was."""
         camera_index = session.view.look_through
@@ -223,7 +245,7 @@ class Scene:
             )
         return shown
 
-    def _take_picture(self, session: Any, view: SceneView, shown: ShownPicture) -> tuple[Hashable, ShownPicture]:
+    def _take_picture(self, session: SceneNeeds, view: SceneView, shown: ShownPicture) -> tuple[Hashable, ShownPicture]:
         full = min(MAX_PICTURE_WIDTH / view.width, 1.0)
         share = full * (self._moving_share if view.is_moving else 1.0)
         self._asked_size = picture_size(view.width, view.height, share)
@@ -244,7 +266,9 @@ class Scene:
             is_on_its_way=picture.is_stale or (view.is_moving and share < full),
         )
 
-    def _take_gaussians(self, session: Any, view: SceneView, shown: ShownPicture) -> tuple[Hashable, ShownPicture]:
+    def _take_gaussians(
+        self, session: SceneNeeds, view: SceneView, shown: ShownPicture
+    ) -> tuple[Hashable, ShownPicture]:
         gaussians, wanted = session.shown_gaussians(), session.wanted_frame()
         if gaussians is None:
             return None, shown
@@ -258,7 +282,7 @@ class Scene:
         is_current = wanted is None or (shown.is_of(wanted) and shown.source.revision == wanted.revision)
         return gaussians.key, replace(shown, is_on_its_way=not is_current)
 
-    def _take_points(self, session: Any) -> Hashable:
+    def _take_points(self, session: SceneNeeds) -> Hashable:
         cloud = session.shown_points()
         if cloud is None:
             return None
@@ -273,7 +297,7 @@ class Scene:
             self._point_size = CLOUD_OVERLAP * cloud.spacing
         return key
 
-    def anchor_text(self, session: Any, view: SceneView, x: float, y: float) -> str:
+    def anchor_text(self, session: SceneNeeds, view: SceneView, x: float, y: float) -> str:
         """What the anchor under a pixel of the view is and why; empty where none is shown or that is unknown. It stands
         out from the next frame on."""
         found = self.marks.anchor_under(session, view, x, y, self._near)
@@ -281,7 +305,7 @@ class Scene:
         self.marks.pointed_anchor = found[0].positions[found[1]] if found is not None and text else None
         return text
 
-    def point_under(self, session: Any, view: SceneView, x: float, y: float, depth: float) -> np.ndarray:
+    def point_under(self, session: SceneNeeds, view: SceneView, x: float, y: float, depth: float) -> np.ndarray:
         """The place under a pixel of the view: of the anchor there if anchors are shown, else of what one sees there.
 
         Args:
@@ -305,7 +329,7 @@ class Scene:
         return origin + depth * direction
 
     def _draw(
-        self, view: SceneView, base_key: Hashable, points_key: Hashable, captured_key: Hashable, session: Any
+        self, view: SceneView, base_key: Hashable, points_key: Hashable, captured_key: Hashable, session: SceneNeeds
     ) -> None:
         camera = (view.world_to_camera, view.K, view.width, view.height)
         target = self._target

@@ -9,14 +9,13 @@ from app.cli.arguments import (
     EXIT_OK,
     add_figure_choices,
     add_follow_links,
-    add_training_settings,
-    overrides_of,
     parse_cameras,
     path_argument,
 )
 from app.cli.progress import ProgressLine, row_progress
 from app.cli.results import check_writable
 from app.cli.training_lines import show_outcome, show_status
+from app.cli.training_settings import add_training_settings, overrides_of
 from app.project.project import check_settings, default_settings
 from app.training.service import Launch
 from engine.capture.capture import open_capture

@@ -83,19 +83,7 @@ VARIANTS = (
         shares_reference=False,
         is_reference_moved=True,
     ),
-    Variant(
-        "gate-images",
-        "static anchors that the pictures show changing get a dynamic feature",
-        {"gate": "images"},
-        shares_reference=False,
-    ),
     Variant("gate-off", "every anchor at every time, as published", {"gate": "off"}, shares_reference=False),
-    Variant(
-        "coarse-to-fine",
-        "the first 30 % of the steps look at pictures of half size",
-        {"coarse_share": 0.3},
-        shares_reference=False,
-    ),
     Variant("independent", "clips share nothing", {"independent": True}, is_baseline=True, shares_reference=False),
     Variant(
         "field-joint",

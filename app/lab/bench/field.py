@@ -10,7 +10,6 @@ from functools import partial
 import torch
 from torch import Tensor
 
-from app.lab.bench.clips import ClipRecipe, chosen_anchors, make_clip
 from app.lab.bench.compared import COMPARED, EXACT, FAST
 from app.lab.bench.raster import relative_errors
 from app.lab.bench.rows import KernelRow, SpeedError, kernel_row
@@ -19,6 +18,7 @@ from engine.backends.backend import Backend
 from engine.model.clip_model import ClipModel
 from engine.model.decoding import decode_anchors
 from engine.raster.gaussians import Gaussians
+from engine.training.plan.synthetic_clip import ClipRecipe, chosen_anchors, make_clip
 
 FRAME = 4
 """Frame of the clip that is decoded."""

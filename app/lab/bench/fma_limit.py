@@ -12,7 +12,7 @@ import numpy as np
 from numba import get_num_threads, njit, prange, types
 
 from engine.kernels.lanes import LaneBuilder, kernel_intrinsic
-from engine.kernels.threads import parallel_guard
+from engine.kernels.launch import parallel_guard
 
 _N_CHAINS = 12
 """Enough to hide the latency of two ports, few enough to stay in registers."""

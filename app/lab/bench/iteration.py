@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.lab.bench.clips import ClipRecipe
 from app.lab.bench.rows import IterationRow, SpeedError
 from app.lab.bench.step import STAGES, StepRun
 from app.lab.bench.step_errors import measure_errors
 from app.lab.bench.timing import interleaved
+from engine.training.plan.synthetic_clip import ClipRecipe
 
 SIZES = {
     "2k": ClipRecipe(2_000, 5, 240, 180),

@@ -14,13 +14,13 @@ from itertools import pairwise
 import torch
 from torch import Tensor, nn
 
-from app.lab.bench.clips import N_FRAMES, ClipRecipe, make_clip, make_truth, make_view
 from app.lab.bench.compared import FAST
 from engine.backends.backend import Backend
 from engine.model.clip_view import View, render_gaussians
 from engine.raster.gaussians import Gaussians
 from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters
+from engine.training.plan.synthetic_clip import N_FRAMES, ClipRecipe, make_clip, make_truth, make_view
 from engine.training.step.losses import photometric_loss
 
 STAGES = ("decode forward", "raster forward", "loss", "raster backward", "decode backward", "optimiser")
@@ -74,7 +74,9 @@ class StepRun:
         self._truth = torch.from_numpy(make_truth(recipe)[rows, columns].copy())
         parameters = named_parameters(self._model, self._gain, self._config)
         self._parameters = {name: parameter for name, (parameter, _) in parameters.items()}
-        self._optimizer = PhaseOptimizer(parameters, n_steps=10_000, config=self._config, backend=backend)
+        self._optimizer = PhaseOptimizer(
+            parameters, n_steps=10_000, config=self._config, final_ratios={}, backend=backend
+        )
         self._frame = 0
         self.n_gaussians = 0
 

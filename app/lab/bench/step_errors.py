@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from app.lab.bench.clips import ClipRecipe
 from app.lab.bench.compared import COMPARED, EXACT, FAST
 from app.lab.bench.raster import relative_errors
 from app.lab.bench.rows import SpeedError, StepErrors
 from app.lab.bench.step import StepRun, Window
 from app.lab.bench.timing import interleaved
 from engine.backends.backend import Backend
+from engine.training.plan.synthetic_clip import ClipRecipe
 
 WINDOW_PX = 64, 48
 """Width and height of the part that is compared; smaller pictures are compared whole."""

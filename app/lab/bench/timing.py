@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import statistics
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from typing import Any
 
-from app.background.children import undisturbed
+from app.background.children import in_fresh_process
 from app.background.memory import peak_bytes
 
 MEMORY_TIMEOUT_S = 120.0
@@ -48,37 +45,6 @@ def interleaved(
             if turn >= n_warm:
                 runs[name].append(stages_ms)
     return {name: [Timing.of(stage_ms) for stage_ms in zip(*rows, strict=True)] for name, rows in runs.items()}
-
-
-def in_fresh_process(call: Callable[..., float], *arguments: Any, timeout_s: float) -> float | None:
-    """What a call returns in a process of its own; None if it fails or takes too long.
-
-    Args:
-        call: Importable function that returns a number.
-        arguments: Its arguments.
-        timeout_s: The process is ended after that.
-    """
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=_send_result, args=(theirs, call, arguments), daemon=True)
-    with undisturbed():
-        process.start()
-    theirs.close()
-    try:
-        with suppress(EOFError, OSError):
-            if ours.poll(timeout_s):
-                return float(ours.recv_bytes())
-        return None
-    finally:
-        process.kill()
-        process.join()
-        ours.close()
-
-
-def _send_result(pipe: Connection, call: Callable[..., float], arguments: tuple[Any, ...]) -> None:
-    number = call(*arguments)
-    with suppress(OSError):  # whoever asked has gone
-        pipe.send_bytes(str(number).encode())
 
 
 def peak_extra_mb(prepare: Callable[..., Callable[[], object]], *arguments: Any) -> float | None:

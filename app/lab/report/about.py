@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import importlib.metadata
 from collections.abc import Mapping
-from dataclasses import asdict
 from datetime import datetime
 from typing import Any
 
-import msgspec
+from msgspec import structs
 
 from app.lab.bench.machine import Machine
 from app.lab.report.parts import Section
 from app.lab.report.tables import Table, TableColumn
 from app.project.project import ProjectSettings
 from app.project.project_facts import ProjectFacts
-from engine.training.config import TrainConfig
+from engine.training.config import SETTINGS
 
 _PAIR = (TableColumn("what", "What"), TableColumn("value", "Value"))
 
@@ -77,9 +76,7 @@ def split_section(facts: ProjectFacts, capture: Mapping[str, Any], n_clips: int)
         + ", ".join(f"{c.clip_index} (frames {c.start} to {c.start + c.n_frames - 1})" for c in facts.clips),
     }
     parts: list[Any] = [_pairs("split", "Cameras and clips", rows)]
-    covered = [
-        {"clip": clip.clip_index, **msgspec.structs.asdict(clip.coverage)} for clip in facts.clips if clip.coverage
-    ]
+    covered = [{"clip": clip.clip_index, **structs.asdict(clip.coverage)} for clip in facts.clips if clip.coverage]
     if covered:
         columns = (
             TableColumn("clip", "Clip"),
@@ -101,9 +98,8 @@ def split_section(facts: ProjectFacts, capture: Mapping[str, Any], n_clips: int)
 
 def settings_section(facts: ProjectFacts) -> Section:
     """Training settings that differ from the defaults."""
-    defaults = asdict(TrainConfig())
     rows = [
-        {"setting": name, "value": value, "default": defaults[name]}
+        {"setting": name, "value": value, "default": SETTINGS[name].default}
         for name, value in facts.settings.config().difference().items()
     ]
     said = f"Seed {facts.settings.seed}, reference clip {facts.settings.reference_clip}."
@@ -120,7 +116,7 @@ def all_settings(settings: ProjectSettings) -> dict[str, Any]:
     return {
         **{name: getattr(settings, name) for name in names},
         "holdout": ",".join(settings.holdout) or "none",
-        **asdict(settings.config()),
+        **structs.asdict(settings.config()),
     }
 
 

@@ -14,10 +14,9 @@ import numpy as np
 from numba import get_num_threads
 from torch import Tensor
 
-from engine.kernels.arrays import Floats2, Floats3, job_reader, pack
-from engine.kernels.lanes import kernel_intrinsic
+from engine.kernels.jobs import Floats2, Floats3, Workers, read
+from engine.kernels.launch import kernel, launch
 from engine.kernels.memory import RecycledMemory
-from engine.kernels.routines import WORKER, routine, run
 from engine.kernels.workspace import WorkspacePool
 from engine.metrics.pictures.flip_lanes import (
     N_FILTERED,
@@ -54,13 +53,12 @@ class AlongJob(NamedTuple):
         picture: Display-encoded sRGB in 0..1. [H, 3 W]
         scratch: Three rows a worker. [3 workers, padded W + 32]
         filtered: Written from row RADIUS on. [7, H + 20, padded W]
-        n_workers: How many workers share the rows.
     """
 
     picture: Floats2
     scratch: Floats2
     filtered: Floats3
-    n_workers: int
+    n_workers: Workers = None
 
 
 class DownJob(NamedTuple):
@@ -69,12 +67,11 @@ class DownJob(NamedTuple):
     Attributes:
         filtered: Of `along_rows`, first and last row repeated beyond the border. [7, H + 20, padded W]
         planes: Written, see Seen. [5, H, padded W]
-        n_workers: How many workers share the rows.
     """
 
     filtered: Floats3
     planes: Floats3
-    n_workers: int
+    n_workers: Workers = None
 
 
 class DifferenceJob(NamedTuple):
@@ -83,13 +80,12 @@ class DifferenceJob(NamedTuple):
     Attributes:
         first, second: See Seen. [5, H, padded W]
         errors: Written. [H, padded W]
-        n_workers: How many workers share the rows.
     """
 
     first: Floats3
     second: Floats3
     errors: Floats2
-    n_workers: int
+    n_workers: Workers = None
 
 
 def seen(picture: np.ndarray) -> Seen:
@@ -110,10 +106,10 @@ def seen(picture: np.ndarray) -> Seen:
     workspace = _POOL.take()
     scratch = workspace.array("scratch", (3 * n_workers, padded + 2 * _MARGIN), np.float32)
     filtered = workspace.array("filtered", (N_FILTERED, height + 2 * RADIUS, padded), np.float32)
-    run(along_rows, pack(AlongJob(rows, scratch, filtered, n_workers)), n_workers)
+    launch(along_rows, AlongJob(rows, scratch, filtered), n_workers)
     filtered[:, :RADIUS] = filtered[:, RADIUS : RADIUS + 1]
     filtered[:, -RADIUS:] = filtered[:, -RADIUS - 1 : -RADIUS]
-    run(down_columns, pack(DownJob(filtered, planes, n_workers)), n_workers)
+    launch(down_columns, DownJob(filtered, planes), n_workers)
     _POOL.give_back(workspace)
     return Seen(planes, width)
 
@@ -122,8 +118,7 @@ def flip_of(image: Seen, truth: Seen) -> np.ndarray:
     """FLIP error of each pixel of two pictures of one size. [H, W] float32 in 0..1"""
     _, height, padded = image.planes.shape
     errors = _MEMORY.empty(height, padded)
-    n_workers = max(1, min(get_num_threads(), height))
-    run(compare, pack(DifferenceJob(image.planes, truth.planes, errors, n_workers)), n_workers)
+    launch(compare, DifferenceJob(image.planes, truth.planes, errors))
     return errors.numpy()[:, : image.width]
 
 
@@ -146,28 +141,10 @@ def warm_up() -> None:
     flip_map(np.zeros((1, 1, 3), np.float32), np.ones((1, 1, 3), np.float32))
 
 
-@kernel_intrinsic
-def _read_along_job(typing_context, address):
-    """The AlongJob at an address."""
-    return job_reader(AlongJob)
-
-
-@kernel_intrinsic
-def _read_down_job(typing_context, address):
-    """The DownJob at an address."""
-    return job_reader(DownJob)
-
-
-@kernel_intrinsic
-def _read_difference_job(typing_context, address):
-    """The DifferenceJob at an address."""
-    return job_reader(DifferenceJob)
-
-
-@routine(WORKER)
+@kernel(AlongJob)
 def along_rows(worker, arguments):
     """See AlongJob."""
-    job = _read_along_job(arguments)
+    job = read(AlongJob, arguments)
     picture, scratch, filtered = job.picture, job.scratch, job.filtered
     height, width = len(picture), picture.shape[1] // 3
     padded = filtered.shape[2]
@@ -199,10 +176,10 @@ def along_rows(worker, arguments):
             )
 
 
-@routine(WORKER)
+@kernel(DownJob)
 def down_columns(worker, arguments):
     """See DownJob."""
-    job = _read_down_job(arguments)
+    job = read(DownJob, arguments)
     filtered, planes = job.filtered, job.planes
     height, padded = planes.shape[1], planes.shape[2]
     for y in range(height * worker // job.n_workers, height * (worker + 1) // job.n_workers):
@@ -211,10 +188,10 @@ def down_columns(worker, arguments):
             filter_down(source + 4 * x, 4 * filtered.shape[1] * padded, 4 * padded, target + 4 * x, 4 * height * padded)
 
 
-@routine(WORKER)
+@kernel(DifferenceJob)
 def compare(worker, arguments):
     """See DifferenceJob."""
-    job = _read_difference_job(arguments)
+    job = read(DifferenceJob, arguments)
     first, second, errors = job.first, job.second, job.errors
     height, padded = errors.shape
     for y in range(height * worker // job.n_workers, height * (worker + 1) // job.n_workers):

@@ -165,7 +165,6 @@ def to_opponent(typing_context, red, green, blue):
             linear.append(curve.where(value.compare(">", 0.04045), value * (1 / 12.92)))
         for address, value in zip(arguments, _matrix(_OPPONENT @ _TO_RELATIVE, linear), strict=True):
             build.store(value, address)
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -183,7 +182,6 @@ def filter_along(typing_context, y, cx, cz, target, plane_bytes):
         of_cx, of_cz = _weigh(build, cx, step, [_CX_TAPS]), _weigh(build, cz, step, list(_CZ_TAPS))
         for index, value in enumerate((of_y[0], *of_cx, *of_cz, *of_y[1:])):
             build.store(value, build.address(target, builder.mul(plane_bytes, build.int64(index))))
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -219,7 +217,6 @@ def filter_down(typing_context, source, plane_bytes, row_bytes, target, target_p
         for index, value in enumerate((lightness, hunt * a, hunt * b, edge, point)):
             place = build.address(target, builder.mul(target_plane_bytes, build.int64(index)))
             build.store(value, place)
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -245,6 +242,5 @@ def difference(typing_context, first, second, plane_bytes, target):
         feature = (edge.abs().max(point.abs()) * math.sqrt(0.5)).sqrt()
         error = _power(color, 1.0 - feature)
         build.store(error.where(distance.compare(">", 0.0)), target)
-        return context.get_dummy_value()
 
     return signature, generate

@@ -12,10 +12,10 @@ import numpy as np
 from numba import get_num_threads, types
 
 from engine.images.ssim_lanes import RADIUS, WINDOW, blur_moments
-from engine.kernels.arrays import Floats2, Floats3, job_reader, pack
+from engine.kernels.jobs import Floats2, Floats3, Workers, read
 from engine.kernels.lanes import LaneBuilder, Lanes, kernel_intrinsic
+from engine.kernels.launch import kernel, launch
 from engine.kernels.memory import RecycledMemory
-from engine.kernels.routines import WORKER, routine, run
 from engine.kernels.workspace import WorkspacePool
 
 K1, K2 = 0.01, 0.03
@@ -36,7 +36,6 @@ class SimilarityJob(NamedTuple):
         padded: Scratch, two rows a worker, zeros before. [2 workers, padded 3 W + 32]
         moments: a, b, a^2 + b^2, a b blurred along rows; RADIUS rows of zeros at both ends. [4, H + 10, padded 3 W]
         maps: Written. [3, H, padded 3 W]
-        n_workers: How many workers share the rows.
     """
 
     a: Floats2
@@ -44,7 +43,7 @@ class SimilarityJob(NamedTuple):
     padded: Floats2
     moments: Floats3
     maps: Floats3
-    n_workers: int
+    n_workers: Workers = None
 
 
 def similarity_maps(image: np.ndarray, truth: np.ndarray) -> np.ndarray:
@@ -62,9 +61,9 @@ def similarity_maps(image: np.ndarray, truth: np.ndarray) -> np.ndarray:
     padded = workspace.array("padded", (2 * n_workers, row + 2 * _MARGIN), np.float32)
     moments = workspace.array("moments", (_N_MOMENTS, height + 2 * RADIUS, row), np.float32)
     padded[:], moments[:, :RADIUS], moments[:, -RADIUS:] = 0.0, 0.0, 0.0
-    job = pack(SimilarityJob(a, b, padded, moments, maps, n_workers))
-    run(blur_rows, job, n_workers)
-    run(compare_rows, job, n_workers)
+    job = SimilarityJob(a, b, padded, moments, maps)
+    launch(blur_rows, job, n_workers)
+    launch(compare_rows, job, n_workers)
     _POOL.give_back(workspace)
     return maps.numpy()[..., : 3 * width]
 
@@ -106,21 +105,14 @@ def _similarity(typing_context, moments, plane_bytes, row_bytes, target, target_
             maps += [structure * (mean_product.times_plus(2.0, c1) / (mean_squares + c1)), structure]
         for index, value in enumerate(maps[:N_MAPS]):
             build.store(value, build.address(target, builder.mul(target_plane_bytes, build.int64(index))))
-        return context.get_dummy_value()
 
     return signature, generate
 
 
-@kernel_intrinsic
-def _read_job(typing_context, address):
-    """The SimilarityJob at an address."""
-    return job_reader(SimilarityJob)
-
-
-@routine(WORKER)
+@kernel(SimilarityJob)
 def blur_rows(worker, arguments):
     """See SimilarityJob."""
-    job = _read_job(arguments)
+    job = read(SimilarityJob, arguments)
     a, b, padded, moments = job.a, job.b, job.padded, job.moments
     height, width3 = a.shape
     plane_bytes = 4 * moments.shape[1] * moments.shape[2]
@@ -135,10 +127,10 @@ def blur_rows(worker, arguments):
             blur_moments(from_a + 4 * x, from_b + 4 * x, target + 4 * x, plane_bytes)
 
 
-@routine(WORKER)
+@kernel(SimilarityJob)
 def compare_rows(worker, arguments):
     """See SimilarityJob."""
-    job = _read_job(arguments)
+    job = read(SimilarityJob, arguments)
     moments, maps = job.moments, job.maps
     height, row = maps.shape[1], maps.shape[2]
     for y in range(height * worker // job.n_workers, height * (worker + 1) // job.n_workers):

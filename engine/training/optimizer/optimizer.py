@@ -6,7 +6,7 @@ Rates carry no scene scale and the horizon is the phase's own number of steps, s
 from __future__ import annotations
 
 import math
-from fnmatch import fnmatchcase
+from collections.abc import Mapping
 
 import numpy as np
 import torch
@@ -19,13 +19,6 @@ from engine.model.host_array import host_array
 from engine.training.config import TrainConfig
 
 _HEADS = ("opacity", "color", "shape", "offset")
-_OWN_RATIOS = {
-    "sets.*.features": "feature_final_ratio",
-    "sets.*.log_*_scales": "scale_final_ratio",
-    "field.*": "field_final_ratio",
-    **{f"decoder.{head}.*": f"{head}_head_final_ratio" for head in _HEADS},
-}
-"""Names of parameters to the setting that says where their rates end."""
 
 
 def named_parameters(
@@ -55,19 +48,14 @@ def named_parameters(
     return chosen
 
 
-def final_ratio(name: str, config: TrainConfig) -> float:
-    """Where the rate of a parameter of `named_parameters` ends, as a share of its start."""
-    own = [getattr(config, setting) for pattern, setting in _OWN_RATIOS.items() if fnmatchcase(name, pattern)]
-    return next((ratio for ratio in own if ratio), config.final_lr_ratio)
-
-
 class PhaseOptimizer:
     """Adam over the trainable parameters of one phase. Owns moments and schedule, not the parameters.
 
     Args:
         parameters: By name, with the rate at the start.
         n_steps: Steps of the phase, over which rates fall.
-        config: Final ratios of the rates and the norm to clip at.
+        config: Final ratio of the rates and the norm to clip at.
+        final_ratios: Of parameters whose rates end elsewhere, by name.
         backend: What Adam is computed with.
     """
 
@@ -77,15 +65,15 @@ class PhaseOptimizer:
         *,
         n_steps: int,
         config: TrainConfig,
+        final_ratios: Mapping[str, float],
         backend: Backend,
     ) -> None:
         self._parameters = {name: parameter for name, (parameter, _) in parameters.items()}
         self._rates = {name: rate for name, (_, rate) in parameters.items()}
-        self._final_ratios = {name: final_ratio(name, config) for name in parameters}
+        self._final_ratios = dict.fromkeys(parameters, config.final_lr_ratio) | dict(final_ratios)
         self._max_norm = config.max_gradient_norm
         self.n_steps = n_steps
         self.steps_done = 0
-        self._from_step, self._from_share = 0, 0.0
         self._adam = backend.adam(self._parameters)
 
     def step(self) -> float:
@@ -113,22 +101,7 @@ class PhaseOptimizer:
     @property
     def share_done(self) -> float:
         """How much of the fall of the rates lies behind, 0 to 1; rates are start * final_ratio ** this."""
-        share = (self.steps_done - self._from_step) / max(self.n_steps - self._from_step, 1)
-        return self._from_share + (1.0 - self._from_share) * share
-
-    def finish_within(self, n_steps: int) -> None:
-        """From here on rates fall to their end within so many more steps, from where they are."""
-        self._from_step, self._from_share = self.steps_done, self.share_done
-        self.n_steps = self.steps_done + n_steps
-
-    @property
-    def schedule(self) -> list[float]:
-        """Where the present fall of the rates began: step, and share of the fall. For a checkpoint."""
-        return [self._from_step, self._from_share]
-
-    @schedule.setter
-    def schedule(self, values: list[float]) -> None:
-        self._from_step, self._from_share = int(values[0]), float(values[1])
+        return self.steps_done / max(self.n_steps, 1)
 
     def clips(self, norm: float) -> bool:
         """Whether gradients of this norm are scaled down."""

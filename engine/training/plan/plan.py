@@ -1,25 +1,53 @@
-"""TrainingPlan: all that is known of a clip's training before it begins, each number with its reason, and a forecast.
+"""TrainingPlan: what is known of a clip's training before it begins, each number with its reason, and a forecast.
 
-Sizes that are fixed by settings or derived from the footage are exact. Those that follow from the clouds are expected,
-and say so. Times come from `engine.training.plan.cost`, corrected by what earlier clips of the project took, or else
-by how fast this machine computes a step of known size. No torch, no clock, no files.
+Numbers of steps and pictures are exact. Of anchors, which follow from the pictures, a plan knows limits. The forecast
+is that of engine.training.plan.forecast. No clock, no files.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import ClipHeader
+from engine.errors import PreparationError
 from engine.training.config import JOINT_RULE, SOURCE_RULE, STATIC_RULE, StepRule, TrainConfig
-from engine.training.plan.cost import checkpoint_mb
-from engine.training.plan.expected_sizes import Counts, Footage, clip_sizes, counts_of, expected_counts
-from engine.training.plan.forecasting import UNKNOWN_MACHINE, MachineSpeed, MeasuredClip, forecast
-from engine.training.step.early_stopping import MEASURE_EVERY, held_in_items
+from engine.training.plan.forecast import (
+    Expected,
+    MeasuredClip,
+    expected_from,
+    expected_training,
+    rough_memory_mb,
+    rough_preparation_s,
+)
+from engine.training.preparation.training_pictures import shared_image_size
 
-Value = int | float | str
+Value = int | float | str | None
+
+_STATIC_PER_PIXEL, _ALIVE_PER_PIXEL = 0.19, 0.035
+"""Anchors per pixel of one picture where nothing better is known: static ones, and moving ones alive in a frame."""
+SEEN_SHARE = 0.6
+"""Of the static anchors, those that one camera sees."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepSizes:
+    """What the time of a training step follows from.
+
+    Attributes:
+        width, height: Of a picture, pixels.
+        n_static, n_moving: Anchors that a camera sees at one time.
+        config: Widths, Gaussians per anchor, loss.
+    """
+
+    width: int
+    height: int
+    n_static: int
+    n_moving: int
+    config: TrainConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +56,7 @@ class PlanLine:
 
     Attributes:
         name: As shown to the user.
-        value: Number or word.
+        value: Number or words; None where nobody can know yet.
         unit: "" where there is none.
         reason: Where the value comes from, one clause.
     """
@@ -42,6 +70,8 @@ class PlanLine:
     def text(self) -> str:
         """Value and unit as people read them."""
         shown = self.value
+        if shown is None:
+            return "unknown"
         if isinstance(shown, float):
             shown = f"{shown:,.0f}" if abs(shown) >= 100 else f"{shown:.2g}" if abs(shown) < 1 else f"{shown:.1f}"
         elif isinstance(shown, int):
@@ -51,9 +81,9 @@ class PlanLine:
 
 @dataclass(frozen=True, slots=True)
 class ForecastLine(PlanLine):
-    """A line of the forecast: its value is a number."""
+    """A line of the forecast: its value is a number, or None."""
 
-    value: float
+    value: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +93,7 @@ class TrainingPlan:
     Attributes:
         clip_index, start, n_frames: The clip.
         role: "reference" or "source".
-        n_steps: Of all phases; early stopping may do with fewer.
+        n_steps: Of all phases.
         lines: Everything that is known, in the order in which it comes about.
         preparation_s, training_s: Forecast; together the wall time, compiling of kernels left out.
         memory_mb: Most that the training process will hold, 10^6 bytes.
@@ -89,8 +119,10 @@ class TrainingPlan:
         return self.preparation_s, self.training_s, self.memory_mb, self.disk_mb
 
     @property
-    def seconds(self) -> float:
-        """Forecast of the wall time."""
+    def seconds(self) -> float | None:
+        """Forecast of the wall time; None where it is not known."""
+        if self.preparation_s.value is None or self.training_s.value is None:
+            return None
         return self.preparation_s.value + self.training_s.value
 
     def line(self, name: str) -> PlanLine | None:
@@ -126,8 +158,55 @@ def resumed_plan(plan: TrainingPlan, steps_done: int, n_steps: int) -> TrainingP
         n_steps=n_steps,
         steps_done=steps_done,
         preparation_s=replace(plan.preparation_s, value=0.0, reason="done before the training was stopped"),
-        training_s=replace(training_s, value=training_s.value * left, reason=f"{training_s.reason}; {done}"),
+        training_s=replace(
+            training_s,
+            value=None if training_s.value is None else training_s.value * left,
+            reason=f"{training_s.reason}; {done}",
+        ),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class Footage:
+    """What there is to train on.
+
+    Attributes:
+        width, height: Working size, pixels.
+        n_cameras, n_held_out: Cameras to train on, and those left out.
+        n_frames: Of the capture.
+    """
+
+    width: int
+    height: int
+    n_cameras: int
+    n_held_out: int
+    n_frames: int
+
+    @property
+    def n_pixels(self) -> int:
+        """Of one picture."""
+        return self.width * self.height
+
+
+def footage_of(capture: Capture, holdout: Sequence[int]) -> Footage:
+    """Numbers of a capture.
+
+    Raises:
+        PreparationError: Cameras differ in size, or fewer than two are left for training.
+    """
+    n_cameras = len(capture.rig) - len(set(holdout))
+    if n_cameras < 2:
+        raise PreparationError(
+            f"Only {n_cameras} of {len(capture.rig)} cameras are left for training; two are needed.",
+            hint="Hold out fewer cameras.",
+            path=capture.path,
+        )
+    width, height = shared_image_size(capture)
+    return Footage(width, height, n_cameras, len(set(holdout)), capture.n_frames)
+
+
+StepTime = Callable[[StepSizes, str], float | None]
+"""Seconds of a step of these sizes in a phase, see engine.training.plan.measured_steps; None without one."""
 
 
 def make_plan(
@@ -138,7 +217,7 @@ def make_plan(
     is_source: bool,
     reference: ClipHeader | None = None,
     history: Sequence[MeasuredClip] = (),
-    machine: MachineSpeed = UNKNOWN_MACHINE,
+    step_time: StepTime = lambda sizes, phase: None,
     is_still: bool = False,
 ) -> TrainingPlan:
     """The plan of one clip.
@@ -150,53 +229,60 @@ def make_plan(
         is_source: Whether the clip begins with what another one has learned, and so has one phase instead of two.
         reference: Header of that other clip; None where it is not trained yet.
         history: Trained clips of the project, in any order; this one, when it is trained again, does not count.
-        machine: What its speed is taken to be where no clip of the project was measured.
+        step_time: Asked where no clip of the same kind was measured.
         is_still: Whether nothing moves in this clip, by `engine.training.plan.stillness.looks_still`.
     """
-    history = [known for known in history if known.clip_index != clip.clip_index]
-    # a clip in which nothing moved says nothing about one in which something may
-    siblings = [
-        known.counts for known in history if known.counts and known.counts.n_alive and known.is_source == is_source
-    ]
-    known = None if reference is None else counts_of(reference)
-    counts = expected_counts(footage, clip, config, reference=known, siblings=siblings, is_source=is_source)
-    if is_still:
-        counts = Counts(counts.n_static, 0, 0, 0)
+    same = [known for known in history if known.clip_index != clip.clip_index and known.is_source == is_source]
+    same = [known for known in same if not known.is_still]
     phases = _phase_lines(footage, clip, config, is_source=is_source)
     if is_still and is_source:
         nothing = "nothing moves in the pictures looked at, so there is nothing to learn"
         phases = [replace(line, value=0, reason=nothing) for line in phases]
-    sizes = clip_sizes(footage, clip, config, counts, is_source=is_source)
-    lines = [
-        *_picture_lines(footage, clip, config, is_source=is_source),
-        *phases,
-        _voxel_line(reference, is_source=is_source),
-        *_anchor_lines(config, counts, known, n_siblings=len(siblings), is_source=is_source),
-        *_model_lines(config, counts, is_source=is_source),
-        PlanLine("kept while training", checkpoint_mb(sizes), "MB", "a checkpoint to go on from; it goes in the end"),
-    ]
-    if config.coarse_share and sum(int(line.value) for line in phases):
-        n_coarse = sum(config.n_coarse_steps(int(line.value)) for line in phases)
-        reason = f"the first {100 * config.coarse_share:.0f} % of every phase, as set"
-        lines.append(PlanLine("half size", n_coarse, "steps", reason))
-    if config.patience and sum(int(line.value) for line in phases):
-        n_kept = len(held_in_items(footage.n_cameras, clip.n_frames, 0))
-        reason = f"when {_plural(n_kept, 'picture')} kept out of training gain nothing over {config.patience} looks"
-        lines.append(PlanLine("early stop", f"{MEASURE_EVERY * config.patience:,}", "steps", reason))
-    steps = [int(line.value) for line in phases]
-    expected = forecast(footage, clip, config, sizes, steps=steps, history=history, machine=machine)
+    steps = {line.name.removesuffix(" steps"): int(line.value or 0) for line in phases}
+    n_static, n_moving = expected_anchors(footage, config, reference)
+    sizes = StepSizes(footage.width, footage.height, round(SEEN_SHARE * n_static), n_moving, config)
+    n_pictures = footage.n_cameras * clip.n_frames
+    n_read = n_pictures if is_source else footage.n_cameras * min(footage.n_frames, config.background_frames)
+    preparation = expected_from(same, "preparation_s") or Expected(
+        rough_preparation_s(n_cameras=footage.n_cameras, n_pictures=n_pictures, is_source=is_source), "rough"
+    )
+    training = expected_training(same, steps, lambda phase: step_time(sizes, phase))
+    memory = expected_from(same, "memory_mb") or Expected(
+        rough_memory_mb(n_pixels=footage.n_pixels, n_pictures=n_pictures, n_read=n_read), "the program and its pictures"
+    )
+    disk = expected_from(same, "disk_mb") or Expected(None, "not known before a clip of this kind is trained")
+    if is_still and is_source:
+        disk = Expected(None, "next to nothing")
     return TrainingPlan(
         clip_index=clip.clip_index,
         start=clip.start,
         n_frames=clip.n_frames,
         role="source" if is_source else "reference",
-        n_steps=sum(steps),
-        lines=tuple(lines),
-        preparation_s=ForecastLine("preparation", *expected.preparation_s),
-        training_s=ForecastLine("training", *expected.training_s),
-        memory_mb=ForecastLine("memory", *expected.memory_mb),
-        disk_mb=ForecastLine("stored clip", *expected.disk_mb),
+        n_steps=sum(steps.values()),
+        lines=(
+            *_picture_lines(footage, clip, config, is_source=is_source),
+            *phases,
+            *_anchor_lines(config, reference, is_source=is_source),
+            PlanLine("Gaussians per anchor", config.gaussians_per_anchor, "", "as in every clip of the project"),
+        ),
+        preparation_s=_forecast_line("preparation", "s", preparation),
+        training_s=_forecast_line("training", "s", training),
+        memory_mb=_forecast_line("memory", "MB", memory),
+        disk_mb=_forecast_line("stored clip", "MB", disk),
     )
+
+
+def _forecast_line(name: str, unit: str, expected: Expected) -> ForecastLine:
+    return ForecastLine(name, None if expected.value is None else round(expected.value, 3), unit, expected.reason)
+
+
+def expected_anchors(footage: Footage, config: TrainConfig, reference: ClipHeader | None) -> tuple[int, int]:
+    """Static anchors, and moving ones alive in one frame: the reference clip's, or as many as pictures suggest."""
+    n_static = min(round(_STATIC_PER_PIXEL * footage.n_pixels), config.max_static_points)
+    n_alive = min(round(_ALIVE_PER_PIXEL * footage.n_pixels), config.max_moving_points)
+    if reference is None:
+        return n_static, n_alive
+    return reference.n_anchors.get("static", n_static), n_alive if reference.n_alive is None else reference.n_alive
 
 
 # ---------------------------------------------------------------- lines
@@ -251,89 +337,17 @@ def _step_reason(given: int, passes: float, rule: StepRule, n_items: int, item: 
     return f"{rule.per_item} for each of {_plural(n_items, item)}{bound}"
 
 
-def _voxel_line(reference: ClipHeader | None, *, is_source: bool) -> PlanLine:
-    """The grid on which what moves is carved."""
-    known = None if reference is None else reference.moving_spacing
-    if is_source and isinstance(known, int | float):
-        return PlanLine("voxel", float(known), "units", "the reference clip's: the same place gives the same anchors")
-    if is_source:
-        return PlanLine("voxel", "inherited", "", "the reference clip's: the same place gives the same anchors")
-    return PlanLine(
-        "voxel", "derived", "", "as fine as pixels are at that distance, coarser where the limits below ask"
-    )
-
-
-def _anchor_lines(
-    config: TrainConfig, counts: Counts, reference: Counts | None, *, n_siblings: int, is_source: bool
-) -> list[PlanLine]:
-    past = f"expected, the middle of {_plural(n_siblings, 'clip')} trained before"
-    limit = f"at most {config.max_moving_points:,} with the inherited ones in use"
+def _anchor_lines(config: TrainConfig, reference: ClipHeader | None, *, is_source: bool) -> list[PlanLine]:
+    """Limits, and what a trained reference clip has; how many anchors a clip gets its pictures decide."""
+    n_static, n_moving = f"<= {config.max_static_points:,}", f"<= {config.max_moving_points:,}"
     if not is_source:
-        static = f"expected; the voxel grows until there are at most {config.max_static_points:,}"
-        moving = f"expected; the voxel grows until there are at most {config.max_moving_points:,}"
-        return [
-            PlanLine("static anchors", counts.n_static, "", past if n_siblings else static),
-            PlanLine("moving anchors", counts.n_moving, "", past if n_siblings else moving),
-        ]
-    words = {
-        "frozen": "kept as they are",
-        "moving": "kept as they are",
-        "trainable": "they go on learning",
-        "off": "left out, the clip has its own",
-    }
-    known = "counted in the reference clip" if reference else "expected, the reference clip is not trained yet"
-    residual = {
-        "dedup": f"expected; those that inherited anchors do not cover, {limit}",
-        "none": "residual=none",
-        "full": "expected; all that moves, residual=full",
-    }[config.residual]
-    if not counts.n_alive:
-        residual = "nothing moves"
-    elif n_siblings:
-        residual = f"{past}; {limit}" if config.residual == "dedup" else past
-    if counts.n_alive and config.inherit == "moving":
-        residual += ", and inherited ones that go on learning"
-    return [
-        PlanLine("static anchors", counts.n_static, "", f"{words[config.inherit]}; {known}"),
-        PlanLine("residual anchors", counts.n_moving, "", residual),
-    ]
-
-
-def _model_lines(config: TrainConfig, counts: Counts, *, is_source: bool) -> list[PlanLine]:
-    default, inherited = TrainConfig(), "the reference clip's" if is_source and config.decoder != "new" else ""
-    widths = f"{config.static_feature_dim} + {config.dynamic_feature_dim}"
-    lines = [
-        PlanLine(
-            "Gaussians per anchor",
-            config.gaussians_per_anchor,
-            "",
-            inherited
-            or _set_or(config, default, "gaussians_per_anchor", "enough where anchors are 2 to 3 pixels apart"),
-        ),
-        PlanLine(
-            "features",
-            widths,
-            "",
-            inherited or _set_or(config, default, "static_feature_dim", "static and dynamic, the small preset"),
-        ),
-    ]
-    if not counts.n_table_values:
-        return [*lines, PlanLine("field", "none", "", "nothing moves")]
-    entries = f"2^{config.field_log2_entries} entries, as set"
-    if not config.field_log2_entries:
-        entries = f"entries follow from {counts.n_alive:,} anchors alive in a frame"
-    n_levels = config.field_levels or config.field_max_levels
-    levels = "as set" if config.field_levels else "until a cell is 1.5 anchor spacings"
-    lines.append(PlanLine("field levels", n_levels, "", f"at most, {levels}" if levels != "as set" else levels))
-    lines.append(PlanLine("field table values", counts.n_table_values, "", f"at most; {entries}"))
-    if is_source:
-        reason = "only tiles that something learning touches" if config.tiles == "active" else "whole pictures, as set"
-        lines.append(PlanLine("tiles", config.tiles, "", reason))
-    return lines
-
-
-def _set_or(config: TrainConfig, default: TrainConfig, name: str, reason: str) -> str:
-    return "as set" if getattr(config, name) != getattr(default, name) else reason
+        grows = "the voxel grows until there are no more"
+        return [PlanLine("static anchors", n_static, "", grows), PlanLine("moving anchors", n_moving, "", grows)]
+    known = None if reference is None else reference.n_anchors.get("static")
+    inherited = PlanLine("static anchors", n_static, "", "inherited; the reference clip is not trained yet")
+    if known is not None:
+        inherited = PlanLine("static anchors", known, "", "inherited, counted in the reference clip")
+    return [inherited, PlanLine("residual anchors", n_moving, "", "together with the inherited moving ones in use")]
 
 
 def _plural(n: int, word: str) -> str:

@@ -5,15 +5,14 @@ Sizes follow the data and the reasons are returned as lines to report. Nothing h
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from msgspec.structs import asdict
 from scipy.spatial import KDTree
 
 from engine.capture.clip import Clip
-from engine.clip_files.anchor_record import AnchorRecord
 from engine.clip_files.clip_header import Coverage
 from engine.clip_files.clip_state import ClipState
 from engine.cloud.motion.budget import NOBODY, choose_within_budget
@@ -21,7 +20,7 @@ from engine.cloud.motion.dedup import mean_neighbor_distance, residual_rows
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
 from engine.model.anchors import AnchorSet
-from engine.model.clip_model import ClipModel, decoder_shape, inherit
+from engine.model.clip_model import ClipModel, inherit
 from engine.model.decoder import Decoder
 from engine.model.host_array import host_array
 from engine.model.model_backend import ModelBackend
@@ -68,14 +67,11 @@ def static_anchors(cloud: StaticCloud, config: TrainConfig) -> AnchorSet:
     )
 
 
-def inheriting_model(
-    reference: ClipState, clip: Clip, config: TrainConfig, backend: ModelBackend
-) -> tuple[ClipModel, str]:
-    """A source clip before its motion is known: what it inherits, and no moving anchor alive yet; says what learns.
+def inheriting_model(reference: ClipState, clip: Clip, backend: ModelBackend, *, learns: bool) -> ClipModel:
+    """A source clip before its motion is known: all that the reference has, and no moving anchor alive yet.
 
-    `config.inherit` says whether anchors may learn. The decoder is the reference's and with inherit=off the anchors
-    are there all the same, because the clip's backgrounds are corrected with a render of both; `choose_decoder` and
-    `drop_inherited` come after that.
+    Args:
+        learns: Whether the anchors go on learning. The decoder is frozen.
     """
     presence = {
         # promoted anchors are part of the still scene and exist at all times; what moves is not known yet
@@ -83,48 +79,8 @@ def inheriting_model(
         for role, record in reference.anchors.items()
         if record.own is not None and record.own.presence is not None
     }
-    sets, decoder = inherit(reference, presence, is_trainable=config.inherit == "trainable")
-    model = _without_field(sets, decoder, clip, backend)
-    words = {
-        "frozen": "kept as they are",
-        "moving": "kept as they are if static, learning on if moving",
-        "trainable": "learning on",
-        "off": "left out",
-    }
-    heads = {"frozen": "kept as it is", "finetune": "learning on", "new": "new"}
-    return model, f"inherited anchors {words[config.inherit]}, decoder {heads[config.decoder]}"
-
-
-def choose_decoder(model: ClipModel, config: TrainConfig, *, seed: int) -> None:
-    """`config.decoder`: the inherited heads as they are, the same heads learning on, or new ones.
-
-    Args:
-        seed: Of new heads, which have a generator of their own: what else starts at random is the same for any choice.
-    """
-    if config.decoder == "new":
-        decoder = Decoder(**asdict(decoder_shape(model.decoder)), generator=torch.Generator().manual_seed(seed))
-        model.decoder = decoder.to(model.backend.device, model.backend.dtype)
-    model.decoder.requires_grad_(config.decoder != "frozen")
-
-
-def merged(state: ClipState) -> ClipState:
-    """A finished clip as a start for another: its residual anchors count among the moving ones from here on, its
-    replacing ones among the promoted."""
-    own = {role: record.own for role, record in state.anchors.items() if record.own is not None}
-    arrays = dict(state.arrays)
-    for added, among in (("residual", "moving"), ("replacing", "promoted")):
-        if added not in own:
-            continue
-        for name in AnchorRecord(own=own[added]).arrays(added):
-            del arrays[name]
-        anchors = own[among].joined(own[added]) if among in own else own[added]
-        arrays |= AnchorRecord(own=anchors).arrays(among)
-    return ClipState(arrays, state.header)
-
-
-def drop_inherited(model: ClipModel, cloud: StaticCloud, config: TrainConfig) -> None:
-    """inherit=off: static anchors of the clip's own take the place of all inherited ones."""
-    model.replace_sets({"static": static_anchors(cloud, config)})
+    sets, decoder = inherit(reference, presence, is_trainable=learns)
+    return _without_field(sets, decoder, clip, backend)
 
 
 def moving_anchors(cloud: MovingCloud, rows: np.ndarray, config: TrainConfig) -> AnchorSet:
@@ -138,7 +94,50 @@ def moving_anchors(cloud: MovingCloud, rows: np.ndarray, config: TrainConfig) ->
     )
 
 
-def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> Coverage:
+@dataclass(frozen=True, slots=True)
+class ResidualAnchors:
+    """Which moving points of a source clip become anchors of its own.
+
+    Attributes:
+        rows: Points that do. [P] bool
+        presence: Of all points; that of a chosen one includes the points that it stands in for. [P, M] bool
+        is_reached: Points within reach of an anchor, own or inherited. [P] bool
+        n_left_out: Points that would have become anchors beyond the budget.
+        reason: Why these, one clause.
+    """
+
+    rows: np.ndarray
+    presence: np.ndarray
+    is_reached: np.ndarray
+    n_left_out: int
+    reason: str
+
+
+def uncovered_points(cloud: MovingCloud, is_new: np.ndarray, n_used: int, config: TrainConfig) -> ResidualAnchors:
+    """Points that no inherited anchor covers, as far as `config.max_moving_points` lets them become anchors.
+
+    A clip has no more anchors that move than that, inherited ones that it uses included. Which of the others become
+    anchors then is chosen by `engine.cloud.motion.budget`; the rest switch on the one beside them.
+
+    Args:
+        cloud: What moves in the clip.
+        is_new: Points that no inherited anchor covers. [P] bool
+        n_used: Inherited anchors that exist in some frame of the clip.
+        config: Gives the most anchors.
+    """
+    budget, limit = _residual_budget(cloud.presence[is_new], n_used, config)
+    if is_new.sum() <= budget:
+        return ResidualAnchors(is_new, cloud.presence, np.ones_like(is_new), 0, "all of them")
+    rows, presence, is_reached = _within_budget(cloud, is_new, budget)
+    return ResidualAnchors(rows, presence, is_reached, int((is_new & ~rows).sum()), limit)
+
+
+def add_residual(
+    model: ClipModel,
+    cloud: MovingCloud,
+    config: TrainConfig,
+    choose: Callable[[MovingCloud, np.ndarray, int, TrainConfig], ResidualAnchors] = uncovered_points,
+) -> Coverage:
     """Split a source clip's moving points into those the reference covers and residual anchors; says how many.
 
     A point is covered when it lies inside the union of spheres around the inherited moving anchors, each with the
@@ -146,8 +145,8 @@ def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> C
     them in the frames they are present in, so nothing covered is left without an anchor; the others become residual
     anchors. Source: ClipGStream, geometry-aware deduplication, with the exact union.
 
-    A clip has no more anchors that move than `config.max_moving_points`, inherited ones that it uses included. Which
-    of the others become anchors then is chosen by `engine.cloud.motion.budget`; the rest switch on the one beside them.
+    Args:
+        choose: Chooses residual anchors, see engine.training.preparation.method.Method.choose_residual.
     """
     is_new = np.ones(len(cloud.points), bool)
     moving = model.anchor_set("moving") if "moving" in model.roles() else None
@@ -160,38 +159,33 @@ def add_residual(model: ClipModel, cloud: MovingCloud, config: TrainConfig) -> C
         np.logical_or.at(presence, nearest, cloud.presence[~is_new])
         moving.presence = torch.from_numpy(presence).to(model.backend.device)
         n_used = int(presence.any(1).sum())
-    chosen, presence, is_reached, reason = is_new, cloud.presence, np.ones(len(cloud.points), bool), "all of them"
-    if config.residual == "none":
-        chosen, is_reached, reason = np.zeros_like(is_new), ~is_new, "residual=none"
-    elif config.residual == "full":
-        chosen, reason = is_reached, "all moving points, residual=full"
-    else:
-        budget, limit = _residual_budget(cloud.presence[is_new], n_used, config)
-        if is_new.sum() > budget:
-            chosen, presence, is_reached = _within_budget(cloud, is_new, budget)
-            reason = limit
-    if chosen.any():
-        residual = moving_anchors(replace(cloud, presence=presence), chosen, config)
+    chosen = choose(cloud, is_new, n_used, config)
+    if chosen.rows.any():
+        residual = moving_anchors(replace(cloud, presence=chosen.presence), chosen.rows, config)
         if moving is not None:
             _start_like_neighbors(residual, moving)
         model.add_set("residual", residual)
-    if moving is not None and config.inherit == "moving":
-        _adapt(model, moving, config)
     return Coverage(
         n_points=len(is_new),
         n_inherited=int((~is_new).sum()),
-        n_residual=int(chosen.sum()),
-        n_left_out=int((is_new & ~chosen).sum()) if config.residual == "dedup" else 0,
-        share=float(is_reached.mean()) if len(is_reached) else 1.0,
-        reason=reason,
+        n_residual=int(chosen.rows.sum()),
+        n_left_out=chosen.n_left_out,
+        share=float(chosen.is_reached.mean()) if len(is_new) else 1.0,
+        reason=chosen.reason,
     )
 
 
-def _adapt(model: ClipModel, moving: AnchorSet, config: TrainConfig) -> None:
-    """inherit=moving: inherited moving anchors that exist in this clip become its own, as they are; others go."""
+def adapt_moving(model: ClipModel, *, all_of_them: bool = False) -> None:
+    """Inherited moving anchors that exist in this clip become its own, as they are, and learn on; others go.
+
+    Args:
+        all_of_them: Also those that exist in none of its frames.
+    """
+    if "moving" not in model.roles():
+        return
+    moving = model.anchor_set("moving")
     assert moving.presence is not None
-    has_gate_in_time = config.gate not in ("off", "static")
-    is_used = moving.presence.any(1) if has_gate_in_time else torch.ones_like(moving.presence[:, 0])
+    is_used = torch.ones(len(moving), dtype=torch.bool) if all_of_them else moving.presence.any(1)
     model.replace_sets({role: model.anchor_set(role) for role in model.roles() if role != "moving"})
     if is_used.any():
         model.add_set("adapted", moving.subset(is_used, is_trainable=True))
@@ -233,15 +227,3 @@ def _start_like_neighbors(residual: AnchorSet, moving: AnchorSet) -> None:
         residual.features.copy_(moving.features[rows])
         residual.log_offset_scales.copy_(moving.log_offset_scales[rows])
         residual.log_base_scales.copy_(moving.log_base_scales[rows])
-
-
-def remove_gate(model: ClipModel, *, in_time_only: bool = False) -> None:
-    """gate=off, the published method: every anchor has a dynamic feature at every time.
-
-    Args:
-        in_time_only: gate=static: static anchors stay without one; dynamic anchors exist at every time.
-    """
-    for role in model.roles():
-        anchors = model.anchor_set(role)
-        if anchors.is_dynamic or not in_time_only:
-            anchors.presence = torch.ones(len(anchors), model.n_frames, dtype=torch.bool, device=model.backend.device)

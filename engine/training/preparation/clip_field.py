@@ -1,25 +1,25 @@
-"""The field of a clip: a fresh one that fits the anchors alive in it, or the one of the clip before."""
+"""The field of a clip: a fresh one that fits the anchors alive in it."""
 
 from __future__ import annotations
 
 import torch
 from torch import Tensor
 
-from engine.capture.clip import Clip
 from engine.clip_files.clip_header import FieldShape
-from engine.clip_files.clip_state import ClipState
-from engine.errors import ProjectError
-from engine.model.clip_model import ClipModel, read_field
+from engine.model.clip_model import ClipModel
 from engine.model.field import SpatioTemporalField
 from engine.model.field_sizes import derive_cells, derive_log2_entries
 from engine.training.config import TrainConfig
 
 
-def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generator: torch.Generator) -> str:
+def fit_field(
+    model: ClipModel, *, spacing: float, config: TrainConfig, generator: torch.Generator, is_shared: bool = True
+) -> str:
     """Attach a fresh field over the dynamic anchors alive in this clip; none when nothing moves. Says its size.
 
     Args:
         spacing: Distance between moving anchors, scene units.
+        is_shared: Whether all frames share one table; else every frame has its own.
     """
     positions, most_alive = _alive_positions(model), n_alive(model)
     if len(positions) == 0:
@@ -28,7 +28,6 @@ def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generato
     lower, upper = positions.quantile(0.005, dim=0), positions.quantile(0.995, dim=0)
     side = max(float((upper - lower).max()), 4 * spacing) + 2 * spacing
     n_levels = config.field_levels or config.field_max_levels
-    is_shared = config.field_tables == "shared"
     n_shared = model.n_frames if is_shared else 1
     log2_entries = config.field_log2_entries or derive_log2_entries(most_alive, n_shared_knots=n_shared)
     cells = derive_cells(
@@ -55,23 +54,6 @@ def fit_field(model: ClipModel, *, spacing: float, config: TrainConfig, generato
         f"{len(cells)} levels up to {cells[-1]} cells (anchors {spacing:.3g} apart), "
         f"2^{log2_entries} entries {'in all' if is_shared else 'per frame'} ({most_alive} anchors alive)"
     )
-
-
-def continue_field(model: ClipModel, previous: ClipState, clip: Clip) -> str:
-    """Attach the field that the clip before has learned; it learns on. Says so.
-
-    Raises:
-        ProjectError: It has fewer frames than this clip.
-    """
-    field, index = read_field(previous), previous.header.clip_index
-    if field.shape.n_knots < clip.n_frames:
-        raise ProjectError(
-            f"The field of clip {index} has {field.shape.n_knots} frames, clip {clip.clip_index} has "
-            f"{clip.n_frames}, so it cannot go on there.",
-            hint="Take a clip of full length as reference, or field=per_clip.",
-        )
-    model.attach_field(field)
-    return f"the field of clip {index} goes on"
 
 
 def n_alive(model: ClipModel) -> int:

@@ -24,8 +24,6 @@ from engine.cloud.keeping import Keep
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
 from engine.errors import DiskError, PreparationError, ProjectError
-from engine.gate.image_gate import GateTable, measure_gate
-from engine.gate.inside import frames_inside
 from engine.gate.regions import GateRegion
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, render_gaussians
@@ -34,14 +32,11 @@ from engine.progress import Progress, ReportProgress
 from engine.training.config import TrainConfig
 from engine.training.preparation.building import (
     add_residual,
-    choose_decoder,
-    drop_inherited,
     inheriting_model,
     moving_anchors,
-    remove_gate,
+    static_anchors,
     static_model,
 )
-from engine.training.preparation.clip_field import continue_field, fit_field
 from engine.training.preparation.cloud_preparation import (
     Backgrounds,
     correct_backgrounds,
@@ -53,7 +48,8 @@ from engine.training.preparation.cloud_preparation import (
     static_cloud,
     write_backgrounds,
 )
-from engine.training.preparation.gating import decide, nothing_measured, with_inside, without_static_regions
+from engine.training.preparation.gating import without_static_regions
+from engine.training.preparation.method import Method
 from engine.training.preparation.stages import Stages
 from engine.training.preparation.training_pictures import TrainingPictures
 
@@ -88,11 +84,12 @@ class ClipPreparation:
         capture: The capture at working resolution.
         clip: Frames to prepare.
         config: All numbers.
+        method: All decisions.
         backend: What the model is made for and drawn with.
         camera_indices: Training cameras, in capture numbering.
         views: Of these cameras.
         base: What the clip inherits from; None for a reference clip.
-        previous: The clip before, finished: its field goes on with field=continue.
+        previous: The clip before, finished, for a method that goes on from it.
         regions: Where the user overrules the gate.
         seed: Of new decoder heads.
         generator: Draws all other initial values.
@@ -105,6 +102,7 @@ class ClipPreparation:
         capture: Capture,
         clip: Clip,
         config: TrainConfig,
+        method: Method,
         *,
         backend: Backend,
         camera_indices: Sequence[int],
@@ -117,7 +115,7 @@ class ClipPreparation:
         prep_dir: Path,
         report: ReportProgress,
     ) -> None:
-        self._capture, self._clip, self._config = capture, clip, config
+        self._capture, self._clip, self._config, self._method = capture, clip, config, method
         self._camera_indices, self._views = list(camera_indices), list(views)
         self._rig = capture.rig.subset(self._camera_indices)
         self._base, self._previous, self._regions = base, previous, tuple(regions)
@@ -160,11 +158,11 @@ class ClipPreparation:
         except DiskError as error:  # clips after this one need them, this one does not: tried again at its end
             self._say("Checking backgrounds", f"{error.message} Tried again when the clip is finished")
         parts = replace(parts, backgrounds=backgrounds)
-        cloud, n_inside, moving_spacing = self._find_motion(parts, pictures)
+        cloud, moving_spacing = self._find_motion(parts, pictures)
         if len(cloud.points):
             parts.model.add_set("moving", moving_anchors(cloud, np.ones(len(cloud.points), bool), self._config))
         self._say("Carving what moves", f"{len(cloud.points)} moving anchors")
-        reasons = self._make_dynamic(parts, pictures, cloud, n_inside)
+        reasons = self._make_dynamic(parts, cloud)
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons)
 
     def source_parts(self, reference: ClipState, pictures: TrainingPictures) -> ClipParts:
@@ -180,23 +178,24 @@ class ClipPreparation:
                 "The training cameras differ from those of the reference clip.",
                 hint="Use the same hold-out for every clip of a project.",
             )
-        model, said = inheriting_model(reference, self._clip, self._config, self._backend)
-        self._say("Taking over the reference", said)
+        model = inheriting_model(reference, self._clip, self._backend, learns=self._method.learns_inherited)
+        self._say("Taking over the reference", self._method.words(self._config))
         backgrounds = read_backgrounds(self._prep_dir, self._key_of_corrected())
         if backgrounds is None:
             estimated = self._estimated()
             keep = self._keep_after(model, gains, estimated)
             backgrounds = self._corrected(estimated, model, gains, pictures, keep)
-        choose_decoder(model, self._config, seed=self._seed)
-        if self._config.inherit == "off":
+        self._method.choose_decoder(model, seed=self._seed)
+        if self._method.builds_static:
             own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
-            drop_inherited(model, own, self._config)
+            model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         parts = ClipParts(model, gains, backgrounds, reference.header.spacing)
-        cloud, n_inside, moving_spacing = self._find_motion(parts, pictures)
-        coverage = add_residual(model, cloud, self._config)
+        cloud, moving_spacing = self._find_motion(parts, pictures)
+        coverage = add_residual(model, cloud, self._config, self._method.choose_residual)
+        self._method.adapt(model, self._config)
         self._say("Comparing with the reference", coverage.text)
-        reasons = self._make_dynamic(parts, pictures, cloud, n_inside)
+        reasons = self._make_dynamic(parts, cloud)
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage)
 
     def keep_backgrounds(self, backgrounds: Backgrounds) -> None:
@@ -274,17 +273,11 @@ class ClipPreparation:
 
     # ---------------------------------------------------------------- what moves
 
-    def _find_motion(
-        self, parts: ClipParts, pictures: TrainingPictures
-    ) -> tuple[MovingCloud, np.ndarray, float | None]:
-        """What moves, frames of each static anchor inside a hull [A], and the spacing of moving anchors."""
+    def _find_motion(self, parts: ClipParts, pictures: TrainingPictures) -> tuple[MovingCloud, float | None]:
+        """What moves, and the spacing of moving anchors."""
         static_points = host_array(parts.model.anchor_set("static").positions)
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
         masks = motion_masks(pictures, parts.backgrounds, self._report, keep)
-        n_inside = np.zeros(0, np.int64)
-        if self._config.gate == "images":
-            inside = keep("frames inside", lambda: {"n": frames_inside(static_points, masks, self._rig)})
-            n_inside = inside["n"]
         gains = host_array(parts.gains)
         voxel_size = None if self._base is None else self._base.header.moving_spacing
         cloud = moving_cloud(
@@ -299,57 +292,23 @@ class ClipPreparation:
             keep=keep,
         )
         moving_spacing = float(cloud.spacing) if len(cloud.points) else voxel_size
-        if self._config.gate != "off":
+        if self._method.obeys_regions:
             cloud = without_static_regions(cloud, self._regions)
-        return cloud, n_inside, moving_spacing
+        return cloud, moving_spacing
 
-    def _make_dynamic(
-        self, parts: ClipParts, pictures: TrainingPictures, cloud: MovingCloud, n_inside: np.ndarray
-    ) -> dict[str, np.ndarray]:
+    def _make_dynamic(self, parts: ClipParts, cloud: MovingCloud) -> dict[str, np.ndarray]:
         """Last step: the gate and the field. Returns the reasons of the gate."""
-        reasons: dict[str, np.ndarray] = {}
-        if self._config.gate == "off":
-            remove_gate(parts.model)
-        else:
-            reasons = self._decide(parts, pictures, cloud, n_inside)
-        if self._config.gate == "static":
-            remove_gate(parts.model, in_time_only=True)
-        if self._config.field == "continue" and self._previous is not None and self._previous.header.field:
-            made = continue_field(parts.model, self._previous, self._clip)
-        else:
-            has_promoted = {"promoted", "replacing"} & set(parts.model.roles())
-            spacing = parts.spacing if has_promoted and len(cloud.points) == 0 else float(cloud.spacing)
-            made = fit_field(parts.model, spacing=spacing, config=self._config, generator=self._generator)
+        model, config = parts.model, self._config
+        reasons, said = self._method.gate(model, self._regions, is_source=self._base is not None)
+        if said:
+            self._say("Deciding what is static", said)
+        has_promoted = {"promoted", "replacing"} & set(model.roles())
+        spacing = parts.spacing if has_promoted and len(cloud.points) == 0 else float(cloud.spacing)
+        made = self._method.attach_field(
+            model, self._clip, config, spacing=spacing, previous=self._previous, generator=self._generator
+        )
         self._say("Sizing the field", made)
         return reasons
-
-    def _decide(
-        self, parts: ClipParts, pictures: TrainingPictures, cloud: MovingCloud, n_inside: np.ndarray
-    ) -> dict[str, np.ndarray]:
-        """Static anchors that change in this clip get a dynamic feature; which, by config.gate and the regions."""
-        static = parts.model.anchor_set("static")
-        is_measured = self._config.gate == "images"
-        if static.is_dynamic or not (is_measured or self._regions):
-            return {}  # already, where the reference has no gate
-        table = nothing_measured(len(static))
-        if is_measured:
-            table = with_inside(self._measured(parts, pictures, cloud), n_inside, self._clip.n_frames)
-        reasons, said = decide(parts.model, table, self._regions, is_source=self._base is not None)
-        self._say("Deciding what is static", said)
-        return reasons
-
-    def _measured(self, parts: ClipParts, pictures: TrainingPictures, cloud: MovingCloud) -> GateTable:
-        return measure_gate(
-            pictures.raw,
-            self._clip.n_frames,
-            parts.backgrounds.images,
-            self._rig,
-            host_array(parts.model.anchor_set("static").positions),
-            spacing=parts.spacing,
-            moving_points=cloud.points,
-            presence=cloud.presence,
-            moving_spacing=float(cloud.spacing),
-        )
 
     def _say(self, stage: str, message: str) -> None:
         self._report(Progress(stage, 1.0, message))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.background.priority import lower_thread
-from app.playback.playback import point_spacing
+from app.playback.point_spacing import point_spacing
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux has a niceness per thread")

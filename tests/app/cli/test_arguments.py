@@ -1,4 +1,4 @@
-"""What arguments mean: ranges, cameras, paths, settings."""
+"""What arguments mean: ranges, cameras, paths."""
 
 import argparse
 from types import SimpleNamespace
@@ -9,15 +9,12 @@ import pytest
 from app.cli.arguments import (
     EXIT_BAD_INPUT,
     PlainParser,
-    add_training_settings,
-    overrides_of,
     parse,
     parse_cameras,
     parse_range,
     path_argument,
 )
 from engine.errors import ProjectError
-from engine.training.presets import preset
 
 
 @pytest.mark.parametrize(
@@ -77,10 +74,3 @@ def test_options_are_written_in_full_and_near_ones_are_named(capsys):
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "unrecognized arguments: --seed 3. Did you mean --seeds? See" in said
-
-
-def test_settings_of_the_command_line_go_before_those_of_the_preset():
-    parser = PlainParser()
-    add_training_settings(parser)
-    options = parse(parser, ["--preset", "toy", "--set", "static_steps=7", "--set", "gaussians_per_anchor=2"])
-    assert overrides_of(options) == preset("toy") | {"static_steps": 7, "gaussians_per_anchor": 2}

@@ -9,13 +9,15 @@ from app.cli.cli import main
 from app.project.project import ProjectSettings, create_project, open_project
 from engine.clip_files.clip_state import ClipState, write_clip_state
 from engine.errors import ProjectError
-from engine.gate.reasons import LIGHT, STILL
+from engine.gate.reasons import STILL
 from engine.gate.regions import GateRegion
 from tests.app.fakes import anchor_arrays
 from tests.clip_headers import make_header
 
 SETTINGS = ProjectSettings(capture="somewhere", fingerprint="abc")
 BOX = GateRegion("static", (-1.0, 0.0, 0.0), (1.0, 2.0, 3.0))
+LIGHT = 2
+"""A code that clips of earlier versions hold: a lamp or a shadow."""
 BALL = GateRegion("dynamic", (0.5, 0.5, 0.5), (1.5, 1.5, 1.5), radius=0.5)
 
 

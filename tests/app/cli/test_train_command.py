@@ -59,9 +59,9 @@ def test_trained_clips_are_not_trained_again(run, capture_folder, tmp_path):
         (["--seed", "-4"], "seed is -4"),
         (["--set", "joint_steps"], "no '='"),
         (["--set", "nonsense=1"], "does not exist"),
-        (["--set", "ssim_weight=5"], "between 0.0 and 1.0"),
-        (["--set", "joint_steps=many"], "not a whole number"),
-        (["--set", "independent=maybe"], "not true or false"),
+        (["--set", "ssim_weight=5"], "between 0 and 1"),
+        (["--set", "joint_steps=many"], "has to be a whole number"),
+        (["--set", "independent=maybe"], "has to be true or false"),
     ],
 )
 def test_bad_arguments_end_with_2_and_leave_nothing_behind(run, capture_folder, tmp_path, arguments, expected):

@@ -19,7 +19,6 @@ from PIL import Image
 from app.cli.cli import main
 from app.lab.bench import chart, raster, suite
 from app.lab.bench.chart import draw_speed_error
-from app.lab.bench.clips import ClipRecipe
 from app.lab.bench.command import CHART_FILE, DEFAULT_OUT
 from app.lab.bench.compared import EXACT
 from app.lab.bench.field import SCENES, DecodeScene, measure_decode
@@ -37,8 +36,8 @@ from app.lab.bench.timing import Timing, interleaved, peak_extra_mb
 from engine.backends.backend import PhotometricLoss
 from engine.backends.cpu.backend import CpuBackend
 from engine.backends.cpu.step.adam import CpuAdam
-from engine.backends.table import backend_called
 from engine.raster import Gaussians, Rendering
+from engine.training.plan.synthetic_clip import ClipRecipe
 
 ROOT = Path(__file__).resolve().parents[3]
 TINY = Recipe(100, 32, 24, 3.0)
@@ -230,7 +229,7 @@ class WrongBackend(CpuBackend):
         self.operation = operation
 
     def rasterize(self, *arguments: Any, **options: Any) -> Rendering:
-        found = super().rasterize(*arguments, **options, backend=backend_called("cpu"))
+        found = super().rasterize(*arguments, **options)
         if self.operation == "picture":
             return replace(found, image=found.image + 0.01)
         return replace(found, image=skewed(found.image)) if self.operation == "rasterizer" else found

@@ -30,12 +30,12 @@ def takes(tmp_path: Path) -> tuple[Capture, Capture]:
 
 def test_a_picture_says_what_it_is_of(takes: tuple[Capture, Capture]):
     pictures = CapturedPictures()
-    assert pictures.picture(takes[0], 1, 1, 400) is None
+    assert pictures.picture(takes[0], 1, 1, 1, 400) is None
     assert pictures.viewing.wait_idle(WAIT_S)
-    picture = pictures.picture(takes[0], 1, 1, 400)
+    picture = pictures.picture(takes[0], 1, 1, 1, 400)
     assert picture is not None
     assert (picture.source, picture.size) == (PictureSource(camera_index=1, frame_index=1), (32, 24))
-    last = pictures.picture(takes[0], 1, 0, 400)
+    last = pictures.picture(takes[0], 1, 1, 0, 400)
     assert last is not None
     assert (last.is_stale, last.source.frame_index) == (True, 1)
     pictures.close()
@@ -55,14 +55,14 @@ def test_a_picture_of_another_take_is_never_shown(takes: tuple[Capture, Capture]
 
     monkeypatch.setattr(Capture, "frame", read_and_wait)
     pictures = CapturedPictures()
-    assert pictures.picture(first, 0, 0, 400) is None
+    assert pictures.picture(first, 1, 0, 0, 400) is None
     assert was_read.wait(WAIT_S)
     pictures.clear()  # the second take is opened
     go_on.set()
     assert pictures.viewing.wait_idle(WAIT_S)
-    assert pictures.picture(second, 0, 0, 400) is None
+    assert pictures.picture(second, 2, 0, 0, 400) is None
     assert pictures.viewing.wait_idle(WAIT_S)
-    picture = pictures.picture(second, 0, 0, 400)
+    picture = pictures.picture(second, 2, 0, 0, 400)
     assert picture is not None
     assert picture.image.max() < 8
     pictures.close()

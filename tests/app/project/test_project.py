@@ -2,9 +2,11 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -28,6 +30,17 @@ def test_settings_come_back_as_they_were(tmp_path):
     assert sorted(child.name for child in (tmp_path / "p").iterdir()) == ["project.json"]
 
 
+def test_settings_that_are_gone_are_dropped_when_an_old_project_is_read(tmp_path):
+    shutil.copy(Path(__file__).with_name("project_with_retired_settings.json"), tmp_path / "project.json")
+    settings = read_settings(tmp_path)
+    assert settings.overrides == {"joint_steps": 40, "inherit": "moving"}
+    assert settings.config().gate == "hull"
+    project = open_project(tmp_path)
+    project.update(settings)
+    project.close()
+    assert "patience" not in (tmp_path / "project.json").read_text()
+
+
 def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch):
     project = create_project(tmp_path / "p", SETTINGS)
     before = (tmp_path / "p" / "project.json").read_bytes()
@@ -49,8 +62,8 @@ def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch):
         ({"schema": 99}, "schema 99"),
         ({"extra": 1}, "unknown entries: extra"),
         ({"scale": "wide"}, "missing or wrong"),
-        ({"scale": 5}, "scale 5"),
-        ({"clip_length": 0}, "clip_length 0"),
+        ({"scale": 5}, "scale is 5"),
+        ({"clip_length": 0}, "clip_length is 0"),
         ({"overrides": {"nonsense": 1}}, "no training setting called nonsense"),
         ({"overrides": {"gaussians_per_anchor": 99}}, "between 1 and 32"),
     ],
@@ -134,7 +147,7 @@ def test_metrics_survive_a_torn_last_line(tmp_path):
         ({"holdout": ("9",)}, "no camera called 9"),
         ({"holdout": ("0", "1", "2")}, "leaves 1 for training"),
         ({"seed": -1}, "seed is -1"),
-        ({"overrides": {"ssim_weight": 2.0}}, r"between 0\.0 and 1\.0"),
+        ({"overrides": {"ssim_weight": 2.0}}, "between 0 and 1"),
     ],
 )
 def test_settings_that_do_not_fit_are_refused_with_the_range(capture_folder, arguments, expected):

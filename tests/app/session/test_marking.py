@@ -30,7 +30,7 @@ def ready(session):
 
 
 def on_disk(session) -> tuple[GateRegion, ...]:
-    session._marking.settle()
+    session.marking.settle()
     return open_project(session.project.folder, is_writable=False).gate_regions()
 
 
@@ -199,7 +199,7 @@ def test_a_damaged_file_is_told_and_not_written_over(make_session):
     assert not session.regions.can_mark
     assert "is not a region" in session.regions.why_not
     session.dispatch(MARK_BALL)
-    session._marking.settle()
+    session.marking.settle()
     assert path.read_text() == '{"regions": [{"treat": "static"}]}'
 
 

@@ -28,7 +28,7 @@ def test_a_fresh_session_is_empty_but_answers(make_session):
     session = make_session(is_open=False)
     assert session.capture is None
     assert session.poll() is False
-    assert (session.clips, session.clip_states, session.training.state) == ([], [], "idle")
+    assert (session.clips, session.clip_states, session.training.state) == ((), [], "idle")
     assert session.shown_gaussians() is None
     assert session.shown_points() is None
     assert session.request_render(10, 10) is None
@@ -52,7 +52,7 @@ def test_opening_makes_a_project_and_frames_the_rig(make_session, tmp_path):
     assert np.allclose(session.view.pivot, session.rig.focus_point())
     assert session.training.can_train_next
     assert session.training.next_clip_index == 0
-    (recent,) = session.settings.recent
+    (recent,) = session.recent.entries
     assert (recent.folder, recent.capture) == (tmp_path / "p", str(session.capture.path.resolve()))
 
 
@@ -349,7 +349,7 @@ def test_what_was_learned_fixes_the_training_settings(make_session):
     poll_until(session, lambda: session.clip_states[0].state == "trained", what="the clip")
     found = planned(session)
     assert (found.clip_index, found.can_edit) == (1, False)
-    assert any("as measured on clip 0" in reason for _, _, reason in found.lines)
+    assert any("inherited" in reason for _, _, reason in found.lines)
     session.dispatch(c.SetPreset("toy"))
     assert "fixed" in session.notices[-1].title
     assert session.project.settings.overrides == {}
@@ -445,7 +445,7 @@ def test_opening_another_capture_keeps_a_running_training(make_session, tmp_path
     session.dispatch(c.TrainNextClip())
     poll_until(session, lambda: session.training.step >= 2)
     first = session.project
-    session._project_dir = tmp_path / "q"
+    session.opener.project_dir = tmp_path / "q"
     session.dispatch(c.OpenCapture(capture_folder))
     poll_until(session, lambda: session.project.folder.name == "q" and not session.jobs)
     assert session.clip_states[0].state == "untrained"

@@ -9,20 +9,19 @@ from __future__ import annotations
 import ctypes
 import dataclasses
 import functools
-import sys
 from collections.abc import Callable, Iterator
 from importlib import import_module
 
 import numpy as np
 import pytest
 
-from tests.guarded_memory import SEGMENTATION_FAULT, GuardedMemory, run_child
+from tests.guarded_memory import SEGMENTATION_FAULT, GuardedMemory, needs_page_rights, run_child
 
 pytestmark = pytest.mark.slow
 
 Say = Callable[[str], None]
 MODULES = (
-    "engine.kernels.arrays",
+    "engine.kernels.jobs",
     "engine.backends.cpu.decode.decode",
     "engine.backends.cpu.decode.layout",
     "engine.backends.cpu.decode.joining",
@@ -261,9 +260,6 @@ def _build_clouds(say: Say) -> None:
 def _touch_the_next_byte(_say: Say, *, is_behind: bool) -> None:
     address = GuardedMemory(is_behind=is_behind).bytes(100).ctypes.data
     ctypes.c_char.from_address(address + (100 if is_behind else -1)).value = b"x"
-
-
-needs_page_rights = pytest.mark.skipif(sys.platform != "linux", reason="page rights are set through Linux's mprotect")
 
 
 @needs_page_rights

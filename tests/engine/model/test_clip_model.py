@@ -10,7 +10,7 @@ from engine.clip_files.clip_header import FieldShape
 from engine.clip_files.clip_state import ClipState
 from engine.clip_files.roles import ROLES
 from engine.errors import ProjectError
-from engine.gate.reasons import LIGHT, NO_REASON, STILL
+from engine.gate.reasons import NO_REASON, STILL, USER_DYNAMIC
 from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel, decoder_shape, inherit, load_clip_model
 from engine.model.decoder import HEADS, Decoder
@@ -213,12 +213,12 @@ def test_anchors_say_what_the_gate_said_of_them():
     source.attach_field(make_field(8))
     state = state_of(source, role="source", reference=reference)
     reasons = np.full(20, STILL, np.uint8)
-    reasons[[2, 5]] = LIGHT
+    reasons[[2, 5]] = USER_DYNAMIC
     loaded = load_clip_model(
         ClipState(state.arrays | {"gate.static": reasons}, state.header), reference, backend=backend_called("cpu")
     )
     view = loaded.anchors()
-    assert (view.own_reasons[view.own_roles == ROLES.index("replacing")] == LIGHT).all()
+    assert (view.own_reasons[view.own_roles == ROLES.index("replacing")] == USER_DYNAMIC).all()
     assert (view.inherited_reasons[view.inherited_roles == ROLES.index("static")] == STILL).all()
     assert (view.inherited_roles == ROLES.index("static")).sum() == 18
     whole = load_clip_model(reference, None, backend=backend_called("cpu")).constant_gaussians("static")

@@ -2,8 +2,9 @@
 
 import numpy as np
 import torch
-from engine.raster.reference import rotation_matrices
 from scipy.spatial.transform import Rotation
+
+from engine.backends.reference.raster import rotation_matrices
 
 
 def test_quaternions_of_any_length_are_rotations(rng):

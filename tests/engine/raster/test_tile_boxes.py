@@ -8,7 +8,6 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import engine.backends.cpu.raster.tile_boxes as kernels
 from engine.backends.table import backend_called
 from engine.raster import TILE_PX, Gaussians, TileBoxes, rasterize, tile_boxes
 from engine.raster.pinhole_view import n_tiles
@@ -88,22 +87,6 @@ def test_meeting_rows_are_those_over_a_wanted_tile():
     assert 0 < len(expected) < 300
     assert boxes.meeting(tile_mask, rows).tolist() == expected
     assert not len(boxes.meeting(torch.zeros_like(tile_mask), rows))
-
-
-def test_what_a_kernel_reads_lives_as_long_as_it_runs(monkeypatch):
-    scene = layered_scene(300, 300, 200, 6.0)
-    boxes = boxes_of(scene, as_float32(scene.gaussians), "cpu")
-    tile_mask = torch.from_numpy(np.random.default_rng(0).random(boxes.shape) < 0.2)
-    expected = boxes.meeting(tile_mask, torch.arange(300))
-    run, kept = kernels.run, []
-
-    def run_in_full_memory(*arguments) -> None:
-        for n in range(1, 400):  # whatever was freed is taken and overwritten
-            kept.append(np.full(n, -1000, np.int32))
-        run(*arguments)
-
-    monkeypatch.setattr(kernels, "run", run_in_full_memory)
-    assert torch.equal(boxes.meeting(tile_mask, torch.arange(300)), expected)
 
 
 def test_arguments_are_checked():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from engine.model.clip_view import View, render_gaussians
 from engine.progress import Progress
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
+from engine.training.variants.variant_method import method_of
 from tests.engine.training.hard_stage import HELD_OUT, N_CAMERAS, HardScene
 
 SIZES: dict[str, Any] = {
@@ -70,7 +71,8 @@ class Trained:
         return ClipTraining(
             self.capture,
             split_clips(self.scene.n_frames, self.scene.clip_length)[clip_index],
-            config=TrainConfig(**(SIZES | self.settings | settings)),
+            config=(config := TrainConfig(**(SIZES | self.settings | settings))),
+            method=method_of(config, previous=None),
             holdout=[HELD_OUT],
             reference=self.states[0] if clip_index else None,
             seed=0,
@@ -89,13 +91,6 @@ class Trained:
         write_compact_clip(path, training.finish())
         self.trainings.append(training)
         return read_clip_state(path)
-
-    def with_other(self, clip_index: int, **settings: Any) -> Trained:
-        """The same clips, but this one trained anew with other settings."""
-        other = replace(self, states=[*self.states], trainings=[*self.trainings], said=[*self.said])
-        with one_thread():
-            other.states[clip_index] = other.train(clip_index, **settings)
-        return other
 
     def n_bytes(self, clip_index: int) -> int:
         """Of a stored clip."""

@@ -14,7 +14,7 @@ from engine.model.clip_model import load_clip_model
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import named_parameters
-from engine.training.preparation.building import merged
+from engine.training.variants.variant_method import merged
 from tests.clip_headers import with_header
 from tests.engine.training.tiny_training import Tiny, finish, live_picture, picture, same_arrays, take_steps
 

@@ -2,13 +2,13 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from msgspec import to_builtins
+from msgspec import structs, to_builtins
 
 from engine.assets import asset_path
 from engine.backends.table import backend_called
@@ -23,6 +23,7 @@ from engine.model.clip_model import load_clip_model
 from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
+from engine.training.preparation.method import Method
 from engine.training.step.nonfinite import loss_not_finite
 from tests.clip_headers import write_values
 from tests.engine.training.damaged_states import damaged_states
@@ -50,6 +51,7 @@ class Setting:
 def start(capture: Capture, clip_index: int, prep_dir: Path, **changes) -> ClipTraining:
     arguments = {
         "config": CONFIG,
+        "method": Method(),
         "holdout": capture.camera_indices(list(capture.default_holdout)),
         "reference": None,
         "seed": 0,
@@ -115,7 +117,7 @@ def test_cameras_that_do_not_differ_get_no_gains(setting):
 
 def test_gains_learn_in_the_reference_clip_and_are_kept_in_the_next(setting, tmp_path):
     said: list[str] = []
-    config = replace(CONFIG, color="gain", static_steps=4, joint_steps=2, max_static_points=1000)
+    config = structs.replace(CONFIG, color="gain", static_steps=4, joint_steps=2, max_static_points=1000)
     training = start(setting.capture, 0, tmp_path, config=config, report=lambda progress: said.append(progress.message))
     training.prepare()
     assert any("White balance: color=gain, gains of the cameras spread by" in line for line in said)

@@ -12,6 +12,7 @@ from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
 from engine.training.config import TrainConfig
 from engine.training.preparation.building import Coverage, add_residual
+from engine.training.variants.variant_method import VariantMethod
 from tests.engine.training.tiny_training import same_arrays
 
 N_SIDE = 6
@@ -78,7 +79,8 @@ def test_the_busiest_frame_always_has_its_anchors():
 @pytest.mark.parametrize(("residual", "n_residual", "share"), [("none", 0, 0.5), ("full", 2 * N, 1.0)])
 def test_other_choices_know_no_budget(residual, n_residual, share):
     model, cloud = scene()
-    coverage = add_residual(model, cloud, TrainConfig(residual=residual, max_moving_points=10))
+    config = TrainConfig(residual=residual, max_moving_points=10)
+    coverage = add_residual(model, cloud, config, VariantMethod(config).choose_residual)
     assert (coverage.n_residual, coverage.n_left_out, coverage.share) == (n_residual, 0, share)
 
 

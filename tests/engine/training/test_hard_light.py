@@ -11,9 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from engine.gate.reasons import CHANGES, INSIDE, LIGHT
 from tests.engine.training.hard_scenes import (
-    BALL,
     DRIFTING,
     EARLY_SPOT,
     LATE_SPOT,
@@ -82,16 +80,6 @@ def test_and_not_before(lit):
     assert pooled_psnr(lit, FIRST, chosen) > pooled_psnr(lit, FIRST, chosen, static_only=True) - 0.5
 
 
-def test_with_the_gate_from_pictures_the_lit_floor_itself_changes(lit):
-    """Hulls of light stand on the floor like bubbles; with gate=images the floor under them can change as well."""
-    better = lit.with_other(1, gate="images")
-    reasons = better.states[1].arrays["gate.static"]
-    assert np.isin(reasons, (INSIDE, LIGHT, CHANGES)).sum() >= 5
-    for light, frames in ((EARLY_SPOT, SECOND), (LATE_SPOT, AFTER)):
-        chosen = under(lit, light)
-        assert pooled_psnr(better, frames, chosen) > pooled_psnr(lit, frames, chosen) - 0.3
-
-
 def test_a_slow_shadow_is_followed(folder):
     # 29 to 35 dB in the pictures, 17 to 23 without what learned; the held-out camera alone the same
     trained = train_scene(slow_shadow(), folder / "shadow")
@@ -116,16 +104,6 @@ def drifted(folder) -> Trained:
 
 def everywhere(_camera: int, _frame: int) -> np.ndarray:
     return np.ones((HEIGHT, WIDTH), dtype=bool)
-
-
-def test_no_anchor_is_promoted_for_a_camera_that_drifts(drifted):
-    judged = drifted.with_other(1, gate="images").states[1].arrays["gate.static"]
-    assert not np.isin(judged, (LIGHT, CHANGES)).any()
-    # the ball on its way over the floor hides an anchor or two from all sides
-    positions = drifted.states[0].arrays["sets.static.positions"][judged == INSIDE]
-    way = [BALL.place(frame) for frame in SECOND]
-    distances = [min(float(np.linalg.norm(position - np.array(center))) for center in way) for position in positions]
-    assert all(distance < 0.45 for distance in distances)  # twice the radius of the ball
 
 
 def test_the_other_cameras_do_not_suffer(steady, drifted):

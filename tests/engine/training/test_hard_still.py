@@ -44,12 +44,6 @@ def test_where_nothing_moves_no_pixel_ever_changes(still):
         assert all(np.array_equal(still.picture(camera, frame), first) for frame in range(1, still.scene.n_frames))
 
 
-def test_nor_does_the_gate_from_pictures_find_anything(still):
-    judged = still.with_other(1, gate="images")
-    assert judged.trainings[-1].n_steps == 0
-    assert "replacing" not in judged.trainings[-1].model.roles()
-
-
 def test_the_still_picture_is_good(still):
     assert pooled_psnr(still, range(8), everywhere) > 25.0  # 28.5 dB in the held-out camera
 

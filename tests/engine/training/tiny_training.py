@@ -18,6 +18,7 @@ from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.clip_model import load_clip_model
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
+from engine.training.variants.variant_method import method_of
 from tests.built_once import BuiltOnce
 
 CLIP_LENGTH = 4
@@ -73,7 +74,9 @@ def make_training(capture: Capture, holdout: list[int], *, clip: Clip, **argumen
     for name in ("reference", "previous", "prep_dir", "seed", "report", "regions", "backend"):
         if name in arguments:
             given[name] = arguments.pop(name)
-    return ClipTraining(capture, clip, config=TrainConfig(**(SIZES | arguments)), holdout=holdout, **given)
+    config = TrainConfig(**(SIZES | arguments))
+    method = method_of(config, previous=given["previous"])
+    return ClipTraining(capture, clip, config=config, method=method, holdout=holdout, **given)
 
 
 def make_tiny(folder: Path, built_once: BuiltOnce, *, scale: float = 0.25) -> Tiny:

@@ -33,7 +33,7 @@ from app.session.session import Session
 from app.session.settings import Settings
 from app.status import ClipStatus
 from engine.clip_files.roles import ROLES
-from engine.gate.reasons import LIGHT
+from engine.gate.reasons import USER_DYNAMIC
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from ui.gl import frusta_lines
@@ -277,7 +277,7 @@ def test_the_pointer_asks_an_anchor_what_it_is_and_why(pilot: Pilot, monkeypatch
         key="one anchor",
         inherited_roles=np.array([ROLES.index("promoted")], np.uint8),
         own_roles=np.zeros(0, np.uint8),
-        inherited_reasons=np.array([LIGHT], np.uint8),
+        inherited_reasons=np.array([USER_DYNAMIC], np.uint8),
         own_reasons=np.zeros(0, np.uint8),
     )
     pilot.move(area.x0 + x, area.y0 + y)
@@ -285,7 +285,7 @@ def test_the_pointer_asks_an_anchor_what_it_is_and_why(pilot: Pilot, monkeypatch
     assert not any("promoted" in text for text in said)  # nothing is shown yet
     pilot.key(key.TAB)
     pilot.draw(2)
-    assert any("promoted" in text and "lamp or shadow" in text for text in said)
+    assert any("promoted" in text and "marked as dynamic" in text for text in said)
 
 
 def test_a_camera_s_pyramid_says_its_name_and_a_click_looks_through_it(

@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 
 from engine.clip_files.roles import ROLES
-from engine.gate.reasons import LIGHT, NO_REASON, USER_DYNAMIC, USER_STATIC, reason_text
+from engine.gate.reasons import NO_REASON, USER_DYNAMIC, USER_STATIC, reason_text
 from engine.gate.regions import sphere_region
 from ui.style.colors import ROLE_COLORS, SKY
 from ui.viewport.anchor_marks import REACH_PX, anchor_marks
 
 POSITIONS = np.array([[0.0, 0.0, 2.0], [0.0, 0.0, 1.0], [1.0, 0.0, 2.0], [0.0, 0.0, -1.0]], np.float32)
 CODES = np.array([ROLES.index(role) for role in ("static", "promoted", "moving", "static")], np.uint8)
+LIGHT = 2
+"""A code that clips of earlier versions hold: a lamp or a shadow."""
 REASONS = np.array([NO_REASON, LIGHT, NO_REASON, NO_REASON], np.uint8)
 K = np.array([[100.0, 0.0, 50.0], [0.0, 100.0, 40.0], [0.0, 0.0, 1.0]])
 

@@ -56,7 +56,6 @@ def _on_rows(n_rows: int, compute: Any) -> Any:
             offset = VECTOR_BYTES * vector
             result = compute(*(build.load(address, offset) for address in arguments))
             build.store(result, arguments[-1], offset)
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -142,7 +141,6 @@ def add_row_sum(typing_context, x, out):
         build = LaneBuilder(builder)
         vectors = [build.load(arguments[0], VECTOR_BYTES * vector) for vector in range(BLOCK_VECTORS)]
         build.store(build.load(arguments[1]) + ((vectors[0] + vectors[1]) + (vectors[2] + vectors[3])), arguments[1])
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -160,6 +158,5 @@ def add_others(typing_context, first, step, n):
             place = builder.add(first, builder.mul(step, builder.add(loop.index, build.int64(1))))
             builder.store((Lanes(build, builder.load(total)) + build.load(place)).value, total)
         build.store(Lanes(build, builder.load(total)), first)
-        return context.get_dummy_value()
 
     return signature, generate

@@ -22,8 +22,8 @@ from engine.backends.cpu.decode.forward import decode_blocks
 from engine.backends.cpu.decode.grid_kernels import Spread, spread_gradient
 from engine.backends.cpu.decode.layout import BLOCK, Job, Sizes
 from engine.backends.cpu.decode.rows import Copy, copy_rows
+from engine.kernels.launch import launch
 from engine.kernels.memory import RecycledMemory
-from engine.kernels.routines import run
 from engine.kernels.workspace import Workspace, WorkspacePool
 from engine.model.decoder import HEADS, Decoder
 from engine.model.field import SpatioTemporalField
@@ -229,7 +229,7 @@ def _decode(plan: _Plan, tensors: list[Tensor], *, keeps_encoded: bool) -> tuple
             n_blocks = -(-len(part.rows) // BLOCK) if keeps_encoded else kernels.n_workers
             encoded = MEMORY.empty(n_blocks * BLOCK if part.corners is not None else 0, lay.padded(sizes.n_encoded))
             job = kernels.job(index, encoded)
-            kernels.run(decode_blocks, job._replace(keeps_encoded=int(keeps_encoded)))
+            launch(decode_blocks, job._replace(keeps_encoded=int(keeps_encoded)), kernels.n_workers)
             kept.append(encoded)
     return columns, kept if keeps_encoded else []
 
@@ -264,17 +264,17 @@ def _differentiate(
             ]
             d_encoded = MEMORY.empty_like(kept[index]) if wanted.field else torch.empty(0)
             job = kernels.job(index, kept[index])._replace(
-                **dict(zip(_D_COLUMNS, (gradient.data_ptr() for gradient in d_columns), strict=True)),
+                **dict(zip(_D_COLUMNS, d_columns, strict=True)),
                 **{f"wants_{name}": int(value) for name, value in wanted._asdict().items()},
-                d_features=d_own[0].data_ptr(),
-                d_log_offset_scales=d_own[1].data_ptr(),
-                d_log_base_scales=d_own[2].data_ptr(),
-                d_encoded=d_encoded.data_ptr(),
-                places=starts.ctypes.data,
-                sums=sums.ctypes.data,
+                d_features=d_own[0],
+                d_log_offset_scales=d_own[1],
+                d_log_base_scales=d_own[2],
+                d_encoded=d_encoded,
+                places=starts,
+                sums=sums,
                 sums_bytes=sums.strides[0],
             )
-            kernels.run(differentiate_blocks, job)
+            launch(differentiate_blocks, job, kernels.n_workers)
             for place, gradient in enumerate(d_own, start=_PER_SET * index):
                 gradients[place] = gradient if needs[place] else None
             if wanted.field:
@@ -294,33 +294,30 @@ def _differentiate(
 
 
 class _Kernels:
-    """Runs kernels for one decode or its backward pass. Owns a workspace while it is entered.
-
-    Everything a kernel gets by address is held by the plan, the tensors or this object until the kernel is done.
-    """
+    """Makes jobs for one decode or its backward pass, and owns a workspace while it is entered."""
 
     def __init__(self, plan: _Plan, tensors: list[Tensor], columns: Sequence[Tensor], *, is_backward: bool) -> None:
         self.plan, self.tensors = plan, tensors
         self.n_workers = get_num_threads()
-        shared = [tensor.data_ptr() for tensor in plan.shared(tensors)]
-        self._weights = np.array((shared + [0] * lay.N_WEIGHTS)[: lay.N_WEIGHTS])
+        shared = plan.shared(tensors)
+        weights: list[Tensor | None] = [*shared[: lay.N_WEIGHTS]]
         tables = shared[lay.N_WEIGHTS :]
         self._knot_weights = np.array([*plan.knot_weights, 0.0][:2], np.float32)
         self._regions = lay.regions(plan.sizes, is_backward=is_backward)
-        table = plan.shared(tensors)[lay.N_WEIGHTS] if tables else None
+        table = tables[0] if tables else None
         self._fixed = {
             **plan.sizes._asdict(),
             **{f"at_{name}": lay.ROW_BYTES * row for name, row in self._regions._asdict().items() if name != "n_rows"},
-            **{name: column.data_ptr() for name, column in zip(_COLUMNS, columns, strict=True)},
-            "weights": self._weights.ctypes.data,
-            "table": tables[0] if tables else 0,
-            "next_table": tables[1] if len(tables) > 1 else 0,
-            "knot_weights": self._knot_weights.ctypes.data,
-            "knot_keys": plan.knot_keys.ctypes.data,
+            **dict(zip(_COLUMNS, columns, strict=True)),
+            "weights": weights + [None] * (lay.N_WEIGHTS - len(weights)),
+            "table": table,
+            "next_table": tables[1] if len(tables) > 1 else None,
+            "knot_weights": self._knot_weights,
+            "knot_keys": plan.knot_keys,
             "n_levels": 0 if table is None else table.shape[0],
             "n_entries": 0 if table is None else table.shape[1],
             "n_channels": 0 if table is None else table.shape[2],
-            "ordinals": _ORDINALS.ctypes.data,
+            "ordinals": _ORDINALS,
             "keeps_encoded": 1,
         }
 
@@ -328,7 +325,7 @@ class _Kernels:
         self.workspace: Workspace = POOL.take()
         shape = (self.n_workers, self._regions.n_rows * BLOCK)
         scratch = self.workspace.array("scratch", shape, np.float32)
-        self._fixed |= {"scratch": scratch.ctypes.data, "scratch_bytes": scratch.strides[0]}
+        self._fixed |= {"scratch": scratch, "scratch_bytes": scratch.strides[0]}
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -341,24 +338,18 @@ class _Kernels:
         features, log_offset_scales, log_base_scales = self.plan.own(index, self.tensors)
         return Job(
             **self._fixed,
-            features=features.data_ptr(),
-            positions=anchors.positions.data_ptr(),
-            color_logits=anchors.color_logits.data_ptr(),
-            log_offset_scales=log_offset_scales.data_ptr(),
-            log_base_scales=log_base_scales.data_ptr(),
-            rows=part.rows.data_ptr(),
+            features=features,
+            positions=anchors.positions,
+            color_logits=anchors.color_logits,
+            log_offset_scales=log_offset_scales,
+            log_base_scales=log_base_scales,
+            rows=part.rows,
             n_rows=len(part.rows),
-            corner_indices=0 if corners is None else corners.indices.data_ptr(),
-            corner_weights=0 if corners is None else corners.weights.data_ptr(),
-            encoded=encoded.data_ptr(),
+            corner_indices=None if corners is None else corners.indices,
+            corner_weights=None if corners is None else corners.weights,
+            encoded=encoded,
             first_anchor=self.plan.first_anchors[index],
-            counter=0,
         )
-
-    def run(self, worker_routine: Any, job: NamedTuple) -> None:
-        """Run a routine with these arguments and a fresh counter."""
-        counter = np.zeros(1, np.int64)
-        run(worker_routine, np.array(job._replace(counter=counter.ctypes.data), np.int64), self.n_workers)
 
     def copy(self, index: int, decoded: Gaussians) -> None:
         """Copy the Gaussians of a set that were decoded before."""
@@ -366,8 +357,8 @@ class _Kernels:
         for name, source in zip(_COLUMNS, decoded.tensors(), strict=True):
             row_bytes = 4 * k * (source.shape[1] if source.ndim == 2 else 1)
             first = self.plan.first_anchors[index]
-            rows, n_rows = part.rows.data_ptr(), len(part.rows)
-            self.run(copy_rows, Copy(source.data_ptr(), self._fixed[name], row_bytes, rows, n_rows, first, 0))
+            job = Copy(source, self._fixed[name], row_bytes, part.rows, len(part.rows), first)
+            launch(copy_rows, job, self.n_workers)
 
     def spread(self, job: Job, knot: int, d_table: Tensor | None, *, is_first: bool) -> None:
         """Gradient of one knot's table from the job's `d_encoded`."""
@@ -377,33 +368,29 @@ class _Kernels:
             n_rows=job.n_rows,
             corner_indices=job.corner_indices,
             corner_weights=job.corner_weights,
-            keys=self.plan.knot_keys[knot].ctypes.data,
+            keys=self.plan.knot_keys[knot],
             d_encoded=job.d_encoded,
             row_bytes=4 * lay.padded(job.n_encoded),
-            scale=self._knot_weights[knot:].ctypes.data,
-            d_table=d_table.data_ptr(),
+            scale=self._knot_weights[knot:],
+            d_table=d_table,
             is_first=int(is_first),
             n_levels=job.n_levels,
             n_entries=job.n_entries,
             n_channels=job.n_channels,
-            counter=0,
         )
-        self.run(spread_gradient, arguments)
+        launch(spread_gradient, arguments, self.n_workers)
 
     def write_weights(self, sums: np.ndarray, starts: np.ndarray, gradients: list[Tensor | None]) -> None:
         """Sums of groups to gradients of weights; None where none is wanted."""
-        addresses = np.zeros(lay.N_WEIGHTS, np.int64)  # a model without a field has fewer weights
-        addresses[: len(gradients)] = [0 if gradient is None else gradient.data_ptr() for gradient in gradients]
-        if not addresses.any():
+        if all(gradient is None for gradient in gradients):
             return
         n_outputs, n_inputs = (np.array(widths) for widths in lay.weight_widths(self.plan.sizes))
         arguments = WeightSums(
-            sums=sums.ctypes.data,
+            sums=sums,
             sums_bytes=sums.strides[0],
-            places=starts.ctypes.data,
-            gradients=addresses.ctypes.data,
-            n_outputs=n_outputs.ctypes.data,
-            n_inputs=n_inputs.ctypes.data,
-            counter=0,
+            places=starts,
+            gradients=gradients + [None] * (lay.N_WEIGHTS - len(gradients)),  # a model without a field has fewer
+            n_outputs=n_outputs,
+            n_inputs=n_inputs,
         )
-        self.run(write_weight_gradients, arguments)
+        launch(write_weight_gradients, arguments, self.n_workers)

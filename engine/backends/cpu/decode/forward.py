@@ -7,10 +7,12 @@ import numpy as np
 from engine.backends.cpu.decode import activation as act
 from engine.backends.cpu.decode import layout as lay
 from engine.backends.cpu.decode.grid_kernels import interpolate, interpolate_any
-from engine.backends.cpu.decode.layout import BLOCK, HEAD_WIDTHS, ROW_BYTES, read_job
+from engine.backends.cpu.decode.layout import BLOCK, HEAD_WIDTHS, ROW_BYTES, Job
 from engine.backends.cpu.decode.products import PLAIN, RELU, multiply
 from engine.backends.cpu.decode.rows import threes_to_lanes, to_lanes, to_rows
-from engine.kernels.routines import WORKER, ints, load_float, load_int, routine, store_float, take_next
+from engine.kernels.jobs import read
+from engine.kernels.launch import kernel
+from engine.kernels.routines import ints, load_float, load_int, routine, store_float, take_next
 
 _FIRST, _FIRST_BIAS, _SECOND, _SECOND_BIAS = lay.FIRST, lay.FIRST_BIAS, lay.SECOND, lay.SECOND_BIAS
 _FIELD_HIDDEN, _FIELD_OUT = lay.FIELD_HIDDEN, lay.FIELD_OUT
@@ -22,7 +24,7 @@ _VECTORS, _N_HEADS = lay.BLOCK_VECTORS, lay.N_HEADS
 @routine(ints(4))
 def encode_block(arguments, first, n_lanes, encoded):
     """Interpolated grid values of one block, one row of padded width per anchor; zeros in rows without anchor."""
-    job = read_job(arguments)
+    job = read(Job, arguments)
     width = (job.n_encoded + 15) // 16 * 16
     for lane in range(n_lanes):
         corner = load_int(job.rows + 8 * (first + lane))
@@ -55,7 +57,7 @@ def load_inputs(arguments, first, n_lanes, encoded, scratch):
         encoded: What `encode_block` wrote; 0 for a set without dynamic feature, whose inputs are the static ones.
         scratch: The worker's scratch memory.
     """
-    job = read_job(arguments)
+    job = read(Job, arguments)
     inputs = scratch + job.at_inputs
     to_lanes(job.features, 4 * job.n_static, job.rows + 8 * first, n_lanes, job.n_static, inputs)
     if encoded == 0:
@@ -76,7 +78,7 @@ def load_inputs(arguments, first, n_lanes, encoded, scratch):
 @routine(ints(4))
 def first_layer(arguments, head, n_inputs, scratch):
     """Hidden layer of one head to region `hidden`."""
-    job = read_job(arguments)
+    job = read(Job, arguments)
     multiply(
         scratch + job.at_hidden, ROW_BYTES, scratch + job.at_inputs, ROW_BYTES,
         load_int(job.weights + 8 * (_FIRST + head)), 4, 4 * job.n_hidden,
@@ -87,7 +89,7 @@ def first_layer(arguments, head, n_inputs, scratch):
 @routine(ints(3))
 def second_layer(arguments, head, scratch):
     """Raw outputs of one head to region `raw`."""
-    job = read_job(arguments)
+    job = read(Job, arguments)
     n_outputs = HEAD_WIDTHS[head] * job.n_gaussians
     multiply(
         scratch + job.at_raw, ROW_BYTES, scratch + job.at_hidden, ROW_BYTES,
@@ -123,7 +125,7 @@ def _activate(head, k, raw, values, anchor):
 
 @routine(ints(5))
 def _decode_block(arguments, first, n_lanes, encoded, scratch):
-    job = read_job(arguments)
+    job = read(Job, arguments)
     load_inputs(arguments, first, n_lanes, encoded, scratch)
     anchor = scratch + job.at_anchors
     threes_to_lanes(
@@ -147,10 +149,10 @@ def _decode_block(arguments, first, n_lanes, encoded, scratch):
     to_rows(values + 11 * k * ROW_BYTES, job.means + 3 * start, 12 * k, job.ordinals, n_lanes, 3 * k)
 
 
-@routine(WORKER)
+@kernel(Job)
 def decode_blocks(worker, arguments):
     """Decode the chosen rows of one set. Arguments: `Job`. Which thread decodes a block does not change its result."""
-    job = read_job(arguments)
+    job = read(Job, arguments)
     n_blocks = (job.n_rows + BLOCK - 1) // BLOCK
     scratch = job.scratch + worker * job.scratch_bytes
     block_bytes = (job.n_encoded + 15) // 16 * 64 * BLOCK

@@ -12,17 +12,10 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 
+from engine.kernels.jobs import Counter, FloatsAt, IntsAt, SmallIntsAt, read
 from engine.kernels.lanes import FLOAT, INT32, INT64, LaneBuilder, kernel_intrinsic
-from engine.kernels.routines import (
-    WORKER,
-    load_float,
-    load_int,
-    load_int32,
-    routine,
-    store_float,
-    take_next,
-    tuple_reader,
-)
+from engine.kernels.launch import kernel
+from engine.kernels.routines import load_float, load_int, load_int32, routine, store_float, take_next
 
 _FOUR = ir.VectorType(FLOAT, 4)
 _N_CORNERS = 8
@@ -75,7 +68,6 @@ def _interpolate_four(typing_context, indices, weights, key_address, table, scal
                 builder.store(builder.fadd(before, total), builder.inttoptr(out, _FOUR.as_pointer()), align=4)
             with otherwise:
                 builder.store(total, builder.inttoptr(out, _FOUR.as_pointer()), align=4)
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -94,13 +86,12 @@ def _spread_four(typing_context, indices, weights, key_address, gradient, scale,
             address, weight = _corner(build, corner, indices, weights, key, d_table)
             total = _times_plus(builder, weight, scaled, _load(builder, address, _FOUR))
             builder.store(total, builder.inttoptr(address, _FOUR.as_pointer()), align=4)
-        return context.get_dummy_value()
 
     return signature, generate
 
 
 class Spread(NamedTuple):
-    """Arguments of `spread_gradient`; arrays by address.
+    """Arguments of `spread_gradient`.
 
     Attributes:
         rows, n_rows: Rows of the corner table. [n] int64
@@ -110,28 +101,23 @@ class Spread(NamedTuple):
         scale: Weight of the knot. [1] float32
         d_table: Added to, or written if `is_first`: 0 where no corner lies. [L, T, C] float32
         n_levels, n_entries, n_channels: L, T, C.
-        counter: [1] int64, zero: the next level.
+        counter: The next level.
     """
 
-    rows: int
+    rows: IntsAt
     n_rows: int
-    corner_indices: int
-    corner_weights: int
-    keys: int
-    d_encoded: int
+    corner_indices: SmallIntsAt
+    corner_weights: FloatsAt
+    keys: SmallIntsAt
+    d_encoded: FloatsAt
     row_bytes: int
-    scale: int
-    d_table: int
+    scale: FloatsAt
+    d_table: FloatsAt
     is_first: int
     n_levels: int
     n_entries: int
     n_channels: int
-    counter: int
-
-
-@kernel_intrinsic
-def _read_spread(typing_context, address):
-    return tuple_reader(Spread)
+    counter: Counter = None
 
 
 @routine(types.void(*[types.int64] * 7, types.float32, types.int64, types.int64))
@@ -165,14 +151,14 @@ def interpolate_any(corner, indices, weights, keys, table, n_levels, n_entries, 
             store_float(address, before + scale * total)
 
 
-@routine(WORKER)
+@kernel(Spread)
 def spread_gradient(worker, arguments):
     """Gradient of one knot's table. Arguments: the fields of `Spread`.
 
     Levels are taken in turn by whichever thread is free; each owns its part of the gradient, so there are no atomics
     on floats and one fixed order of additions.
     """
-    job = _read_spread(arguments)
+    job = read(Spread, arguments)
     scale = load_float(job.scale)
     n_levels, n_channels = job.n_levels, job.n_channels
     level = take_next(job.counter)

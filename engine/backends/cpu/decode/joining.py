@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 import torch
-from numba import get_num_threads
 from torch import Tensor
 
 from engine.backends.cpu.decode.rows import Copy, copy_rows
+from engine.kernels.launch import launch
 from engine.kernels.memory import RecycledMemory
-from engine.kernels.routines import run
 from engine.raster.gaussians import Gaussians
 
 MEMORY = RecycledMemory()
@@ -43,17 +42,7 @@ class _Join(torch.autograd.Function):
         for source, column in zip(frozen.tensors(), columns, strict=True):
             target = MEMORY.empty(len(rows) + len(column), *column.shape[1:])
             row_bytes = 4 * (source.shape[1] if source.ndim == 2 else 1)
-            counter = np.zeros(1, np.int64)
-            job = Copy(
-                source.data_ptr(),
-                target.data_ptr(),
-                row_bytes,
-                rows.ctypes.data,
-                len(rows),
-                0,
-                counter.ctypes.data,
-            )
-            run(copy_rows, np.array(job, np.int64), get_num_threads())
+            launch(copy_rows, Copy(source, target, row_bytes, rows, len(rows), 0))
             # by numpy: torch's own threads would spin on the cores that the kernels need
             target.numpy()[len(rows) :] = column.detach().numpy()
             joined.append(target)

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from engine.kernels.lanes import N_LANES, kernel_intrinsic
-from engine.kernels.routines import tuple_reader
+from engine.kernels.jobs import Counter, FloatsAt, IntsAt, ManyFloats, SmallIntsAt
+from engine.kernels.lanes import N_LANES
 
 BLOCK = 64
 """Anchors per block."""
@@ -64,7 +64,7 @@ class Sizes(NamedTuple):
 class Regions(NamedTuple):
     """First row of each region of a worker's scratch memory, and the number of rows at the end."""
 
-    encoded: int
+    encoded: FloatsAt
     field_hidden: int
     inputs: int
     inputs_rows: int
@@ -108,15 +108,15 @@ def regions(sizes: Sizes, *, is_backward: bool) -> Regions:
 
 
 class Job(NamedTuple):
-    """Arguments of the kernels that go through the blocks of one set. All int64; arrays by address.
+    """What the kernels that go through the blocks of one set are given; None stands for an array that is not there.
 
     Attributes:
         Sizes: as in `Sizes`. Regions: as in `Regions`, as byte offsets into a worker's scratch memory.
-        weights: Address of every weight. [N_WEIGHTS] int64
+        weights: All N_WEIGHTS of them, None for those that a model without a field lacks.
         features, positions, color_logits, log_offset_scales, log_base_scales: The set. float32
         rows, n_rows: Rows of it to decode. int64
-        corner_indices, corner_weights: Of all its anchors, or 0 for a set without dynamic feature. [A, L, 8]
-        table, next_table: Of the one or two knots; 0 for none. [L, T, C] float32
+        corner_indices, corner_weights: Of all its anchors, or None for a set without dynamic feature. [A, L, 8]
+        table, next_table: Of the one or two knots. [L, T, C] float32
         knot_weights: [2] float32
         knot_keys: What entries of each knot and level are combined with. [2, L] int32
         n_levels, n_entries, n_channels: L, T, C.
@@ -125,14 +125,14 @@ class Job(NamedTuple):
         first_anchor: Anchors of earlier sets in the output.
         means, quats, scales, opacities, colors: The output. float32
         ordinals: 0 to 63. int64
-        scratch, scratch_bytes: Memory of worker 0, and of each.
-        counter: Zero: the next block, or group of blocks. [1] int64
+        scratch, scratch_bytes: Memory of all workers, and bytes of each.
+        counter: The next block, or group of blocks.
         d_means, d_quats, d_scales, d_opacities, d_colors: Gradient of the output.
         wants_features, wants_scales, wants_heads, wants_field: What to compute.
         d_features, d_log_offset_scales, d_log_base_scales: Written at the chosen rows, where wanted.
         d_encoded: Written where the field is wanted; laid out like `encoded`.
         places: Starts of `gradient_places`. int64
-        sums, sums_bytes: Sums of weight gradients of group 0, added to, and distance of the groups.
+        sums, sums_bytes: Sums of weight gradients of the groups, added to, and bytes of each.
     """
 
     n_gaussians: int
@@ -156,57 +156,51 @@ class Job(NamedTuple):
     at_d_field_hidden: int
     at_d_encoded: int
     at_anchors: int
-    weights: int
-    features: int
-    positions: int
-    color_logits: int
-    log_offset_scales: int
-    log_base_scales: int
-    rows: int
+    weights: ManyFloats
+    features: FloatsAt
+    positions: FloatsAt
+    color_logits: FloatsAt
+    log_offset_scales: FloatsAt
+    log_base_scales: FloatsAt
+    rows: IntsAt
     n_rows: int
-    corner_indices: int
-    corner_weights: int
-    table: int
-    next_table: int
-    knot_weights: int
-    knot_keys: int
+    corner_indices: SmallIntsAt
+    corner_weights: FloatsAt
+    table: FloatsAt
+    next_table: FloatsAt
+    knot_weights: FloatsAt
+    knot_keys: SmallIntsAt
     n_levels: int
     n_entries: int
     n_channels: int
-    encoded: int
+    encoded: FloatsAt
     keeps_encoded: int
     first_anchor: int
-    means: int
-    quats: int
-    scales: int
-    opacities: int
-    colors: int
-    ordinals: int
-    scratch: int
+    means: FloatsAt
+    quats: FloatsAt
+    scales: FloatsAt
+    opacities: FloatsAt
+    colors: FloatsAt
+    ordinals: IntsAt
+    scratch: FloatsAt
     scratch_bytes: int
-    counter: int
-    d_means: int = 0
-    d_quats: int = 0
-    d_scales: int = 0
-    d_opacities: int = 0
-    d_colors: int = 0
+    counter: Counter = None
+    d_means: FloatsAt = None
+    d_quats: FloatsAt = None
+    d_scales: FloatsAt = None
+    d_opacities: FloatsAt = None
+    d_colors: FloatsAt = None
     wants_features: int = 0
     wants_scales: int = 0
     wants_heads: int = 0
     wants_field: int = 0
-    d_features: int = 0
-    d_log_offset_scales: int = 0
-    d_log_base_scales: int = 0
-    d_encoded: int = 0
-    places: int = 0
-    sums: int = 0
+    d_features: FloatsAt = None
+    d_log_offset_scales: FloatsAt = None
+    d_log_base_scales: FloatsAt = None
+    d_encoded: FloatsAt = None
+    places: IntsAt = None
+    sums: FloatsAt = None
     sums_bytes: int = 0
-
-
-@kernel_intrinsic
-def read_job(typing_context, address):
-    """The Job at an address."""
-    return tuple_reader(Job)
 
 
 class GradientPlaces(NamedTuple):

@@ -10,6 +10,7 @@ from numba import types
 from numba.core import cgutils
 
 from engine.backends.cpu.decode.layout import BLOCK, ROW_BYTES
+from engine.kernels.jobs import Counter, FloatsAt, IntsAt, read
 from engine.kernels.lanes import (
     FLOATS,
     INT32,
@@ -20,7 +21,8 @@ from engine.kernels.lanes import (
     Lanes,
     kernel_intrinsic,
 )
-from engine.kernels.routines import WORKER, ints, load_int, routine, take_next, tuple_reader
+from engine.kernels.launch import kernel
+from engine.kernels.routines import ints, load_int, routine, take_next
 
 _BOOLS = ir.VectorType(ir.IntType(1), N_LANES)
 _POINTER = FLOATS.as_pointer()
@@ -76,7 +78,6 @@ def _sixteen_to_lanes(typing_context, source, row_bytes, indices, n_rows, n_colu
             rows.append(Lanes(build, _masked_load(build, address, mask, build.constant(0.0).value)))
         for column, lanes in enumerate(build.transpose(rows)):
             build.store(lanes, out, column * ROW_BYTES)
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -98,7 +99,6 @@ def _sixteen_to_rows(typing_context, source, out, row_bytes, indices, n_rows, n_
         for lanes, (address, is_row) in zip(rows, places, strict=True):
             mask = builder.select(is_row, columns, nothing)
             builder.call(store, [lanes.value, builder.inttoptr(address, _POINTER), ir.Constant(INT32, 4), mask])
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -114,7 +114,6 @@ def _transpose_sixteen(typing_context, source, source_row, out, out_row):
         rows = [build.load(builder.add(source, builder.mul(source_row, build.int64(i)))) for i in range(N_LANES)]
         for i, lanes in enumerate(build.transpose(rows)):
             build.store(lanes, builder.add(out, builder.mul(out_row, build.int64(i))))
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -190,7 +189,6 @@ def _sixteen_threes(typing_context, positions, color_logits, log_offset_scales, 
                 rows[lane] = _masked_load(build, build.address(address, -12 * place), mask, rows[lane])
         for column, lanes in enumerate(build.transpose([Lanes(build, row) for row in rows])[: 3 * len(arrays)]):
             build.store(lanes, out, column * ROW_BYTES)
-        return context.get_dummy_value()
 
     return ints(7), generate
 
@@ -207,28 +205,23 @@ def threes_to_lanes(positions, color_logits, log_offset_scales, log_base_scales,
 
 
 class Copy(NamedTuple):
-    """Arguments of `copy_rows`; arrays by address.
+    """Arguments of `copy_rows`.
 
     Attributes:
         source, target: float32, anchor-major.
         row_bytes: Of both.
         rows, n_rows: Rows of the source. int64
         first: Row of the target that the first one goes to.
-        counter: [1] int64, zero: the next piece.
+        counter: The next piece.
     """
 
-    source: int
-    target: int
+    source: FloatsAt
+    target: FloatsAt
     row_bytes: int
-    rows: int
+    rows: IntsAt
     n_rows: int
     first: int
-    counter: int
-
-
-@kernel_intrinsic
-def _read_copy(typing_context, address):
-    return tuple_reader(Copy)
+    counter: Counter = None
 
 
 @kernel_intrinsic
@@ -236,15 +229,14 @@ def _copy_bytes(typing_context, source, target, n_bytes):
     def generate(context, builder, signature, arguments):
         source, target = (builder.inttoptr(value, ir.IntType(8).as_pointer()) for value in arguments[:2])
         cgutils.raw_memcpy(builder, target, source, arguments[2], 1)
-        return context.get_dummy_value()
 
     return ints(3), generate
 
 
-@routine(WORKER)
+@kernel(Copy)
 def copy_rows(worker, arguments):
     """Copy indexed rows one after the other; neighbours in one go. Arguments: `Copy`."""
-    job = _read_copy(arguments)
+    job = read(Copy, arguments)
     first = take_next(job.counter) * _COPY_PIECE
     while first < job.n_rows:
         end = min(first + _COPY_PIECE, job.n_rows)

@@ -16,9 +16,8 @@ from numba import njit
 from engine.backends.cpu.raster import record as rec
 from engine.backends.cpu.raster.record import f4
 from engine.backends.cpu.raster.tile import prefetch
-from engine.kernels.arrays import Flags1, Floats2, Ints2, Rows1, SmallInts1, SmallInts2, job_reader
-from engine.kernels.lanes import kernel_intrinsic
-from engine.kernels.routines import WORKER, routine
+from engine.kernels.jobs import Flags1, Floats2, Ints2, Rows1, SmallInts1, SmallInts2, read
+from engine.kernels.launch import kernel
 
 _HALF, _ZERO = f4(0.5), f4(0.0)
 _PER_TILE = f4(1.0 / rec.TILE)
@@ -111,16 +110,10 @@ class CountJob(NamedTuple):
     pairs_of_row: SmallInts1
 
 
-@kernel_intrinsic
-def _read_gather_and_count(typing_context, address):
-    """The CountJob at an address."""
-    return job_reader(CountJob)
-
-
-@routine(WORKER, fastmath=rec.FASTMATH)
+@kernel(CountJob, fastmath=rec.FASTMATH)
 def gather_and_count(worker, arguments):
     """See CountJob."""
-    job = _read_gather_and_count(arguments)
+    job = read(CountJob, arguments)
     unsorted, order, n_records, n_columns = job.unsorted, job.order, job.n_records, job.n_columns
     tile_mask, records, packed, counts = job.tile_mask, job.records, job.packed, job.counts
     pairs_of_row = job.pairs_of_row
@@ -215,16 +208,10 @@ class FillJob(NamedTuple):
     pair_slots: SmallInts1
 
 
-@kernel_intrinsic
-def _read_fill_pairs(typing_context, address):
-    """The FillJob at an address."""
-    return job_reader(FillJob)
-
-
-@routine(WORKER, fastmath=rec.FASTMATH)
+@kernel(FillJob, fastmath=rec.FASTMATH)
 def fill_pairs(worker, arguments):
     """See FillJob."""
-    job = _read_fill_pairs(arguments)
+    job = read(FillJob, arguments)
     records, packed, order, n_records = job.records, job.packed, job.order, job.n_records
     n_columns, tile_mask, counts, row_slots = job.n_columns, job.tile_mask, job.counts, job.row_slots
     pair_records, pair_slots = job.pair_records, job.pair_slots

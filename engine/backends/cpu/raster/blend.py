@@ -14,9 +14,10 @@ from engine.backends.cpu.raster.pixels import open_block, write_block
 from engine.backends.cpu.raster.record import f4
 from engine.backends.cpu.raster.tile import prefetch
 from engine.conventions import ALPHA_MAX, TRANSMITTANCE_MIN
-from engine.kernels.arrays import Floats1, Floats2, Floats3, Ints1, SmallInts1, job_reader
+from engine.kernels.jobs import Counter, Floats1, Floats2, Floats3, Ints1, SmallInts1, read
 from engine.kernels.lanes import VECTOR_BYTES, LaneBuilder, kernel_intrinsic
-from engine.kernels.routines import WORKER, routine, take_next
+from engine.kernels.launch import kernel
+from engine.kernels.routines import take_next
 
 _TILE, _BLOCK, _BLOCKS, _BLOCKS_PER_ROW = rec.TILE, rec.BLOCK, rec.BLOCKS, rec.BLOCKS_PER_ROW
 _RECORD_BYTES = rec.RECORD_BYTES
@@ -101,7 +102,7 @@ class BlendJob(NamedTuple):
         transmittance, alpha: What is let through behind the last Gaussian, and one minus it, written. [H, W]
         pair_blocks: Blocks of the tile that each pair changed, one bit each, written. [pairs]
         scratch: One row per worker, 64-byte aligned. [workers, SCRATCH_FLOATS]
-        counter: Next tile, zero. [1]
+        counter: Next tile.
     """
 
     records: Floats2
@@ -114,19 +115,13 @@ class BlendJob(NamedTuple):
     alpha: Floats2
     pair_blocks: Ints1
     scratch: Floats2
-    counter: Ints1
+    counter: Counter = None
 
 
-@kernel_intrinsic
-def _read_blend_tiles(typing_context, address):
-    """The BlendJob at an address."""
-    return job_reader(BlendJob)
-
-
-@routine(WORKER, fastmath=rec.FASTMATH)
+@kernel(BlendJob, fastmath=rec.FASTMATH)
 def blend_tiles(worker, arguments):
     """See BlendJob."""
-    job = _read_blend_tiles(arguments)
+    job = read(BlendJob, arguments)
     records, tile_starts, pair_records, n_columns = job.records, job.tile_starts, job.pair_records, job.n_columns
     background, image, transmittance, alpha = job.background, job.image, job.transmittance, job.alpha
     pair_blocks, scratch, counter = job.pair_blocks, job.scratch, job.counter
@@ -134,11 +129,10 @@ def blend_tiles(worker, arguments):
     n_tiles = len(tile_starts) - 1
     address = np.int64(scratch[worker].ctypes.data)
     records_address = np.int64(records.ctypes.data)
-    counter_address = np.int64(counter.ctypes.data)
     background_address = np.int64(background.ctypes.data)
     image_address = np.int64(image.ctypes.data)
     transmittance_address, alpha_address = np.int64(transmittance.ctypes.data), np.int64(alpha.ctypes.data)
-    tile = take_next(counter_address)
+    tile = take_next(counter)
     while tile < n_tiles:
         tile_x = (tile % n_columns) * _TILE
         tile_y = (tile // n_columns) * _TILE
@@ -180,4 +174,4 @@ def blend_tiles(worker, arguments):
                 transmittance_address,
                 alpha_address,
             )
-        tile = take_next(counter_address)
+        tile = take_next(counter)

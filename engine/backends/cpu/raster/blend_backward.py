@@ -23,9 +23,10 @@ from engine.backends.cpu.raster.pixels import read_block, subtract_alpha
 from engine.backends.cpu.raster.record import f4
 from engine.backends.cpu.raster.tile import prefetch
 from engine.conventions import ALPHA_MAX
-from engine.kernels.arrays import Floats2, Floats3, Ints1, SmallInts1, job_reader
+from engine.kernels.jobs import Counter, Floats2, Floats3, Ints1, SmallInts1, read
 from engine.kernels.lanes import VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
-from engine.kernels.routines import WORKER, routine, take_next
+from engine.kernels.launch import kernel
+from engine.kernels.routines import take_next
 
 _TILE, _BLOCK, _BLOCKS, _BLOCKS_PER_ROW = rec.TILE, rec.BLOCK, rec.BLOCKS, rec.BLOCKS_PER_ROW
 _RECORD_BYTES, _PAIR_BYTES = rec.RECORD_BYTES, 4 * rec.PAIR_FLOATS
@@ -71,7 +72,6 @@ def _pass_record(typing_context, scratch, record, tile_x, tile_y, changed_blocks
             _Step(build, footprint, channels, block)
 
         build.for_each_bit(changed_blocks, pass_block)
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -105,7 +105,6 @@ def _replay_record(typing_context, scratch, record, tile_x, tile_y, changed_bloc
         build.for_each_bit(changed_blocks, replay_block)
         totals = build.sum_lanes([Lanes(build, builder.load(slot)) for slot in sums])
         build.store_first(totals, rec.PAIR_FLOATS, sums_address)
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -118,7 +117,6 @@ def _clear_sums(typing_context, sums_address):
     def generate(context, builder, signature, arguments):
         build = LaneBuilder(builder)
         build.store_first(build.constant(0.0), rec.PAIR_FLOATS, arguments[0])
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -132,7 +130,7 @@ class ReplayJob(NamedTuple):
         grad_image: Upstream gradient. [H, W, 3]
         grad_alpha: Upstream gradient, or empty where it is zero. [H, W]
         pair_sums: Written. [slots + 1, PAIR_FLOATS]
-        Others: As in `BlendJob`; `counter` is zero again.
+        Others: As in `BlendJob`.
     """
 
     records: Floats2
@@ -147,19 +145,13 @@ class ReplayJob(NamedTuple):
     pair_blocks: Ints1
     pair_sums: Floats2
     scratch: Floats2
-    counter: Ints1
+    counter: Counter = None
 
 
-@kernel_intrinsic
-def _read_replay_tiles(typing_context, address):
-    """The ReplayJob at an address."""
-    return job_reader(ReplayJob)
-
-
-@routine(WORKER, fastmath=rec.FASTMATH)
+@kernel(ReplayJob, fastmath=rec.FASTMATH)
 def replay_tiles(worker, arguments):
     """See ReplayJob."""
-    job = _read_replay_tiles(arguments)
+    job = read(ReplayJob, arguments)
     records, tile_starts, pair_records, pair_slots = job.records, job.tile_starts, job.pair_records, job.pair_slots
     n_columns, image, transmittance, grad_image = job.n_columns, job.image, job.transmittance, job.grad_image
     grad_alpha, pair_blocks, pair_sums, scratch = job.grad_alpha, job.pair_blocks, job.pair_sums, job.scratch
@@ -170,16 +162,15 @@ def replay_tiles(worker, arguments):
     address = np.int64(scratch[worker].ctypes.data)
     records_address = np.int64(records.ctypes.data)
     sums_address = np.int64(pair_sums.ctypes.data)
-    counter_address = np.int64(counter.ctypes.data)
     image_address, grad_image_address = np.int64(image.ctypes.data), np.int64(grad_image.ctypes.data)
     transmittance_address, grad_alpha_address = np.int64(transmittance.ctypes.data), np.int64(grad_alpha.ctypes.data)
-    tile = take_next(counter_address)
+    tile = take_next(counter)
     while tile < n_tiles:
         tile_x = (tile % n_columns) * _TILE
         tile_y = (tile // n_columns) * _TILE
         first, end = tile_starts[tile], tile_starts[tile + 1]
         if first == end:
-            tile = take_next(counter_address)
+            tile = take_next(counter)
             continue
         for block in range(_BLOCKS):
             x = tile_x + _BLOCK * (block % _BLOCKS_PER_ROW)
@@ -203,4 +194,4 @@ def replay_tiles(worker, arguments):
                 _pass_record(address, record_address, f4(tile_x), f4(tile_y), changed)
             else:
                 _replay_record(address, record_address, f4(tile_x), f4(tile_y), changed, sums)
-        tile = take_next(counter_address)
+        tile = take_next(counter)

@@ -103,7 +103,6 @@ def open_block(typing_context, planes, x, y, width, height):
         build.store(build.constant(1.0).where(_Block(build, *place).inside()), planes, tl.TRANSMITTANCE)
         for plane in _PLANES:
             build.store(build.constant(0.0), planes, plane)
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -125,7 +124,6 @@ def write_block(typing_context, planes, x, y, width, height, background, image, 
         block.store(colors, image)
         block.store([left_over], transmittance)
         block.store([1.0 - left_over], alpha)
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -145,7 +143,6 @@ def read_block(typing_context, planes, x, y, width, height, image, grad_image):
         remainder = gradients[0] * colors[0] + gradients[1] * colors[1] + gradients[2] * colors[2]
         build.store(remainder, planes, tl.REMAINDER)
         build.store(build.constant(1.0).where(block.inside()), planes, tl.TRANSMITTANCE)
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -161,6 +158,5 @@ def subtract_alpha(typing_context, planes, x, y, width, height, transmittance, g
         block = _Block(build, x, y, width, height)
         (left_over,), (gradient,) = block.load(transmittance, 1), block.load(grad_alpha, 1)
         build.store(build.load(planes, tl.REMAINDER) - gradient * left_over, planes, tl.REMAINDER)
-        return context.get_dummy_value()
 
     return signature, generate

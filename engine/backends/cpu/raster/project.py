@@ -12,9 +12,9 @@ from engine.backends.cpu.raster import record as rec
 from engine.backends.cpu.raster.camera_row import CameraLanes
 from engine.backends.cpu.raster.projection_math import Projection, cholesky, covariance, project_lanes
 from engine.conventions import ALPHA_MIN
-from engine.kernels.arrays import Floats1, Floats2, SmallInts2, job_reader
+from engine.kernels.jobs import Floats1, Floats2, SmallInts2, Workers, read
 from engine.kernels.lanes import INTS, N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
-from engine.kernels.routines import WORKER, routine
+from engine.kernels.launch import kernel
 from engine.raster.limits import EXTENT_MAX_PX, QUAT_NORM_SQUARED_MAX, QUAT_NORM_SQUARED_MIN, VALUE_MAX
 
 _ZERO = rec.f4(0.0)
@@ -47,7 +47,6 @@ def _project_sixteen(
         for lane, record in enumerate(build.transpose(fields)):
             build.store(record, records, lane * VECTOR_BYTES)
         build.store(depth_keys, keys, align=4)
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -155,7 +154,6 @@ class ProjectJob(NamedTuple):
         packed: The same memory as int32.
         keys: [>= N rounded up to 16]
         centers: Centres of the rows that can be drawn, 0 of others, pixels, written unless empty. [N, 2]
-        n_workers: How many workers share the rows.
     """
 
     means: Floats2
@@ -169,19 +167,13 @@ class ProjectJob(NamedTuple):
     packed: SmallInts2
     keys: Floats1
     centers: Floats2
-    n_workers: int
+    n_workers: Workers = None
 
 
-@kernel_intrinsic
-def _read_project(typing_context, address):
-    """The ProjectJob at an address."""
-    return job_reader(ProjectJob)
-
-
-@routine(WORKER, fastmath=rec.FASTMATH)
+@kernel(ProjectJob, fastmath=rec.FASTMATH)
 def project(worker, arguments):
     """See ProjectJob."""
-    job = _read_project(arguments)
+    job = read(ProjectJob, arguments)
     keys, records, packed, centers, mask_sums = job.keys, job.records, job.packed, job.centers, job.mask_sums
     n_rows = len(job.means)
     n_groups = (n_rows + 15) // 16

@@ -17,9 +17,9 @@ from engine.backends.cpu.raster import record as rec
 from engine.backends.cpu.raster.camera_row import CameraLanes
 from engine.backends.cpu.raster.project import gather_rows
 from engine.backends.cpu.raster.projection_math import Projection, Row, cholesky, covariance, dot, project_lanes
-from engine.kernels.arrays import Floats1, Floats2, SmallInts1, job_reader
+from engine.kernels.jobs import Floats1, Floats2, SmallInts1, read
 from engine.kernels.lanes import N_LANES, VECTOR_BYTES, LaneBuilder, Lanes, kernel_intrinsic
-from engine.kernels.routines import WORKER, routine
+from engine.kernels.launch import kernel
 
 _PAIR_BYTES = 4 * rec.PAIR_FLOATS
 _ZERO = rec.f4(0.0)
@@ -38,7 +38,6 @@ def _sum_pairs(typing_context, pair_sums, n_pairs, destination):
             row = build.load(pair_sums, builder.mul(loop.index, build.int64(_PAIR_BYTES)), align=4)
             builder.store((Lanes(build, builder.load(total)) + row).value, total)
         build.store(Lanes(build, builder.load(total)), destination)
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -66,7 +65,6 @@ def _backward_sixteen(typing_context, sums, rows, means, quats, scales, opacitie
         gradients = _gradients(camera_lanes, projection, scale, opacity[0], moments)
         for lane, gradient in enumerate(build.transpose(gradients)):
             build.store(gradient, sums, lane * VECTOR_BYTES)
-        return context.get_dummy_value()
 
     return signature, generate
 
@@ -192,16 +190,10 @@ class BackwardJob(NamedTuple):
     grad_centers: Floats2
 
 
-@kernel_intrinsic
-def _read_project_backward(typing_context, address):
-    """The BackwardJob at an address."""
-    return job_reader(BackwardJob)
-
-
-@routine(WORKER, fastmath=rec.FASTMATH)
+@kernel(BackwardJob, fastmath=rec.FASTMATH)
 def project_backward(worker, arguments):
     """See BackwardJob."""
-    job = _read_project_backward(arguments)
+    job = read(BackwardJob, arguments)
     trained, n_trained, pairs_of_row, row_slots = job.trained, job.n_trained, job.pairs_of_row, job.row_slots
     pair_sums, means, quats, scales = job.pair_sums, job.means, job.quats, job.scales
     opacities, camera, scratch = job.opacities, job.camera, job.scratch

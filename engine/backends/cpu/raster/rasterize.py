@@ -23,9 +23,7 @@ from engine.backends.cpu.raster import binning, blend, blend_backward, project, 
 from engine.backends.cpu.raster.camera_row import camera_row
 from engine.backends.cpu.raster.record import BLUE, GREEN, PAIR_FLOATS, RECORD_FLOATS, RED, TILE
 from engine.backends.cpu.raster.tile import SCRATCH_FLOATS
-from engine.kernels.arrays import pack
-from engine.kernels.routines import run
-from engine.kernels.threads import parallel_guard
+from engine.kernels.launch import launch, parallel_guard
 from engine.kernels.workspace import Workspace, WorkspacePool
 from engine.raster.gaussians import Gaussians
 from engine.raster.pinhole_view import PinholeView
@@ -222,9 +220,8 @@ def _draw(request: _Request, parameters: Sequence[Tensor], centers: np.ndarray |
             unsorted.view(np.int32),
             depths,
             _NO_CENTERS if centers is None else centers,
-            n_threads,
         )
-        run(project.project, pack(job), n_threads)
+        launch(project.project, job, n_threads)
 
     order = workspace.array("order", (n_padded,), np.uint32)
     scratch = [workspace.array(name, (n_padded,), np.uint32) for name in ("key_a", "key_b", "order_b")]
@@ -238,7 +235,7 @@ def _draw(request: _Request, parameters: Sequence[Tensor], centers: np.ndarray |
     tile_starts = workspace.array("tile_starts", (n_tiles + 1,), np.int64)
     flat_mask = tile_mask.reshape(-1)
     job = binning.CountJob(unsorted, order, n_kept, n_columns, flat_mask, records, packed, counts, pairs_of_row)
-    run(binning.gather_and_count, pack(job), n_threads)
+    launch(binning.gather_and_count, job, n_threads)
     n_pairs = binning.place_pairs(counts, tile_starts)
     if n_pairs > _MAX_PAIRS:
         raise MemoryError(f"{n_kept} Gaussians cover {n_pairs} tiles of {TILE} px; at most {_MAX_PAIRS} are possible")
@@ -253,7 +250,7 @@ def _draw(request: _Request, parameters: Sequence[Tensor], centers: np.ndarray |
     job = binning.FillJob(
         records, packed, order, n_kept, n_columns, flat_mask, counts, row_slots, pair_records, pair_slots
     )
-    run(binning.fill_pairs, pack(job), n_threads)
+    launch(binning.fill_pairs, job, n_threads)
     return _Drawing(
         workspace=workspace,
         view=view,
@@ -300,9 +297,8 @@ def _blend(drawing: _Drawing, background: Tensor) -> tuple[Tensor, Tensor, Tenso
         alpha[..., 0],
         drawing.pair_blocks,
         drawing.workspace.array("scratch", (n_threads, SCRATCH_FLOATS), np.float32),
-        np.zeros(1, np.int64),
     )
-    run(blend.blend_tiles, pack(job), n_threads)
+    launch(blend.blend_tiles, job, n_threads)
     return image, transmittance, alpha
 
 
@@ -337,9 +333,8 @@ def _differentiate(
         drawing.pair_blocks,
         pair_sums,
         scratch,
-        np.zeros(1, np.int64),
     )
-    run(blend_backward.replay_tiles, pack(job), n_threads)
+    launch(blend_backward.replay_tiles, job, n_threads)
     means, quats, scales, opacities, _ = parameters
     grads = [torch.empty_like(tensor) for tensor in parameters]
     grad_means, grad_quats, grad_scales, grad_opacities, grad_colors = grads
@@ -363,5 +358,5 @@ def _differentiate(
         grad_colors,
         grad_centers,
     )
-    run(project_backward.project_backward, pack(job), n_threads)
+    launch(project_backward.project_backward, job, n_threads)
     return grads, grad_centers

@@ -175,6 +175,5 @@ def prefetch(typing_context, address):
 
     def generate(context, builder, signature, arguments):
         LaneBuilder(builder).prefetch(arguments[0])
-        return context.get_dummy_value()
 
     return signature, generate

@@ -14,9 +14,8 @@ from engine.backends.cpu.raster import project
 from engine.backends.cpu.raster import record as rec
 from engine.backends.cpu.raster.binning import mask_sums
 from engine.backends.cpu.raster.camera_row import camera_row
-from engine.kernels.arrays import Floats1, Ints1, SmallInts2, job_reader, pack
-from engine.kernels.lanes import kernel_intrinsic
-from engine.kernels.routines import WORKER, routine, run
+from engine.kernels.jobs import Floats1, Ints1, SmallInts2, Workers, read
+from engine.kernels.launch import kernel, launch
 from engine.kernels.workspace import WorkspacePool
 from engine.raster.gaussians import Gaussians
 from engine.raster.pinhole_view import PinholeView, n_tiles
@@ -37,13 +36,12 @@ class BoxJob(NamedTuple):
         packed: Records as int32. [>= N, 16]
         keys: Camera depth, or a number <= 0 for rows that are not drawn. [>= N]
         boxes: Written. [N, 2]
-        n_workers: How many workers share the rows.
     """
 
     packed: SmallInts2
     keys: Floats1
     boxes: SmallInts2
-    n_workers: int
+    n_workers: Workers = None
 
 
 class CoverJob(NamedTuple):
@@ -76,28 +74,10 @@ class MeetJob(NamedTuple):
     n_found: Ints1
 
 
-@kernel_intrinsic
-def _read_box_job(typing_context, address):
-    """The BoxJob at an address."""
-    return job_reader(BoxJob)
-
-
-@kernel_intrinsic
-def _read_cover_job(typing_context, address):
-    """The CoverJob at an address."""
-    return job_reader(CoverJob)
-
-
-@kernel_intrinsic
-def _read_meet_job(typing_context, address):
-    """The MeetJob at an address."""
-    return job_reader(MeetJob)
-
-
-@routine(WORKER)
+@kernel(BoxJob)
 def read_boxes(worker, arguments):
     """See BoxJob."""
-    job = _read_box_job(arguments)
+    job = read(BoxJob, arguments)
     packed, keys, boxes, n_rows = job.packed, job.keys, job.boxes, len(job.boxes)
     for row in range(n_rows * worker // job.n_workers, n_rows * (worker + 1) // job.n_workers):
         is_drawn = keys[row] > np.float32(0)
@@ -105,10 +85,10 @@ def read_boxes(worker, arguments):
         boxes[row, 1] = packed[row, rec.TILE_ROWS] if is_drawn else _NOWHERE
 
 
-@routine(WORKER)
+@kernel(CoverJob)
 def cover(_worker, arguments):
     """See CoverJob."""
-    job = _read_cover_job(arguments)
+    job = read(CoverJob, arguments)
     boxes, tiles = job.boxes, job.tiles
     for row in range(len(boxes)):
         columns, rows = boxes[row, 0], boxes[row, 1]
@@ -117,10 +97,10 @@ def cover(_worker, arguments):
                 tiles[tile_row, tile_column] = 1
 
 
-@routine(WORKER)
+@kernel(MeetJob)
 def find_meeting(_worker, arguments):
     """See MeetJob."""
-    job = _read_meet_job(arguments)
+    job = read(MeetJob, arguments)
     boxes, sums, rows, found = job.boxes, job.mask_sums, job.rows, job.found
     n_found = 0
     for row in range(len(boxes)):
@@ -140,15 +120,12 @@ class CpuTileBoxes(TileBoxes):
     def mask(self) -> Tensor:
         """See TileBoxes."""
         tiles = np.zeros(self.shape, np.int32)
-        job = CoverJob(self.packed.numpy(), tiles)
-        run(cover, pack(job), 1)
+        launch(cover, CoverJob(self.packed, tiles), 1)
         return torch.from_numpy(tiles.astype(bool))
 
     def _meeting(self, tile_mask: Tensor, rows: Tensor) -> Tensor:
         found, n_found = np.empty(len(self.packed), np.int64), np.zeros(1, np.int64)
-        sums = mask_sums(tile_mask.numpy())
-        job = MeetJob(self.packed.numpy(), sums, rows.numpy(), found, n_found)
-        run(find_meeting, pack(job), 1)
+        launch(find_meeting, MeetJob(self.packed, mask_sums(tile_mask.numpy()), rows, found, n_found), 1)
         return torch.from_numpy(found[: n_found[0]])
 
 
@@ -177,10 +154,8 @@ def tile_boxes_cpu(gaussians: Gaussians, view: PinholeView) -> CpuTileBoxes:
         packed,
         keys,
         _NO_CENTERS,
-        n_threads,
     )
-    run(project.project, pack(job), n_threads)
-    box_job = BoxJob(packed, keys, boxes, n_threads)
-    run(read_boxes, pack(box_job), n_threads)
+    launch(project.project, job, n_threads)
+    launch(read_boxes, BoxJob(packed, keys, boxes), n_threads)
     POOL.give_back(workspace)
     return found

@@ -9,38 +9,25 @@ its momentum.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 import torch
-from llvmlite import ir
-from numba import get_num_threads, njit, types
-from numba.np.numpy_support import carray
+from numba import get_num_threads, njit
 from torch import Tensor
 
 from engine.backends.backend import ADAM_BETAS, ADAM_EPSILON
-from engine.kernels.arrays import Doubles1, Floats2, Ints2, job_reader, pack
-from engine.kernels.lanes import kernel_intrinsic
-from engine.kernels.routines import WORKER, routine, run
+from engine.kernels.jobs import Doubles1, Floats2, Ints2, ManyBytes, ManyFloats, Workers, bytes_at, floats_at, read
+from engine.kernels.launch import kernel, launch
+from engine.kernels.routines import load_int
 
 BETA1, BETA2 = ADAM_BETAS
 _BLOCK = 64
 _CHUNK = 1 << 14
-_GRADIENT, _TOUCHED, _COUNT = 1, 4, 5
 _KEEP1, _KEEP2 = np.float32(BETA1), np.float32(BETA2)
 _NEW1, _NEW2 = np.float32(1 - BETA1), np.float32(1 - BETA2)
 _EPSILON = np.float32(ADAM_EPSILON)
-
-
-@kernel_intrinsic
-def _pointer(typing_context, address):
-    """An int64 address as a pointer."""
-
-    def generate(context, builder, signature, arguments):
-        return builder.inttoptr(arguments[0], ir.IntType(8).as_pointer())
-
-    return types.voidptr(types.int64), generate
 
 
 @njit(nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
@@ -65,47 +52,47 @@ def _adam(values, gradients, means, squares, scale, step_size, root_scale):
 
 
 class ChunkJob(NamedTuple):
-    """Arguments of `work_on_chunks`.
+    """Arguments of `work_on_chunks`. Parameters are cut into chunks, which the workers share.
 
     Attributes:
-        chunks: Addresses of values, gradient, both moments and touched flags, and number of values. [n, 6]
+        chunks: Number of the parameter, first value and number of values of each chunk. [n, 3]
+        values, gradients, means, squares: Of every parameter.
+        touched: Flag of every block of every parameter that ever had a gradient.
         is_update: 1 for Adam of the touched blocks; 0 for flags of blocks with a gradient and sums of squares.
         scale: Factor of the gradients.
         factors: step_size and root_scale of `_adam` for each chunk, read for an update. [n, 2]
         sums: Sum of squares of each chunk, written unless it is an update. [n]
-        n_workers: How many workers share the chunks.
     """
 
     chunks: Ints2
+    values: ManyFloats
+    gradients: ManyFloats
+    means: ManyFloats
+    squares: ManyFloats
+    touched: ManyBytes
     is_update: int
     scale: float
     factors: Floats2
     sums: Doubles1
-    n_workers: int
+    n_workers: Workers = None
 
 
-@kernel_intrinsic
-def _read_chunk_job(typing_context, address):
-    """The ChunkJob at an address."""
-    return job_reader(ChunkJob)
-
-
-@routine(WORKER)
+@kernel(ChunkJob)
 def work_on_chunks(worker, arguments):
     """See ChunkJob."""
-    job = _read_chunk_job(arguments)
+    job = read(ChunkJob, arguments)
     chunks, scale = job.chunks, np.float32(job.scale)
     for c in range(len(chunks) * worker // job.n_workers, len(chunks) * (worker + 1) // job.n_workers):
-        n = chunks[c, 5]
-        n_blocks = (n + 63) // 64
-        gradients = carray(_pointer(chunks[c, 1]), (n,), np.float32)
-        touched = carray(_pointer(chunks[c, 4]), (n_blocks,), np.uint8)
-        values = carray(_pointer(chunks[c, 0]), (n,), np.float32)
-        means = carray(_pointer(chunks[c, 2]), (n,), np.float32)
-        squares = carray(_pointer(chunks[c, 3]), (n,), np.float32)
+        parameter, start, n = 8 * chunks[c, 0], chunks[c, 1], chunks[c, 2]
+        n_blocks = (n + _BLOCK - 1) // _BLOCK
+        touched = bytes_at(load_int(job.touched + parameter) + start // _BLOCK, n_blocks)
+        values = floats_at(load_int(job.values + parameter) + 4 * start, n)
+        gradients = floats_at(load_int(job.gradients + parameter) + 4 * start, n)
+        means = floats_at(load_int(job.means + parameter) + 4 * start, n)
+        squares = floats_at(load_int(job.squares + parameter) + 4 * start, n)
         total = 0.0
         for block in range(n_blocks):
-            first, end = 64 * block, min(64 * block + 64, n)
+            first, end = _BLOCK * block, min(_BLOCK * (block + 1), n)
             if not job.is_update:
                 part = _sum_squares(gradients[first:end])
                 if part != 0.0:
@@ -125,11 +112,6 @@ def work_on_chunks(worker, arguments):
             job.sums[c] = total
 
 
-def _work_on_chunks(chunks: np.ndarray, is_update: bool, scale: float, factors: np.ndarray, sums: np.ndarray) -> None:
-    n_workers = max(1, min(get_num_threads(), len(chunks)))
-    run(work_on_chunks, pack(ChunkJob(chunks, int(is_update), scale, factors, sums, n_workers)), n_workers)
-
-
 class CpuAdam:
     """See engine.backends.backend.Adam."""
 
@@ -142,26 +124,12 @@ class CpuAdam:
         self._means = {name: np.zeros(p.shape, np.float32) for name, p in self._parameters.items()}
         self._squares = {name: np.zeros(p.shape, np.float32) for name, p in self._parameters.items()}
         self._touched = {name: np.zeros(-(-p.numel() // _BLOCK), np.uint8) for name, p in self._parameters.items()}
-        self._chunks = {name: self._cut(name) for name in self._parameters}
-        self._last: tuple[list[Tensor], np.ndarray] | None = None
+        self._chunks = {name: _cut(p.numel()) for name, p in self._parameters.items()}
 
-    def _cut(self, name: str) -> np.ndarray:
-        """Chunks of a parameter, with offsets where the address of the gradient goes."""
-        first = np.arange(0, self._parameters[name].numel(), _CHUNK, dtype=np.int64)
-        chunks = np.empty((len(first), 6), np.int64)
-        bases = (
-            self._parameters[name].data_ptr(),
-            0,
-            self._means[name].ctypes.data,
-            self._squares[name].ctypes.data,
-        )
-        for column, base in enumerate(bases):
-            chunks[:, column] = base + 4 * first
-        chunks[:, _TOUCHED] = self._touched[name].ctypes.data + first // _BLOCK
-        chunks[:, _COUNT] = np.minimum(self._parameters[name].numel() - first, _CHUNK)
-        return chunks
-
-    def _table(self, gradients: Mapping[str, Tensor]) -> tuple[list[Tensor], np.ndarray]:
+    def _work(
+        self, gradients: Mapping[str, Tensor], scale: float, factors: np.ndarray | None, sums: np.ndarray | None
+    ) -> None:
+        """One launch over the parameters that have a gradient: an update with `factors`, else sums of squares."""
         for name, gradient in gradients.items():
             wanted = self._parameters[name]
             if gradient.shape != wanted.shape or not _is_float32(gradient):
@@ -169,24 +137,36 @@ class CpuAdam:
                     f"the gradient of {name} must be {list(wanted.shape)} in float32 on the cpu like the parameter, "
                     f"got {list(gradient.shape)} in {gradient.dtype} on {gradient.device}"
                 )
-        kept = [gradient.contiguous() for gradient in gradients.values()]  # alive as long as addresses are used
-        rows = [self._chunks[name].copy() for name in gradients]
-        for chunk, gradient in zip(rows, kept, strict=True):
-            chunk[:, _GRADIENT] += gradient.data_ptr()
-        return kept, np.concatenate(rows) if rows else np.empty((0, 6), np.int64)
+        chunks = self._chunks_of(gradients)
+        job = ChunkJob(
+            chunks,
+            [self._parameters[name].detach() for name in gradients],
+            [gradient.contiguous() for gradient in gradients.values()],
+            [self._means[name] for name in gradients],
+            [self._squares[name] for name in gradients],
+            [self._touched[name] for name in gradients],
+            int(factors is not None),
+            scale,
+            np.empty((0, 2), np.float32) if factors is None else factors,
+            np.empty(0) if sums is None else sums,
+        )
+        launch(work_on_chunks, job, max(1, min(get_num_threads(), len(chunks))))
+
+    def _chunks_of(self, names: Iterable[str]) -> np.ndarray:
+        """Chunks of some parameters, which are numbered in this order. [n, 3] int64"""
+        rows = [self._chunks[name] + (number, 0, 0) for number, name in enumerate(names)]
+        return np.concatenate(rows) if rows else np.empty((0, 3), np.int64)
 
     def norm(self, gradients: Mapping[str, Tensor]) -> float:
         """See Adam. Also notes which blocks have a gradient, so `update` must follow it."""
-        _kept, chunks = self._table(gradients)
-        sums = np.zeros(len(chunks))
-        _work_on_chunks(chunks, False, 1.0, np.empty((0, 2), np.float32), sums)
+        sums = np.zeros(sum(len(self._chunks[name]) for name in gradients))
+        self._work(gradients, 1.0, None, sums)
         total = float(sums.sum())
         return math.sqrt(total) if total >= 0.0 else total  # NaN stays NaN
 
     def update(self, gradients: Mapping[str, Tensor], rates: Mapping[str, float], scale: float) -> None:
         """See Adam. `norm` of the same gradients has to be asked for before."""
-        _kept, chunks = self._table(gradients)
-        factors = np.empty((len(chunks), 2), np.float32)
+        factors = np.empty((sum(len(self._chunks[name]) for name in gradients), 2), np.float32)
         first = 0
         for name in gradients:
             self._steps[name] += 1
@@ -194,7 +174,7 @@ class CpuAdam:
             factors[first:end, 0] = rates[name] / (1.0 - BETA1 ** self._steps[name])
             factors[first:end, 1] = 1.0 / math.sqrt(1.0 - BETA2 ** self._steps[name])
             first = end
-        _work_on_chunks(chunks, True, scale, factors, np.empty(0))
+        self._work(gradients, scale, factors, None)
 
     def state(self) -> dict[str, dict[str, Tensor]]:
         """See Adam."""
@@ -218,6 +198,12 @@ class CpuAdam:
         is_moving = (self._means[name].ravel() != 0) | (self._squares[name].ravel() != 0)
         starts = np.arange(0, is_moving.size, _BLOCK)
         self._touched[name][:] = np.logical_or.reduceat(is_moving, starts) if is_moving.size else 0
+
+
+def _cut(n_values: int) -> np.ndarray:
+    """Chunks of a parameter: 0 for its number, first value, number of values. [n, 3] int64"""
+    first = np.arange(0, n_values, _CHUNK, dtype=np.int64)
+    return np.stack([np.zeros_like(first), first, np.minimum(n_values - first, _CHUNK)], 1)
 
 
 def _is_float32(tensor: Tensor) -> bool:

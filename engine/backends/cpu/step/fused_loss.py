@@ -34,20 +34,9 @@ from engine.images.ssim_lanes import (
     gradient_rows,
     ssim_rows,
 )
-from engine.kernels.arrays import (
-    Bytes2,
-    Doubles3,
-    Flags2,
-    Floats1,
-    Floats2,
-    Floats3,
-    Ints1,
-    Ints3,
-    job_reader,
-    pack,
-)
-from engine.kernels.lanes import kernel_intrinsic
-from engine.kernels.routines import WORKER, ints, load_float, routine, run
+from engine.kernels.jobs import Bytes2, Doubles3, Flags2, Floats1, Floats2, Floats3, Ints1, Ints3, read
+from engine.kernels.launch import kernel, launch
+from engine.kernels.routines import ints, load_float, routine
 from engine.raster.pinhole_view import TILE_PX, n_tiles
 
 _TILE_VALUES = 3 * TILE_PX
@@ -114,12 +103,6 @@ class LossJob(NamedTuple):
     gain_sums: Doubles3
 
 
-@kernel_intrinsic
-def _read_job(typing_context, address):
-    """The LossJob at an address."""
-    return job_reader(LossJob)
-
-
 def _row_floats(width: int) -> int:
     """Floats of a scratch row: padded to whole vectors, zeros on both ends."""
     return 2 * _PAD + -(-3 * width // 16) * 16
@@ -131,7 +114,7 @@ def _find_runs(arguments, band, first_row, last_row, dilation, lower, upper):
 
     Fills runs [n, 2] (first, end) of the band and returns their number.
     """
-    job = _read_job(arguments)
+    job = read(LossJob, arguments)
     active, runs, height = job.active, job.runs[band], len(job.image)
     first_row, last_row = max(first_row, 0), min(last_row, height - 1)
     n_runs = 0
@@ -156,7 +139,7 @@ def _find_runs(arguments, band, first_row, last_row, dilation, lower, upper):
 @routine(ints(5), fastmath=_FASTMATH)
 def _load_row(arguments, band, y, first, end):
     """Values first .. end of one row into the rings of a and b. Both limits lie between pixels."""
-    job = _read_job(arguments)
+    job = read(LossJob, arguments)
     truth, truth_bytes, is_counted, active = job.truth, job.truth_bytes, job.is_counted, job.active
     rest, all_gains = job.rest, job.gains
     scratch = job.scratch[band]
@@ -189,7 +172,7 @@ def _load_row(arguments, band, y, first, end):
 @routine(ints(5), fastmath=_FASTMATH)
 def _finish_row(arguments, band, y, first, end):
     """Gradient by a, in scratch, to that by the image and by the gains, values first .. end of one row."""
-    job = _read_job(arguments)
+    job = read(LossJob, arguments)
     is_counted, scratch = job.is_counted, job.scratch[band]
     by_a = scratch[_GRADIENT + y % N_ROWS, _PAD + first : _PAD + end]
     if is_counted.shape[1]:
@@ -222,7 +205,7 @@ def _moment_stage(scratch, row_bytes, y, first, end):
 @routine(ints(7), fastmath=_FASTMATH)
 def _ssim_stage(arguments, band, first_row, first, end, lower, upper):
     """Stage 2 of four rows: SSIM, its derivatives in temporary rows, and sums of 1 - SSIM."""
-    job = _read_job(arguments)
+    job = read(LossJob, arguments)
     scratch, lane_sums = job.scratch[band], job.lane_sums[band]
     row_bytes = scratch.shape[1] * 4
     base = np.int64(scratch.ctypes.data) + _PAD * 4
@@ -277,7 +260,7 @@ def _sum_lanes(vectors, index):
 @routine(ints(3), fastmath=_FASTMATH)
 def _loss_strip(arguments, band, strip):
     """One strip of a band; see the module docstring."""
-    job = _read_job(arguments)
+    job = read(LossJob, arguments)
     sums, gain_sums, runs, gradient = job.sums, job.gain_sums, job.runs[band], job.gradient
     scratch, lane_sums = job.scratch[band], job.lane_sums[band]
     first_row, end_row = job.band_rows[band], job.band_rows[band + 1]
@@ -348,10 +331,10 @@ def _loss_strip(arguments, band, strip):
                     gain_sums[c // N_ROWS, strip, channel] += gain_total[3 * pixel + channel]
 
 
-@routine(WORKER)
+@kernel(LossJob)
 def loss_band(worker, arguments):
     """One band, strip by strip, since strips share its scratch; see LossJob."""
-    for strip in range(_read_job(arguments).sums.shape[1]):
+    for strip in range(read(LossJob, arguments).sums.shape[1]):
         _loss_strip(arguments, worker, strip)
 
 
@@ -439,7 +422,7 @@ def loss_terms(
         sums,
         gain_sums,
     )
-    run(loss_band, pack(job), n_bands)
+    launch(loss_band, job, n_bands)
     l1, square, dissimilarity = (float(total) for total in sums.sum((0, 1)))
     return LossTerms(l1, square, dissimilarity, gradient, gain_sums.sum((0, 1)))
 

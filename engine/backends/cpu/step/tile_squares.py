@@ -8,9 +8,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from engine.kernels.arrays import Bytes2, Doubles2, Floats1, Floats2, job_reader, pack
-from engine.kernels.lanes import kernel_intrinsic
-from engine.kernels.routines import WORKER, routine, run
+from engine.kernels.jobs import Bytes2, Doubles2, Floats1, Floats2, read
+from engine.kernels.launch import kernel, launch
 from engine.raster.pinhole_view import TILE_PX, n_tiles
 
 _BYTE = np.float32(1 / 255)
@@ -32,16 +31,10 @@ class SquareJob(NamedTuple):
     sums: Doubles2
 
 
-@kernel_intrinsic
-def _read_job(typing_context, address):
-    """The SquareJob at an address."""
-    return job_reader(SquareJob)
-
-
-@routine(WORKER, fastmath={"contract", "reassoc", "nsz"})
+@kernel(SquareJob, fastmath={"contract", "reassoc", "nsz"})
 def sum_squares(worker, arguments):
     """See SquareJob."""
-    job = _read_job(arguments)
+    job = read(SquareJob, arguments)
     image, truth, gains, sums = job.image, job.truth, job.gains, job.sums
     height, n_values = image.shape
     for y in range(worker * TILE_PX, min((worker + 1) * TILE_PX, height)):
@@ -65,7 +58,7 @@ def tile_squares_cpu(image: Tensor, truth: Tensor, gain: Tensor) -> Tensor:
     """
     height, width = image.shape[:2]
     sums = np.zeros(n_tiles(width, height))
-    first, second = (picture.detach().contiguous().numpy().reshape(height, -1) for picture in (image, truth))
+    first, second = (picture.detach().contiguous().reshape(height, -1) for picture in (image, truth))
     job = SquareJob(first, second, np.tile(gain.detach().numpy(), width), sums)
-    run(sum_squares, pack(job), len(sums))
+    launch(sum_squares, job, len(sums))
     return torch.from_numpy(sums)

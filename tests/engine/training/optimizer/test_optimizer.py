@@ -24,7 +24,9 @@ def make_parameters(dtype: torch.dtype = torch.float32, seed: int = 0) -> dict[s
 
 
 def make_optimizer(parameters, backend: str = "cpu", **config) -> PhaseOptimizer:
-    return PhaseOptimizer(parameters, n_steps=100, config=TrainConfig(**config), backend=backend_called(backend))
+    return PhaseOptimizer(
+        parameters, n_steps=100, config=TrainConfig(**config), final_ratios={}, backend=backend_called(backend)
+    )
 
 
 def set_gradients(parameters, step: int) -> None:

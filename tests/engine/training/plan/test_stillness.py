@@ -82,7 +82,7 @@ def test_nobody_knows_without_backgrounds_of_the_same_settings(look, tmp_path):
 
 @pytest.mark.parametrize(
     "settings",
-    [{"gate": "off"}, {"gate": "images"}, {"inherit": "trainable"}, {"decoder": "new"}, {"field": "continue"}],
+    [{"gate": "off"}, {"inherit": "trainable"}, {"decoder": "new"}, {"field": "continue"}],
 )
 def test_what_learns_without_motion_is_never_still(look, settings):
     assert look("still", **settings) == (False, [])

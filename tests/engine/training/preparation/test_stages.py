@@ -121,10 +121,10 @@ def test_a_finished_clip_forgets_its_own_pieces_only(tmp_path, slow):
     assert (len(stage_files(tmp_path, 0)), len(stage_files(tmp_path, 1))) == (0, 1)
 
 
-@pytest.mark.parametrize("kind", ["reference", "source", "gate=images", "inherit=off"])
+@pytest.mark.parametrize("kind", ["reference", "source", "inherit=off"])
 def test_interrupted_anywhere_the_clip_is_the_same_bit_for_bit(tiny, tmp_path, monkeypatch, kind):
     """Interrupted after every piece in turn, in the preparation and in the change of phase."""
-    settings = {"gate=images": {"gate": "images"}, "inherit=off": {"inherit": "off"}}.get(kind, {})
+    settings = {"inherit=off": {"inherit": "off"}}.get(kind, {})
     is_source = kind in ("source", "inherit=off")
 
     def make(folder: Path) -> ClipTraining:

@@ -34,7 +34,7 @@ def test_warm_up_leaves_nothing_to_compile():
             photometric_loss(image, truth, backend=backend_called("cpu"), ssim_weight=0.2, **options)
     parameters = {"large": (nn.Parameter(torch.zeros(40_000)), 0.1), "small": (nn.Parameter(torch.zeros(2, 3)), 0.1)}
     config = TrainConfig(max_gradient_norm=1.0)
-    optimizer = PhaseOptimizer(parameters, n_steps=2, config=config, backend=backend_called("cpu"))
+    optimizer = PhaseOptimizer(parameters, n_steps=2, config=config, final_ratios={}, backend=backend_called("cpu"))
     optimizer.step()
     for parameter, _ in parameters.values():
         parameter.grad = torch.ones(parameter.shape)

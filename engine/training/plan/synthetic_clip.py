@@ -1,4 +1,4 @@
-"""Synthetic clips for benchmarks: anchors spread over a picture and its depth, a field, a decoder, one camera."""
+"""Synthetic clips to time steps on: anchors spread over a picture and its depth, a field, a decoder, one camera."""
 
 from __future__ import annotations
 
@@ -31,10 +31,11 @@ class ClipRecipe:
 
     Attributes:
         n_anchors: Anchors, all in the picture and alive in every frame.
+        n_static: How many of them are static; None for half of them in a source clip, and none otherwise.
+        motion_share: Share of the picture's width and height, around its middle, in which the moving ones are.
         gaussians_per_anchor: K.
         width, height: Picture, pixels.
-        is_source: Heads frozen, half of the anchors static and frozen, as in a source clip; else everything learns and
-            every anchor moves.
+        is_source: Heads and static anchors frozen, as in a source clip; else everything learns.
     """
 
     n_anchors: int
@@ -42,36 +43,46 @@ class ClipRecipe:
     width: int = 480
     height: int = 360
     is_source: bool = False
+    n_static: int | None = None
+    motion_share: float = 1.0
 
     def __str__(self) -> str:
         return f"{self.n_anchors} anchors, k={self.gaussians_per_anchor}, {self.width}x{self.height}"
 
 
-def make_clip(recipe: ClipRecipe, *, backend: ModelBackend, seed: int = 0) -> ClipModel:
-    """A clip with random features, so that no head is at its start. Same seed, same clip but for its dtype."""
+def make_clip(
+    recipe: ClipRecipe, *, backend: ModelBackend, seed: int = 0, config: TrainConfig | None = None
+) -> ClipModel:
+    """A clip with random features, so that no head is at its start. Same seed, same clip but for its dtype.
+
+    Without anything that moves it has no field. `config` gives the widths; the recipe's number of Gaussians counts.
+    """
     generator = torch.Generator().manual_seed(seed)
-    config = TrainConfig(gaussians_per_anchor=recipe.gaussians_per_anchor)
+    config = config or TrainConfig(gaussians_per_anchor=recipe.gaussians_per_anchor)
     decoder = Decoder(
         static_dim=config.static_feature_dim,
         dynamic_dim=config.dynamic_feature_dim,
-        gaussians_per_anchor=config.gaussians_per_anchor,
+        gaussians_per_anchor=recipe.gaussians_per_anchor,
         hidden=config.head_hidden,
         generator=generator,
     )
-    n_static = recipe.n_anchors // 2 if recipe.is_source else 0
+    n_static = recipe.n_static
+    if n_static is None:
+        n_static = recipe.n_anchors // 2 if recipe.is_source else 0
     sets = {}
     if n_static:
         sets["static"] = _anchors(recipe, n_static, config, generator, is_moving=False)
     role = "residual" if recipe.is_source else "moving"
-    sets[role] = _anchors(recipe, recipe.n_anchors - n_static, config, generator, is_moving=True)
+    if recipe.n_anchors > n_static:
+        sets[role] = _anchors(recipe, recipe.n_anchors - n_static, config, generator, is_moving=True)
     if recipe.is_source:
         decoder.requires_grad_(requires_grad=False)
-        sets["static"].requires_grad_(requires_grad=False)
+        for anchors in sets.values():
+            anchors.requires_grad_(requires_grad=anchors.is_dynamic)
     model = ClipModel(sets=sets, decoder=decoder, field=None, clip_length=N_FRAMES, n_frames=N_FRAMES, backend=backend)
     fit_field(model, spacing=8.0 * _LEVELS_SPACING, config=config, generator=generator)
     with torch.no_grad():
-        assert model.field is not None
-        for table in model.field.tables:  # away from its start of nearly zero
+        for table in [] if model.field is None else model.field.tables:  # away from its start of nearly zero
             table.mul_(300.0)
     return model
 
@@ -109,8 +120,9 @@ def _anchors(
 
     focal = 0.9 * recipe.width
     z = uniform(2.0, 10.0)
-    x = uniform(-0.5, 0.5) * recipe.width / focal * z
-    y = uniform(-0.5, 0.5) * recipe.height / focal * z
+    reach = 0.5 * (recipe.motion_share if is_moving else 1.0)
+    x = uniform(-reach, reach) * recipe.width / focal * z
+    y = uniform(-reach, reach) * recipe.height / focal * z
     log_px = (z / focal).log()[:, None].expand(n_rows, 3)
     anchors = AnchorSet.from_cloud(
         torch.stack([x, y, z], 1),

@@ -1,0 +1,207 @@
+"""FrameDecoder: a frame of a trained clip as arrays to draw. Loads states and decodes on one thread; keeps results by
+key.
+
+A key is (generation, path, clip_index, revision, frame_index). The generation goes up when another project is opened:
+what the thread finishes for the one before is dropped. A new revision of a live clip makes its older frames worthless.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.background.kernels import prepare_decoding
+from app.background.latest import LatestWorker
+from app.playback.arrays import AnchorArrays, GaussianArrays
+from app.playback.picture_source import UNKNOWN, PictureSource
+from engine.backends.table import backend_called
+from engine.byte_cache import ByteCache
+from engine.capture.clip import Clip
+from engine.clip_files.clip_state import ClipState, read_clip_state
+
+if TYPE_CHECKING:
+    from engine.model.clip_model import AnchorView, ClipModel  # brings torch, which only the thread needs
+
+CACHE_BYTES = 384 << 20
+"""Decoded frames kept in memory."""
+MAX_MODELS = 3
+"""Loaded clips kept in memory: the shown one, its reference, and the one shown before."""
+
+
+ModelKey = tuple[int, str, int, str]
+"""generation, path, clip_index, revision"""
+FrameKey = tuple[int, str, int, str, int]
+"""the same, and frame_index"""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameRequest:
+    """A frame of one state of a clip.
+
+    Attributes:
+        revision: Names the state; with the file, clip and frame it is the identity of the result.
+        path, reference_path: Files to load when the model is not loaded yet.
+        clip: For the conversion to clip time.
+        is_live: Whether the file is a snapshot of a running training: it may be gone before it is read, and another
+            one follows soon.
+        generation: Of the open project.
+    """
+
+    clip_index: int
+    revision: str
+    frame_index: int
+    path: Path
+    generation: int
+    reference_path: Path | None = field(compare=False)
+    clip: Clip = field(compare=False)
+    is_live: bool = field(default=False, compare=False)
+
+    @property
+    def model_key(self) -> ModelKey:
+        """Identity of the model."""
+        return self.generation, str(self.path), self.clip_index, self.revision
+
+    @property
+    def key(self) -> FrameKey:
+        """Identity of the result."""
+        return *self.model_key, self.frame_index
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedClip:
+    """A model in memory and what is shown of it."""
+
+    model: ClipModel
+    anchors: AnchorArrays
+    near_plane: float
+    step: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ShownFrame:
+    """What is drawn of a frame: Gaussians, and the anchors that exist then."""
+
+    gaussians: GaussianArrays
+    anchors: AnchorArrays
+
+
+class FrameDecoder:
+    """Frames to arrays on one thread; the newest request wins. Methods are for one other thread."""
+
+    def __init__(self, *, cache_bytes: int = CACHE_BYTES) -> None:
+        self._cache: ByteCache[FrameKey, ShownFrame] = ByteCache(cache_bytes)
+        self._models: OrderedDict[ModelKey, LoadedClip] = OrderedDict()
+        self._reference: tuple[tuple[str, int], ClipState] | None = None
+        self._last: ShownFrame | None = None
+        self.worker: LatestWorker[FrameRequest, ShownFrame] = LatestWorker(
+            "playback", self._compute, prepare=prepare_decoding
+        )
+
+    def frame(self, request: FrameRequest) -> ShownFrame | None:
+        """The frame if it is ready; otherwise it is asked for and the newest finished one is returned.
+
+        What comes back says itself which frame of which clip it is.
+        """
+        known = self._cache.get(request.key)
+        if known is not None:
+            self._last = known
+            return known
+        self.worker.request(request)
+        newest = self.worker.newest
+        if newest is not None:
+            self._last = newest[1]
+        return self._last
+
+    def anchors(self, request: FrameRequest) -> AnchorArrays | None:
+        """All anchors of a state; None until it was loaded."""
+        loaded = self._models.get(request.model_key)
+        return None if loaded is None else loaded.anchors
+
+    def is_loaded(self, request: FrameRequest) -> bool:
+        """Whether the file of this state is not needed any more."""
+        return request.model_key in self._models
+
+    def has_failed(self, request: FrameRequest) -> bool:
+        """Whether this frame could not be made, so that it is not on its way."""
+        return self.worker.has_failed(request)
+
+    def clear(self) -> None:
+        """Forget everything, as when another capture was opened."""
+        self.worker.forget()  # first: from here on the thread keeps nothing of what it is working on
+        self._cache.clear()
+        self._models = OrderedDict()
+        self._reference = self._last = None
+
+    def close(self) -> None:
+        """End the thread."""
+        self.worker.close()
+
+    # ---------------------------------------------------------------- on the thread
+
+    def _compute(self, request: FrameRequest) -> ShownFrame:
+        import torch
+
+        from engine.model.host_array import host_array
+
+        loaded = self._load(request)
+        clip_time = request.clip.clip_time(request.frame_index)
+        with torch.no_grad():
+            gaussians = loaded.model.decode(clip_time)
+        source = PictureSource(
+            request.clip_index, request.frame_index, request.revision, loaded.step, loaded.model.field is None
+        )
+        anchors = _anchor_arrays(loaded.model.anchors(clip_time), request.key, source)
+        values = [np.ascontiguousarray(host_array(tensor)) for tensor in gaussians.tensors()]
+        arrays = GaussianArrays(*values, key=request.key, near_plane=loaded.near_plane, source=source)
+        shown = ShownFrame(arrays, anchors)
+        if self.worker.is_still_wanted:
+            n_bytes = arrays.n_bytes + anchors.inherited_positions.nbytes + anchors.own_positions.nbytes
+            self._cache.put(request.key, shown, n_bytes)
+        return shown
+
+    def _load(self, request: FrameRequest) -> LoadedClip:
+        identity = request.model_key
+        models = self._models
+        if identity in models:
+            models.move_to_end(identity)
+            return models[identity]
+        from engine.model.clip_model import load_clip_model
+
+        state = read_clip_state(request.path)
+        reference = None if state.is_reference else self._read_reference(request.reference_path)
+        model = load_clip_model(state, reference, backend=backend_called())
+        anchors = _anchor_arrays(model.anchors(), identity)
+        loaded = LoadedClip(model, anchors, state.header.near_plane, state.header.step)
+        if not self.worker.is_still_wanted:
+            return loaded
+        self._cache.drop(lambda key: key[2] == request.clip_index and key[3] != request.revision)
+        kept = [(key, value) for key, value in models.items() if key[2] != request.clip_index]
+        # replaced as a whole, so that the other thread never sees it half changed
+        self._models = OrderedDict([*kept[-(MAX_MODELS - 1) :], (identity, loaded)])
+        return loaded
+
+    def _read_reference(self, path: Path | None) -> ClipState | None:
+        if path is None or not path.is_file():
+            return None
+        identity = (str(path), path.stat().st_mtime_ns)
+        if self._reference is None or self._reference[0] != identity:
+            self._reference = (identity, read_clip_state(path))
+        return self._reference[1]
+
+
+def _anchor_arrays(view: AnchorView, key: Hashable, source: PictureSource = UNKNOWN) -> AnchorArrays:
+    return AnchorArrays(
+        np.ascontiguousarray(view.inherited_positions, np.float32),
+        np.ascontiguousarray(view.own_positions, np.float32),
+        key,
+        inherited_roles=view.inherited_roles,
+        own_roles=view.own_roles,
+        inherited_reasons=view.inherited_reasons,
+        own_reasons=view.own_reasons,
+        source=source,
+    )

@@ -1,0 +1,86 @@
+"""ProjectOpener: opens captures and projects on threads. What was asked for last wins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from app.background.jobs import JobContext, Jobs
+from app.project.opening import Opened, open_for_window
+from app.project.recents import RecentProject
+from app.session.commands import OpenCapture, OpenProject
+from app.session.notices import Notice, Notices
+from engine.errors import EngineError
+from engine.text import printable
+
+
+class ProjectOpener:
+    """Carries out OpenCapture and OpenProject. For one thread, which does not wait.
+
+    Args:
+        jobs, notices: Of the session.
+        project_dir: Folder for the project of the next capture; the user's data folder when None.
+        take: Called by `Jobs.poll` with what was opened.
+        open_path: Opens a path on the thread; tests bring their own.
+    """
+
+    def __init__(
+        self,
+        jobs: Jobs,
+        notices: Notices,
+        take: Callable[[Opened], None],
+        *,
+        project_dir: Path | None = None,
+        open_path: Callable[..., Opened] = open_for_window,
+    ) -> None:
+        self.project_dir = project_dir
+        self._jobs, self._notices, self._take, self._open_path = jobs, notices, take, open_path
+        self._refusals: list[Notice] = []
+        self._newest: object | None = None
+        """Stands for what was asked for last."""
+
+    def open(
+        self, command: OpenCapture | OpenProject, *, current: Path | None, recent: Sequence[RecentProject]
+    ) -> None:
+        """Open something; see app.project.opening for what that means.
+
+        Args:
+            current: Folder of the project that is open now.
+            recent: Projects opened lately; those of the capture may be opened.
+        """
+        path, recent, project_dir = Path(command.path), tuple(recent), self.project_dir
+        asked = command if isinstance(command, OpenCapture) else OpenCapture(path)
+        self._newest = this = object()
+
+        def work(context: JobContext) -> Opened:
+            return self._open_path(
+                path,
+                scale=asked.scale,
+                project_dir=project_dir,
+                current=current,
+                context=context,
+                recent=recent,
+                is_new_project=asked.is_new_project,
+                follow_links=asked.follow_links,
+            )
+
+        def take(opened: Opened) -> None:
+            if this is self._newest:
+                self._withdraw_refusals()
+                self._take(opened)
+            elif opened.project is not None:  # something else was asked for meanwhile
+                opened.project.close()
+                opened.capture.close()
+
+        def failed(error: Exception) -> None:
+            notice = self._notices.add_failure(f"{printable(path.name or str(path))} cannot be opened", error)
+            if isinstance(error, EngineError):
+                self._refusals.append(notice)
+
+        self._jobs.start("Opening", work, take, failed)
+
+    def _withdraw_refusals(self) -> None:
+        """Something is open now; why something else was not no longer matters."""
+        for notice in self._refusals:
+            self._notices.withdraw(notice)
+        self._refusals.clear()

@@ -1,0 +1,116 @@
+"""Method: the decisions by which a clip is prepared and trained; this class is the method of the product.
+
+What a clip begins with, what of that learns, which anchors it adds, which of its anchors exist when, which field it
+has, and what a step looks at. A variant overrides single decisions (engine.training.variants); whoever prepares and
+trains a clip asks here and does not know which it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import torch
+
+from engine.capture.clip import Clip
+from engine.clip_files.clip_state import ClipState
+from engine.cloud.motion.moving_cloud import MovingCloud
+from engine.gate.regions import GateRegion
+from engine.model.clip_model import ClipModel
+from engine.training.config import TrainConfig
+from engine.training.preparation.building import ResidualAnchors, adapt_moving, uncovered_points
+from engine.training.preparation.clip_field import fit_field
+from engine.training.preparation.gating import decide
+
+
+class Method:
+    """The decisions. Owns nothing; the numbers are those of the settings.
+
+    Attributes:
+        learns_inherited: Whether all inherited anchors go on learning; they are stored with the clip then.
+        builds_static: Whether a source clip has static anchors of its own in place of all inherited ones.
+        obeys_regions: Whether regions that the user marks count.
+        has_active_tiles: Whether a step of a source clip may leave out tiles that nothing learning touches.
+        keeps_unread_entries: Whether entries of the field that no anchor of the clip reads are stored.
+    """
+
+    learns_inherited = False
+    builds_static = False
+    obeys_regions = True
+    has_active_tiles = True
+    keeps_unread_entries = False
+
+    def base(self, reference: ClipState | None, previous: ClipState | None) -> ClipState | None:
+        """What a clip begins with: the reference clip that it inherits from; None for a clip that inherits nothing."""
+        return reference
+
+    def words(self, config: TrainConfig) -> str:
+        """What becomes of what a source clip takes over, in one line."""
+        moving = ", moving ones learning on" if config.inherit == "moving" else ""
+        return f"inherited anchors kept as they are{moving}, decoder kept as it is"
+
+    def choose_decoder(self, model: ClipModel, *, seed: int) -> None:
+        """The heads of a source clip: those of the reference clip, as they are.
+
+        Args:
+            model: With the heads of the reference clip.
+            seed: Of new heads.
+        """
+        model.decoder.requires_grad_(requires_grad=False)
+
+    def choose_residual(
+        self, cloud: MovingCloud, is_new: np.ndarray, n_used: int, config: TrainConfig
+    ) -> ResidualAnchors:
+        """Which moving points of a source clip become anchors: those that inherited anchors do not cover.
+
+        Args:
+            cloud: What moves in the clip.
+            is_new: Points that no inherited anchor covers. [P] bool
+            n_used: Inherited anchors that exist in some frame of the clip.
+            config: Gives the most anchors.
+        """
+        return uncovered_points(cloud, is_new, n_used, config)
+
+    def adapt(self, model: ClipModel, config: TrainConfig) -> None:
+        """Which inherited moving anchors become the clip's own: with inherit=moving those that exist in it."""
+        if config.inherit == "moving":
+            adapt_moving(model)
+
+    def gate(
+        self, model: ClipModel, regions: Sequence[GateRegion], *, is_source: bool
+    ) -> tuple[dict[str, np.ndarray], str]:
+        """Which anchors have a dynamic feature and exist when: static ones have none, except where the user says so.
+
+        Returns:
+            Reasons by the name under which the clip stores them, and the decision in one line; both empty where
+            nothing was decided.
+        """
+        if not regions or model.anchor_set("static").is_dynamic:
+            return {}, ""
+        return decide(model, regions, is_source=is_source)
+
+    def attach_field(
+        self,
+        model: ClipModel,
+        clip: Clip,
+        config: TrainConfig,
+        *,
+        spacing: float,
+        previous: ClipState | None,
+        generator: torch.Generator,
+    ) -> str:
+        """Give a clip its field, a fresh one of its own; says its size.
+
+        Args:
+            spacing: Distance between moving anchors, scene units.
+            previous: The clip before, finished, where it is known.
+        """
+        return fit_field(model, spacing=spacing, config=config, generator=generator)
+
+    def final_ratios(self, names: Iterable[str], config: TrainConfig) -> dict[str, float]:
+        """Where rates of parameters end that do not end at `config.final_lr_ratio`, as shares of their start.
+
+        Args:
+            names: Of all parameters that learn.
+        """
+        return {}

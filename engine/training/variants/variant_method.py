@@ -1,0 +1,184 @@
+"""The method with some decisions replaced, as settings name them: ablations, baselines and the published scheme."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fnmatch import fnmatchcase
+
+import numpy as np
+import torch
+from msgspec.structs import asdict
+
+from engine.capture.clip import Clip
+from engine.clip_files.anchor_record import AnchorRecord
+from engine.clip_files.clip_state import ClipState
+from engine.cloud.motion.moving_cloud import MovingCloud
+from engine.errors import ProjectError
+from engine.gate.regions import GateRegion
+from engine.model.clip_model import ClipModel, decoder_shape, read_field
+from engine.model.decoder import Decoder
+from engine.training.config import TrainConfig
+from engine.training.preparation.building import ResidualAnchors, adapt_moving
+from engine.training.preparation.clip_field import fit_field
+from engine.training.preparation.method import Method
+
+_FINAL_RATIOS = {
+    "sets.*.features": "feature_final_ratio",
+    "sets.*.log_*_scales": "scale_final_ratio",
+    "field.*": "field_final_ratio",
+    **{f"decoder.{head}.*": f"{head}_head_final_ratio" for head in ("opacity", "color", "shape", "offset")},
+}
+"""Names of parameters to the setting that says where their rates end; 0 stands for `final_lr_ratio`."""
+
+
+def method_of(config: TrainConfig, *, previous: ClipState | None) -> Method:
+    """The method that settings describe.
+
+    Args:
+        config: All settings of a clip's training.
+        previous: The clip before, finished; with start=previous a clip goes on from there.
+    """
+    if config.start == "previous" and previous is not None:
+        return StreamingMethod(config)
+    return Method() if _is_product(config) else VariantMethod(config)
+
+
+def _is_product(config: TrainConfig) -> bool:
+    default = TrainConfig()
+    names = ["gate", "tiles", "decoder", "residual", "field_tables", *_FINAL_RATIOS.values()]
+    is_default = all(getattr(config, name) == getattr(default, name) for name in names)
+    return is_default and config.inherit in ("frozen", "moving") and config.field != "continue"
+
+
+class VariantMethod(Method):
+    """Every decision as the settings say it.
+
+    Args:
+        config: Gives the choices.
+    """
+
+    def __init__(self, config: TrainConfig) -> None:
+        self._gate, self._tables = config.gate, config.field_tables
+        self._inherit, self._decoder, self._residual = config.inherit, config.decoder, config.residual
+        self._field_goes_on = config.field == "continue"
+        self.learns_inherited = self._inherit == "trainable"
+        self.builds_static = self._inherit == "off"
+        self.obeys_regions = self._gate != "off"
+        self.has_active_tiles = config.tiles == "active"
+        # the field may show this clip as the next one leaves it, which reads other entries
+        self.keeps_unread_entries = self._field_goes_on
+
+    def words(self, config: TrainConfig) -> str:
+        anchors = {
+            "frozen": "kept as they are",
+            "moving": "kept as they are if static, learning on if moving",
+            "trainable": "learning on",
+            "off": "left out",
+        }
+        heads = {"frozen": "kept as it is", "finetune": "learning on", "new": "new"}
+        return f"inherited anchors {anchors[self._inherit]}, decoder {heads[self._decoder]}"
+
+    def choose_decoder(self, model: ClipModel, *, seed: int) -> None:
+        """New heads have a generator of their own: what else starts at random is the same for any choice."""
+        if self._decoder == "new":
+            model.decoder = Decoder(
+                **asdict(decoder_shape(model.decoder)), generator=torch.Generator().manual_seed(seed)
+            ).to(model.backend.device, model.backend.dtype)
+        model.decoder.requires_grad_(self._decoder != "frozen")
+
+    def choose_residual(
+        self, cloud: MovingCloud, is_new: np.ndarray, n_used: int, config: TrainConfig
+    ) -> ResidualAnchors:
+        if self._residual == "none":
+            return ResidualAnchors(np.zeros_like(is_new), cloud.presence, ~is_new, 0, "residual=none")
+        if self._residual == "full":
+            every = np.ones_like(is_new)
+            return ResidualAnchors(every, cloud.presence, every, 0, "all moving points, residual=full")
+        return super().choose_residual(cloud, is_new, n_used, config)
+
+    def adapt(self, model: ClipModel, config: TrainConfig) -> None:
+        if config.inherit == "moving" and self._gate in ("off", "static"):
+            adapt_moving(model, all_of_them=True)
+        else:
+            super().adapt(model, config)
+
+    def gate(
+        self, model: ClipModel, regions: Sequence[GateRegion], *, is_source: bool
+    ) -> tuple[dict[str, np.ndarray], str]:
+        """gate=off: every anchor has a dynamic feature at every time. static: only those that move, at every time."""
+        decided: tuple[dict[str, np.ndarray], str] = ({}, "")
+        if self._gate != "off":
+            decided = super().gate(model, regions, is_source=is_source)
+        if self._gate != "hull":
+            for role in model.roles():
+                anchors = model.anchor_set(role)
+                if anchors.is_dynamic or self._gate == "off":
+                    shape = len(anchors), model.n_frames
+                    anchors.presence = torch.ones(shape, dtype=torch.bool, device=model.backend.device)
+        return decided
+
+    def attach_field(
+        self,
+        model: ClipModel,
+        clip: Clip,
+        config: TrainConfig,
+        *,
+        spacing: float,
+        previous: ClipState | None,
+        generator: torch.Generator,
+    ) -> str:
+        if self._field_goes_on and previous is not None and previous.header.field:
+            return _continue_field(model, previous, clip)
+        is_shared = self._tables == "shared"
+        return fit_field(model, spacing=spacing, config=config, generator=generator, is_shared=is_shared)
+
+    def final_ratios(self, names: Iterable[str], config: TrainConfig) -> dict[str, float]:
+        own = {
+            name: getattr(config, setting)
+            for name in names
+            for pattern, setting in _FINAL_RATIOS.items()
+            if fnmatchcase(name, pattern)
+        }
+        return {name: ratio for name, ratio in own.items() if ratio}
+
+
+class StreamingMethod(VariantMethod):
+    """start=previous: a clip goes on from everything that the clip before has learned, and all of it learns on."""
+
+    def __init__(self, config: TrainConfig) -> None:
+        super().__init__(config.going_on())
+
+    def base(self, reference: ClipState | None, previous: ClipState | None) -> ClipState | None:
+        return reference if previous is None else merged(previous)
+
+
+def merged(state: ClipState) -> ClipState:
+    """A finished clip as a start for another: its residual anchors count among the moving ones from here on, its
+    replacing ones among the promoted."""
+    own = {role: record.own for role, record in state.anchors.items() if record.own is not None}
+    arrays = dict(state.arrays)
+    for added, among in (("residual", "moving"), ("replacing", "promoted")):
+        if added not in own:
+            continue
+        for name in AnchorRecord(own=own[added]).arrays(added):
+            del arrays[name]
+        anchors = own[among].joined(own[added]) if among in own else own[added]
+        arrays |= AnchorRecord(own=anchors).arrays(among)
+    return ClipState(arrays, state.header)
+
+
+def _continue_field(model: ClipModel, previous: ClipState, clip: Clip) -> str:
+    """Attach the field that the clip before has learned; it learns on. Says so.
+
+    Raises:
+        ProjectError: It has fewer frames than this clip.
+    """
+    field, index = read_field(previous), previous.header.clip_index
+    if field.shape.n_knots < clip.n_frames:
+        raise ProjectError(
+            f"The field of clip {index} has {field.shape.n_knots} frames, clip {clip.clip_index} has "
+            f"{clip.n_frames}, so it cannot go on there.",
+            hint="Take a clip of full length as reference, or field=per_clip.",
+        )
+    model.attach_field(field)
+    return f"the field of clip {index} goes on"
