@@ -135,7 +135,7 @@ def test_a_change_of_any_real_kernel_file_changes_the_key(monkeypatch):
     before = sources_hash(ROOT / "engine")
     names = real_kernel_files()
     assert {"kernels/lanes.py", "model/decode/cpu/forward.py", "cloud/motion/hull.py"} <= set(names)
-    assert {"training/step/fused_loss.py", "images/ssim_lanes.py", "training/optimizer/adam.py"} <= set(names)
+    assert {"backends/cpu/step/fused_loss.py", "images/ssim_lanes.py", "backends/cpu/step/adam.py"} <= set(names)
     unnoticed = []
     for changed in [*names, "conventions.py", "backends/cpu/decode/warm.py"]:
         if sources_hash(ROOT / "engine") == before:
