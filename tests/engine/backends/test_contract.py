@@ -13,7 +13,7 @@ import torch
 
 from engine.backends.backend import Backend
 from engine.backends.reference.backend import ReferenceBackend
-from engine.backends.table import BACKENDS, backend_called
+from engine.backends.table import BACKENDS, Entry, backend_called
 from engine.errors import ProjectError
 from engine.model.decoding import ChosenAnchors, decode_anchors
 from engine.model.joining import join_frozen
@@ -24,7 +24,7 @@ from engine.training.step.losses import photometric_loss
 from tests.decode_scenes import ODD, Scene, backward
 
 EXACT = ReferenceBackend(dtype=torch.float64)
-TABLE = {**BACKENDS, "counting": "tests.engine.backends.counting.backend:CountingBackend"}
+TABLE = {**BACKENDS, "counting": Entry("tests.engine.backends.counting.backend:CountingBackend", "counts its calls")}
 ROUNDING = 1e-4
 """Of values and gradients relative to their largest: float32 sums of some hundred terms, an exponential between."""
 
