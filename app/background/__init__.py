@@ -1,0 +1,1 @@
+"""Work beside the window: threads, child processes, kernels, logs."""

@@ -15,7 +15,7 @@ from collections.abc import Collection, Iterator, Sequence
 from app.background.logs import start_logging
 from app.cli.arguments import EXIT_BAD_INPUT, EXIT_FAILED, PlainParser, fail, parse
 from app.cli.commands import COMMANDS
-from app.cli.printable_stream import PrintableStream
+from app.cli.terminal.printable_stream import PrintableStream
 from app.training.process import ProcessWorker
 from app.training.service import Launch
 from engine.errors import CaptureError, DiskError, EngineError, ProjectError

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from app.cli.arguments import EXIT_OK, add_figure_choices, parse_range, path_argument
-from app.cli.progress import ProgressLine, row_progress
-from app.cli.results import check_writable, write_text
+from app.cli.terminal.progress import ProgressLine, row_progress
+from app.cli.terminal.results import check_writable, write_text
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
 from app.project.project import open_project

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from app.cli.arguments import EXIT_OK, parse_cameras, parse_range, path_argument
-from app.cli.progress import ProgressLine, row_progress
-from app.cli.results import check_writable
+from app.cli.terminal.progress import ProgressLine, row_progress
+from app.cli.terminal.results import check_writable
 from app.evaluation.headless import open_trained, render_frames
 from app.project.project import open_project
 from app.training.service import Launch

@@ -15,8 +15,8 @@ from app.cli.arguments import (
     path_argument,
 )
 from app.cli.chosen_project import open_for_training, project_to_plan
-from app.cli.progress import ProgressLine
-from app.cli.training_lines import PlanLines, show_event, show_outcome, show_status
+from app.cli.terminal.progress import ProgressLine
+from app.cli.terminal.training_lines import PlanLines, show_event, show_outcome, show_status
 from app.cli.training_settings import add_training_settings
 from app.evaluation.headless import train_clips, train_document
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals

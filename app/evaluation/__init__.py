@@ -1,0 +1,1 @@
+"""Figures of trained projects, measured once and kept."""

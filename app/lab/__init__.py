@@ -1,0 +1,1 @@
+"""Benchmarks, ablations and reports; the product never imports them."""

@@ -1,0 +1,1 @@
+"""What training the next clips would take."""

@@ -1,0 +1,1 @@
+"""Everything that prepares what is shown: frames, pictures, clouds, views."""

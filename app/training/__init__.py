@@ -1,0 +1,1 @@
+"""Background training: one process per clip, messages, snapshots."""

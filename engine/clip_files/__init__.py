@@ -1,0 +1,1 @@
+"""A clip on disk: typed header, named arrays, compact form."""

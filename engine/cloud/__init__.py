@@ -1,0 +1,1 @@
+"""Points from pictures, with numpy and numba only."""

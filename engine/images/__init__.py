@@ -1,0 +1,1 @@
+"""Arithmetic on pictures that clouds, training and figures share."""

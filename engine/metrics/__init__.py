@@ -1,0 +1,1 @@
+"""Figures of rendered pictures, and what changes between clips."""

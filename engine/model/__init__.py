@@ -1,0 +1,1 @@
+"""Anchors, field, decoder, and a clip made of them."""

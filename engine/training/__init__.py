@@ -1,0 +1,1 @@
+"""One clip, step by step; no loop, no file names."""

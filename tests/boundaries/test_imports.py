@@ -61,7 +61,7 @@ def test_import_contracts_hold() -> None:
         ("engine/training/seeded.py", "import engine.training.variants.variant_method", "Only the job of a training"),
         ("engine/capture/seeded.py", "import engine.training.config", "Layers of engine:"),
         ("app/project/seeded.py", "import app.session.session", "Layers of app:"),
-        ("app/session/seeded.py", "import app.lab.report.tables", "Layers of app:"),
+        ("app/session/seeded.py", "import app.lab.report.page.tables", "Layers of app:"),
         ("ui/gl/seeded.py", "import ui.panels.state", "Layers of ui:"),
         ("ui/panels/seeded.py", "import app.training.service", "The window talks to the session"),
         ("engine/cloud/background/seeded.py", "import engine.cloud.stereo.sweep", "Layers of engine.cloud:"),

@@ -1,0 +1,1 @@
+"""One file per panel: functions that read the session and send commands."""

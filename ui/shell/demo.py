@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.cli.arguments import EXIT_BAD_INPUT
-from app.cli.progress import ProgressLine
+from app.cli.terminal.progress import ProgressLine
 from app.project.project import PROJECT_FILE
 from app.session.commands import OpenCapture, SetFrame, ToggleOverlay
 from app.session.session import Session

@@ -1,0 +1,1 @@
+"""Colours, fonts, sizes and words that all of the window shares."""

@@ -1,0 +1,1 @@
+"""What the viewport draws and what lies under the pointer."""

@@ -12,9 +12,9 @@ from app.cli.arguments import (
     parse_cameras,
     path_argument,
 )
-from app.cli.progress import ProgressLine, row_progress
-from app.cli.results import check_writable
-from app.cli.training_lines import show_outcome, show_status
+from app.cli.terminal.progress import ProgressLine, row_progress
+from app.cli.terminal.results import check_writable
+from app.cli.terminal.training_lines import show_outcome, show_status
 from app.cli.training_settings import add_training_settings, overrides_of
 from app.project.project import check_settings, default_settings
 from app.training.service import Launch

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli.results import named_failure
+from app.cli.terminal.results import named_failure
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
 from app.evaluation.source_clip_means import later_figures

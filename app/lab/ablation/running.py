@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.cli.results import write_text
+from app.cli.terminal.results import write_text
 from app.evaluation.headless import ClipOutcome, train_clips
 from app.lab.ablation.curves import curves_of
 from app.lab.ablation.measuring import Measured, Scope, kept_figures, measure

@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 
 from app.cli.arguments import EXIT_OK, path_argument
-from app.cli.progress import ProgressLine
-from app.cli.results import check_writable, named_failure, write_text
+from app.cli.terminal.progress import ProgressLine
+from app.cli.terminal.results import check_writable, named_failure, write_text
 from app.training.service import Launch
 from engine.errors import ProjectError
 from engine.storage.files import atomic_path

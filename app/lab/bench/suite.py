@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 
-from app.lab.bench.machine import Machine, describe_machine
 from app.lab.bench.raster import limit_shares, measure_raster
 from app.lab.bench.rows import IterationRow, KernelRow, SpeedError
+from app.lab.machine import Machine, describe_machine
 
 SCHEMA = 1
 

@@ -1,0 +1,1 @@
+"""clipgstream report: one page about a project."""

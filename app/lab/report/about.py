@@ -9,9 +9,9 @@ from typing import Any
 
 from msgspec import structs
 
-from app.lab.bench.machine import Machine
-from app.lab.report.parts import Section
-from app.lab.report.tables import Table, TableColumn
+from app.lab.machine import Machine
+from app.lab.report.page.parts import Section
+from app.lab.report.page.tables import Table, TableColumn
 from app.project.project import ProjectSettings
 from app.project.project_facts import ProjectFacts
 from engine.training.config import SETTINGS

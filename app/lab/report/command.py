@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from app.cli.arguments import EXIT_OK, add_figure_choices, path_argument
-from app.cli.progress import ProgressLine, row_progress
-from app.cli.results import check_writable
+from app.cli.terminal.progress import ProgressLine, row_progress
+from app.cli.terminal.results import check_writable
 from app.project.project import read_settings
 from app.training.service import Launch
 

@@ -9,9 +9,9 @@ from typing import Any
 from app.evaluation.source_clip_means import LATER_MOVING, LATER_PSNR, LATER_S, later_figures
 from app.lab.report.about import all_settings
 from app.lab.report.charts import SpeedPanel, draw_speed_error
+from app.lab.report.page.parts import Figure, Section
+from app.lab.report.page.tables import Table, TableColumn
 from app.lab.report.pareto import pareto_front
-from app.lab.report.parts import Figure, Section
-from app.lab.report.tables import Table, TableColumn
 from app.project.project_facts import ProjectFacts
 from engine.metrics.clips.flicker import FIGURES, definition_of, flicker_figures
 

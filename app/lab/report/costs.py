@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from app.background.kernels import COMPILING
 from app.lab.report.charts import draw_stacked
-from app.lab.report.parts import Figure, Section
-from app.lab.report.tables import Table, TableColumn
+from app.lab.report.page.parts import Figure, Section
+from app.lab.report.page.tables import Table, TableColumn
 from app.project.clip_bytes import COMPONENT_NAMES
 from app.project.project_facts import ProjectFacts
 from app.training.stage_watch import KEEPING, TRAINING

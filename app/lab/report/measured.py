@@ -8,10 +8,10 @@ from typing import Any
 
 from app.lab.report.charts import Curve, CurvePanel, draw_over_time, draw_pictures
 from app.lab.report.comparison import main_group
-from app.lab.report.labels import FIGURE_LABELS, figure_label
-from app.lab.report.parts import Figure, Folded, Section
+from app.lab.report.page.labels import FIGURE_LABELS, figure_label
+from app.lab.report.page.parts import Figure, Folded, Section
+from app.lab.report.page.tables import Table, TableColumn
 from app.lab.report.pictures import Pictures
-from app.lab.report.tables import Table, TableColumn
 from engine.metrics.columns import COLUMNS
 
 GROUP_WORDS = {"held_out": "held out", "trained_on": "trained on"}

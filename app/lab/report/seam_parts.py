@@ -9,9 +9,9 @@ import numpy as np
 
 from app.lab.report.charts import Curve, CurvePanel, MapPanel, draw_maps, draw_over_time
 from app.lab.report.measured import GROUP_WORDS, Tick, clip_borders
-from app.lab.report.parts import Figure, Folded, Part, Section
+from app.lab.report.page.parts import Figure, Folded, Part, Section
+from app.lab.report.page.tables import Table, TableColumn
 from app.lab.report.pictures import Pictures
-from app.lab.report.tables import Table, TableColumn
 from engine.metrics.clips.seams import MAP_RANGE
 from engine.metrics.clips.summary import mean_of
 

@@ -17,8 +17,8 @@ from app.lab.report.comparison import Compared, comparison_section, speed_sectio
 from app.lab.report.costs import storage_section, times_section
 from app.lab.report.measured import clips_section, time_section, worst_pictures, worst_section
 from app.lab.report.measuring import evaluation_of
-from app.lab.report.page import page_html
-from app.lab.report.parts import Section
+from app.lab.report.page.page import page_html
+from app.lab.report.page.parts import Section
 from app.lab.report.pictures import Pictures, ProjectPictures
 from app.lab.report.seam_parts import seams_section, shown_boundaries
 from app.project.project_facts import find_projects, read_facts, short_names
@@ -143,7 +143,7 @@ def _sections(
         n_drawn += 1
         on_stage("Drawing", n_drawn, n_pictures)
 
-    from app.lab.bench.machine import describe_machine
+    from app.lab.machine import describe_machine
 
     capture = describe(opened.capture)
     speed = speed_section(compared)

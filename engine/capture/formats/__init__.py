@@ -1,0 +1,1 @@
+"""One reader per layout on disk: probe(folder), read(folder)."""

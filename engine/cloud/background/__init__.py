@@ -1,0 +1,1 @@
+"""What each camera sees when nothing moves."""

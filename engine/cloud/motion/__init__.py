@@ -1,0 +1,1 @@
+"""What moves as points: visual hulls of all frames."""

@@ -1,0 +1,1 @@
+"""The static scene as points: plane sweeps over the backgrounds."""

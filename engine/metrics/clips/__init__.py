@@ -1,0 +1,1 @@
+"""Figures of trained clips: every frame against every camera, and the seams between clips."""

@@ -1,0 +1,1 @@
+"""Learning rates, their schedule, and clipping of gradients."""

@@ -1,0 +1,1 @@
+"""What a clip's training starts from: pictures, clouds, anchors, field."""

@@ -1,0 +1,1 @@
+"""What one training step consists of, beside decoding and drawing."""

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from app.cli.commands import COMMANDS
-from app.cli.results import check_writable
+from app.cli.terminal.results import check_writable
 from app.project.project import read_settings
 from engine.errors import ProjectError
 from tests.app.fakes import write_capture

@@ -24,7 +24,6 @@ from app.lab.bench.compared import EXACT
 from app.lab.bench.field import SCENES, DecodeScene, measure_decode
 from app.lab.bench.fma_limit import measure_fma_limit
 from app.lab.bench.iteration import SIZES, measure_iteration
-from app.lab.bench.machine import describe_machine
 from app.lab.bench.raster import evaluated_pairs, limit_shares, measure_raster
 from app.lab.bench.rows import SpeedError
 from app.lab.bench.scenes import RECIPES, Recipe
@@ -33,6 +32,7 @@ from app.lab.bench.step_errors import measure_errors, middle
 from app.lab.bench.suite import FULL, QUICK, Plan, document
 from app.lab.bench.table import report_text
 from app.lab.bench.timing import Timing, interleaved, peak_extra_mb
+from app.lab.machine import describe_machine
 from engine.backends.backend import PhotometricLoss
 from engine.backends.cpu.backend import CpuBackend
 from engine.backends.cpu.step.adam import CpuAdam

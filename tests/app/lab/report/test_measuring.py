@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from app.evaluation.evaluation import Scope, is_measured
 from app.evaluation.headless import open_trained
-from app.lab.report.labels import FIGURE_LABELS
+from app.lab.report.page.labels import FIGURE_LABELS
 from app.project.project import open_project
 from engine.clip_files.clip_state import read_clip_header
 from engine.metrics.clips.seams import PairRow

@@ -2,7 +2,7 @@
 
 import io
 
-from app.cli.progress import ProgressLine
+from app.cli.terminal.progress import ProgressLine
 
 
 class Stream(io.StringIO):

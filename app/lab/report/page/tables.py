@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from app.csv_text import csv_text
-from app.lab.report.markup import Markup, tag
+from app.lab.report.page.markup import Markup, tag
 
 MISSING = "–"
 _WIDE_TEXT = 24

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from app.lab.report.tables import Table
+from app.lab.report.page.tables import Table
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from app.cli.progress import ProgressLine
+from app.cli.terminal.progress import ProgressLine
 from app.evaluation.headless import ClipOutcome
 from app.plan.planning import begin_text, compared_text, plan_clip
 from app.project.clip_catalog import ClipCatalog

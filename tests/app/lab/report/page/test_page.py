@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from app.lab.report.labels import FIGURE_LABELS
-from app.lab.report.tables import value_text
+from app.lab.report.page.labels import FIGURE_LABELS
+from app.lab.report.page.tables import value_text
 from engine.metrics.columns import COLUMNS
 from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import CAMERAS, ODD_NAME, Page, change_header, report, train

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from app.lab.report.markup import Markup, escaped, joined, png_source, tag
-from app.lab.report.parts import Figure, Folded, Part, Section
-from app.lab.report.tables import Table
+from app.lab.report.page.markup import Markup, escaped, joined, png_source, tag
+from app.lab.report.page.parts import Figure, Folded, Part, Section
+from app.lab.report.page.tables import Table
 from engine.assets import asset_path
 
 STYLE_FILE = "report.css"

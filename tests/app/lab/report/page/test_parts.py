@@ -9,10 +9,10 @@ import pytest
 from PIL import Image
 
 from app.lab.report.charts import draw_pictures
-from app.lab.report.markup import escaped, tag
 from app.lab.report.measured import clip_borders, worst_pictures
+from app.lab.report.page.markup import escaped, tag
+from app.lab.report.page.tables import Table, TableColumn
 from app.lab.report.pareto import pareto_front
-from app.lab.report.tables import Table, TableColumn
 from app.project.clip_bytes import storage_of
 from app.project.project_facts import short_names
 from engine.errors import ProjectError
