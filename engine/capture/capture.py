@@ -222,7 +222,7 @@ def _not_a_capture(folder: Path, reasons: Sequence[str]) -> CaptureError:
         hint = f"Open {inside[0]} inside it, which is one."
     else:
         layouts = ", or ".join(reader.LAYOUT for reader in FORMATS)
-        hint = f"A capture holds {layouts}. For other recordings write cameras.json, see the README."
+        hint = f"A capture holds {layouts}. For other recordings write cameras.json, see docs/capture_formats.md."
     return CaptureError(
         f"This folder is not a capture ({'; '.join(reasons)}). In it: {folder_contents(folder)}.",
         hint=hint,
