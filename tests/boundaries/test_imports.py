@@ -52,14 +52,17 @@ def test_import_contracts_hold() -> None:
 @pytest.mark.parametrize(
     ("bad_file", "bad_import", "broken_contract"),
     [
-        ("engine/seeded.py", "import app.seeded_target", "Arrows point one way"),
-        ("engine/seeded.py", "from ui import seeded_target", "Arrows point one way"),
-        ("app/seeded.py", "def late():\n    import ui.seeded_target", "Arrows point one way"),
-        ("app/seeded.py", "import moderngl", "app and engine know no window"),
-        ("engine/seeded.py", "from pyglet import window", "app and engine know no window"),
-        ("ui/seeded.py", "import torch", "ui imports no torch"),
+        ("engine/images/seeded.py", "import app.session.seeded_target", "Arrows point one way"),
+        ("engine/images/seeded.py", "from ui.shell import seeded_target", "Arrows point one way"),
+        ("app/session/seeded.py", "def late():\n    import ui.shell.seeded_target", "Arrows point one way"),
+        ("app/session/seeded.py", "import moderngl", "app and engine know no window"),
+        ("engine/images/seeded.py", "from pyglet import window", "app and engine know no window"),
+        ("ui/style/seeded.py", "import torch", "ui imports no torch"),
         ("engine/training/seeded.py", "import engine.training.variants.variant_method", "Only the job of a training"),
         ("engine/capture/seeded.py", "import engine.training.config", "Layers of engine:"),
+        ("engine/homeless.py", "", "Layers of engine:"),
+        ("app/homeless.py", "", "Layers of app:"),
+        ("ui/homeless.py", "", "Layers of ui:"),
         ("app/project/seeded.py", "import app.session.session", "Layers of app:"),
         ("app/session/seeded.py", "import app.lab.report.page.tables", "Layers of app:"),
         ("ui/gl/seeded.py", "import ui.panels.state", "Layers of ui:"),
@@ -71,7 +74,7 @@ def test_import_contracts_hold() -> None:
 def test_contracts_refuse_a_seeded_bad_import(
     copied_tree: Path, bad_file: str, bad_import: str, broken_contract: str
 ) -> None:
-    for package in ("app", "ui"):
+    for package in ("app/session", "ui/shell"):
         (copied_tree / package / "seeded_target.py").write_text("")
     assert lint_imports(copied_tree).returncode == 0, "the copy must be clean before it is spoiled"
     (copied_tree / bad_file).write_text(bad_import + "\n")
