@@ -196,12 +196,12 @@ class Session:
                 setattr(self.overlays, name, not getattr(self.overlays, name))
             case commands.SetHoldout() | commands.SetClipLength() | commands.SetTrainSetting() | commands.SetPreset():
                 self._change_settings(command)
-            case commands.MarkRegion() | commands.RemoveRegion() | commands.UndoMark() | commands.RedoMark():
-                self.marking.apply(command)
             case commands.HomeView():
                 self.view.home()
             case commands.DismissNotice(index=index):
                 self.notices.dismiss(index)
+            case _ if isinstance(command, commands.EditCommand):
+                self.marking.apply(command)
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
