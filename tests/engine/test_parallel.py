@@ -9,7 +9,7 @@ from engine.parallel import map_ordered, row_spans
 
 
 def test_results_keep_the_order_of_the_items(monkeypatch):
-    monkeypatch.setattr(parallel, "n_workers", lambda: 2)
+    monkeypatch.setattr(parallel, "n_cores", lambda: 2)
     is_second_done = threading.Event()
 
     def function(item: int) -> int:
@@ -23,13 +23,13 @@ def test_results_keep_the_order_of_the_items(monkeypatch):
 
 
 def test_what_fails_on_a_thread_reaches_the_caller(monkeypatch):
-    monkeypatch.setattr(parallel, "n_workers", lambda: 2)
+    monkeypatch.setattr(parallel, "n_cores", lambda: 2)
     with pytest.raises(ZeroDivisionError):
         map_ordered(lambda item: 1 // item, [1, 0, 2])
 
 
 def test_one_core_needs_no_thread(monkeypatch):
-    monkeypatch.setattr(parallel, "n_workers", lambda: 1)
+    monkeypatch.setattr(parallel, "n_cores", lambda: 1)
     here = threading.get_ident()
     assert map_ordered(lambda _: threading.get_ident(), range(3)) == [here] * 3
 

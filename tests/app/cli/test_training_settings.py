@@ -15,7 +15,7 @@ def test_help_settings_lists_every_setting_and_trains_nothing(run, command):
     for setting in SETTINGS.values():
         assert f"  {setting.name}=" in out
     assert "gaussians_per_anchor=5             1 to 32 Gaussians" in out
-    assert "gate=hull                          hull, images, static, off" in out
+    assert "gate=hull                          hull, static, off" in out
 
 
 def test_lines_fit_a_terminal():

@@ -118,7 +118,7 @@ def real_kernel_files() -> list[str]:
     held = {
         path for path in engine.rglob("*.py") if any(f"\n@{name}" in path.read_text("utf-8") for name in decorators)
     }
-    for folder in ("kernels", "raster/cpu", "model/decode/cpu"):
+    for folder in ("kernels", "backends/cpu/raster", "backends/cpu/decode", "backends/cpu/step"):
         held.update((engine / folder).glob("*.py"))
     return sorted(path.relative_to(engine).as_posix() for path in held)
 
@@ -134,7 +134,7 @@ def test_a_change_of_any_real_kernel_file_changes_the_key(monkeypatch):
     monkeypatch.setattr(cache, "_python_texts", texts)
     before = sources_hash(ROOT / "engine")
     names = real_kernel_files()
-    assert {"kernels/lanes.py", "model/decode/cpu/forward.py", "cloud/motion/hull.py"} <= set(names)
+    assert {"kernels/lanes.py", "backends/cpu/decode/forward.py", "cloud/motion/hull.py"} <= set(names)
     assert {"backends/cpu/step/fused_loss.py", "images/ssim_lanes.py", "backends/cpu/step/adam.py"} <= set(names)
     unnoticed = []
     for changed in [*names, "conventions.py", "backends/cpu/decode/warm.py"]:

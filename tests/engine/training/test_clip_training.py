@@ -25,6 +25,7 @@ from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
 from engine.training.preparation.method import Method
 from engine.training.step.nonfinite import loss_not_finite
+from engine.training.variants.variant_method import method_of
 from tests.clip_headers import write_values
 from tests.engine.training.damaged_states import damaged_states
 
@@ -307,7 +308,7 @@ def test_holding_out_almost_everything_is_refused(setting, tmp_path):
 
 def test_gate_off_gives_every_anchor_a_dynamic_feature_at_every_time(setting, tmp_path):
     config = TrainConfig(static_steps=2, joint_steps=2, max_static_points=500, max_moving_points=200, gate="off")
-    training = start(setting.capture, 0, tmp_path, config=config)
+    training = start(setting.capture, 0, tmp_path, config=config, method=method_of(config, previous=None))
     training.prepare()
     state = finish(training)
     model = load_clip_model(state, None, backend=backend_called("cpu"))
