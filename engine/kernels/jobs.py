@@ -19,6 +19,7 @@ import ctypes
 from collections.abc import Sequence
 from enum import Enum
 from functools import cache
+from struct import Struct
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -44,16 +45,22 @@ class _Form(Enum):
 
 
 class _Kind(NamedTuple):
-    """What a field is: its form, dtype, the same for torch (None where torch has none), and number of dimensions."""
+    """What a field is: its form, dtype, the same for torch (None where torch has none), number of dimensions (-1 for
+    any), and whether it holds whole numbers."""
 
     form: _Form
     dtype: np.dtype
     torch_dtype: torch.dtype | None
     n_dimensions: int
+    is_whole: bool
 
 
 def _kind(form: _Form, dtype: type[np.generic] = np.int64, n_dimensions: int = -1) -> _Kind:
-    return _Kind(form, np.dtype(dtype), getattr(torch, np.dtype(dtype).name, None), n_dimensions)
+    of_torch = getattr(torch, np.dtype(dtype).name, None)
+    return _Kind(form, np.dtype(dtype), of_torch, n_dimensions, np.dtype(dtype).kind == "i")
+
+
+_DOUBLE, _BITS = Struct("<d"), Struct("<q")
 
 
 Array = np.ndarray | Tensor
@@ -115,13 +122,14 @@ def pack(job: NamedTuple, n_workers: int) -> Packed:
     for (name, kind), value in zip(_kinds(type(job)), job, strict=True):
         form = kind.form
         if form is _Form.NUMBER:
-            table.append(value if kind.dtype.kind == "i" else int(np.float64(value).view(np.int64)))
+            table.append(value if kind.is_whole else _BITS.unpack(_DOUBLE.pack(value))[0])
         elif form is _Form.ADDRESS:
-            table.append(_checked_address(name, kind, value))
+            table.append(0 if value is None else _checked_address(name, kind, value))
         elif form is _Form.ARRAY:
-            table += (_checked_address(name, kind, value), *value.shape)
+            table.append(_checked_address(name, kind, value))
+            table += value.shape
         elif form is _Form.ADDRESSES:
-            held.append(np.array([_checked_address(name, kind, one) for one in value], np.int64))
+            held.append(np.array([0 if one is None else _checked_address(name, kind, one) for one in value], np.int64))
             table.append(address_of(held[-1]))
         elif value is not None:
             raise TypeError(f"{name} is filled in by launch and must be left out, got {value!r}")
@@ -133,31 +141,28 @@ def pack(job: NamedTuple, n_workers: int) -> Packed:
     return Packed(np.array(table, np.int64), held)
 
 
-def _checked_address(name: str, kind: _Kind, value: Array | None) -> int:
-    """Address of an array of this kind; 0 for None where only the address is wanted."""
-    if isinstance(value, Tensor):
-        is_fit = value.dtype is kind.torch_dtype and value.is_contiguous() and value.is_cpu
-    elif value is not None:
-        is_fit = value.dtype is kind.dtype and value.flags.c_contiguous
-    elif kind.form is _Form.ARRAY:
+def _checked_address(name: str, kind: _Kind, value: Array) -> int:
+    """Address of an array of this kind."""
+    if type(value) is np.ndarray:  # an isinstance of a tensor's class takes longer than all that follows
+        if value.dtype is kind.dtype and value.flags.c_contiguous and kind.n_dimensions in (-1, value.ndim):
+            return address_of(value)
+    elif isinstance(value, Tensor) and value.dtype is kind.torch_dtype and value.is_contiguous() and value.is_cpu:
+        if kind.n_dimensions in (-1, value.ndim):
+            return value.data_ptr()
+    elif value is None:
         raise TypeError(f"{name} must be an array, got None")
-    else:
-        return 0
-    if not is_fit or (kind.n_dimensions >= 0 and value.ndim != kind.n_dimensions):
-        wanted = f"contiguous {kind.dtype} in main memory"
-        if kind.n_dimensions >= 0:
-            wanted += f" with {kind.n_dimensions} dimensions"
-        raise TypeError(f"{name} must be {wanted}, got {value.dtype} {list(value.shape)}")
-    return value.data_ptr() if isinstance(value, Tensor) else address_of(value)
+    wanted = f"contiguous {kind.dtype} in main memory"
+    if kind.n_dimensions >= 0:
+        wanted += f" with {kind.n_dimensions} dimensions"
+    raise TypeError(f"{name} must be {wanted}, got {value.dtype} {list(value.shape)}")
 
 
 def address_of(array: np.ndarray) -> int:
     """Address of the first value, 0 without values. `array.ctypes.data` takes three times as long."""
-    if array.size == 0:
-        return 0
-    if not array.flags.writeable:
-        return array.ctypes.data
-    return ctypes.addressof(ctypes.c_char.from_buffer(array))  # pyright: ignore[reportArgumentType]
+    try:
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))  # pyright: ignore[reportArgumentType]
+    except (TypeError, ValueError):  # read-only, or without values
+        return array.ctypes.data if array.size else 0
 
 
 @kernel_intrinsic
