@@ -58,7 +58,6 @@ def _redirect_output(path: Path) -> None:
     sys.stderr.flush()
     _point_output_to(descriptor)
     logging.raiseExceptions = False  # a log on a full disk is not worth a word, and must not end anything
-    logging.raiseExceptions = False  # a full disk takes the log, not the training, and needs no traceback
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, force=True)
     for handler in logging.getLogger().handlers:
         handler.setFormatter(PrintableFormatter(FORMAT))
