@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow  # left out by make check, as the file takes seconds as a whole
+
 ROOT = Path(__file__).resolve().parents[2]
 WINDOW_LIBRARIES = {"pyglet", "moderngl", "imgui_bundle"}
 

@@ -14,7 +14,7 @@ from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot
 from ui.shell.redraw import FRAMES_AFTER_CHANGE, FRAMES_AFTER_INPUT, MAX_SETTLING, RedrawPlan
 
-pytestmark = pytest.mark.gl
+pytestmark = [pytest.mark.gl, pytest.mark.slow]
 
 
 def assert_finished(pilot: Pilot) -> np.ndarray:

@@ -25,7 +25,7 @@ from ui.panels.hud import legend_rows
 from ui.shell.screenshot import read_window
 from ui.viewport.hud_text import CLOUD, RENDERED, HudText
 
-pytestmark = pytest.mark.gl
+pytestmark = [pytest.mark.gl, pytest.mark.slow]
 WAIT_S = 300.0
 """Only a hang takes longer, or the first start, which compiles the kernels."""
 

@@ -20,7 +20,7 @@ from tests.ui.pilot import Pilot
 from ui.shell.questions import outdated_text, retrain_texts
 from ui.shell.window import window_title
 
-pytestmark = pytest.mark.gl
+pytestmark = [pytest.mark.gl, pytest.mark.slow]
 
 RETRAIN = RetrainQuestion(0, False, "", 29.7, (1, 2), 104.0, False, 190.0, 810)
 PROJECTS = ProjectQuestion(

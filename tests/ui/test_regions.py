@@ -18,7 +18,7 @@ from ui.shell.screenshot import read_window
 from ui.style.colors import REGION_COLORS
 from ui.viewport.region_tool import FIRST_RADIUS_SHARE, GROWTH, SHIFT_SHARE, RegionTool, rig_radius
 
-pytestmark = pytest.mark.gl
+pytestmark = [pytest.mark.gl, pytest.mark.slow]
 
 
 def tool(pilot: Pilot) -> RegionTool:

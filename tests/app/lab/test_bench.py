@@ -39,6 +39,8 @@ from engine.backends.cpu.step.adam import CpuAdam
 from engine.raster import Gaussians, Rendering
 from engine.training.plan.synthetic_clip import ClipRecipe
 
+pytestmark = pytest.mark.slow  # left out by make check, as the file takes seconds as a whole
+
 ROOT = Path(__file__).resolve().parents[3]
 TINY = Recipe(100, 32, 24, 3.0)
 TINY_CLIP = ClipRecipe(60, 2, 32, 24)

@@ -26,6 +26,8 @@ from engine.metrics.pictures.picture import measure_picture
 from engine.metrics.pictures.similarity import Similarity, dssim1, dssim_ms, dssim_range2, ssim
 from tests.engine.metrics.made_pictures import disturbed, scene
 
+pytestmark = pytest.mark.slow  # left out by make check, as the file takes seconds as a whole
+
 SIZES = ((41, 60), (180, 240), (181, 333))
 
 

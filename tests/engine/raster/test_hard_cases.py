@@ -16,6 +16,8 @@ from engine.raster import TILE_PX, Gaussians, rasterize
 from engine.synthetic.gaussian_scenes import Scene, camera, gaussians_of, layered_scene, simple_scene
 from tests.engine.raster.gradients import gradients
 
+pytestmark = pytest.mark.slow  # left out by make check, as the file takes seconds as a whole
+
 NAMES = ("means", "quats", "scales", "opacities", "colors")
 NAN, INF = math.nan, math.inf
 

@@ -103,6 +103,7 @@ def test_reference_gradients_match_finite_differences():
             )
 
 
+@pytest.mark.slow
 def test_cpu_gradients_match_finite_differences_of_the_reference(truth):
     scene, exact, _ = truth
     gaussians = leaves(scene.gaussians, torch.float32)

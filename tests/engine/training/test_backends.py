@@ -16,6 +16,8 @@ from engine.clip_files.clip_state import ClipState
 from tests.engine.backends.counting.backend import CountingBackend
 from tests.engine.training.tiny_training import Tiny, make_training, take_steps
 
+pytestmark = pytest.mark.slow  # left out by make check, as the file takes seconds as a whole
+
 SIZES: dict[str, Any] = {
     "static_steps": 5,
     "joint_steps": 4,

@@ -19,7 +19,7 @@ from ui.panels.state import Rect, UiState
 from ui.shell.window import screen_scale
 from ui.style.ui_scale import MIN_UNITS, UiScale, next_choice, parse_scale
 
-pytestmark = pytest.mark.gl
+pytestmark = [pytest.mark.gl, pytest.mark.slow]
 PADDING = 5.0
 """Rows of lists reach a little into the padding of their window, on purpose."""
 SIZES = [(900, 600), (1600, 1000), (880, 560), (640, 420)]

@@ -40,7 +40,7 @@ from ui.gl import frusta_lines
 from ui.shell.screenshot import read_window, write_png
 from ui.viewport.frusta import frustum_size
 
-pytestmark = pytest.mark.gl
+pytestmark = [pytest.mark.gl, pytest.mark.slow]
 
 
 def test_dragging_along_the_timeline_visits_the_frames_under_the_pointer(pilot: Pilot) -> None:
