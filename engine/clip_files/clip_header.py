@@ -83,11 +83,6 @@ class FieldShape(Struct, frozen=True):
         """Tables of the field."""
         return 1 if self.is_shared else self.n_knots
 
-    @property
-    def n_table_values(self) -> int:
-        """Of all tables."""
-        return self.n_tables * len(self.cells) * self.n_entries * self.channels
-
 
 class Coverage(Struct, frozen=True):
     """How much of what moves in a source clip has an anchor near it.

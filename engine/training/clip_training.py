@@ -215,9 +215,8 @@ class ClipTraining:
             backend=self.backend,
             ssim_weight=self.config.ssim_weight,
             gain=self.gains[camera_row],
-            is_counted=None
-            if is_counted is None
-            else self._tensor(is_counted),  # unstable pixels of a background do not
+            # unstable pixels of a background do not count
+            is_counted=None if is_counted is None else self._tensor(is_counted),
             tile_mask=active.tile_mask,
             rest=active.rest,
         )
