@@ -214,7 +214,7 @@ class TrainedProject:
             last = read_clip_state(self.project.clip_path(self.last_trained))
             if last.header.field and model.field is not None:
                 model.attach_field(read_field(last).requires_grad_(requires_grad=False))
-        return TrainedClip(self.clips[clip_index], model, base)
+        return TrainedClip(self.clips[clip_index], model, base, state.drift)
 
 
 def open_trained(project: Project) -> TrainedProject:

@@ -22,6 +22,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from engine.clip_files.anchor_record import AnchorRecord, RecordError, read_records
+from engine.clip_files.array_names import LOG_DRIFT
 from engine.clip_files.clip_header import ClipHeader, NewerSchema, header_text, parse_header
 from engine.clip_files.coding import CodedArray, CodingError, decode_array
 from engine.errors import ProjectError
@@ -29,6 +30,8 @@ from engine.storage.array_files import ArraysError, read_arrays, read_metadata, 
 from engine.storage.json_files import JsonError, parse_object
 from engine.storage.typed_json import EntryError
 
+_MAX_LOG_DRIFT = 3.0
+"""Gains of a camera beyond a factor of 20 are damage."""
 _ENTRIES = ("header", "coding")
 """Texts of a file beside its checksum."""
 
@@ -50,6 +53,25 @@ class ClipState:
     def anchors(self) -> dict[str, AnchorRecord]:
         """What the clip stores of anchors, by role. Raises RecordError where arrays do not fit together."""
         return read_records(self.arrays)
+
+    @property
+    def drift(self) -> np.ndarray | None:
+        """Exposure of the training cameras against the reference clip's; None where none changes. [C, M, 3] float32
+
+        Raises:
+            ProjectError: The array does not fit the clip.
+        """
+        logs = self.arrays.get(LOG_DRIFT)
+        if logs is None:
+            return None
+        shape = (len(self.header.camera_names), self.header.n_frames, 3)
+        if logs.shape != shape or logs.dtype != np.float32 or not (np.abs(logs) < _MAX_LOG_DRIFT).all():
+            raise ProjectError(
+                f"The exposure of the cameras in clip {self.header.clip_index} is {logs.dtype} {list(logs.shape)}, "
+                f"not float32 {list(shape)} within {_MAX_LOG_DRIFT}.",
+                hint="Train this clip again.",
+            )
+        return np.exp(logs)
 
     @property
     def is_reference(self) -> bool:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace as with_entries
 
-from engine.clip_files.array_names import DECODER, FIELD, own_kind, table_index
+from engine.clip_files.array_names import DECODER, FIELD, LOG_DRIFT, own_kind, table_index
 from engine.clip_files.clip_header import SCHEMA, ClipFigures
 from engine.clip_files.clip_state import ClipState, write_coded_arrays
 from engine.clip_files.coding import CodedArray, CodingError, decode_array, encode_array
@@ -99,6 +99,8 @@ def _codecs(name: str, array: np.ndarray, state: ClipState) -> list[Codec]:
         return [*_position_codecs(array, state), exact]
     if kind in _BITS and not state.is_reference:
         return [("steps", {"bits": _BITS[kind]}), exact]
+    if name == LOG_DRIFT:
+        return [("half", {}), exact]
     if kind is not None or name.startswith((DECODER, FIELD)):
         return [("half", {}), exact]
     return [exact]

@@ -19,7 +19,7 @@ from engine.camera.depth_range import near_plane
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.anchor_record import AnchorRecord
-from engine.clip_files.array_names import GAINS
+from engine.clip_files.array_names import GAINS, LOG_DRIFT
 from engine.clip_files.clip_header import SCHEMA, ClipHeader, Place
 from engine.clip_files.clip_state import ClipState, fingerprint_of
 from engine.clip_files.compact import CompactClip, compact_clip
@@ -27,6 +27,7 @@ from engine.cloud.background.gains import in_gauge
 from engine.errors import NonFiniteLoss, PreparationError, ProjectError
 from engine.gate.regions import GateRegion
 from engine.images.psnr import psnr
+from engine.model.camera_colors import CameraColors
 from engine.model.clip_model import ClipModel, decoder_shape, load_clip_model
 from engine.model.clip_view import REACH_SPACINGS, View, render_gaussians, render_model
 from engine.model.host_array import host_array
@@ -146,18 +147,18 @@ class ClipTraining:
         torch.manual_seed(self.seed)
         self.pictures = self._preparation.read_pictures()
         if self._base is None:
-            self._take(self._preparation.static_parts())
+            self._take(self._preparation.static_parts(self.pictures))
         else:
             self._take(self._preparation.source_parts(self._base, self.pictures))
         self._start_phase(0, 0)
 
     def _add_moving(self) -> None:
         """Between the phases of a reference clip: corrected backgrounds, motion, moving anchors, field."""
-        parts = ClipParts(self.model, self.gains, self.backgrounds, self.spacing)
+        parts = ClipParts(self.model, self.gains, self.drift, self.backgrounds, self.spacing)
         self._take(self._preparation.with_motion(parts, self.pictures))
 
     def _take(self, parts: ClipParts) -> None:
-        self.model, self.gains, self.backgrounds = parts.model, parts.gains, parts.backgrounds
+        self.model, self.gains, self.drift, self.backgrounds = parts.model, parts.gains, parts.drift, parts.backgrounds
         self.spacing, self.moving_spacing = parts.spacing, parts.moving_spacing
         self._reasons, self._coverage = parts.reasons, parts.coverage
 
@@ -204,7 +205,7 @@ class ClipTraining:
         else:
             camera_row, frame = divmod(item, self.clip.n_frames)
             clip_time = frame / self.clip.clip_length
-            truth, is_counted = self.pictures.raw(camera_row, frame), None
+            truth, is_counted = self.pictures.picture(camera_row, frame), None
         view = self._training_views[camera_row]
         active = self._active_picture(camera_row, view, clip_time)
         image = render_gaussians(active.gaussians, view, backend=self.backend, tile_mask=active.tile_mask).image[0]
@@ -272,11 +273,14 @@ class ClipTraining:
 
     def held_out_psnr(self, *, n_pictures: int = 3) -> float:
         """Mean PSNR of a few held-out pictures in raw colours, dB; NaN without held-out cameras."""
+        colors = CameraColors(self.rig.names, host_array(self.gains), self.drift, self.clip.clip_length)
         values = []
         for i, camera in enumerate(self.holdout[:n_pictures]):
             frame = self.clip.start + (i * self.clip.n_frames) // max(len(self.holdout[:n_pictures]), 1)
-            image = render_model(self.model, self._views[camera], self.clip.clip_time(frame), reach=self._reach)
-            values.append(psnr(host_array(image), self.capture.frame(camera, frame) / 255.0))
+            clip_time = self.clip.clip_time(frame)
+            image = render_model(self.model, self._views[camera], clip_time, reach=self._reach)
+            shown = colors.in_camera(host_array(image), self.capture.rig, camera, clip_time)
+            values.append(psnr(shown, self.capture.frame(camera, frame) / 255.0))
         return float(np.mean(values)) if values else float("nan")
 
     def state(self) -> ClipState:
@@ -289,6 +293,8 @@ class ClipTraining:
             arrays |= AnchorRecord(reasons=codes).arrays(role)
         if self.reference is None:
             arrays[GAINS] = host_array(self.gains).copy()
+        if (self.drift != 1.0).any():
+            arrays[LOG_DRIFT] = np.log(self.drift)
         header = ClipHeader(
             schema=SCHEMA,
             role="reference" if self.reference is None else "source",
@@ -377,9 +383,14 @@ class ClipTraining:
             found = f"{kept.backgrounds.images.shape} and {kept.gains.shape}"
             raise ValueError(f"backgrounds and gains are {found}, not of {len(self.rig)} cameras of {width}x{height}")
         header, place = kept.state.header, kept.place
+        drift = kept.state.drift
+        if drift is None:
+            drift = np.ones((len(self.rig), self.clip.n_frames, 3), np.float32)
+        self.pictures.remove_drift(drift)
         parts = ClipParts(
             load_clip_model(kept.state, self.reference, backend=self.backend, is_learning=True),
             nn.Parameter(torch.from_numpy(kept.gains).to(self.backend.device, self.backend.dtype)),
+            drift,
             kept.backgrounds,
             header.spacing,
             moving_spacing=header.moving_spacing,

@@ -15,6 +15,7 @@ import numpy as np
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.cloud.background.background import estimate_background
+from engine.cloud.background.exposure import Exposure
 from engine.cloud.background.masks import motion_mask
 from engine.metrics.clips.seams import PairRow, SeamMaps, change_of, part_means, seam_maps
 from engine.metrics.clips.summary import EvalRow
@@ -59,7 +60,7 @@ class Evaluation:
         self.capture, self.cameras, self.holdout = capture, list(cameras), frozenset(holdout)
         self.metrics: Choice = metrics
         self.precision: Precision = precision
-        self._backgrounds: dict[int, np.ndarray] = {}
+        self._backgrounds: dict[int, tuple[np.ndarray, Exposure]] = {}
 
     def measure(
         self,
@@ -172,16 +173,24 @@ class Evaluation:
     def _shot(self, trained: TrainedClip, camera: int, frame: int) -> _Shot:
         pixels = self.capture.frame(camera, frame)
         image = self._render(trained, camera, trained.clip.clip_time(frame))
-        return _Shot(frame, image, pixels, motion_mask(pixels, self._background(camera)))
+        return _Shot(frame, image, pixels, self._is_moving(camera, pixels))
 
     def _render(self, trained: TrainedClip, camera: int, clip_time: float) -> np.ndarray:
         """Picture in the camera's colours, as it is compared. [H, W, 3] float32"""
         return as_shown(trained.picture(self.capture.rig, camera, clip_time), self.precision)
 
-    def _background(self, camera: int) -> np.ndarray:
+    def _is_moving(self, camera: int, pixels: np.ndarray) -> np.ndarray:
+        """Where a picture differs from the camera's background, whatever its exposure. [H, W] bool"""
+        background, exposure = self._background(camera)
+        return motion_mask(exposure.applied_to(pixels[None])[0], background)
+
+    def _background(self, camera: int) -> tuple[np.ndarray, Exposure]:
+        """What a camera sees when nothing moves, in its mean exposure, and that exposure."""
         if camera not in self._backgrounds:
             spread = spread_frames(self.capture.n_frames, _BACKGROUND_FRAMES)
-            self._backgrounds[camera] = estimate_background(self.capture.frames_of(camera, spread)).image
+            frames = self.capture.frames_of(camera, spread)
+            background = estimate_background(Exposure.of_frames(frames).applied_to(frames)).image
+            self._backgrounds[camera] = (background, Exposure.of_background(background))
         return self._backgrounds[camera]
 
     def _maps(self, shot: _Shot, last: _Shot) -> SeamMaps:

@@ -23,7 +23,7 @@ from engine.metrics.pictures.similarity import (
 
 Choice = Literal["quick", "all"]
 CHOICES: tuple[Choice, ...] = get_args(Choice)
-FIGURES_VERSION = 2
+FIGURES_VERSION = 3
 """Raised when a figure of the same picture changes: kept figures of earlier versions are not mixed with new ones."""
 
 

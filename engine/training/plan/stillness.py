@@ -8,8 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.cloud.background.exposure import Exposure
 from engine.cloud.background.masks import motion_mask
 from engine.training.config import TrainConfig
 from engine.training.preparation.cloud_preparation import key_of_corrected, read_backgrounds
@@ -41,7 +44,11 @@ def looks_still(
     last = clip.n_frames - 1
     instants = dict.fromkeys((last // 2, last, 0))  # each once; most motion shows in the first picture or two
     return not any(
-        motion_mask(capture.frame(camera, clip.start + instant), background).any()
+        motion_mask(_in_exposure_of(background, capture.frame(camera, clip.start + instant)), background).any()
         for instant in instants
         for camera, background in zip(camera_indices, backgrounds.images, strict=True)
     )
+
+
+def _in_exposure_of(background: np.ndarray, picture: np.ndarray) -> np.ndarray:
+    return Exposure.of_background(background).applied_to(picture[None])[0]

@@ -6,7 +6,7 @@ been trained. Source clip: `source_parts` does all of it at once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import Coverage
 from engine.clip_files.clip_state import ClipState, fingerprint_of
+from engine.cloud.background.exposure import Exposure
 from engine.cloud.keeping import Keep
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
@@ -28,6 +29,7 @@ from engine.gate.regions import GateRegion
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, render_gaussians
 from engine.model.host_array import host_array
+from engine.parallel import map_ordered
 from engine.progress import Progress, ReportProgress
 from engine.training.config import TrainConfig
 from engine.training.preparation.building import (
@@ -61,6 +63,7 @@ class ClipParts:
     Attributes:
         model: Everything that is visible in the clip.
         gains: Of the training cameras. [C, 3] float32
+        drift: Exposure of each training camera in each frame against the reference clip's. [C, M, 3] float32
         backgrounds: What the training cameras see when nothing moves.
         spacing: Distance between static anchors, scene units.
         moving_spacing: Likewise of moving ones; None as long as nothing has moved.
@@ -70,6 +73,7 @@ class ClipParts:
 
     model: ClipModel
     gains: nn.Parameter
+    drift: np.ndarray
     backgrounds: Backgrounds
     spacing: float
     moving_spacing: float | None = None
@@ -124,7 +128,7 @@ class ClipPreparation:
         self._stages = Stages(prep_dir, clip.clip_index, self._key(), report)
 
     def read_pictures(self) -> TrainingPictures:
-        """The clip's pictures of the training cameras.
+        """The clip's pictures of the training cameras, as the cameras took them.
 
         Raises:
             CaptureError: They cannot be read.
@@ -136,18 +140,20 @@ class ClipPreparation:
         self._say("Reading pictures", f"{len(pictures)} pictures, {size_mb:.0f} MB")
         return pictures
 
-    def static_parts(self) -> ClipParts:
-        """A reference clip before its motion is known: static anchors and a fresh decoder.
+    def static_parts(self, pictures: TrainingPictures) -> ClipParts:
+        """A reference clip before its motion is known: static anchors and a fresh decoder. Removes the pictures' drift.
 
         Raises:
             PreparationError: No static point was found.
         """
-        backgrounds = self._estimated()
+        exposures = self._exposures_of(map(pictures.of_camera, range(len(self._rig))))
+        drift = self._remove_drift(pictures, exposures)
+        backgrounds = self._estimated(exposures)
         cloud = self._static_cloud(backgrounds, self._stages.keep)
         gains = self._gains(cloud.gains)
         model = static_model(cloud, self._clip, self._config, self._backend, self._generator)
         self._say("Building the static cloud", f"{len(cloud.points)} static anchors, spacing {cloud.spacing:.4g}")
-        return ClipParts(model, gains, backgrounds, float(cloud.spacing))
+        return ClipParts(model, gains, drift, backgrounds, float(cloud.spacing))
 
     def with_motion(self, parts: ClipParts, pictures: TrainingPictures) -> ClipParts:
         """A reference clip whose static anchors were trained, with corrected backgrounds and what moves."""
@@ -166,7 +172,7 @@ class ClipPreparation:
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons)
 
     def source_parts(self, reference: ClipState, pictures: TrainingPictures) -> ClipParts:
-        """A clip that takes over what another one has learned.
+        """A clip that takes over what another one has learned. Removes the pictures' drift.
 
         Raises:
             PreparationError: It needs a static cloud of its own and no static point was found.
@@ -180,17 +186,18 @@ class ClipPreparation:
             )
         model = inheriting_model(reference, self._clip, self._backend, learns=self._method.learns_inherited)
         self._say("Taking over the reference", self._method.words(self._config))
-        backgrounds = read_backgrounds(self._prep_dir, self._key_of_corrected())
-        if backgrounds is None:
-            estimated = self._estimated()
-            keep = self._keep_after(model, gains, estimated)
-            backgrounds = self._corrected(estimated, model, gains, pictures, keep)
+        kept = read_backgrounds(self._prep_dir, self._key_of_corrected())
+        backgrounds = kept or self._estimated(self._exposures_in(reference))
+        drift = self._remove_drift(pictures, [Exposure.of_background(image) for image in backgrounds.images])
+        if kept is None:
+            keep = self._keep_after(model, gains, backgrounds)
+            backgrounds = self._corrected(backgrounds, model, gains, pictures, keep)
         self._method.choose_decoder(model, seed=self._seed)
         if self._method.builds_static:
             own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
             model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
-        parts = ClipParts(model, gains, backgrounds, reference.header.spacing)
+        parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing)
         cloud, moving_spacing = self._find_motion(parts, pictures)
         coverage = add_residual(model, cloud, self._config, self._method.choose_residual)
         self._method.adapt(model, self._config)
@@ -239,11 +246,39 @@ class ClipPreparation:
         tensor = torch.from_numpy(values).to(self._backend.device, self._backend.dtype)
         return nn.Parameter(tensor, requires_grad=is_learning)
 
+    # ---------------------------------------------------------------- exposure
+
+    @property
+    def _has_drift(self) -> bool:
+        return self._config.color != "off"
+
+    def _exposures_of(self, frames_of_cameras: Iterable[np.ndarray]) -> list[Exposure]:
+        return map_ordered(Exposure.of_frames, frames_of_cameras)
+
+    def _exposures_in(self, reference: ClipState) -> list[Exposure]:
+        """Of the training cameras in the reference clip, from its frames."""
+        frames = range(reference.header.start, reference.header.start + reference.header.n_frames)
+        return self._exposures_of(self._capture.frames_of(camera, list(frames)) for camera in self._camera_indices)
+
+    def _remove_drift(self, pictures: TrainingPictures, exposures: Sequence[Exposure]) -> np.ndarray:
+        """Brings the pictures into the exposure of the reference clip; gives the gains that they had against it."""
+        n_cameras, n_frames = len(self._rig), self._clip.n_frames
+        if not self._has_drift:
+            return np.ones((n_cameras, n_frames, 3), np.float32)
+        drift = np.stack(map_ordered(lambda row: exposures[row].gains_of(pictures.of_camera(row)), range(n_cameras)))
+        pictures.remove_drift(drift)
+        means = drift.mean((1, 2)) - 1.0
+        said = f"{100 * means.min():+.1f} to {100 * means.max():+.1f} % against the reference clip"
+        n_changed = int((drift != 1.0).any((1, 2)).sum())
+        self._say("Measuring exposure", f"{said}, {n_changed} of {n_cameras} cameras" if n_changed else "as it was")
+        return drift
+
     # ---------------------------------------------------------------- what does not move
 
-    def _estimated(self) -> Backgrounds:
+    def _estimated(self, exposures: Sequence[Exposure]) -> Backgrounds:
         keep = self._stages.keep
-        return estimate_backgrounds(self._capture, self._camera_indices, self._config, self._report, keep)
+        known = exposures if self._has_drift else [None] * len(exposures)
+        return estimate_backgrounds(self._capture, self._camera_indices, known, self._config, self._report, keep)
 
     def _corrected(
         self,

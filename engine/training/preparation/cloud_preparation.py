@@ -19,6 +19,7 @@ import numpy as np
 from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture
 from engine.cloud.background.background import estimate_background
+from engine.cloud.background.exposure import Exposure
 from engine.cloud.background.masks import motion_mask
 from engine.cloud.background.recheck import recheck_background
 from engine.cloud.keeping import Arrays, Keep, do_now
@@ -61,20 +62,26 @@ def spread_frames(n_frames: int, at_most: int) -> list[int]:
 def estimate_backgrounds(
     capture: Capture,
     camera_indices: Sequence[int],
+    exposures: Sequence[Exposure | None],
     config: TrainConfig,
     report: ReportProgress,
     keep: Keep = do_now,
 ) -> Backgrounds:
-    """Backgrounds from frames spread over the whole capture."""
+    """Backgrounds from frames spread over the whole capture.
+
+    Args:
+        exposures: Of each camera, the one that its background is in; None leaves frames as they are.
+    """
     frames = spread_frames(capture.n_frames, config.background_frames)
 
-    def estimate(camera: int) -> Arrays:
-        background = estimate_background(capture.frames_of(camera, frames))
+    def estimate(camera: int, exposure: Exposure | None) -> Arrays:
+        pictures = capture.frames_of(camera, frames)
+        background = estimate_background(pictures if exposure is None else exposure.applied_to(pictures))
         return {"image": background.image, "is_stable": np.packbits(background.is_stable, axis=-1)}
 
     images, stable = [], []
-    for row, camera in enumerate(camera_indices):
-        kept = keep(f"background {row}", partial(estimate, camera))
+    for row, (camera, exposure) in enumerate(zip(camera_indices, exposures, strict=True)):
+        kept = keep(f"background {row}", partial(estimate, camera, exposure))
         images.append(kept["image"])
         stable.append(np.unpackbits(kept["is_stable"], axis=-1, count=kept["image"].shape[1]).astype(bool))
         report(Progress("Looking for what stands still", (row + 1) / len(camera_indices)))
@@ -148,12 +155,11 @@ def correct_backgrounds(
     corrected = backgrounds.images.copy()
 
     def correct(row: int) -> Arrays:
-        frames = np.stack([pictures.raw(row, i) for i in range(pictures.clip.n_frames)])
         image = recheck_background(
             backgrounds.images[row],
             backgrounds.is_stable[row],
             render_static(row),
-            frames,
+            pictures.of_camera(row),
         )
         return {"image": image}
 
@@ -179,7 +185,7 @@ def motion_masks(
     masks = np.empty((n_frames, *backgrounds.is_stable.shape), bool)
 
     def find(row: int) -> Arrays:
-        found = [motion_mask(pictures.raw(row, frame), backgrounds.images[row]) for frame in range(n_frames)]
+        found = [motion_mask(pictures.picture(row, frame), backgrounds.images[row]) for frame in range(n_frames)]
         return {"masks": np.packbits(np.stack(found), axis=-1)}
 
     for row in range(n_cameras):
@@ -214,7 +220,7 @@ def moving_cloud(
 
     lower, upper = motion_bounds(static_points, rig)
     return build_moving_cloud(
-        pictures.raw,
+        pictures.picture,
         masks,
         rig,
         gains,

@@ -1,4 +1,4 @@
-"""Training pictures: the pixels of one clip's training cameras.
+"""Training pictures: the pixels of one clip's training cameras, all in the exposure of the reference clip.
 
 Pictures stay uint8 in memory (a clip of 27 cameras x 10 frames at 640 x 360 is 187 MB); the loss reads them like that.
 """
@@ -12,6 +12,8 @@ import numpy as np
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import PreparationError
+from engine.images.exposure_curve import to_reference
+from engine.parallel import map_ordered
 
 
 def shared_image_size(capture: Capture) -> tuple[int, int]:
@@ -49,6 +51,24 @@ class TrainingPictures:
     def __len__(self) -> int:
         return len(self.camera_indices) * self.clip.n_frames
 
-    def raw(self, camera_row: int, frame_in_clip: int) -> np.ndarray:
-        """One picture as decoded. [H, W, 3] uint8"""
+    def picture(self, camera_row: int, frame_in_clip: int) -> np.ndarray:
+        """One picture. [H, W, 3] uint8"""
         return self._pixels[camera_row][frame_in_clip]
+
+    def of_camera(self, camera_row: int) -> np.ndarray:
+        """All pictures of one camera. [M, H, W, 3] uint8"""
+        return self._pixels[camera_row]
+
+    def remove_drift(self, drift: np.ndarray) -> None:
+        """Bring the pictures, as they were decoded, into the exposure of the reference clip.
+
+        Args:
+            drift: Gains of the cameras against it, frame by frame. [C, M, 3]
+        """
+
+        def correct(row: int) -> np.ndarray:
+            if (drift[row] == 1.0).all():
+                return self._pixels[row]
+            return np.stack([to_reference(*pair) for pair in zip(self._pixels[row], drift[row], strict=True)])
+
+        self._pixels = map_ordered(correct, range(len(self._pixels)))
