@@ -58,7 +58,10 @@ COMMANDS = {
         "app.cli.render_command",
         "A video was not written; single pictures that were finished are there.",
     ),
-    "inspect": Command("describe a capture, or what the trained clips of a project weigh", "app.cli.inspect_command"),
+    "inspect": Command(
+        "describe a capture and how exposure changes in it, or what the trained clips of a project weigh",
+        "app.cli.inspect_command",
+    ),
     "gate": Command("say what is static in a project and why, and overrule it", "app.cli.gate_command"),
     "doctor": Command(
         "look at this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.doctor_command"

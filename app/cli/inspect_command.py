@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 
+from app.background.kernels import use_threads
 from app.cli.arguments import EXIT_OK, add_follow_links, path_argument
 from app.training.service import Launch
 from engine.capture.capture import FORMATS, open_capture
@@ -24,19 +25,26 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream inspect: describe a capture or a project. Returns the exit code."""
     from app.project.project import is_project
     from app.project.project_summary import describe_project, project_lines
-    from engine.capture.capture_summary import describe
 
-    is_one = is_project(options.path)
-    found = (
-        describe_project(options.path)
-        if is_one
-        else describe(open_capture(options.path, follow_links=options.follow_links))
-    )
+    if not is_project(options.path):
+        return _inspect_capture(options)
+    found = describe_project(options.path)
+    print(json_text(found, indent=2) if options.json else "\n".join(project_lines(found)))
+    return EXIT_OK
+
+
+def _inspect_capture(options: argparse.Namespace) -> int:
+    """What a capture is, and how the exposure of its cameras changes."""
+    use_threads(None)
+    from app.cli.exposure_lines import exposure_document, exposure_lines
+    from engine.capture.capture_summary import describe
+    from engine.cloud.background.exposure_survey import survey_exposure
+
+    capture = open_capture(options.path, follow_links=options.follow_links)
+    found, survey = describe(capture), survey_exposure(capture)
+    capture.close()
     if options.json:
-        print(json_text(found, indent=2))
-        return EXIT_OK
-    if is_one:
-        print("\n".join(project_lines(found)))
+        print(json_text(found | {"exposure": exposure_document(survey)}, indent=2))
         return EXIT_OK
     print(
         f"{printable(found['path'])}: {found['n_cameras']} cameras, {found['n_frames']} frames at {found['fps']:g} per "
@@ -49,6 +57,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             f"{camera['fov_y_deg']:.0f} degrees{held_out}"
         )
     print(f"The cameras are up to {found['rig_extent']:.3g} scene units apart.")
+    for line in exposure_lines(survey):
+        print(line)
     for warning in found["warnings"]:
         print(f"Note: {warning}")
     return EXIT_OK
