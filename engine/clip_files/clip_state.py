@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -120,19 +120,23 @@ def write_coded_arrays(path: Path | str, coded: dict[str, CodedArray], header: C
     write_arrays(path, {name: array.payload for name, array in coded.items()}, metadata, what="The clip")
 
 
-def read_clip_state(path: Path | str) -> ClipState:
+def read_clip_state(path: Path | str, *, only: Collection[str] | None = None) -> ClipState:
     """Read a state written by `write_clip_state` or `write_coded_arrays`.
 
+    Args:
+        only: Names of the arrays to read, as far as they are there; all of them when None.
     Raises:
         ProjectError: The file is missing, damaged, or of a newer schema; says which, and why.
     """
     path = Path(path)
     try:
-        arrays, metadata = read_arrays(path, _ENTRIES)
+        arrays, metadata = read_arrays(path, _ENTRIES, only=only)
         header = _header_of(metadata)
         if "coding" in metadata:
-            arrays = _decoded(arrays, parse_object(metadata["coding"]))
-        read_records(arrays)
+            specs = parse_object(metadata["coding"])
+            arrays = _decoded(arrays, specs if only is None else {n: specs[n] for n in only if n in specs})
+        if only is None:
+            read_records(arrays)
     except FileNotFoundError as error:
         raise ProjectError("The clip file does not exist.", hint="Train the clip first.", path=path) from error
     except NewerSchema as error:

@@ -51,11 +51,14 @@ def _table() -> dict[str, Column]:
                 words = base.definition + part_words + fit_words
                 name = base.name + fit + part
                 found.append(Column(name, base.unit, base.is_higher_better, base.is_quick, words))
+    words = f"{_BASES[0].definition}, after the colour fit and a fit of smooth local brightness: a factor per block of "
+    words += "a grid of 16 blocks across the picture, from pixels that do not move"
+    found.append(Column("psnr_light", "dB", True, True, words))
     words = "share of the pixels that differ from the camera's own background"
     found.append(Column("moving_share", "1", None, True, words))
     return {column.name: column for column in found}
 
 
 COLUMNS = _table()
-"""Every column by name, in the order of a row. Raw figures have no suffix; `_fit` is after the colour fit, `_moving`
-and `_rest` are of a part of the pixels."""
+"""Every column by name, in the order of a row. Raw figures have no suffix; `_fit` is after the colour fit, `_light`
+after a fit of smooth local brightness too, `_moving` and `_rest` are of a part of the pixels."""

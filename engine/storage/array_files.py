@@ -73,16 +73,19 @@ def write_arrays(
             file.write(_bytes_of(arrays[name]))
 
 
-def read_arrays(path: Path | str, entries: Collection[str]) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+def read_arrays(
+    path: Path | str, entries: Collection[str], *, only: Collection[str] | None = None
+) -> tuple[dict[str, np.ndarray], dict[str, str]]:
     """Arrays and texts of a file.
 
     Args:
         entries: Names that its texts may have; another one is damage.
+        only: Arrays to read, as far as they are there; all of them when None.
     Raises:
         OSError: The file is missing, cannot be read, or is not a regular file.
         ArraysError: It is damaged, or something else.
     """
-    arrays, metadata, _ = _read(path, entries, with_arrays=True)
+    arrays, metadata, _ = _read(path, entries, only)
     return arrays, metadata
 
 
@@ -91,12 +94,12 @@ def read_metadata(path: Path | str, entries: Collection[str]) -> tuple[dict[str,
 
     Args and Raises: as of `read_arrays`.
     """
-    _, metadata, table = _read(path, entries, with_arrays=False)
+    _, metadata, table = _read(path, entries, ())
     return metadata, {name: math.prod(shape) * _ITEM_BYTES[dtype] for name, (dtype, shape) in table.items()}
 
 
 def _read(
-    path: Path | str, entries: Collection[str], *, with_arrays: bool
+    path: Path | str, entries: Collection[str], only: Collection[str] | None
 ) -> tuple[dict[str, np.ndarray], dict[str, str], Table]:
     check_regular(path)
     arrays: dict[str, np.ndarray] = {}
@@ -114,7 +117,9 @@ def _read(
                 raise ArraysError(f"numbers of type {odd[0]}")
             stated = metadata.pop(_CHECKSUM, None)
             sums = _checked_sums(stated, metadata, table)
-            for i, name in enumerate(names if with_arrays else []):
+            for i, name in enumerate(names):
+                if only is not None and name not in only:
+                    continue
                 arrays[name] = file.get_tensor(name)
                 if sums is not None and _sum_of(arrays[name]) != sums[_DIGITS * i : _DIGITS * (i + 1)]:
                     raise ArraysError(f"the numbers of {name} do not fit their checksum")

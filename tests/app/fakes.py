@@ -145,7 +145,9 @@ class FakeTraining:
         )
         arrays = anchor_arrays("static" if reference is None else "residual")
         arrays["value"] = np.array([self.value], np.float32)
-        return ClipState(arrays | (decoder_arrays() if reference is None else {}), header).stamped()
+        if reference is None:
+            arrays |= decoder_arrays() | {"gains": np.ones((0, 3), np.float32)}
+        return ClipState(arrays, header).stamped()
 
     def finish(self) -> CompactClip:
         return compact_clip(self.state())

@@ -12,6 +12,7 @@ from engine.images.psnr import psnr_of, squared_error
 from engine.metrics.columns import COLUMNS
 from engine.metrics.pictures import flip, lpips
 from engine.metrics.pictures.colors import Precision, as_shown, fit_colors
+from engine.metrics.pictures.light import fit_light
 from engine.metrics.pictures.similarity import (
     MS_MIN_SIDE_PX,
     Similarity,
@@ -23,7 +24,7 @@ from engine.metrics.pictures.similarity import (
 
 Choice = Literal["quick", "all"]
 CHOICES: tuple[Choice, ...] = get_args(Choice)
-FIGURES_VERSION = 3
+FIGURES_VERSION = 4
 """Raised when a figure of the same picture changes: kept figures of earlier versions are not mixed with new ones."""
 
 
@@ -65,7 +66,9 @@ def measure_picture(
     truth_seen = flip.seen(truth) if metrics == "all" else None
     found: dict[str, float | None] = {"moving_share": float(is_moving.mean())}
     parts = {"": None, "_moving": is_moving, "_rest": ~is_moving}
-    for fit, picture in (("", shown), ("_fit", np.clip(fit_colors(shown, truth), 0.0, 1.0).astype(np.float32))):
+    fitted = np.clip(fit_colors(shown, truth), 0.0, 1.0).astype(np.float32)
+    found["psnr_light"] = _psnr_in_same_light(fitted, truth, ~is_moving)
+    for fit, picture in (("", shown), ("_fit", fitted)):
         similarity = Similarity.of(picture, truth)
         error, alike = squared_error(picture, truth), ssim_pixels(similarity)
         for part, mask in parts.items():
@@ -82,6 +85,11 @@ def measure_picture(
     if metrics == "all":
         found["lpips_unscaled"] = lpips.lpips_unscaled(shown, truth)
     return _filled(found, None, metrics, is_moving, image.shape)
+
+
+def _psnr_in_same_light(fitted: np.ndarray, truth: np.ndarray, is_still: np.ndarray) -> float | None:
+    relit = fit_light(fitted, truth, is_still)
+    return None if relit is None else psnr_of(squared_error(np.clip(relit, 0.0, 1.0), truth))
 
 
 def _filled(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -61,7 +62,7 @@ def test_a_jump_of_a_calm_curve_is_a_step():
     found = survey_exposure(capture_of(1, 100, lambda _, frame: 1.0 if frame < 50 else 0.94))
     ((before, after, change),) = found.curves["cam0"].steps
     assert before < 50 <= after
-    assert (before, after) in zip(found.frames, found.frames[1:], strict=False)
+    assert (before, after) in pairwise(found.frames)
     assert change == pytest.approx(-0.06, abs=0.005)
 
 
@@ -100,7 +101,7 @@ def test_of_very_many_cameras_fewer_pictures_are_looked_at(monkeypatch):
     assert len(looked) == 40
     assert (len(found.frames), len(found.curves), found.n_left_out, found.is_late) == (4, 10, 15, False)
     cameras = sorted({camera for camera, _ in looked})
-    assert max(b - a for a, b in zip(cameras, cameras[1:], strict=False)) <= 5, "they are spread over the rig"
+    assert max(b - a for a, b in pairwise(cameras)) <= 5, "they are spread over the rig"
 
 
 def test_what_takes_too_long_is_left_out_but_one_camera_is_always_measured():

@@ -6,6 +6,7 @@ from engine.metrics.columns import COLUMNS
 
 _KINDS = {
     "psnr": "PSNR",
+    "psnr_light": "PSNR, after the fit of colour and light",
     "ssim": "SSIM",
     "dssim1": "DSSIM1",
     "dssim_range2": "DSSIM, constants of range 2",
