@@ -1,4 +1,5 @@
-"""CapturedPictures: decoded and downsized pictures of the capture, made on threads, kept up to a number of bytes."""
+"""CapturedPictures: decoded and downsized pictures of the capture, as the cameras took them or in the scene's colours,
+made on threads, kept up to a number of bytes."""
 
 from __future__ import annotations
 
@@ -12,10 +13,14 @@ from app.playback.arrays import Picture
 from app.playback.picture_source import PictureSource
 from engine.byte_cache import ByteCache
 from engine.capture.capture import Capture
+from engine.images.exposure_curve import to_reference
 
 CACHE_BYTES = 96 << 20
 THUMBNAIL_WIDTH_PX = 200
 """Requests up to this width are thumbnails: answered exactly or not at all, on a thread of their own."""
+
+
+Gain = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +29,8 @@ class PictureRequest:
 
     Attributes:
         generation: Of the open project. Two takes with the same cameras have the same fingerprint.
+        scene_gain: By which the camera's colours differ from the scene's, to be taken out; None for the picture as it
+            was taken. It says all that the picture depends on of a clip and its revision.
     """
 
     generation: int
@@ -32,6 +39,7 @@ class PictureRequest:
     frame_index: int
     max_width: int
     capture: Capture = field(compare=False)
+    scene_gain: Gain | None = None
 
     @property
     def is_thumbnail(self) -> bool:
@@ -49,13 +57,21 @@ class CapturedPictures:
         self.thumbnails: LatestWorker[PictureRequest, Picture] = LatestWorker("thumbnails", self._compute)
 
     def picture(
-        self, capture: Capture, generation: int, camera_index: int, frame_index: int, max_width: int
+        self,
+        capture: Capture,
+        generation: int,
+        camera_index: int,
+        frame_index: int,
+        max_width: int,
+        scene_gain: Gain | None = None,
     ) -> Picture | None:
         """The picture if it was decoded; otherwise it is asked for.
 
         Meanwhile the last picture of the same camera is returned as stale, except for thumbnails: None.
         """
-        request = PictureRequest(generation, capture.fingerprint, camera_index, frame_index, max_width, capture)
+        request = PictureRequest(
+            generation, capture.fingerprint, camera_index, frame_index, max_width, capture, scene_gain
+        )
         known = self._cache.get(request)
         if known is None:
             self._worker(request).request(request)
@@ -81,18 +97,21 @@ class CapturedPictures:
         self.thumbnails.close()
 
     def _compute(self, request: PictureRequest) -> Picture:
-        frame = request.capture.frame(request.camera_index, request.frame_index)
-        picture = Picture(
-            downsized(frame, request.max_width),
-            request_key(request),
-            source=PictureSource(frame_index=request.frame_index, camera_index=request.camera_index),
+        image = downsized(request.capture.frame(request.camera_index, request.frame_index), request.max_width)
+        if request.scene_gain is not None:
+            image = to_reference(image, np.array(request.scene_gain))
+        source = PictureSource(
+            frame_index=request.frame_index,
+            camera_index=request.camera_index,
+            has_scene_colors=request.scene_gain is not None,
         )
+        picture = Picture(image, request_key(request), source=source)
         if self._worker(request).is_still_wanted:
             self._cache.put(request, picture, picture.image.nbytes)
         return picture
 
 
-def request_key(request: PictureRequest) -> tuple[int, str, int, int, int]:
+def request_key(request: PictureRequest) -> tuple[int, str, int, int, int, Gain | None]:
     """Identity of a picture."""
     return (
         request.generation,
@@ -100,6 +119,7 @@ def request_key(request: PictureRequest) -> tuple[int, str, int, int, int]:
         request.camera_index,
         request.frame_index,
         request.max_width,
+        request.scene_gain,
     )
 
 

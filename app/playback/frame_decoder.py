@@ -22,9 +22,11 @@ from app.playback.picture_source import UNKNOWN, PictureSource
 from engine.backends.table import backend_called
 from engine.byte_cache import ByteCache
 from engine.capture.clip import Clip
+from engine.clip_files.array_names import GAINS
 from engine.clip_files.clip_state import ClipState, read_clip_state
 
 if TYPE_CHECKING:
+    from engine.model.camera_colors import CameraColors
     from engine.model.clip_model import AnchorView, ClipModel  # brings torch, which only the thread needs
 
 CACHE_BYTES = 384 << 20
@@ -74,12 +76,17 @@ class FrameRequest:
 
 @dataclass(frozen=True, slots=True)
 class LoadedClip:
-    """A model in memory and what is shown of it."""
+    """A model in memory and what is shown of it.
+
+    Attributes:
+        colors: What the cameras make of the scene's colours; None where the files do not say.
+    """
 
     model: ClipModel
     anchors: AnchorArrays
     near_plane: float
     step: int | None = None
+    colors: CameraColors | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +128,11 @@ class FrameDecoder:
         """All anchors of a state; None until it was loaded."""
         loaded = self._models.get(request.model_key)
         return None if loaded is None else loaded.anchors
+
+    def colors(self, request: FrameRequest) -> CameraColors | None:
+        """What the cameras make of the scene's colours in a state; None until it was loaded, or where unknown."""
+        loaded = self._models.get(request.model_key)
+        return None if loaded is None else loaded.colors
 
     def is_loaded(self, request: FrameRequest) -> bool:
         """Whether the file of this state is not needed any more."""
@@ -176,7 +188,8 @@ class FrameDecoder:
         reference = None if state.is_reference else self._read_reference(request.reference_path)
         model = load_clip_model(state, reference, backend=backend_called())
         anchors = _anchor_arrays(model.anchors(), identity)
-        loaded = LoadedClip(model, anchors, state.header.near_plane, state.header.step)
+        colors = _camera_colors(state, reference)
+        loaded = LoadedClip(model, anchors, state.header.near_plane, state.header.step, colors)
         if not self.worker.is_still_wanted:
             return loaded
         self._cache.drop(lambda key: key[2] == request.clip_index and key[3] != request.revision)
@@ -192,6 +205,16 @@ class FrameDecoder:
         if self._reference is None or self._reference[0] != identity:
             self._reference = (identity, read_clip_state(path))
         return self._reference[1]
+
+
+def _camera_colors(state: ClipState, reference: ClipState | None) -> CameraColors | None:
+    from engine.model.camera_colors import CameraColors
+
+    base = state if reference is None else reference
+    gains, names = base.arrays.get(GAINS), tuple(base.header.camera_names)
+    if gains is None or len(gains) != len(names):
+        return None
+    return CameraColors(names, gains, state.drift, state.header.clip_length)
 
 
 def _anchor_arrays(view: AnchorView, key: Hashable, source: PictureSource = UNKNOWN) -> AnchorArrays:

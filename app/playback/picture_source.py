@@ -19,6 +19,7 @@ class PictureSource:
             learned.
         camera_index: The capture camera that took it, or that it is looked at through; None for a free view.
         look: From where and through which lens, whatever the size; see OrbitView.look_key.
+        has_scene_colors: Whether a captured picture was brought into the scene's colours.
     """
 
     clip_index: int | None = None
@@ -28,6 +29,7 @@ class PictureSource:
     is_still: bool = False
     camera_index: int | None = None
     look: Hashable = None
+    has_scene_colors: bool = False
 
 
 UNKNOWN = PictureSource()

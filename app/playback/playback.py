@@ -11,7 +11,7 @@ from typing import Any
 from app.background.jobs import Jobs
 from app.background.latest import LatestWorker
 from app.playback.arrays import AnchorArrays, Picture, PointArrays
-from app.playback.capture_pictures import CapturedPictures
+from app.playback.capture_pictures import CapturedPictures, Gain
 from app.playback.clouds import CloudRequest, Clouds
 from app.playback.frame_decoder import FrameDecoder, FrameRequest, ShownFrame
 from app.playback.orbit_view import OrbitView
@@ -163,6 +163,28 @@ class Playback:
         if opened is None:
             return None
         return self.captured.picture(opened.capture, opened.generation, camera_index, frame_index, max_width)
+
+    def compared_picture(self, timeline: Timeline, camera_index: int, max_width: int) -> Picture | None:
+        """What a camera took at the playhead, to be set beside the render: in the scene's colours where the frame is
+        trained and loaded, otherwise as it was taken. It says which. None until it was decoded."""
+        opened = self._opened
+        if opened is None:
+            return None
+        gain = self._scene_gain(opened, timeline, camera_index)
+        return self.captured.picture(
+            opened.capture, opened.generation, camera_index, timeline.frame_index, max_width, gain
+        )
+
+    def _scene_gain(self, opened: OpenedProject, timeline: Timeline, camera_index: int) -> Gain | None:
+        """By which a camera's colours differ from the scene's at the playhead; None where they do not, or nobody
+        knows."""
+        request = self._request(timeline)
+        colors = None if request is None else self.decoder.colors(request)
+        if request is None or colors is None:
+            return None
+        clip_time = request.clip.clip_time(request.frame_index)
+        gain = colors.gain(opened.rig.names[camera_index]) * colors.exposure(opened.rig, camera_index, clip_time)
+        return None if (gain == 1.0).all() else (float(gain[0]), float(gain[1]), float(gain[2]))
 
     # ---------------------------------------------------------------- threads
 

@@ -374,6 +374,10 @@ class Session:
         """The captured picture, at most `max_width` pixels wide; None until it was decoded."""
         return self.playback.captured_picture(camera_index, frame_index, max_width)
 
+    def compared_picture(self, camera_index: int, max_width: int) -> Picture | None:
+        """What a camera took at the playhead, to be set beside the render; see Playback.compared_picture."""
+        return self.playback.compared_picture(self.timeline, camera_index, max_width)
+
 
 _TITLES: dict[type, str] = {
     commands.TrainClip: "The clip cannot be trained",

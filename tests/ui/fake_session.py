@@ -241,6 +241,10 @@ class FakeSession:
         """A coloured ball of points."""
         return PointArrays(self._points, self._colors, ("points", 0))
 
+    def compared_picture(self, camera_index: int, max_width: int) -> Picture:
+        """Of the frame under the playhead."""
+        return self.ground_truth(camera_index, self.timeline.frame_index, max_width)
+
     def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture:
         """Stripes that differ per camera."""
         height = max_width * 3 // 4

@@ -23,7 +23,7 @@ from ui.panels.welcome import WelcomeNeeds, draw_welcome
 from ui.panels.widgets import chip
 from ui.style import theme
 from ui.style.theme import Icon
-from ui.viewport.hud_text import pane_text
+from ui.viewport.hud_text import captured_words, pane_text
 from ui.viewport.region_layer import ShownRegions
 from ui.viewport.region_tool import GROWTH
 from ui.viewport.scene import Scene, SceneNeeds, SceneView
@@ -403,7 +403,11 @@ class ViewportPanel:
         shown = self.scene.shown
         self._captured_frame = None if captured is None else captured.frame_index
         frames = (None if captured is None else captured.frame_index, shown.source.frame_index)
-        words = "Captured picture is being read" if captured is None else pane_text("Captured", *frames)
+        words = (
+            "Captured picture is being read"
+            if captured is None
+            else pane_text(captured_words(captured.has_scene_colors), *frames)
+        )
         rendered_words = pane_text(shown.kind, *frames[::-1])
         color = theme.YELLOW if None not in frames and frames[0] != frames[1] else theme.TEXT
         if session.overlays.compare == "side":

@@ -117,6 +117,11 @@ def rate_text(rate: ShownRate, fps: float) -> str:
     return f"{words}, frames skipped" if rate.has_skipped else words
 
 
+def captured_words(has_scene_colors: bool) -> str:
+    """What a captured picture beside the render is called. Both are in the same colours where it says so."""
+    return "Captured, in the scene's colours" if has_scene_colors else "Captured"
+
+
 def pane_text(kind: str, frame_index: int | None, other_frame_index: int | None) -> str:
     """The label of one of two pictures that are compared. It warns where they are not of the same frame."""
     if frame_index is None:

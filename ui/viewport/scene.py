@@ -59,7 +59,7 @@ class SceneNeeds(MarkNeeds, Protocol):
 
     def request_render(self, width: int, height: int) -> Picture | None: ...
 
-    def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None: ...
+    def compared_picture(self, camera_index: int, max_width: int) -> Picture | None: ...
 
 
 @dataclass(frozen=True)
@@ -104,11 +104,13 @@ class CapturedPicture:
 
     Attributes:
         frame_index: The frame it was taken at, which need not be that of the playhead yet.
+        has_scene_colors: Whether it was brought into the scene's colours, those of the render.
     """
 
     texture: moderngl.Texture
     frame_index: int | None
     is_stale: bool
+    has_scene_colors: bool = False
 
 
 class Scene:
@@ -126,7 +128,7 @@ class Scene:
         self.regions = RegionLayer(ctx)
         self._drawn_key: Hashable = None
         self._asked_size: tuple[int, int] | None = None
-        self._asked_capture: tuple[int, int, int] | None = None
+        self._asked_capture: tuple[int, int] | None = None
         self._near = NEAR
         self._moving_share = MOVING_SHARES[1]
         self._cloud_kind = CLOUD
@@ -167,7 +169,7 @@ class Scene:
             if picture is not None and picture.key != self._picture_key:
                 return True
         if self._asked_capture is not None:
-            captured = session.ground_truth(*self._asked_capture)
+            captured = session.compared_picture(*self._asked_capture)
             if captured is not None and captured.key != self._captured_key:
                 return True
         return False
@@ -221,13 +223,16 @@ class Scene:
             self._asked_capture = None
             return None
         own_width = int(session.rig.image_sizes[camera_index, 0])
-        self._asked_capture = (camera_index, session.timeline.frame_index, min(width_px, own_width))
-        picture = session.ground_truth(*self._asked_capture)
+        self._asked_capture = (camera_index, min(width_px, own_width))
+        picture = session.compared_picture(*self._asked_capture)
         if picture is None:
             return None
         self._captured.set(picture.image, key=picture.key)
         self._captured_key = picture.key
-        return CapturedPicture(self._captured.texture, picture.source.frame_index, picture.is_stale)
+        source = picture.source
+        return CapturedPicture(
+            self._captured.texture, source.frame_index, picture.is_stale, has_scene_colors=source.has_scene_colors
+        )
 
     def _without_render(
         self, shown: ShownPicture, points_key: Hashable, captured: CapturedPicture | None

@@ -26,11 +26,13 @@ _STYLES = ("-", "--", ":", "-.")
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One line over frames; None where there is no value."""
+    """One line over frames or clips; None where there is no value. Faint ones stand behind the others; a line without
+    a label is not in the legend."""
 
     label: str
     values: Sequence[float | None]
     is_main: bool = False
+    is_faint: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,12 +61,15 @@ class SpeedPanel:
     is_higher_better: bool
 
 
-def draw_over_time(panels: Sequence[CurvePanel], frames: Sequence[int], borders: Sequence[int]) -> bytes:
+def draw_over_time(
+    panels: Sequence[CurvePanel], frames: Sequence[int], borders: Sequence[int], unit: str = "frame"
+) -> bytes:
     """Figures over frames, one panel below the other.
 
     Args:
-        frames: Frame indices of the values.
+        frames: Frame indices of the values, or other numbers that count time.
         borders: First frames of clips; a line stands before each.
+        unit: What is counted.
     """
     with plain_texts():
         figure = new_figure(WIDTH_INCHES, 0.4 + 2.5 * len(panels))
@@ -77,7 +82,7 @@ def draw_over_time(panels: Sequence[CurvePanel], frames: Sequence[int], borders:
             axes.set_ylabel(panel.label)
             add_grid(axes)
             axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
-        rows[-1].set_xlabel("frame")
+        rows[-1].set_xlabel(unit)
         rows[-1].xaxis.get_major_locator().set_params(integer=True)
         return png_of(figure)
 
@@ -89,8 +94,12 @@ def _draw_curves(axes: Any, panel: CurvePanel, frames: Sequence[int]) -> None:
         if curve.is_main:
             axes.plot(frames, values, color="#000000", linewidth=2.2, marker=".", label=curve.label, zorder=3)
             continue
+        if curve.is_faint:
+            axes.plot(frames, values, color=FAINT_COLOR, alpha=0.35, linewidth=0.8, label=curve.label or "_")
+            continue
         color, style = PALETTE[n_thin % (len(PALETTE) - 1)], _STYLES[n_thin // (len(PALETTE) - 1) % len(_STYLES)]
-        axes.plot(frames, values, color=color, linestyle=style, linewidth=1.2, label=curve.label)
+        marker = "." if len(frames) < 3 else None
+        axes.plot(frames, values, color=color, linestyle=style, linewidth=1.2, marker=marker, label=curve.label)
         n_thin += 1
 
 

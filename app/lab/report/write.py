@@ -17,6 +17,7 @@ from app.lab.report.comparison import Compared, comparison_section, speed_sectio
 from app.lab.report.costs import storage_section, times_section
 from app.lab.report.measured import clips_section, time_section, worst_pictures, worst_section
 from app.lab.report.measuring import evaluation_of
+from app.lab.report.over_clips import exposures_of, over_clips_section
 from app.lab.report.page.page import page_html
 from app.lab.report.page.parts import Section
 from app.lab.report.pictures import Pictures, ProjectPictures
@@ -155,6 +156,7 @@ def _sections(
         split_section(facts, capture, len(opened.clips)),
         settings_section(facts),
         clips_section(evaluation),
+        over_clips_section(evaluation, exposures_of(opened, evaluation["clips"])),
         time_section(evaluation),
         worst_section(evaluation, pictures, tick),
         seams_section(evaluation, pictures, tick),

@@ -34,10 +34,7 @@ def fit_light(image: np.ndarray, truth: np.ndarray, is_still: np.ndarray) -> np.
     is_known = n_still >= np.maximum(_MIN_SHARE * n_pixels, 1.0)
     if not is_known.any():
         return None
-    ours, theirs = (
-        _block_sums(np.einsum("hwc->hw", picture) * weight, edges_y, edges_x)
-        for picture in (image, truth)
-    )
+    ours, theirs = (_block_sums(np.einsum("hwc->hw", picture) * weight, edges_y, edges_x) for picture in (image, truth))
     added = 3.0 * _DARK * n_still
     with np.errstate(divide="ignore", invalid="ignore"):
         factors = np.clip((theirs + added) / (ours + added), 1.0 / FURTHEST, FURTHEST)

@@ -13,6 +13,7 @@ from PIL import Image
 from app.playback.capture_pictures import CapturedPictures
 from app.playback.picture_source import PictureSource
 from engine.capture.capture import Capture, open_capture
+from engine.images.exposure_curve import to_reference
 from tests.app.fakes import write_capture
 
 WAIT_S = 20.0
@@ -38,6 +39,27 @@ def test_a_picture_says_what_it_is_of(takes: tuple[Capture, Capture]):
     last = pictures.picture(takes[0], 1, 1, 0, 400)
     assert last is not None
     assert (last.is_stale, last.source.frame_index) == (True, 1)
+    pictures.close()
+
+
+def test_a_picture_in_the_scenes_colours_is_another_one_than_as_it_was_taken(takes: tuple[Capture, Capture]):
+    pictures, gain = CapturedPictures(), (1.25, 1.0, 0.8)
+    found = {}
+    for scene_gain in (None, gain):
+        assert pictures.picture(takes[0], 1, 1, 1, 400, scene_gain) is None or scene_gain is not None
+        assert pictures.viewing.wait_idle(WAIT_S)
+        found[scene_gain] = pictures.picture(takes[0], 1, 1, 1, 400, scene_gain)
+    taken, evened = found[None], found[gain]
+    assert taken is not None
+    assert evened is not None
+    assert (taken.source.has_scene_colors, evened.source.has_scene_colors) == (False, True)
+    assert taken.key != evened.key
+    assert np.array_equal(taken.image, takes[0].frame(1, 1))
+    assert np.array_equal(evened.image, to_reference(taken.image, np.array(gain)))
+    assert evened.image[..., 0].mean() < taken.image[..., 0].mean() - 10
+    again = pictures.picture(takes[0], 1, 1, 1, 400)
+    assert again is not None
+    assert (again.key, again.is_stale) == (taken.key, False)
     pictures.close()
 
 

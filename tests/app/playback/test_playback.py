@@ -8,13 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.playback.arrays import Picture
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
 from app.project.opened_project import OpenedProject
 from app.training.service import ShownState
+from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
+from engine.images.exposure_curve import to_reference
 from tests.app.fakes import N_ANCHORS, N_STEPS, write_trained
+from tests.clip_headers import with_header
 
 WAIT_S = 300.0
 """Only a hang takes longer, or the first start, which compiles the kernels."""
@@ -140,6 +144,70 @@ def test_other_settings_of_the_same_project_keep_what_was_made(shown: Shown, mak
     shown.wait()
     shown.playback.show(opened)
     assert shown.playback.captured_picture(1, 0, 640) is not None
+
+
+def with_colors(path: Path, gains: np.ndarray, drift: np.ndarray | None = None) -> None:
+    """Write colours of the cameras 1, 2 and 3 into a clip file. gains [3, 3], drift [3, M, 3]"""
+    state = with_header(read_clip_state(path), camera_names=["1", "2", "3"])
+    arrays = state.arrays | ({"gains": gains} if state.is_reference else {})
+    arrays |= {} if drift is None else {"log_drift": np.log(drift)}
+    write_clip_state(path, ClipState(arrays, state.header))
+
+
+def test_beside_the_render_of_a_trained_frame_the_captured_picture_is_in_the_scenes_colours(shown: Shown, make_opened):
+    opened = make_opened()
+    shown.open(opened)
+    gains, drift = np.ones((3, 3), np.float32), np.ones((3, 3, 3), np.float32)
+    gains[0], drift[0, 1] = (1.1, 1.0, 1.0), (0.9, 0.9, 0.9)
+    names = opened.rig.names
+
+    def compared(camera: int) -> Picture:
+        shown.playback.frame(shown.timeline)
+        shown.wait()
+        shown.playback.compared_picture(shown.timeline, camera, 640)
+        shown.wait()
+        picture = shown.playback.compared_picture(shown.timeline, camera, 640)
+        assert picture is not None
+        assert not picture.is_stale
+        return picture
+
+    taken = compared(names.index("1"))
+    assert not taken.source.has_scene_colors, "nothing is trained"
+    with_colors(shown.train(opened, 0), gains)
+    with_colors(shown.train(opened, 1), gains, drift)
+    for frame, gain in ((0, gains[0]), (3, gains[0]), (4, gains[0] * drift[0, 1])):
+        shown.timeline.seek(frame)
+        picture = compared(names.index("1"))
+        assert picture.source.has_scene_colors
+        expected = to_reference(opened.capture.frame(names.index("1"), frame), gain)
+        assert np.array_equal(picture.image, expected), frame
+    assert not compared(names.index("2")).source.has_scene_colors, "a camera in the scene's colours"
+    held_out = compared(names.index("0"))
+    assert held_out.source.has_scene_colors, "with the exposure that the others suggest"
+    captured = shown.playback.captured_picture(names.index("1"), 4, 640)
+    shown.wait()
+    captured = shown.playback.captured_picture(names.index("1"), 4, 640)
+    assert captured is not None
+    assert np.array_equal(captured.image, opened.capture.frame(names.index("1"), 4)), "elsewhere as it was taken"
+
+
+def test_another_state_of_a_clip_has_other_colours(shown: Shown, make_opened):
+    opened = make_opened()
+    shown.open(opened)
+    camera = opened.rig.names.index("1")
+    means = []
+    for revision, red in (("a", 1.0), ("b", 1.25)):
+        path = write_trained(opened, 0)
+        with_colors(path, np.full((3, 3), red, np.float32))
+        shown.states[0] = ShownState(path, revision, True)
+        for _ in range(3):  # decode, then read
+            shown.playback.frame(shown.timeline)
+            picture = shown.playback.compared_picture(shown.timeline, camera, 640)
+            shown.wait()
+        picture = shown.playback.compared_picture(shown.timeline, camera, 640)
+        assert picture is not None
+        means.append(picture.image.mean())
+    assert means[1] < means[0] - 10
 
 
 def test_all_anchors_of_a_clip_are_known_while_it_trains_only(shown: Shown, make_opened):

@@ -16,6 +16,7 @@ from ui.viewport.hud_text import (
     RENDERED,
     HudText,
     ShownPicture,
+    captured_words,
     count_text,
     hud_text,
     pane_text,
@@ -154,6 +155,8 @@ def test_compared_pictures_of_different_frames_never_share_a_label():
     assert pane_text("Captured", 3, 0) == "Captured, frame 3 (not the same frame)"
     assert pane_text("Rendered", 0, 3) == "Rendered, frame 0 (not the same frame)"
     assert pane_text(CLOUD, None, 3) == "Point cloud"
+    assert pane_text(captured_words(True), 3, 3) == "Captured, in the scene's colours, frame 3"
+    assert captured_words(False) == "Captured"
 
 
 def test_a_count_says_whether_it_is_of_the_frame_or_of_the_clip():

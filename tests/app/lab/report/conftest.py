@@ -18,6 +18,7 @@ def quick_charts(monkeypatch: pytest.MonkeyPatch) -> None:
     Image.new("RGB", (2, 2)).save(buffer, "png")
     for module, names in {
         "measured": ("draw_over_time", "draw_pictures"),
+        "over_clips": ("draw_over_time",),
         "seam_parts": ("draw_over_time", "draw_maps"),
         "costs": ("draw_stacked",),
         "comparison": ("draw_speed_error",),
