@@ -143,6 +143,8 @@ class ClipStatus:
         resume_step: The step that its training goes on from; None when there is nothing to go on from. A clip that
             was being trained again when that was stopped is trained and has one.
         reason: Why it is stale or damaged; empty otherwise.
+        exposure_change: How far the cameras' exposure is from the reference clip's on average, a share: 0.01 is 1
+            percent; None where the clip is not finished.
     """
 
     state: str = "untrained"
@@ -152,6 +154,7 @@ class ClipStatus:
     n_own: int = 0
     resume_step: int | None = None
     reason: str = ""
+    exposure_change: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

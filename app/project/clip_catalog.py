@@ -36,6 +36,7 @@ class ClipRecord:
         reason: Why it is stale or damaged, or what became of its checkpoint; empty otherwise.
         blocked_by: A damaged clip without which this one cannot be trained.
         seconds: What it took when it was trained; None where not recorded.
+        exposure_change: How far the cameras' exposure is from the reference clip's, a share; None where not known.
         n_anchors: Inherited ones, and those of the clip itself; zeros where the file does not say.
     """
 
@@ -50,6 +51,7 @@ class ClipRecord:
     reason: str = ""
     blocked_by: int | None = None
     seconds: float | None = None
+    exposure_change: float | None = None
     n_anchors: tuple[int, int] = (0, 0)
 
 
@@ -254,6 +256,7 @@ class ClipCatalog:
         psnr = header.figures.held_out_psnr
         psnr = psnr if psnr is not None or kept is not None else self._curve_psnr.get(index)
         figures = {"held_out_psnr": psnr, "seconds": header.figures.seconds, "n_anchors": anchor_counts(header)}
+        figures["exposure_change"] = found.exposure_change
         if basis.reason:  # it cannot be shown without what it was trained on
             return ClipRecord("stale", header.step, header.n_steps, reason=basis.reason, **figures, **resume)
         revision = f"trained-{header.fingerprint}"

@@ -1,4 +1,5 @@
-"""Headers of clip files, each read once for as long as its file stays as it is. Knows no project and no arrays."""
+"""Headers of clip files, each read once for as long as its file stays as it is. Knows no project, and of the arrays
+only how far the cameras' exposure is from the reference clip's."""
 
 from __future__ import annotations
 
@@ -8,6 +9,8 @@ from pathlib import Path
 
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import look_at_clip
+from engine.clip_files.kept_drift import mean_change, read_drift
+from engine.errors import ProjectError
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,11 +21,13 @@ class FoundHeader:
         header: None when the file is damaged.
         damage: What is wrong with the file; empty for a good one.
         n_bytes: Size of the file.
+        exposure_change: Of a finished clip, see engine.clip_files.kept_drift.mean_change; None elsewhere.
     """
 
     header: ClipHeader | None
     damage: str
     n_bytes: int
+    exposure_change: float | None = None
 
 
 class HeaderCache:
@@ -50,6 +55,13 @@ class HeaderCache:
 def _read(path: Path, n_bytes: int) -> FoundHeader:
     found = look_at_clip(path)
     if isinstance(found, ClipHeader):
-        return FoundHeader(found, "", n_bytes)
+        return FoundHeader(found, "", n_bytes, None if found.metrics is None else _exposure_change(path))
     reason = "it is not there any more" if found is None else found.reason
     return FoundHeader(None, f"The file is damaged ({reason}).", n_bytes)
+
+
+def _exposure_change(path: Path) -> float | None:
+    try:
+        return mean_change(read_drift(path))
+    except ProjectError:  # damage of arrays is told where they are needed
+        return None

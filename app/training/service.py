@@ -431,4 +431,5 @@ class TrainingService:
             n_own=n_own,
             resume_step=record.resume_step,
             reason=record.reason,
+            exposure_change=record.exposure_change,
         )

@@ -11,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.cli.commands import COMMANDS
+from app.status import ClipStatus
 from ui.main import main
+from ui.panels.clip_quality import clip_quality
 from ui.panels.shortcuts import SHORTCUTS
 from ui.panels.state import Rect
 from ui.panels.timeline import MIN_TICK_SPACING_PX, cell_left, frame_at, tick_step
@@ -48,6 +50,26 @@ def test_plot_arrays_are_contiguous_finite_and_short() -> None:
     assert np.isfinite(values).all()
     assert (steps[0], steps[-1]) == (0, 4999)
     assert plot_arrays([])[0].shape == (0,)
+
+
+def test_quality_over_the_clips_is_of_those_that_were_measured() -> None:
+    states = [
+        ClipStatus("trained", 1.0, 31.0, exposure_change=0.0),
+        ClipStatus("untrained"),
+        ClipStatus("trained", 1.0, 29.5, exposure_change=0.031),
+        ClipStatus("training", 0.4, 25.0),
+        ClipStatus("stopped", 0.4, float("nan")),
+    ]
+    quality = clip_quality(states)
+    assert quality.clips.tolist() == [0, 2, 3]
+    assert quality.psnr.tolist() == [31.0, 29.5, 25.0]
+    assert quality.title == "Quality over clips: 31.0 to 25.0 dB"
+    assert "up to 3.1 %" in quality.exposure_text
+    assert "(clip 2)" in quality.exposure_text
+    assert all(values.flags.c_contiguous for values in (quality.clips, quality.psnr, quality.exposure))
+    assert clip_quality(states[:2]).title == ""
+    assert "does not change" in clip_quality(states[:2]).exposure_text
+    assert clip_quality([]).title == ""
 
 
 def test_panes_keep_the_camera_s_aspect_and_do_not_overlap() -> None:

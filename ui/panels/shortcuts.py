@@ -30,7 +30,7 @@ from app.status import COMPARE_MODES, Overlays, TrainingStatus, WantedFrame
 from engine.camera.projection import camera_center
 from engine.camera.rig import CameraRig
 from ui.panels.regions import RegionsNeeds, begin_choosing
-from ui.panels.state import REGIONS, Dispatch, UiState
+from ui.panels.state import REGIONS, TRAINING, Dispatch, UiState
 from ui.style.ui_scale import next_choice
 from ui.viewport.region_tool import GROWTH
 
@@ -246,6 +246,12 @@ def _stop_training(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> N
         dispatch(StopTraining())
 
 
+def _toggle_quality(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.is_quality_open = not ui.is_quality_open
+    if ui.is_quality_open:
+        ui.wanted_panel = TRAINING
+
+
 def _choose_region(session: ShortcutNeeds, dispatch: Dispatch, ui: UiState) -> None:
     begin_choosing(session, ui)
 
@@ -385,6 +391,7 @@ SHORTCUTS: tuple[Shortcut, ...] = (
         _toggle_overlay("show_regions"),
         is_on=_is_shown("show_regions"),
     ),
+    Shortcut("_6", "6", "Quality over clips, in the training panel", COMPARE, _toggle_quality),
     Shortcut("m", "M", "Mark a sphere as static or moving; again to switch", MARK, _choose_region),
     Shortcut("enter", "Enter", "Mark the chosen sphere", MARK, _mark_chosen, needs_choosing=True),
     Shortcut("escape", "Escape", "Leave without marking", MARK, _leave_choosing, needs_choosing=True),

@@ -58,6 +58,7 @@ class UiState:
         regions: The region that is being chosen, and the one that stands out.
         is_popup_open: Is a menu or another popup open, so that keys belong to it?
         is_menu_wanted: Open the first menu, for the keyboard.
+        is_quality_open: Is the plot of quality over the clips folded out?
         wanted_panel: Title of a panel that is to come to the front, or None.
         redraw_in_s: Shortest wait after which some panel wants to be drawn again, or None.
     """
@@ -67,6 +68,7 @@ class UiState:
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
     wanted_panel: str | None = None
+    is_quality_open: bool = False
     is_help_open: bool = False
     is_popup_open: bool = False
     is_menu_wanted: bool = False

@@ -12,6 +12,7 @@ from app.session.commands import PauseTraining, ResumeTraining, StopTraining, Tr
 from app.status import ClipStatus, PlanStatus, TrainingStatus
 from engine.capture.clip import Clip
 from engine.text import duration_text
+from ui.panels.clip_quality import draw_clip_quality
 from ui.panels.plan import draw_plan
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline import STATE_WORDS, state_note
@@ -64,7 +65,7 @@ def plot_arrays(history: Sequence[tuple[float, float]]) -> tuple[np.ndarray, np.
 
 
 def draw_training(session: TrainingNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    """Buttons, progress, curves, then one row per clip."""
+    """Buttons, progress, curves, quality over the clips, then one row per clip."""
     if session.capture is None:
         text_wrapped_dim("Training starts from here when a capture is open.")
         return
@@ -74,6 +75,7 @@ def draw_training(session: TrainingNeeds, dispatch: Dispatch, ui: UiState) -> No
         _draw_progress(status, ui)
     imgui.spacing()
     _draw_curves(status, ui)
+    draw_clip_quality(session.clip_states, ui)
     imgui.spacing()
     _draw_clips(session)
 
@@ -262,6 +264,8 @@ def _draw_clip_row(clip: Clip, status: ClipStatus) -> None:
         imgui.set_item_tooltip(note)
     imgui.table_next_column()
     imgui.text("–" if status.held_out_psnr is None else f"{status.held_out_psnr:.1f}")
+    if status.exposure_change:
+        imgui.set_item_tooltip(f"Exposure {100.0 * status.exposure_change:.1f} % from the reference clip's, removed")
     imgui.table_next_column()
     imgui.text(anchors_text(status.n_inherited, status.n_own))
     imgui.set_item_tooltip(ANCHORS_TOOLTIP)

@@ -1,11 +1,13 @@
 """Headers are read once for as long as their file stays as it is."""
 
 import numpy as np
+import pytest
 
 from app.project import header_cache
 from app.project.header_cache import HeaderCache
 from engine.clip_files.clip_state import ClipState, write_clip_state
 from tests.app.made_projects import clip_header
+from tests.clip_headers import make_header
 
 
 def write(path, step: int) -> None:
@@ -43,3 +45,22 @@ def test_a_damaged_file_says_so_and_is_not_read_over_and_over(tmp_path):
     assert found.header is None
     assert found.damage.startswith("The file is damaged (")
     assert cache.read(path) is found
+
+
+def test_the_exposure_of_a_finished_clip_is_known(tmp_path):
+    cache, path = HeaderCache(), tmp_path / "a.safetensors"
+    drift = np.full((2, 3, 3), 1.04, np.float32)
+
+    def found(arrays, **entries) -> float | None:
+        header = make_header(camera_names=["a", "b"], n_frames=3, **entries)
+        write_clip_state(path, ClipState(arrays, header))
+        read = cache.read(path)
+        assert read is not None
+        assert read.header is not None
+        return read.exposure_change
+
+    finished = {"metrics": {"held_out_psnr": 30.0}}
+    assert found({"log_drift": np.log(drift)}, **finished) == pytest.approx(0.04)
+    assert found({"value": np.zeros(1, np.float32)}, **finished) == 0.0
+    assert found({"log_drift": np.log(drift), "value": np.zeros(9, np.float32)}) is None, "a snapshot"
+    assert found({"log_drift": np.zeros((1, 3, 3), np.float32)}, **finished) is None, "damaged"

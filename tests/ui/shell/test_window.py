@@ -163,6 +163,26 @@ def test_the_plan_of_the_next_clip_folds_out_and_settings_can_be_typed(pilot: Pi
     assert pilot.sent(SetPreset) == [SetPreset("toy")]
 
 
+def test_quality_over_the_clips_folds_out_by_pointer_and_keyboard(pilot: Pilot) -> None:
+    session = pilot.session
+    pilot.draw(2)
+    assert "quality.header" not in pilot.rects
+    session.clip_states[0] = ClipStatus("trained", 1.0, 31.2, exposure_change=0.0)
+    session.clip_states[1] = ClipStatus("trained", 1.0, 29.9, exposure_change=0.028)
+    pilot.draw(2)
+    assert "quality.psnr" not in pilot.rects
+    pilot.click("quality.header")
+    pilot.draw(2)
+    assert {"quality.psnr", "quality.exposure"} <= pilot.rects.keys()
+    assert pilot.rects["quality.psnr"].width > 100
+    pilot.key(key._6)
+    pilot.draw(2)
+    assert "quality.psnr" not in pilot.rects
+    pilot.key(key._6)
+    pilot.draw(2)
+    assert "quality.psnr" in pilot.rects
+
+
 def test_settings_of_a_trained_project_cannot_be_typed(pilot: Pilot) -> None:
     pilot.session.plan = dataclasses.replace(pilot.session.plan, can_edit=False)
     pilot.click("plan.header")
