@@ -14,7 +14,7 @@ from ui.panels.widgets import text_wrapped_dim
 from ui.style import theme
 from ui.style.axis import ticks_that_fit, whole_ticks
 
-PLOT_HEIGHT = 96.0
+PLOT_HEIGHT = 76.0
 TICK_ROOM = 52.0
 """What the numbers on the left and the margins take of a plot, units."""
 MIN_TICK_DISTANCE = 30.0
@@ -50,7 +50,7 @@ class ClipQuality:
         """How far exposure goes, and what became of that."""
         largest = np.nanmax(self.exposure) if np.isfinite(self.exposure).any() else 0.0
         if largest < LEAST_CHANGE_PERCENT:
-            return "The cameras' exposure does not change."
+            return "The clips hold no change of the cameras' exposure."
         clip = int(self.clips[np.nanargmax(self.exposure)])
         return (
             f"The cameras' exposure is up to {largest:.1f} % from the reference clip's (clip {clip}); it was removed."
@@ -69,25 +69,34 @@ def clip_quality(clip_states: Sequence[ClipStatus]) -> ClipQuality:
 
 
 def draw_clip_quality(clip_states: Sequence[ClipStatus], ui: UiState) -> None:
-    """A header that folds out to the plot; nothing where fewer than two clips have a figure."""
+    """A header that folds out to the plots; nothing where fewer than two clips have a figure."""
     quality = clip_quality(clip_states)
     if not quality.title:
         return
     imgui.set_next_item_open(ui.is_quality_open)
-    ui.is_quality_open = imgui.collapsing_header(f"{quality.title}###quality")
+    is_open = imgui.collapsing_header(f"{quality.title}###quality")
     ui.mark("quality.header")
-    if not ui.is_quality_open:
-        return
+    if imgui.is_item_toggled_open():  # a header in a panel that is hidden for a frame says it is closed
+        ui.is_quality_open = is_open
+    if is_open:
+        _draw_plots(quality, len(clip_states), ui)
+    if is_open and not ui.is_quality_seen:
+        imgui.set_scroll_here_y(1.0)
+        ui.redraw_within(0.0)
+    ui.is_quality_seen = is_open
+
+
+def _draw_plots(quality: ClipQuality, n_clips: int, ui: UiState) -> None:
     low, high = float(quality.psnr.min()), float(quality.psnr.max())
     margin = max(0.15 * (high - low), 0.2)
-    _draw_plot("psnr", quality.clips, quality.psnr, (low - margin, high + margin), theme.GREEN, len(clip_states))
+    _draw_plot("psnr", quality.clips, quality.psnr, (low - margin, high + margin), theme.GREEN, n_clips)
     ui.mark("quality.psnr")
     is_known = np.isfinite(quality.exposure)
     if is_known.any() and quality.exposure[is_known].max() >= LEAST_CHANGE_PERCENT:
         imgui.text("Exposure, % from the reference clip")
         highest = 1.15 * float(quality.exposure[is_known].max())
         clips, exposure = (np.ascontiguousarray(values[is_known]) for values in (quality.clips, quality.exposure))
-        _draw_plot("exposure", clips, exposure, (0.0, highest), theme.YELLOW, len(clip_states))
+        _draw_plot("exposure", clips, exposure, (0.0, highest), theme.YELLOW, n_clips)
         ui.mark("quality.exposure")
     text_wrapped_dim(quality.exposure_text)
 

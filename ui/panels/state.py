@@ -59,6 +59,7 @@ class UiState:
         is_popup_open: Is a menu or another popup open, so that keys belong to it?
         is_menu_wanted: Open the first menu, for the keyboard.
         is_quality_open: Is the plot of quality over the clips folded out?
+        is_quality_seen: Was it scrolled to since then?
         wanted_panel: Title of a panel that is to come to the front, or None.
         redraw_in_s: Shortest wait after which some panel wants to be drawn again, or None.
     """
@@ -69,6 +70,7 @@ class UiState:
     regions: RegionTool = field(default_factory=RegionTool)
     wanted_panel: str | None = None
     is_quality_open: bool = False
+    is_quality_seen: bool = False
     is_help_open: bool = False
     is_popup_open: bool = False
     is_menu_wanted: bool = False

@@ -27,6 +27,8 @@ MAX_PLOT_POINTS = 600
 TICK_ROOM = 52.0
 """What the numbers on the left and the margins take of a plot, units."""
 MIN_TICK_DISTANCE = 46.0
+ROOM_BELOW, QUALITY_ROOM = 190.0, 240.0
+"""Room below the curves for the clips, and for the quality over them when it is folded out, units."""
 ANCHORS_TOOLTIP = """All anchors of a clip, whichever frames they are alive in.
 Reference clip: reference anchors, which later clips inherit.
 Later clips: inherited + residual anchors."""
@@ -167,7 +169,8 @@ def _pair(left: str, right: str) -> None:
 
 
 def _draw_curves(status: TrainingStatus, ui: UiState) -> None:
-    height = min(max((imgui.get_content_region_avail().y - 190) / 2, 84.0), 150.0)
+    below = ROOM_BELOW + (QUALITY_ROOM if ui.is_quality_open else 0.0)
+    height = min(max((imgui.get_content_region_avail().y - below) / 2, 84.0), 150.0)
     n_steps = 0 if status.state in ("idle", "failed") else status.n_steps
     of_clip = "" if status.curve_clip_index is None else f" of clip {status.curve_clip_index}"
     _draw_curve(
