@@ -1,4 +1,4 @@
-"""A picture in the truth's smooth local brightness: what is left is no error of light, but of shape and texture.
+"""A picture in the truth's smooth local brightness: what is left is an error of shape and texture.
 
 Daylight that moves, or a shadow of somebody out of sight, changes the brightness of whole parts of a picture. One
 factor per block of a coarse grid follows that, between the blocks it is interpolated. Blocks in which nothing stands
