@@ -6,7 +6,7 @@ been trained. Source clip: `source_parts` does all of it at once.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,9 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import Coverage
 from engine.clip_files.clip_state import ClipState, fingerprint_of
+from engine.clip_files.roles import STATIC
 from engine.cloud.background.exposure import Exposure
+from engine.cloud.background.light import WINDOW_FRAMES, anchor_light
 from engine.cloud.keeping import Keep
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
@@ -47,6 +49,7 @@ from engine.training.preparation.cloud_preparation import (
     motion_masks,
     moving_cloud,
     read_backgrounds,
+    seen_still,
     static_cloud,
     write_backgrounds,
 )
@@ -54,6 +57,9 @@ from engine.training.preparation.gating import without_static_regions
 from engine.training.preparation.method import Method
 from engine.training.preparation.stages import Stages
 from engine.training.preparation.training_pictures import TrainingPictures
+
+_DARK = 0.03
+"""Sum over RGB of a render below which no brightness is told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,12 +165,14 @@ class ClipPreparation:
         """A reference clip whose static anchors were trained, with corrected backgrounds and what moves."""
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
         backgrounds = self._corrected(parts.backgrounds, parts.model, parts.gains, pictures, keep)
+        parts = replace(parts, backgrounds=backgrounds)
+        masks = self._motion_masks(parts, pictures)
+        cloud, moving_spacing = self._moving_cloud(parts, pictures, masks)
+        parts = replace(parts, backgrounds=seen_still(backgrounds, pictures, masks))
         try:
-            self.keep_backgrounds(backgrounds)
+            self.keep_backgrounds(parts.backgrounds)
         except DiskError as error:  # clips after this one need them, this one does not: tried again at its end
             self._say("Checking backgrounds", f"{error.message} Tried again when the clip is finished")
-        parts = replace(parts, backgrounds=backgrounds)
-        cloud, moving_spacing = self._find_motion(parts, pictures)
         if len(cloud.points):
             parts.model.add_set("moving", moving_anchors(cloud, np.ones(len(cloud.points), bool), self._config))
         self._say("Carving what moves", f"{len(cloud.points)} moving anchors")
@@ -186,19 +194,18 @@ class ClipPreparation:
             )
         model = inheriting_model(reference, self._clip, self._backend, learns=self._method.learns_inherited)
         self._say("Taking over the reference", self._method.words(self._config))
-        kept = read_backgrounds(self._prep_dir, self._key_of_corrected())
-        backgrounds = kept or self._estimated(self._exposures_in(reference))
+        backgrounds = read_backgrounds(self._prep_dir, self._key_of_corrected())
+        if backgrounds is None:
+            backgrounds = self._backgrounds_of(reference, model, gains)
         drift = self._remove_drift(pictures, [Exposure.of_background(image) for image in backgrounds.images])
-        if kept is None:
-            keep = self._keep_after(model, gains, backgrounds)
-            backgrounds = self._corrected(backgrounds, model, gains, pictures, keep)
         self._method.choose_decoder(model, seed=self._seed)
         if self._method.builds_static:
             own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
             model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing)
-        cloud, moving_spacing = self._find_motion(parts, pictures)
+        self._measure_light(parts, pictures)
+        cloud, moving_spacing = self._moving_cloud(parts, pictures, self._motion_masks(parts, pictures))
         coverage = add_residual(model, cloud, self._config, self._method.choose_residual)
         self._method.adapt(model, self._config)
         self._say("Comparing with the reference", coverage.text)
@@ -255,17 +262,16 @@ class ClipPreparation:
     def _exposures_of(self, frames_of_cameras: Iterable[np.ndarray]) -> list[Exposure]:
         return map_ordered(Exposure.of_frames, frames_of_cameras)
 
-    def _exposures_in(self, reference: ClipState) -> list[Exposure]:
-        """Of the training cameras in the reference clip, from its frames."""
-        frames = range(reference.header.start, reference.header.start + reference.header.n_frames)
-        return self._exposures_of(self._capture.frames_of(camera, list(frames)) for camera in self._camera_indices)
-
     def _remove_drift(self, pictures: TrainingPictures, exposures: Sequence[Exposure]) -> np.ndarray:
         """Brings the pictures into the exposure of the reference clip; gives the gains that they had against it."""
-        n_cameras, n_frames = len(self._rig), self._clip.n_frames
+        n_cameras = len(self._rig)
         if not self._has_drift:
-            return np.ones((n_cameras, n_frames, 3), np.float32)
-        drift = np.stack(map_ordered(lambda row: exposures[row].gains_of(pictures.of_camera(row)), range(n_cameras)))
+            return np.ones((n_cameras, pictures.clip.n_frames, 3), np.float32)
+
+        def gains_of(row: int) -> np.ndarray:
+            return exposures[row].gains_of(pictures.of_camera(row))
+
+        drift = np.stack(map_ordered(gains_of, range(n_cameras)))
         pictures.remove_drift(drift)
         means = drift.mean((1, 2)) - 1.0
         said = f"{100 * means.min():+.1f} to {100 * means.max():+.1f} % against the reference clip"
@@ -273,12 +279,63 @@ class ClipPreparation:
         self._say("Measuring exposure", f"{said}, {n_changed} of {n_cameras} cameras" if n_changed else "as it was")
         return drift
 
+    # ---------------------------------------------------------------- light
+
+    def _measure_light(self, parts: ClipParts, pictures: TrainingPictures) -> None:
+        """Gives a model whose static anchors never change the light on them at the start and the end of the clip."""
+        model = parts.model
+        if not model.is_constant(STATIC):
+            return
+        points = host_array(model.anchor_set(STATIC).positions).astype(np.float64)
+        exposures = [Exposure.of_background(image) for image in parts.backgrounds.images]
+        light = []
+        for frame_index in (self._clip.start, self._clip.stop):
+            around = range(frame_index - WINDOW_FRAMES, frame_index + WINDOW_FRAMES)
+            frames_of = self._frames_around(around, pictures, exposures)
+            light.append(anchor_light(points, self._rig, parts.backgrounds.images, frames_of))
+            self._report(Progress("Measuring light", 0.5 * len(light)))
+        logs = np.stack(light, axis=1)
+        share = 100 * (logs != 0).any(1).mean()
+        if share:
+            model.light = torch.from_numpy(logs)
+        self._say("Measuring light", f"on {share:.1f} % of the static anchors other than in the reference clip")
+
+    def _frames_around(
+        self, around: range, pictures: TrainingPictures, exposures: Sequence[Exposure]
+    ) -> Callable[[int], list[np.ndarray]]:
+        """Camera row to its pictures of some frames, as far as the capture has them, in the backgrounds' exposure."""
+        clip = self._clip.frame_indices()
+        inside = [index for index in around if index in clip]
+        outside = [index for index in around if index not in clip and 0 <= index < self._capture.n_frames]
+
+        def frames_of(row: int) -> list[np.ndarray]:
+            own = [pictures.picture(row, index - self._clip.start) for index in inside]
+            if not outside:
+                return own
+            others = self._capture.frames_of(self._camera_indices[row], outside)
+            return [*own, *(exposures[row].applied_to(others) if self._has_drift else others)]
+
+        return frames_of
+
     # ---------------------------------------------------------------- what does not move
 
     def _estimated(self, exposures: Sequence[Exposure]) -> Backgrounds:
         keep = self._stages.keep
         known = exposures if self._has_drift else [None] * len(exposures)
         return estimate_backgrounds(self._capture, self._camera_indices, known, self._config, self._report, keep)
+
+    def _backgrounds_of(self, reference: ClipState, model: ClipModel, gains: nn.Parameter) -> Backgrounds:
+        """What the reference clip left behind, made anew from its pictures where it is gone."""
+        header = reference.header
+        clip = Clip(header.clip_index, header.start, header.n_frames, header.clip_length)
+        pictures = TrainingPictures(self._capture, clip, self._camera_indices)
+        exposures = self._exposures_of(map(pictures.of_camera, range(len(self._rig))))
+        drift = self._remove_drift(pictures, exposures)
+        estimated = self._estimated(exposures)
+        keep = self._keep_after(model, gains, estimated)
+        backgrounds = self._corrected(estimated, model, gains, pictures, keep)
+        parts = ClipParts(model, gains, drift, backgrounds, header.spacing)
+        return seen_still(backgrounds, pictures, self._motion_masks(parts, pictures))
 
     def _corrected(
         self,
@@ -308,11 +365,33 @@ class ClipPreparation:
 
     # ---------------------------------------------------------------- what moves
 
-    def _find_motion(self, parts: ClipParts, pictures: TrainingPictures) -> tuple[MovingCloud, float | None]:
+    def _motion_masks(self, parts: ClipParts, pictures: TrainingPictures) -> np.ndarray:
+        """What moves in each picture. [M, C, H, W] bool"""
+        keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
+        brightness = self._brightness(parts.model) if parts.model.has_light else None
+        return motion_masks(pictures, parts.backgrounds, brightness, self._report, keep)
+
+    def _brightness(self, model: ClipModel) -> Callable[[int, int], np.ndarray]:
+        """(camera row, frame in clip) -> by which factor light changes what stands still there. [H, W, 1]"""
+
+        def at_ends(row: int) -> np.ndarray:
+            return np.stack([_light_in(model, self._views[row], clip_time) for clip_time in (0.0, end)])
+
+        end = self._clip.n_frames / self._clip.clip_length
+        ends = [at_ends(row) for row in range(len(self._rig))]
+
+        def brightness(row: int, frame_in_clip: int) -> np.ndarray:
+            weights = model.light_weights(frame_in_clip / self._clip.clip_length)
+            return np.tensordot(np.array(weights, np.float32), ends[row], 1)
+
+        return brightness
+
+    def _moving_cloud(
+        self, parts: ClipParts, pictures: TrainingPictures, masks: np.ndarray
+    ) -> tuple[MovingCloud, float | None]:
         """What moves, and the spacing of moving anchors."""
         static_points = host_array(parts.model.anchor_set("static").positions)
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
-        masks = motion_masks(pictures, parts.backgrounds, self._report, keep)
         gains = host_array(parts.gains)
         voxel_size = None if self._base is None else self._base.header.moving_spacing
         cloud = moving_cloud(
@@ -347,6 +426,16 @@ class ClipPreparation:
 
     def _say(self, stage: str, message: str) -> None:
         self._report(Progress(stage, 1.0, message))
+
+
+def _light_in(model: ClipModel, view: View, clip_time: float) -> np.ndarray:
+    """By which factor light changes what a view sees of the static anchors. [H, W, 1] float32"""
+    with torch.no_grad():
+        plain, lit = (
+            host_array(render_gaussians(gaussians, view, backend=model.backend).image[0]).sum(-1, keepdims=True)
+            for gaussians in (model.constant_gaussians(STATIC), model.lit_gaussians(STATIC, clip_time))
+        )
+    return np.where(plain > _DARK, lit / np.maximum(plain, _DARK), 1.0).astype(np.float32)
 
 
 def _render_static(model: ClipModel, view: View, gain: torch.Tensor) -> np.ndarray:
