@@ -22,7 +22,7 @@ from engine.cloud.background.exposure import BRIGHTEST, DARKEST, at_working_size
 from engine.parallel import map_ordered, n_cores
 
 WINDOW_FRAMES = 3
-"""Light is measured where clips meet, from so many frames on either side: both clips find the same."""
+"""Light is measured where clips meet, on either side from so many frames: both clips find the same."""
 MIN_CAMERAS = 3
 AGREED_LOG = 0.03
 """Cameras agree within this of their median, log brightness."""
@@ -34,49 +34,79 @@ NO_CHANGE = 0.005
 """Log brightness up to this is no change, twice this counts in full, in between there is no jump. Anchors of a real
 capture scatter by 0.003 where nothing changes."""
 LARGEST_LOG = 0.7
+JUMP_LOG = 0.02
+"""Sides of a border that differ by more than this differ in truth."""
+HIDDEN = -1
 BEHIND_SHARE = 0.03
 """Anchors that lie further behind the nearest one, as a share of its depth, are hidden."""
 
 
-def anchor_light(
-    points: np.ndarray, rig: CameraRig, backgrounds: np.ndarray, frames_of: Callable[[int], Sequence[np.ndarray]]
-) -> np.ndarray:
-    """Log brightness of static anchors at one instant, against the backgrounds.
+class AnchorLight:
+    """Measures the light on static anchors at any instant, against the backgrounds.
 
     Args:
         points: Static anchors, scene units. [A, 3]
         rig: Training cameras at full size.
         backgrounds: What they see while nothing moves. [C, H, W, 3] uint8
-        frames_of: Camera row to some pictures around the instant, in the exposure of the backgrounds. [H, W, 3] uint8
-    Returns:
-        [A] float32, 0 where nothing changes or nobody can tell.
     """
-    step = max(1, backgrounds.shape[2] // at_working_size(backgrounds[0]).shape[1])
-    projections = projection_matrices(rig)
 
-    def seen_by(row: int) -> np.ndarray:
-        frames = frames_of(row)
-        if not len(frames):
-            return np.full(len(points), np.nan, np.float32)
-        base = at_working_size(backgrounds[row]).mean(-1)
-        now = np.median(np.stack([at_working_size(frame).mean(-1) for frame in frames]), axis=0)
-        is_usable = (base > DARKEST) & (base < BRIGHTEST) & (now > DARKEST) & (now < BRIGHTEST)
-        ratios = np.where(is_usable, np.log(np.maximum(now, 1.0) / np.maximum(base, 1.0)), np.nan).astype(np.float32)
-        found = np.full(len(points), np.nan, np.float32)
-        depths = np.full(base.shape, np.inf, np.float32)
-        _sample(points, projections[row], float(step), ratios, depths, found)
-        return found
+    def __init__(self, points: np.ndarray, rig: CameraRig, backgrounds: np.ndarray) -> None:
+        self._base = [at_working_size(background).mean(-1) for background in backgrounds]
+        step = backgrounds.shape[2] // self._base[0].shape[1]
+        projections, n_points = projection_matrices(rig), len(points)
 
-    seen = np.stack(map_ordered(seen_by, range(len(rig))))  # [C, A]
-    values, n_agreed = np.zeros(len(points), np.float32), np.zeros(len(points), np.float32)
-    _agree(seen, np.empty(len(rig), np.float32), values, n_agreed)
-    return _without_noise(_smooth(points, values, n_agreed))
+        def pixels_of(row: int) -> np.ndarray:
+            pixels = np.full(n_points, HIDDEN, np.int64)
+            depths = np.full(self._base[row].shape, np.inf)
+            _visible_pixels(points, projections[row], float(step), depths, pixels)
+            return pixels
+
+        self._pixels = map_ordered(pixels_of, range(len(rig)))
+        n_neighbors = min(N_NEIGHBORS, n_points)
+        self._near = KDTree(points).query(points, k=n_neighbors, workers=n_cores())[1].reshape(n_points, n_neighbors)
+
+    def at(self, frames_of: Callable[[int], Sequence[np.ndarray]]) -> np.ndarray:
+        """Log brightness of the anchors.
+
+        Args:
+            frames_of: Camera row to some pictures around the instant, in the exposure of the backgrounds. [H, W, 3]
+                uint8 each
+        Returns:
+            [A] float32, 0 where nothing changes or nobody can tell.
+        """
+        n_cameras, n_points = len(self._base), len(self._near)
+
+        def seen_by(row: int) -> np.ndarray:
+            base, frames = self._base[row], frames_of(row)
+            if not len(frames):
+                return np.full(n_points, np.nan, np.float32)
+            now = np.median(np.stack([at_working_size(frame).mean(-1) for frame in frames]), axis=0)
+            is_usable = (base > DARKEST) & (base < BRIGHTEST) & (now > DARKEST) & (now < BRIGHTEST)
+            ratios = np.where(is_usable, np.log(np.maximum(now, 1.0) / np.maximum(base, 1.0)), np.nan)
+            pixels = self._pixels[row]
+            return np.where(pixels == HIDDEN, np.nan, ratios.reshape(-1)[pixels]).astype(np.float32)
+
+        seen = np.stack(map_ordered(seen_by, range(n_cameras)))  # [C, A]
+        values, n_agreed = np.zeros((2, n_points), np.float32)
+        _agree(seen, np.empty(n_cameras, np.float32), values, n_agreed)
+        return _without_noise(_smooth(self._near, values, n_agreed))
+
+
+def joined(before: np.ndarray, after: np.ndarray, *, own: np.ndarray) -> np.ndarray:
+    """Light where two clips meet: the mean of both sides, so that nothing jumps; a real jump, as of a lamp that is
+    switched, stays one.
+
+    Args:
+        before, after: Log brightness just before and just after. [A]
+        own: The one of them that lies in the clip.
+    """
+    return np.where(np.abs(before - after) < JUMP_LOG, (before + after) / 2, own)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _sample(points, projection, step, ratios, depths, found):
-    """Writes the ratio at each point that the camera sees unhidden by others. depths: scratch, infinite."""
-    height, width = ratios.shape
+def _visible_pixels(points, projection, step, depths, pixels):
+    """Writes in which working pixel each point lies that the camera sees unhidden by others. depths: infinite."""
+    height, width = depths.shape
     for is_second in range(2):
         for i in range(len(points)):
             p = points[i]
@@ -90,7 +120,7 @@ def _sample(points, projection, step, ratios, depths, found):
             column, row = int(x / step), int(y / step)
             if is_second:
                 if z <= depths[row, column] * (1.0 + BEHIND_SHARE):
-                    found[i] = ratios[row, column]
+                    pixels[i] = row * width + column
                 continue
             for near_row in range(max(row - 1, 0), min(row + 2, height)):
                 for near_column in range(max(column - 1, 0), min(column + 2, width)):
@@ -126,11 +156,8 @@ def _agree(seen, ranked, values, n_agreed):
             n_agreed[i] = agreed
 
 
-def _smooth(points: np.ndarray, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+def _smooth(near: np.ndarray, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Weighted mean over the nearest anchors; 0 where too few of them are known. [A] float32"""
-    n_neighbors = min(N_NEIGHBORS, len(points))
-    _, near = KDTree(points).query(points, k=n_neighbors, workers=n_cores())
-    near = near.reshape(len(points), n_neighbors)
     total = weights[near].sum(1)
     means = (values * weights)[near].sum(1) / np.maximum(total, 1e-9)
     is_known = (weights[near] > 0).mean(1) >= MIN_KNOWN_SHARE

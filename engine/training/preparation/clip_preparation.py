@@ -22,7 +22,7 @@ from engine.clip_files.clip_header import Coverage
 from engine.clip_files.clip_state import ClipState, fingerprint_of
 from engine.clip_files.roles import STATIC
 from engine.cloud.background.exposure import Exposure
-from engine.cloud.background.light import WINDOW_FRAMES, anchor_light
+from engine.cloud.background.light import WINDOW_FRAMES, AnchorLight, joined
 from engine.cloud.keeping import Keep
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
@@ -288,25 +288,28 @@ class ClipPreparation:
             return
         points = host_array(model.anchor_set(STATIC).positions).astype(np.float64)
         exposures = [Exposure.of_background(image) for image in parts.backgrounds.images]
-        light = []
-        for frame_index in (self._clip.start, self._clip.stop):
-            around = range(frame_index - WINDOW_FRAMES, frame_index + WINDOW_FRAMES)
-            frames_of = self._frames_around(around, pictures, exposures)
-            light.append(anchor_light(points, self._rig, parts.backgrounds.images, frames_of))
-            self._report(Progress("Measuring light", 0.5 * len(light)))
-        logs = np.stack(light, axis=1)
+        measure = AnchorLight(points, self._rig, parts.backgrounds.images)
+
+        def light_in(first: int, stop: int) -> np.ndarray:
+            return measure.at(self._frames_in(range(first, stop), pictures, exposures))
+
+        start, stop = self._clip.start, self._clip.stop
+        first, last = light_in(start, start + WINDOW_FRAMES), light_in(stop - WINDOW_FRAMES, stop)
+        before = light_in(start - WINDOW_FRAMES, start) if start > 0 else first
+        after = light_in(stop, stop + WINDOW_FRAMES) if stop < self._capture.n_frames else last
+        logs = np.stack([joined(before, first, own=first), joined(last, after, own=last)], axis=1)
         share = 100 * (logs != 0).any(1).mean()
         if share:
             model.light = torch.from_numpy(logs)
         self._say("Measuring light", f"on {share:.1f} % of the static anchors other than in the reference clip")
 
-    def _frames_around(
-        self, around: range, pictures: TrainingPictures, exposures: Sequence[Exposure]
+    def _frames_in(
+        self, frames: range, pictures: TrainingPictures, exposures: Sequence[Exposure]
     ) -> Callable[[int], list[np.ndarray]]:
         """Camera row to its pictures of some frames, as far as the capture has them, in the backgrounds' exposure."""
         clip = self._clip.frame_indices()
-        inside = [index for index in around if index in clip]
-        outside = [index for index in around if index not in clip and 0 <= index < self._capture.n_frames]
+        inside = [index for index in frames if index in clip]
+        outside = [index for index in frames if index not in clip and 0 <= index < self._capture.n_frames]
 
         def frames_of(row: int) -> list[np.ndarray]:
             own = [pictures.picture(row, index - self._clip.start) for index in inside]
