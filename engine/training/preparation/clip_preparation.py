@@ -6,7 +6,7 @@ been trained. Source clip: `source_parts` does all of it at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -20,9 +20,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import Coverage
 from engine.clip_files.clip_state import ClipState, fingerprint_of
-from engine.clip_files.roles import STATIC
 from engine.cloud.background.exposure import Exposure
-from engine.cloud.background.light import WINDOW_FRAMES, AnchorLight, joined
 from engine.cloud.keeping import Keep
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
@@ -31,7 +29,6 @@ from engine.gate.regions import GateRegion
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, render_gaussians
 from engine.model.host_array import host_array
-from engine.parallel import map_ordered
 from engine.progress import Progress, ReportProgress
 from engine.training.config import TrainConfig
 from engine.training.preparation.building import (
@@ -53,13 +50,12 @@ from engine.training.preparation.cloud_preparation import (
     static_cloud,
     write_backgrounds,
 )
+from engine.training.preparation.drift import exposures_in, exposures_of, no_drift, remove_drift
 from engine.training.preparation.gating import without_static_regions
+from engine.training.preparation.light import brightness_in, measure_light
 from engine.training.preparation.method import Method
 from engine.training.preparation.stages import Stages
 from engine.training.preparation.training_pictures import TrainingPictures
-
-_DARK = 0.03
-"""Sum over RGB of a render below which no brightness is told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,8 +148,7 @@ class ClipPreparation:
         Raises:
             PreparationError: No static point was found.
         """
-        exposures = self._exposures_of(map(pictures.of_camera, range(len(self._rig))))
-        drift = self._remove_drift(pictures, exposures)
+        drift, exposures = self._without_drift(pictures)
         backgrounds = self._estimated(exposures)
         cloud = self._static_cloud(backgrounds, self._stages.keep)
         gains = self._gains(cloud.gains)
@@ -197,14 +192,15 @@ class ClipPreparation:
         backgrounds = read_backgrounds(self._prep_dir, self._key_of_corrected())
         if backgrounds is None:
             backgrounds = self._backgrounds_of(reference, model, gains)
-        drift = self._remove_drift(pictures, [Exposure.of_background(image) for image in backgrounds.images])
+        exposures = exposures_in(backgrounds.images) if self._has_drift else None
+        drift = no_drift(pictures) if exposures is None else remove_drift(pictures, exposures, self._report)
         self._method.choose_decoder(model, seed=self._seed)
         if self._method.builds_static:
             own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
             model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing)
-        self._measure_light(parts, pictures)
+        measure_light(model, pictures, self._rig, backgrounds, exposures, self._report)
         cloud, moving_spacing = self._moving_cloud(parts, pictures, self._motion_masks(parts, pictures))
         coverage = add_residual(model, cloud, self._config, self._method.choose_residual)
         self._method.adapt(model, self._config)
@@ -253,92 +249,33 @@ class ClipPreparation:
         tensor = torch.from_numpy(values).to(self._backend.device, self._backend.dtype)
         return nn.Parameter(tensor, requires_grad=is_learning)
 
-    # ---------------------------------------------------------------- exposure
+    # ---------------------------------------------------------------- what does not move
 
     @property
     def _has_drift(self) -> bool:
         return self._config.color != "off"
 
-    def _exposures_of(self, frames_of_cameras: Iterable[np.ndarray]) -> list[Exposure]:
-        return map_ordered(Exposure.of_frames, frames_of_cameras)
-
-    def _remove_drift(self, pictures: TrainingPictures, exposures: Sequence[Exposure]) -> np.ndarray:
-        """Brings the pictures into the exposure of the reference clip; gives the gains that they had against it."""
-        n_cameras = len(self._rig)
+    def _without_drift(self, pictures: TrainingPictures) -> tuple[np.ndarray, list[Exposure] | None]:
+        """Drift within a reference clip, which its pictures lose, and its exposures; None where they do not count."""
         if not self._has_drift:
-            return np.ones((n_cameras, pictures.clip.n_frames, 3), np.float32)
+            return no_drift(pictures), None
+        exposures = exposures_of(pictures)
+        return remove_drift(pictures, exposures, self._report), exposures
 
-        def gains_of(row: int) -> np.ndarray:
-            return exposures[row].gains_of(pictures.of_camera(row))
-
-        drift = np.stack(map_ordered(gains_of, range(n_cameras)))
-        pictures.remove_drift(drift)
-        means = drift.mean((1, 2)) - 1.0
-        said = f"{100 * means.min():+.1f} to {100 * means.max():+.1f} % against the reference clip"
-        n_changed = int((drift != 1.0).any((1, 2)).sum())
-        self._say("Measuring exposure", f"{said}, {n_changed} of {n_cameras} cameras" if n_changed else "as it was")
-        return drift
-
-    # ---------------------------------------------------------------- light
-
-    def _measure_light(self, parts: ClipParts, pictures: TrainingPictures) -> None:
-        """Gives a model whose static anchors never change the light on them at the start and the end of the clip."""
-        model = parts.model
-        if not model.is_constant(STATIC):
-            return
-        points = host_array(model.anchor_set(STATIC).positions).astype(np.float64)
-        exposures = [Exposure.of_background(image) for image in parts.backgrounds.images]
-        measure = AnchorLight(points, self._rig, parts.backgrounds.images)
-
-        def light_in(first: int, stop: int) -> np.ndarray:
-            return measure.at(self._frames_in(range(first, stop), pictures, exposures))
-
-        start, stop = self._clip.start, self._clip.stop
-        first, last = light_in(start, start + WINDOW_FRAMES), light_in(stop - WINDOW_FRAMES, stop)
-        before = light_in(start - WINDOW_FRAMES, start) if start > 0 else first
-        after = light_in(stop, stop + WINDOW_FRAMES) if stop < self._capture.n_frames else last
-        logs = np.stack([joined(before, first, own=first), joined(last, after, own=last)], axis=1)
-        share = 100 * (logs != 0).any(1).mean()
-        if share:
-            model.light = torch.from_numpy(logs)
-        self._say("Measuring light", f"on {share:.1f} % of the static anchors other than in the reference clip")
-
-    def _frames_in(
-        self, frames: range, pictures: TrainingPictures, exposures: Sequence[Exposure]
-    ) -> Callable[[int], list[np.ndarray]]:
-        """Camera row to its pictures of some frames, as far as the capture has them, in the backgrounds' exposure."""
-        clip = self._clip.frame_indices()
-        inside = [index for index in frames if index in clip]
-        outside = [index for index in frames if index not in clip and 0 <= index < self._capture.n_frames]
-
-        def frames_of(row: int) -> list[np.ndarray]:
-            own = [pictures.picture(row, index - self._clip.start) for index in inside]
-            if not outside:
-                return own
-            others = self._capture.frames_of(self._camera_indices[row], outside)
-            return [*own, *(exposures[row].applied_to(others) if self._has_drift else others)]
-
-        return frames_of
-
-    # ---------------------------------------------------------------- what does not move
-
-    def _estimated(self, exposures: Sequence[Exposure]) -> Backgrounds:
+    def _estimated(self, exposures: Sequence[Exposure] | None) -> Backgrounds:
         keep = self._stages.keep
-        known = exposures if self._has_drift else [None] * len(exposures)
-        return estimate_backgrounds(self._capture, self._camera_indices, known, self._config, self._report, keep)
+        return estimate_backgrounds(self._capture, self._camera_indices, exposures, self._config, self._report, keep)
 
     def _backgrounds_of(self, reference: ClipState, model: ClipModel, gains: nn.Parameter) -> Backgrounds:
         """What the reference clip left behind, made anew from its pictures where it is gone."""
         header = reference.header
         clip = Clip(header.clip_index, header.start, header.n_frames, header.clip_length)
         pictures = TrainingPictures(self._capture, clip, self._camera_indices)
-        exposures = self._exposures_of(map(pictures.of_camera, range(len(self._rig))))
-        drift = self._remove_drift(pictures, exposures)
+        _, exposures = self._without_drift(pictures)
         estimated = self._estimated(exposures)
         keep = self._keep_after(model, gains, estimated)
         backgrounds = self._corrected(estimated, model, gains, pictures, keep)
-        parts = ClipParts(model, gains, drift, backgrounds, header.spacing)
-        return seen_still(backgrounds, pictures, self._motion_masks(parts, pictures))
+        return seen_still(backgrounds, pictures, motion_masks(pictures, backgrounds, None, self._report))
 
     def _corrected(
         self,
@@ -371,23 +308,8 @@ class ClipPreparation:
     def _motion_masks(self, parts: ClipParts, pictures: TrainingPictures) -> np.ndarray:
         """What moves in each picture. [M, C, H, W] bool"""
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
-        brightness = self._brightness(parts.model) if parts.model.has_light else None
+        brightness = brightness_in(parts.model, self._views) if parts.model.has_light else None
         return motion_masks(pictures, parts.backgrounds, brightness, self._report, keep)
-
-    def _brightness(self, model: ClipModel) -> Callable[[int, int], np.ndarray]:
-        """(camera row, frame in clip) -> by which factor light changes what stands still there. [H, W, 1]"""
-
-        def at_ends(row: int) -> np.ndarray:
-            return np.stack([_light_in(model, self._views[row], clip_time) for clip_time in (0.0, end)])
-
-        end = self._clip.n_frames / self._clip.clip_length
-        ends = [at_ends(row) for row in range(len(self._rig))]
-
-        def brightness(row: int, frame_in_clip: int) -> np.ndarray:
-            weights = model.light_weights(frame_in_clip / self._clip.clip_length)
-            return np.tensordot(np.array(weights, np.float32), ends[row], 1)
-
-        return brightness
 
     def _moving_cloud(
         self, parts: ClipParts, pictures: TrainingPictures, masks: np.ndarray
@@ -429,16 +351,6 @@ class ClipPreparation:
 
     def _say(self, stage: str, message: str) -> None:
         self._report(Progress(stage, 1.0, message))
-
-
-def _light_in(model: ClipModel, view: View, clip_time: float) -> np.ndarray:
-    """By which factor light changes what a view sees of the static anchors. [H, W, 1] float32"""
-    with torch.no_grad():
-        plain, lit = (
-            host_array(render_gaussians(gaussians, view, backend=model.backend).image[0]).sum(-1, keepdims=True)
-            for gaussians in (model.constant_gaussians(STATIC), model.lit_gaussians(STATIC, clip_time))
-        )
-    return np.where(plain > _DARK, lit / np.maximum(plain, _DARK), 1.0).astype(np.float32)
 
 
 def _render_static(model: ClipModel, view: View, gain: torch.Tensor) -> np.ndarray:

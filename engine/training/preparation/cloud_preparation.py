@@ -63,7 +63,7 @@ def spread_frames(n_frames: int, at_most: int) -> list[int]:
 def estimate_backgrounds(
     capture: Capture,
     camera_indices: Sequence[int],
-    exposures: Sequence[Exposure | None],
+    exposures: Sequence[Exposure] | None,
     config: TrainConfig,
     report: ReportProgress,
     keep: Keep = do_now,
@@ -71,7 +71,7 @@ def estimate_backgrounds(
     """Backgrounds from frames spread over the whole capture.
 
     Args:
-        exposures: Of each camera, the one that its background is in; None leaves frames as they are.
+        exposures: Of each camera, the one that its background comes in; None leaves frames as they are.
     """
     frames = spread_frames(capture.n_frames, config.background_frames)
 
@@ -81,8 +81,8 @@ def estimate_backgrounds(
         return {"image": background.image, "is_stable": np.packbits(background.is_stable, axis=-1)}
 
     images, stable = [], []
-    for row, (camera, exposure) in enumerate(zip(camera_indices, exposures, strict=True)):
-        kept = keep(f"background {row}", partial(estimate, camera, exposure))
+    for row, camera in enumerate(camera_indices):
+        kept = keep(f"background {row}", partial(estimate, camera, None if exposures is None else exposures[row]))
         images.append(kept["image"])
         stable.append(np.unpackbits(kept["is_stable"], axis=-1, count=kept["image"].shape[1]).astype(bool))
         report(Progress("Looking for what stands still", (row + 1) / len(camera_indices)))

@@ -109,13 +109,15 @@ def test_anchors_behind_others_are_not_asked(floor):
 
 def test_black_and_white_pictures_say_nothing(measure):
     for level in (0, 255):
-        assert (measure.at(lambda row: [np.full((HEIGHT, WIDTH, 3), level, np.uint8)]) == 0).all()  # noqa: B023
+        assert (measure.at(lambda row: [np.full((HEIGHT, WIDTH, 3), level, np.uint8)]) == 0).all()
 
 
 def test_large_changes_are_bounded_and_small_ones_do_not_jump(measure):
     found = measure.at(frames(lambda points: np.full(points.shape[:-1], -0.65)))
     assert np.abs(found).max() <= LARGEST_LOG
-    step = [np.median(measure.at(frames(lambda points, by=by: np.full(points.shape[:-1], by)))) for by in (0.004, 0.007)]
+    step = [
+        np.median(measure.at(frames(lambda points, by=by: np.full(points.shape[:-1], by)))) for by in (0.004, 0.007)
+    ]
     assert step[0] == 0.0
     assert 0.0 < step[1] < 0.007
     assert NO_CHANGE < 0.007
