@@ -146,7 +146,7 @@ def _no_gains(scene: SyntheticScene) -> np.ndarray:
 
 
 def _trained(scene: SyntheticScene) -> list[int]:
-    """Cameras whose exposure may change. Held-out ones keep theirs: what is compared with is the same in each capture."""
+    """Cameras whose exposure may change. Held-out ones keep theirs, so that what is compared with stays the same."""
     return [i for i, name in enumerate(scene.rig.names) if name not in scene.default_holdout]
 
 
