@@ -9,7 +9,7 @@ in every capture; "- none" is the difference to the capture without a change. St
 that moves, by the truth of the generator, in every fifth frame. Flicker is the change of the render from frame to
 frame on still pixels, by the program's own masks, and noise that of the capture itself on the same ones. Seconds say
 something only where nothing else runs; beside other work keep to one core (`taskset -c 0`), because threads wait for
-each other.
+each other. Trainings that differ by nothing but their seed differ by some tenths of a dB: see ±.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ from tests.long_captures.writing import write_long_captures
 
 COLUMNS: dict[str, tuple[str, int]] = {
     "psnr": ("PSNR", 2),
+    "psnr_spread": ("±", 2),
     "psnr_first": ("first clip", 2),
     "psnr_last": ("last clip", 2),
     "psnr_less": ("- none", 2),
@@ -61,10 +62,11 @@ COLUMNS: dict[str, tuple[str, int]] = {
     "memory_growth": ("growth %", 1),
     "kilobytes": ("kB/clip", 0),
 }
-"""Figure to its heading and decimals. PSNR in dB, flicker and noise in 1/255. Seconds: median of the first ten source
-clips and of the last ten. Memory: most of the training process of the second clip, and of the last."""
+"""Figure to its heading and decimals. PSNR in dB, ± its standard deviation over seeds, flicker and noise in 1/255.
+Seconds: median of the first ten source clips and of the last ten. Memory: most of the training process of the second
+clip, and of the last."""
 SETTINGS = ("gaussians_per_anchor=8", "passes=6")
-"""On top of the preset: about 30 dB, for 10 s a source clip on one core."""
+"""On top of the preset: about 28 dB, and a source clip takes 10 s on one quiet core."""
 BY_PROGRAM = ("psnr", "psnr_fit")
 COMPARED = (*BY_PROGRAM, "psnr_still")
 STILL_EVERY = 5
@@ -89,10 +91,10 @@ def write_missing(folder: Path, scene: SyntheticScene, chosen: Sequence[str]) ->
         write_long_captures(folder, scene, missing, report=lambda line: print(line, file=sys.stderr))
 
 
-def train(capture: Path, project: Path, options: argparse.Namespace) -> None:
+def train(capture: Path, project: Path, seed: int, options: argparse.Namespace) -> None:
     """Train the clips that are not trained yet; a failure ends the program."""
     arguments = ["train", str(capture), "--project", str(project), "--clips", f"0:{options.clips}", "--quiet"]
-    arguments += ["--clip-length", str(options.clip_length), "--preset", options.preset]
+    arguments += ["--clip-length", str(options.clip_length), "--preset", options.preset, "--seed", str(seed)]
     arguments += [part for setting in (*SETTINGS, *options.set) for part in ("--set", setting)]
     if code := clipgstream(arguments):
         sys.exit(code)
@@ -161,6 +163,17 @@ def costs(opened: TrainedProject, n_clips: int) -> dict[str, Any]:
     }
 
 
+def over_seeds(results: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Means over the trainings of one capture with several seeds, and all that was measured of each of them."""
+    known = [name for name in COLUMNS if name in results[0]]
+    levels = [result["psnr"] for result in results]
+    spread = statistics.stdev(levels) if len(levels) > 1 else None
+    return {name: mean_of([result[name] for result in results]) for name in known} | {
+        "psnr_spread": spread,
+        "by_seed": list(results),
+    }
+
+
 def compared(rows: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
     """The same rows with their differences to "none"; None where it was not measured."""
     base = rows.get("none")
@@ -192,7 +205,8 @@ def main() -> None:
     parser.add_argument("--width", type=int, default=160, help="of the pictures, which are 4:3")
     parser.add_argument("--preset", default="toy")
     parser.add_argument("--set", nargs="*", default=[], help="key=value settings, beside those here")
-    parser.add_argument("--project-suffix", default="", help="keeps projects of other settings apart")
+    parser.add_argument("--seeds", type=int, default=1, help="trainings of each capture; figures are their means")
+    parser.add_argument("--projects", default="projects", help="name of a folder for other settings or another version")
     parser.add_argument("--json", type=Path, help="also write all figures here")
     options = parser.parse_args()
     chosen = names(options.changes, list(CHANGES), parser)
@@ -207,13 +221,17 @@ def main() -> None:
     write_missing(options.out / "captures", scene, chosen)
     rows: dict[str, dict[str, Any]] = {}
     for name in chosen:
-        project = options.out / "projects" / f"{name}{options.project_suffix}"
-        print(f"training {name}", file=sys.stderr)
-        train(options.out / "captures" / name, project, options)
-        with ending_on_bad_input():
-            rows[name] = measure(project, scene, options.clips)
+        results = []
+        for seed in range(options.seeds):
+            print(f"training {name}, seed {seed}", file=sys.stderr)
+            project = options.out / options.projects / f"{name}-seed{seed}"
+            train(options.out / "captures" / name, project, seed, options)
+            with ending_on_bad_input():
+                results.append(measure(project, scene, options.clips))
+        rows[name] = over_seeds(results)
         load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
-        print(f"\n{options.clips} clips of {options.clip_length} frames, preset {options.preset}{load}")
+        size = f"{options.clips} clips of {options.clip_length} frames"
+        print(f"\n{size}, preset {options.preset}, {options.seeds} seeds{load}")
         print(table_text(compared(rows)), flush=True)
     if options.json:
         options.json.write_text(json_text(compared(rows), indent=1) + "\n")
