@@ -9,7 +9,10 @@ in every capture; "- none" is the difference to the capture without a change. St
 that moves, by the truth of the generator, in every fifth frame. Flicker is the change of the render from frame to
 frame on still pixels, by the program's own masks, and noise that of the capture itself on the same ones. Seconds say
 something only where nothing else runs; beside other work keep to one core (`taskset -c 0`), because threads wait for
-each other. Trainings that differ by nothing but their seed differ by some tenths of a dB: see ±.
+each other.
+
+Reference clips that differ by nothing but their seed differ by up to 1 dB (see ±), and with them all clips of a capture.
+"Since first" is the mean of the source clips less the reference clip, which leaves that out.
 """
 
 from __future__ import annotations
@@ -48,6 +51,8 @@ COLUMNS: dict[str, tuple[str, int]] = {
     "psnr_first": ("first clip", 2),
     "psnr_last": ("last clip", 2),
     "psnr_less": ("- none", 2),
+    "psnr_since": ("since first", 2),
+    "psnr_since_less": ("- none", 2),
     "psnr_fit": ("fit", 2),
     "psnr_fit_less": ("- none", 2),
     "psnr_still": ("still", 2),
@@ -68,7 +73,7 @@ clip, and of the last."""
 SETTINGS = ("gaussians_per_anchor=8", "passes=6")
 """On top of the preset: about 28 dB, and a source clip takes 10 s on one quiet core."""
 BY_PROGRAM = ("psnr", "psnr_fit")
-COMPARED = (*BY_PROGRAM, "psnr_still")
+COMPARED = (*BY_PROGRAM, "psnr_since", "psnr_still")
 STILL_EVERY = 5
 """Frames from one in which still pixels are compared to the next."""
 NEAR_MOTION_PX = 2
@@ -111,14 +116,16 @@ def measure(project: Path, scene: SyntheticScene, n_clips: int) -> dict[str, Any
         on_progress=lambda n_done, n_rows, row: None,
     )
     clips = [document["means"]["clips"][str(i)]["held_out"] for i in range(n_clips)]
+    levels = [clip["psnr"] for clip in clips]
     pairs = document["seams"]["rows"]
     noise = mean_of([pair["truth_change_static"] for pair in pairs])
     flicker = flicker_figures(pairs)
     return {
         **{name: document["means"]["held_out"][name] for name in BY_PROGRAM},
         "psnr_still": still_psnr(opened, scene, n_clips),
-        "psnr_first": clips[0]["psnr"],
-        "psnr_last": clips[-1]["psnr"],
+        "psnr_first": levels[0],
+        "psnr_since": statistics.mean(levels[1:]) - levels[0] if levels[1:] else None,
+        "psnr_last": levels[-1],
         "flicker_inside": flicker["flicker_inside"],
         "flicker_borders": flicker["flicker_borders"],
         "noise": None if noise is None else 255.0 * noise,
@@ -141,7 +148,7 @@ def still_psnr(opened: TrainedProject, scene: SyntheticScene, n_clips: int) -> f
 def is_still(scene: SyntheticScene, camera_index: int, frame_index: int) -> np.ndarray:
     """Pixels that are not near anything that moves. [H, W] bool"""
     is_moving = make_truth(scene, camera_index, frame_index).is_moving
-    return ~binary_dilation(is_moving, iterations=NEAR_MOTION_PX)
+    return np.logical_not(binary_dilation(is_moving, iterations=NEAR_MOTION_PX))
 
 
 def costs(opened: TrainedProject, n_clips: int) -> dict[str, Any]:
@@ -177,10 +184,11 @@ def over_seeds(results: Sequence[dict[str, Any]]) -> dict[str, Any]:
 def compared(rows: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
     """The same rows with their differences to "none"; None where it was not measured."""
     base = rows.get("none")
-    return {
-        name: row | {f"{figure}_less": row[figure] - base[figure] if base else None for figure in COMPARED}
-        for name, row in rows.items()
-    }
+
+    def less(row: dict[str, Any], figure: str) -> float | None:
+        return None if base is None or row[figure] is None else row[figure] - base[figure]
+
+    return {name: row | {f"{figure}_less": less(row, figure) for figure in COMPARED} for name, row in rows.items()}
 
 
 def table_text(rows: dict[str, dict[str, Any]]) -> str:
