@@ -11,8 +11,8 @@ frame on still pixels, by the program's own masks, and noise that of the capture
 something only where nothing else runs; beside other work keep to one core (`taskset -c 0`), because threads wait for
 each other.
 
-Reference clips that differ by nothing but their seed differ by up to 1 dB (see ±), and with them all clips of a capture.
-"Since first" is the mean of the source clips less the reference clip, which leaves that out.
+Reference clips that differ by nothing but their seed differ by up to 1 dB (see ±), and with them all clips of the
+capture. "Since first" is the mean of the source clips less the reference clip, which leaves that out.
 """
 
 from __future__ import annotations
