@@ -55,6 +55,10 @@ def no_light(points: np.ndarray) -> np.ndarray:
     return np.zeros(points.shape[:-1])
 
 
+def evenly(log_brightness: float):
+    return lambda points: np.full(points.shape[:-1], log_brightness)
+
+
 @pytest.fixture(scope="module")
 def floor() -> np.ndarray:
     x, z = np.meshgrid(np.arange(-1.2, 1.21, 0.05), np.arange(-1.2, 1.21, 0.05))
@@ -95,13 +99,13 @@ def test_people_in_front_of_some_cameras_are_no_light(measure):
 
 
 def test_what_few_cameras_see_and_what_they_do_not_agree_on_stays(measure):
-    brighter = [pictures(lambda points: np.full(points.shape[:-1], 0.2 * (row % 5 - 2)), 9) for row in range(N_CAMERAS)]
-    assert (measure.at(lambda row: [brighter[row][row]]) == 0).all()
+    at_odds = [pictures(evenly(0.2 * (row % 5 - 2)), 9)[row] for row in range(N_CAMERAS)]
+    assert (measure.at(lambda row: [at_odds[row]]) == 0).all()
     assert (measure.at(lambda row: frames(shadow)(row) if row < 2 else []) == 0).all()
 
 
 def test_anchors_behind_others_are_not_asked(floor):
-    below = floor + [0.0, 0.5, 0.0]
+    below = floor + np.array([0.0, 0.5, 0.0])
     both = AnchorLight(np.concatenate([floor, below]), ring(), pictures(no_light, seed=0)).at(frames(shadow))
     hidden = both[len(floor) :][np.linalg.norm(floor[:, [0, 2]], axis=1) < 0.5]
     assert (hidden == 0).mean() > 0.9
@@ -109,15 +113,14 @@ def test_anchors_behind_others_are_not_asked(floor):
 
 def test_black_and_white_pictures_say_nothing(measure):
     for level in (0, 255):
-        assert (measure.at(lambda row: [np.full((HEIGHT, WIDTH, 3), level, np.uint8)]) == 0).all()
+        picture = np.full((HEIGHT, WIDTH, 3), level, np.uint8)
+        assert (measure.at(lambda row, picture=picture: [picture]) == 0).all()
 
 
 def test_large_changes_are_bounded_and_small_ones_do_not_jump(measure):
-    found = measure.at(frames(lambda points: np.full(points.shape[:-1], -0.65)))
+    found = measure.at(frames(evenly(-0.65)))
     assert np.abs(found).max() <= LARGEST_LOG
-    step = [
-        np.median(measure.at(frames(lambda points, by=by: np.full(points.shape[:-1], by)))) for by in (0.004, 0.007)
-    ]
+    step = [np.median(measure.at(frames(evenly(by)))) for by in (0.004, 0.007)]
     assert step[0] == 0.0
     assert 0.0 < step[1] < 0.007
     assert NO_CHANGE < 0.007
