@@ -63,6 +63,7 @@ def plan_clip(
         history=history,
         step_time=step_time,
         is_still=base is not None and _looks_still(project, capture, clip, config),
+        exposure=None if base is None else _exposure_span(project, capture, clip, config),
     )
     record = None if catalog is None else catalog[clip.clip_index]
     if record is None or record.resume_step is None:
@@ -79,6 +80,13 @@ def _looks_still(project: Project, capture: Capture, clip: Clip, config: TrainCo
         return False
     held_out = capture.camera_indices(project.settings.holdout)
     return looks_still(capture, clip, capture.training_cameras(held_out), config, project.prep_dir)
+
+
+def _exposure_span(project: Project, capture: Capture, clip: Clip, config: TrainConfig) -> tuple[float, float] | None:
+    from engine.training.plan.exposure_span import exposure_span  # with numba, like the above
+
+    held_out = capture.camera_indices(project.settings.holdout)
+    return exposure_span(capture, clip, capture.training_cameras(held_out), config, project.prep_dir)
 
 
 def _measured(project: Project, clip_index: int) -> MeasuredClip | None:

@@ -58,12 +58,14 @@ class AnchorRecord:
         own: The anchors, where the clip itself stores them.
         presence: Of inherited anchors, the frames of this clip in which each exists. [A, M] bool
         is_hidden: Of inherited anchors, those that this clip leaves out. [A] bool
+        light: Of inherited static anchors, log brightness at the clip's start and end. [A, 2]
         reasons: Why the gate decided so about each, codes of engine.gate.reasons. [A] uint8
     """
 
     own: StoredAnchors | None = None
     presence: np.ndarray | None = None
     is_hidden: np.ndarray | None = None
+    light: np.ndarray | None = None
     reasons: np.ndarray | None = None
 
     def arrays(self, role: str) -> dict[str, np.ndarray]:
@@ -73,6 +75,7 @@ class AnchorRecord:
         said = {
             f"{INHERITED}.{role}.presence": self.presence,
             f"{INHERITED}.{role}.is_hidden": self.is_hidden,
+            f"{INHERITED}.{role}.light": self.light,
             f"{REASONS}.{role}": self.reasons,
         }
         return named | {name: array for name, array in said.items() if array is not None}
@@ -102,6 +105,7 @@ def _record(role: str, found: Mapping[tuple[str, str], np.ndarray]) -> AnchorRec
         own=_stored(role, own) if own else None,
         presence=found.get((INHERITED, "presence")),
         is_hidden=found.get((INHERITED, "is_hidden")),
+        light=found.get((INHERITED, "light")),
         reasons=found.get((REASONS, "")),
     )
 

@@ -23,6 +23,7 @@ from engine.errors import NonFiniteLoss, ProjectError
 _BITS = {"features": 7, "color_logits": 7, "log_offset_scales": 6, "log_base_scales": 6}
 """Bits per value of what a source clip's own anchors hold."""
 _TABLE_BITS = 7
+_LIGHT_BITS = 8
 _POSITION_BITS = 16
 """Of positions on no lattice, per axis of their bounding box: 0.2 mm in a hall of 20 m."""
 _MAX_POSITION_ERROR = 0.01
@@ -99,6 +100,8 @@ def _codecs(name: str, array: np.ndarray, state: ClipState) -> list[Codec]:
         return [*_position_codecs(array, state), exact]
     if kind in _BITS and not state.is_reference:
         return [("steps", {"bits": _BITS[kind]}), exact]
+    if name.endswith(".light"):
+        return [("steps", {"bits": _LIGHT_BITS}), exact]
     if name == LOG_DRIFT:
         return [("half", {}), exact]
     if kind is not None or name.startswith((DECODER, FIELD)):

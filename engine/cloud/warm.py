@@ -8,6 +8,7 @@ from engine.camera.projection import projection_matrices
 from engine.camera.rig import CameraRig
 from engine.cloud.background.background import estimate_background
 from engine.cloud.background.exposure import Exposure
+from engine.cloud.background.light import AnchorLight
 from engine.cloud.background.masks import motion_mask
 from engine.cloud.motion.hull import Grid, carve, hull_colors, hull_visibility
 from engine.cloud.stereo.consistency import check_depths
@@ -26,6 +27,7 @@ def warm_up() -> None:
     rng = np.random.default_rng(0)
     rig = _two_cameras()
     frames = rng.integers(0, 255, (3, _SIZE_PX, _SIZE_PX, 3)).astype(np.uint8)
+    AnchorLight(np.full((3, 3), 2.0), rig, frames[:2]).at(lambda row: [frames[row]])
     background = estimate_background(Exposure.of_frames(frames).applied_to(frames))
     motion_mask(frames[0], background.image)
     motion_mask(background.image, frames[0].astype(np.float32))

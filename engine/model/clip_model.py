@@ -9,7 +9,7 @@ all clips. "replacing" ones are the same for one source clip: they take the plac
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import torch
@@ -20,7 +20,7 @@ from engine.clip_files.anchor_record import AnchorRecord, StoredAnchors
 from engine.clip_files.array_names import DECODER, FIELD
 from engine.clip_files.clip_header import DecoderShape
 from engine.clip_files.clip_state import ClipState
-from engine.clip_files.roles import ROLES
+from engine.clip_files.roles import ROLES, STATIC
 from engine.errors import ProjectError
 from engine.gate.reasons import NO_REASON
 from engine.model.anchors import AnchorSet
@@ -64,6 +64,8 @@ class ClipModel(nn.Module):
         clip_length: M, the divisor of clip_time.
         n_frames: Frames of this clip.
         backend: What decodes and draws the clip; anchors, decoder and field are moved to its device and dtype.
+        light: Log brightness of the reference clip's static anchors at the start and the end of this clip, hidden ones
+            too; None where it is as in the reference clip. [A of the reference, 2]
         hidden: Rows of the reference clip's sets that this clip leaves out; the sets given are without them already.
             By role, [A of the reference] bool
     """
@@ -77,17 +79,20 @@ class ClipModel(nn.Module):
         clip_length: int,
         n_frames: int,
         backend: ModelBackend,
+        light: Tensor | None = None,
         hidden: dict[str, Tensor] | None = None,
     ) -> None:
         super().__init__()
         self.backend = backend
         self.sets = nn.ModuleDict(sets)
         self.hidden = dict(hidden or {})
+        self.light = light
         self.reasons: dict[str, np.ndarray] = {}  # what the gate said of the anchors of a role, for display
         self.decoder = decoder
         self.clip_length, self.n_frames = clip_length, n_frames
         self._corners: dict[str, CornerTable] = {}
         self._frozen: dict[str, Gaussians] = {}
+        self._lit: dict[float, Gaussians] = {}
         self.field: SpatioTemporalField | None = None
         self.to(backend.device, backend.dtype)
         if field is not None:
@@ -110,7 +115,7 @@ class ClipModel(nn.Module):
     def replace_sets(self, sets: dict[str, AnchorSet]) -> None:
         """These sets take the place of all others; a field attached later covers them."""
         self.sets = nn.ModuleDict(sets).to(self.backend.device, self.backend.dtype)
-        self._corners, self._frozen, self.hidden = {}, {}, {}
+        self._corners, self._frozen, self._lit, self.hidden = {}, {}, {}, {}
 
     def take_out(self, role: str, is_taken: Tensor) -> AnchorSet:
         """Take rows out of a set; gives them. Those of an inherited set are hidden in this clip, and stored as such.
@@ -123,6 +128,7 @@ class ClipModel(nn.Module):
         assert not anchors.is_dynamic  # corners of a field would have to follow
         self.sets[role] = anchors.subset(~is_taken)
         self._frozen.pop(role, None)
+        self._lit.clear()
         if not anchors.is_trainable:
             before = self.hidden.get(role)
             hidden = torch.zeros(len(anchors), dtype=torch.bool) if before is None else before.clone()
@@ -174,7 +180,7 @@ class ClipModel(nn.Module):
                 anchors=self.anchor_set(role),
                 rows=self.alive(role, clip_time) if rows is None else rows[role],
                 corners=self._corners.get(role),
-                decoded=self.constant_gaussians(role) if self.is_constant(role) else None,
+                decoded=self.lit_gaussians(role, clip_time) if self.is_constant(role) else None,
             )
             for role in self.roles()
         ]
@@ -187,6 +193,34 @@ class ClipModel(nn.Module):
             with torch.no_grad():
                 self._frozen[role] = decode_anchors([everything], self.decoder, None, [(0, 1.0)], backend=self.backend)
         return self._frozen[role]
+
+    @property
+    def has_light(self) -> bool:
+        """Whether light on what stands still differs from the reference clip's somewhere."""
+        return self.light is not None and self.is_constant(STATIC)
+
+    def light_weights(self, clip_time: float) -> tuple[float, float]:
+        """Weights of the light at the start and at the end of the clip."""
+        weight = min(max(clip_time * self.clip_length / self.n_frames, 0.0), 1.0)
+        return 1.0 - weight, weight
+
+    def lit_gaussians(self, role: str, clip_time: float) -> Gaussians:
+        """`constant_gaussians` in the light of a time of the clip. Static anchors alone are lit; the colours are linear
+        in time, so pictures of them are too."""
+        gaussians = self.constant_gaussians(role)
+        if role != STATIC or self.light is None:
+            return gaussians
+        weights = self.light_weights(clip_time)
+        if weights[1] not in self._lit:
+            if len(self._lit) > self.n_frames:  # times between frames, as playback asks for
+                self._lit.clear()
+            is_hidden = self.hidden.get(role)
+            light = self.light if is_hidden is None else self.light[~is_hidden]
+            factors = (torch.exp(light.to(gaussians.colors)) @ gaussians.colors.new_tensor(weights)).repeat_interleave(
+                self.decoder.gaussians_per_anchor
+            )
+            self._lit[weights[1]] = replace(gaussians, colors=gaussians.colors * factors[:, None])
+        return self._lit[weights[1]]
 
     def anchors(self, clip_time: float | None = None) -> AnchorView:
         """Positions for display: all, or those that exist at a time of the clip, in [0, 1)."""
@@ -240,6 +274,7 @@ class ClipModel(nn.Module):
                 own=_stored(anchors) if anchors.is_trainable else None,
                 presence=presence,
                 is_hidden=None if is_hidden is None else _copy(is_hidden),
+                light=_copy(self.light) if role == STATIC and self.light is not None else None,
             )
             arrays |= record.arrays(role)
         if any(p.requires_grad for p in self.decoder.parameters()):
@@ -328,6 +363,7 @@ def read_field(state: ClipState) -> SpatioTemporalField:
 def _rebuild(state: ClipState, reference: ClipState | None, backend: ModelBackend) -> ClipModel:
     header = state.header
     hidden: dict[str, Tensor] = {}
+    light: Tensor | None = None
     if state.is_reference:
         sets = _read_sets(state, is_trainable=True)
         decoder = _read_decoder(state)
@@ -344,6 +380,7 @@ def _rebuild(state: ClipState, reference: ClipState | None, backend: ModelBacken
         hidden = {role: _tensor(record.is_hidden) for role, record in records if record.is_hidden is not None}
         presence = {role: _tensor(record.presence) for role, record in records if record.presence is not None}
         inherited, decoder = inherit(reference, presence, hidden=hidden)
+        light = _read_light(state, reference)
         sets = inherited | _read_sets(state, is_trainable=True)
         sets = {role: sets[role] for role in ROLES if role in sets}
         if any(name.startswith(DECODER) for name in state.arrays):  # it went on learning in this clip
@@ -355,10 +392,21 @@ def _rebuild(state: ClipState, reference: ClipState | None, backend: ModelBacken
         clip_length=header.clip_length,
         n_frames=header.n_frames,
         backend=backend,
+        light=light,
         hidden=hidden,
     )
     model.reasons = _reasons(state, reference, model)
     return model
+
+
+def _read_light(state: ClipState, reference: ClipState) -> Tensor | None:
+    record = state.anchors.get(STATIC)
+    if record is None or record.light is None:
+        return None
+    shape = (reference.header.n_anchors.get(STATIC, 0), 2)
+    if record.light.shape != shape or record.light.dtype != np.float32 or not (np.abs(record.light) < 3.0).all():
+        raise ValueError(f"light of static anchors is {record.light.dtype} {record.light.shape}, not float32 {shape}")
+    return _tensor(record.light)
 
 
 def _reasons(state: ClipState, reference: ClipState | None, model: ClipModel) -> dict[str, np.ndarray]:

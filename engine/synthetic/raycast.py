@@ -52,6 +52,19 @@ class Truth:
         return np.isin(self.part_indices, rows)
 
 
+@dataclass(frozen=True, slots=True)
+class Surfaces:
+    """What a camera sees, pixel by pixel.
+
+    Attributes:
+        colors: Display-encoded, before a sensor clips them: above 1 where brighter than white. [H, W, 3] float64
+        positions: World point seen by the middle sub-pixel, scene units. [H, W, 3] float64
+    """
+
+    colors: np.ndarray
+    positions: np.ndarray
+
+
 @dataclass(slots=True)
 class _Samples:
     """One value per ray of a camera. [R, ...]; a ray is one sub-pixel."""
@@ -76,10 +89,17 @@ class SceneCamera:
 
     def image(self, frame_index: int) -> np.ndarray:
         """The picture. [H, W, 3] uint8, display-encoded"""
+        colors = self._colors(self._cast(frame_index))
+        return np.floor(np.clip(colors, 0, 1) * 255 + 0.5).astype(np.uint8)
+
+    def surfaces(self, frame_index: int) -> Surfaces:
+        """Colours that no sensor has clipped or rounded, and where in the room they are."""
         width, height = self._size
         n = self.supersampling
-        light = self._cast(frame_index).light.reshape(height, n, width, n, 3).mean(axis=(1, 3))
-        return np.floor(np.clip(light, 0, 1) ** (1 / GAMMA) * 255 + 0.5).astype(np.uint8)
+        samples = self._cast(frame_index)
+        rays = self._rays.reshape(height, n, width, n, 6)[:, n // 2, :, n // 2]
+        depths = samples.depths.reshape(height, n, width, n)[:, n // 2, :, n // 2, None]
+        return Surfaces(self._colors(samples), rays[..., :3] + rays[..., 3:] * depths)
 
     def coverage(self, frame_index: int, *names: str) -> np.ndarray:
         """Share of each pixel that these parts cover. [H, W] float32"""
@@ -88,6 +108,12 @@ class SceneCamera:
         rows = [self.scene.part_index(name) for name in names]
         is_part = np.isin(self._cast(frame_index).part_indices, rows).reshape(height, n, width, n)
         return is_part.mean(axis=(1, 3), dtype=np.float32)
+
+    def _colors(self, samples: _Samples) -> np.ndarray:
+        """Mean light of each pixel, display-encoded. [H, W, 3]"""
+        width, height = self._size
+        n = self.supersampling
+        return samples.light.reshape(height, n, width, n, 3).mean(axis=(1, 3)) ** (1 / GAMMA)
 
     def _cast(self, frame_index: int) -> _Samples:
         standing, caster = self._standing_samples(frame_index)

@@ -141,7 +141,8 @@ class TrainConfig(msgspec.Struct, frozen=True):
         _choice(
             COLORS,
             "What a training camera's colours are against the scene's: estimated first, trained with the reference "
-            "clip, kept by later clips.",
+            "clip, kept by later clips. Except with `off`, how its exposure changes from frame to frame is measured in "
+            "every clip and removed.",
             {
                 "auto": "a gain per channel where the cameras differ",
                 "gain": "always a gain per channel",

@@ -219,6 +219,7 @@ def make_plan(
     history: Sequence[MeasuredClip] = (),
     step_time: StepTime = lambda sizes, phase: None,
     is_still: bool = False,
+    exposure: tuple[float, float] | None = None,
 ) -> TrainingPlan:
     """The plan of one clip.
 
@@ -231,6 +232,7 @@ def make_plan(
         history: Trained clips of the project, in any order; this one, when it is trained again, does not count.
         step_time: Asked where no clip of the same kind was measured.
         is_still: Whether nothing moves in this clip, by `engine.training.plan.stillness.looks_still`.
+        exposure: Against the reference clip's, see `engine.training.plan.exposure_span`; None where it is not known.
     """
     same = [known for known in history if known.clip_index != clip.clip_index and known.is_source == is_source]
     same = [known for known in same if not known.is_still]
@@ -263,6 +265,7 @@ def make_plan(
             *_picture_lines(footage, clip, config, is_source=is_source),
             *phases,
             *_anchor_lines(config, reference, is_source=is_source),
+            *_distance_lines(clip, reference, exposure),
             PlanLine("Gaussians per anchor", config.gaussians_per_anchor, "", "as in every clip of the project"),
         ),
         preparation_s=_forecast_line("preparation", "s", preparation),
@@ -348,6 +351,21 @@ def _anchor_lines(config: TrainConfig, reference: ClipHeader | None, *, is_sourc
     if known is not None:
         inherited = PlanLine("static anchors", known, "", "inherited, counted in the reference clip")
     return [inherited, PlanLine("residual anchors", n_moving, "", "together with the inherited moving ones in use")]
+
+
+def _distance_lines(clip: Clip, reference: ClipHeader | None, exposure: tuple[float, float] | None) -> list[PlanLine]:
+    """How far a source clip lies from its reference clip, in clips and in exposure."""
+    lines = []
+    if reference is not None:
+        distance = abs(clip.clip_index - reference.clip_index)
+        lines.append(
+            PlanLine("distance", distance, "clips", f"from clip {reference.clip_index}, which it inherits from")
+        )
+    if exposure is not None:
+        low, high = (round(100 * share, 1) + 0.0 for share in exposure)
+        shown = "unchanged" if low == high == 0 else f"{low:+.1f} to {high:+.1f} %"
+        lines.append(PlanLine("exposure", shown, "", "against the reference clip, in the middle frame; is removed"))
+    return lines
 
 
 def _plural(n: int, word: str) -> str:

@@ -6,7 +6,7 @@ been trained. Source clip: `source_parts` does all of it at once.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,6 @@ from engine.gate.regions import GateRegion
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, render_gaussians
 from engine.model.host_array import host_array
-from engine.parallel import map_ordered
 from engine.progress import Progress, ReportProgress
 from engine.training.config import TrainConfig
 from engine.training.preparation.building import (
@@ -47,10 +46,13 @@ from engine.training.preparation.cloud_preparation import (
     motion_masks,
     moving_cloud,
     read_backgrounds,
+    seen_still,
     static_cloud,
     write_backgrounds,
 )
+from engine.training.preparation.drift import exposures_in, exposures_of, no_drift, remove_drift
 from engine.training.preparation.gating import without_static_regions
+from engine.training.preparation.light import brightness_in, measure_light
 from engine.training.preparation.method import Method
 from engine.training.preparation.stages import Stages
 from engine.training.preparation.training_pictures import TrainingPictures
@@ -146,8 +148,7 @@ class ClipPreparation:
         Raises:
             PreparationError: No static point was found.
         """
-        exposures = self._exposures_of(map(pictures.of_camera, range(len(self._rig))))
-        drift = self._remove_drift(pictures, exposures)
+        drift, exposures = self._without_drift(pictures)
         backgrounds = self._estimated(exposures)
         cloud = self._static_cloud(backgrounds, self._stages.keep)
         gains = self._gains(cloud.gains)
@@ -159,12 +160,14 @@ class ClipPreparation:
         """A reference clip whose static anchors were trained, with corrected backgrounds and what moves."""
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
         backgrounds = self._corrected(parts.backgrounds, parts.model, parts.gains, pictures, keep)
+        parts = replace(parts, backgrounds=backgrounds)
+        masks = self._motion_masks(parts, pictures)
+        cloud, moving_spacing = self._moving_cloud(parts, pictures, masks)
+        parts = replace(parts, backgrounds=seen_still(backgrounds, pictures, masks))
         try:
-            self.keep_backgrounds(backgrounds)
+            self.keep_backgrounds(parts.backgrounds)
         except DiskError as error:  # clips after this one need them, this one does not: tried again at its end
             self._say("Checking backgrounds", f"{error.message} Tried again when the clip is finished")
-        parts = replace(parts, backgrounds=backgrounds)
-        cloud, moving_spacing = self._find_motion(parts, pictures)
         if len(cloud.points):
             parts.model.add_set("moving", moving_anchors(cloud, np.ones(len(cloud.points), bool), self._config))
         self._say("Carving what moves", f"{len(cloud.points)} moving anchors")
@@ -186,19 +189,19 @@ class ClipPreparation:
             )
         model = inheriting_model(reference, self._clip, self._backend, learns=self._method.learns_inherited)
         self._say("Taking over the reference", self._method.words(self._config))
-        kept = read_backgrounds(self._prep_dir, self._key_of_corrected())
-        backgrounds = kept or self._estimated(self._exposures_in(reference))
-        drift = self._remove_drift(pictures, [Exposure.of_background(image) for image in backgrounds.images])
-        if kept is None:
-            keep = self._keep_after(model, gains, backgrounds)
-            backgrounds = self._corrected(backgrounds, model, gains, pictures, keep)
+        backgrounds = read_backgrounds(self._prep_dir, self._key_of_corrected())
+        if backgrounds is None:
+            backgrounds = self._backgrounds_of(reference, model, gains)
+        exposures = exposures_in(backgrounds.images) if self._has_drift else None
+        drift = no_drift(pictures) if exposures is None else remove_drift(pictures, exposures, self._report)
         self._method.choose_decoder(model, seed=self._seed)
         if self._method.builds_static:
             own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
             model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing)
-        cloud, moving_spacing = self._find_motion(parts, pictures)
+        measure_light(model, pictures, self._rig, backgrounds, exposures, self._report)
+        cloud, moving_spacing = self._moving_cloud(parts, pictures, self._motion_masks(parts, pictures))
         coverage = add_residual(model, cloud, self._config, self._method.choose_residual)
         self._method.adapt(model, self._config)
         self._say("Comparing with the reference", coverage.text)
@@ -246,39 +249,33 @@ class ClipPreparation:
         tensor = torch.from_numpy(values).to(self._backend.device, self._backend.dtype)
         return nn.Parameter(tensor, requires_grad=is_learning)
 
-    # ---------------------------------------------------------------- exposure
+    # ---------------------------------------------------------------- what does not move
 
     @property
     def _has_drift(self) -> bool:
         return self._config.color != "off"
 
-    def _exposures_of(self, frames_of_cameras: Iterable[np.ndarray]) -> list[Exposure]:
-        return map_ordered(Exposure.of_frames, frames_of_cameras)
-
-    def _exposures_in(self, reference: ClipState) -> list[Exposure]:
-        """Of the training cameras in the reference clip, from its frames."""
-        frames = range(reference.header.start, reference.header.start + reference.header.n_frames)
-        return self._exposures_of(self._capture.frames_of(camera, list(frames)) for camera in self._camera_indices)
-
-    def _remove_drift(self, pictures: TrainingPictures, exposures: Sequence[Exposure]) -> np.ndarray:
-        """Brings the pictures into the exposure of the reference clip; gives the gains that they had against it."""
-        n_cameras, n_frames = len(self._rig), self._clip.n_frames
+    def _without_drift(self, pictures: TrainingPictures) -> tuple[np.ndarray, list[Exposure] | None]:
+        """Drift within a reference clip, which its pictures lose, and its exposures; None where they do not count."""
         if not self._has_drift:
-            return np.ones((n_cameras, n_frames, 3), np.float32)
-        drift = np.stack(map_ordered(lambda row: exposures[row].gains_of(pictures.of_camera(row)), range(n_cameras)))
-        pictures.remove_drift(drift)
-        means = drift.mean((1, 2)) - 1.0
-        said = f"{100 * means.min():+.1f} to {100 * means.max():+.1f} % against the reference clip"
-        n_changed = int((drift != 1.0).any((1, 2)).sum())
-        self._say("Measuring exposure", f"{said}, {n_changed} of {n_cameras} cameras" if n_changed else "as it was")
-        return drift
+            return no_drift(pictures), None
+        exposures = exposures_of(pictures)
+        return remove_drift(pictures, exposures, self._report), exposures
 
-    # ---------------------------------------------------------------- what does not move
-
-    def _estimated(self, exposures: Sequence[Exposure]) -> Backgrounds:
+    def _estimated(self, exposures: Sequence[Exposure] | None) -> Backgrounds:
         keep = self._stages.keep
-        known = exposures if self._has_drift else [None] * len(exposures)
-        return estimate_backgrounds(self._capture, self._camera_indices, known, self._config, self._report, keep)
+        return estimate_backgrounds(self._capture, self._camera_indices, exposures, self._config, self._report, keep)
+
+    def _backgrounds_of(self, reference: ClipState, model: ClipModel, gains: nn.Parameter) -> Backgrounds:
+        """What the reference clip left behind, made anew from its pictures where it is gone."""
+        header = reference.header
+        clip = Clip(header.clip_index, header.start, header.n_frames, header.clip_length)
+        pictures = TrainingPictures(self._capture, clip, self._camera_indices)
+        _, exposures = self._without_drift(pictures)
+        estimated = self._estimated(exposures)
+        keep = self._keep_after(model, gains, estimated)
+        backgrounds = self._corrected(estimated, model, gains, pictures, keep)
+        return seen_still(backgrounds, pictures, motion_masks(pictures, backgrounds, None, self._report))
 
     def _corrected(
         self,
@@ -308,11 +305,18 @@ class ClipPreparation:
 
     # ---------------------------------------------------------------- what moves
 
-    def _find_motion(self, parts: ClipParts, pictures: TrainingPictures) -> tuple[MovingCloud, float | None]:
+    def _motion_masks(self, parts: ClipParts, pictures: TrainingPictures) -> np.ndarray:
+        """What moves in each picture. [M, C, H, W] bool"""
+        keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
+        brightness = brightness_in(parts.model, self._views) if parts.model.has_light else None
+        return motion_masks(pictures, parts.backgrounds, brightness, self._report, keep)
+
+    def _moving_cloud(
+        self, parts: ClipParts, pictures: TrainingPictures, masks: np.ndarray
+    ) -> tuple[MovingCloud, float | None]:
         """What moves, and the spacing of moving anchors."""
         static_points = host_array(parts.model.anchor_set("static").positions)
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
-        masks = motion_masks(pictures, parts.backgrounds, self._report, keep)
         gains = host_array(parts.gains)
         voxel_size = None if self._base is None else self._base.header.moving_spacing
         cloud = moving_cloud(

@@ -26,6 +26,7 @@ from engine.cloud.keeping import Arrays, Keep, do_now
 from engine.cloud.motion.moving_cloud import MovingCloud, build_moving_cloud, motion_bounds
 from engine.cloud.stereo.sparse import triangulate
 from engine.cloud.stereo.static_cloud import StaticCloud, build_static_cloud
+from engine.parallel import map_ordered
 from engine.progress import Progress, ReportProgress
 from engine.storage.array_files import ArraysError, read_arrays, write_arrays
 from engine.training.config import TrainConfig
@@ -62,7 +63,7 @@ def spread_frames(n_frames: int, at_most: int) -> list[int]:
 def estimate_backgrounds(
     capture: Capture,
     camera_indices: Sequence[int],
-    exposures: Sequence[Exposure | None],
+    exposures: Sequence[Exposure] | None,
     config: TrainConfig,
     report: ReportProgress,
     keep: Keep = do_now,
@@ -70,7 +71,7 @@ def estimate_backgrounds(
     """Backgrounds from frames spread over the whole capture.
 
     Args:
-        exposures: Of each camera, the one that its background is in; None leaves frames as they are.
+        exposures: Of each camera, the one that its background comes in; None leaves frames as they are.
     """
     frames = spread_frames(capture.n_frames, config.background_frames)
 
@@ -80,8 +81,8 @@ def estimate_backgrounds(
         return {"image": background.image, "is_stable": np.packbits(background.is_stable, axis=-1)}
 
     images, stable = [], []
-    for row, (camera, exposure) in enumerate(zip(camera_indices, exposures, strict=True)):
-        kept = keep(f"background {row}", partial(estimate, camera, exposure))
+    for row, camera in enumerate(camera_indices):
+        kept = keep(f"background {row}", partial(estimate, camera, None if exposures is None else exposures[row]))
         images.append(kept["image"])
         stable.append(np.unpackbits(kept["is_stable"], axis=-1, count=kept["image"].shape[1]).astype(bool))
         report(Progress("Looking for what stands still", (row + 1) / len(camera_indices)))
@@ -178,14 +179,29 @@ def correct_backgrounds(
 
 
 def motion_masks(
-    pictures: TrainingPictures, backgrounds: Backgrounds, report: ReportProgress, keep: Keep = do_now
+    pictures: TrainingPictures,
+    backgrounds: Backgrounds,
+    brightness: Callable[[int, int], np.ndarray] | None,
+    report: ReportProgress,
+    keep: Keep = do_now,
 ) -> np.ndarray:
-    """What differs from the background, per frame and camera. [M, C, H, W] bool"""
+    """What differs from the background, per frame and camera. [M, C, H, W] bool
+
+    Args:
+        brightness: (camera row, frame in clip) -> factor by which light changes the background [H, W, 1]; None where it
+            does not.
+    """
     n_frames, n_cameras = pictures.clip.n_frames, len(pictures.camera_indices)
     masks = np.empty((n_frames, *backgrounds.is_stable.shape), bool)
 
     def find(row: int) -> Arrays:
-        found = [motion_mask(pictures.picture(row, frame), backgrounds.images[row]) for frame in range(n_frames)]
+        background = backgrounds.images[row]
+        found = [
+            motion_mask(
+                pictures.picture(row, frame), background if brightness is None else background * brightness(row, frame)
+            )
+            for frame in range(n_frames)
+        ]
         return {"masks": np.packbits(np.stack(found), axis=-1)}
 
     for row in range(n_cameras):
@@ -194,6 +210,26 @@ def motion_masks(
         report(Progress("Finding what moves", (row + 1) / n_cameras))
     report(Progress("Finding what moves", 1.0, f"{100 * masks.mean():.1f} % of pixels move"))
     return masks
+
+
+def seen_still(backgrounds: Backgrounds, pictures: TrainingPictures, masks: np.ndarray) -> Backgrounds:
+    """Backgrounds in the light of a clip: where a camera sees something stand still in most frames, their mean.
+
+    Args:
+        masks: What moves, of the same pictures. [M, C, H, W] bool
+    """
+    n_frames = len(masks)
+
+    def seen(row: int) -> np.ndarray:
+        is_still = ~masks[:, row]
+        sums = np.zeros(backgrounds.images[row].shape, np.int32)
+        for frame in range(n_frames):
+            sums += np.where(is_still[frame, ..., None], pictures.picture(row, frame), np.uint8(0))
+        n_still = is_still.sum(0)[..., None]
+        means = np.floor(sums / np.maximum(n_still, 1) + 0.5).astype(np.uint8)
+        return np.where(2 * n_still > n_frames, means, backgrounds.images[row])
+
+    return Backgrounds(np.stack(map_ordered(seen, range(masks.shape[1]))), backgrounds.is_stable)
 
 
 def moving_cloud(

@@ -44,12 +44,17 @@ class TrainingPictures:
 
     def __init__(self, capture: Capture, clip: Clip, camera_indices: Sequence[int]) -> None:
         self.camera_indices = list(camera_indices)
-        self.clip = clip
+        self.capture, self.clip = capture, clip
         frames = list(clip.frame_indices())
         self._pixels = [capture.frames_of(camera, frames) for camera in self.camera_indices]
 
     def __len__(self) -> int:
         return len(self.camera_indices) * self.clip.n_frames
+
+    @property
+    def n_cameras(self) -> int:
+        """Training cameras."""
+        return len(self.camera_indices)
 
     def picture(self, camera_row: int, frame_in_clip: int) -> np.ndarray:
         """One picture. [H, W, 3] uint8"""

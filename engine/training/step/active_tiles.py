@@ -1,6 +1,7 @@
 """Active tiles: the part of a picture that a source clip's learning Gaussians touch, and the rest as it always is.
 
-Static anchors under frozen heads never change, so what a camera sees of them alone is one picture for the whole clip.
+Static anchors under frozen heads never change, so what a camera sees of them alone is one picture for the whole clip,
+or, where the light on them changes, a mean of two: what a picture shows is linear in their colours.
 A tile under no learning Gaussian shows that picture whatever is learned, and nothing flows back from it; it need not be
 drawn, compared or differentiated, whether or not the truth changed there. Tiles are found anew at every step, from the
 boxes by which the rasterizer itself bins the learning Gaussians: none is ever missed, and there is nothing to keep in
@@ -49,20 +50,21 @@ class _FrozenView:
     """What a camera sees of the constant Gaussians.
 
     Attributes:
-        picture: All of them, scene colours over black. [H, W, 3]
+        pictures: All of them, scene colours over black: in the light of the clip's start and of its end, one where that
+            is the same. [H, W, 3] each
         rows: Those that are drawn, in the constant Gaussians. [n] int64
         boxes: Of these rows.
         n_seen: Gaussians of all anchors that the camera may see.
     """
 
-    picture: Tensor
+    pictures: tuple[Tensor, ...]
     rows: Tensor
     boxes: TileBoxes
     n_seen: int
 
     @property
     def n_bytes(self) -> int:
-        return self.picture.nbytes + self.rows.nbytes + self.boxes.packed.nbytes
+        return sum(picture.nbytes for picture in self.pictures) + self.rows.nbytes + self.boxes.packed.nbytes
 
 
 class ActiveTiles:
@@ -104,8 +106,14 @@ class ActiveTiles:
         learning = self._model.decode(clip_time, rows | {role: nothing})
         mask = self._boxes(learning, view).mask()
         chosen = frozen_view.boxes.meeting(mask, frozen_view.rows)
-        gaussians = join_frozen(self._model.constant_gaussians(role), chosen, learning, backend=self._backend)
-        return ActivePicture(gaussians, learning, frozen_view.n_seen + len(learning), mask, frozen_view.picture)
+        lit = self._model.lit_gaussians(role, clip_time)
+        gaussians = join_frozen(lit, chosen, learning, backend=self._backend)
+        rest = self._picture_at(frozen_view, clip_time)
+        return ActivePicture(gaussians, learning, frozen_view.n_seen + len(learning), mask, rest)
+
+    def _picture_at(self, frozen_view: _FrozenView, clip_time: float) -> Tensor:
+        first, last = frozen_view.pictures[0], frozen_view.pictures[-1]
+        return first if first is last else torch.lerp(first, last, self._model.light_weights(clip_time)[1])
 
     def square_outside(self, picture: ActivePicture, item: int, truth: Tensor, gain: Tensor) -> float:
         """Mean square that tiles which are not active add to that of the whole picture.
@@ -127,12 +135,14 @@ class ActiveTiles:
             (role,) = self._constant
             k = self._model.decoder.gaussians_per_anchor
             seen = (rows[role][:, None] * k + torch.arange(k, device=rows[role].device)).reshape(-1)
+            ends = (0.0, self._model.n_frames / self._model.clip_length) if self._model.has_light else (0.0,)
             with torch.no_grad():
-                gaussians = self._model.constant_gaussians(role)[seen]
-                picture = render_gaussians(gaussians, view, backend=self._backend).image[0]
+                lit = [self._model.lit_gaussians(role, clip_time)[seen] for clip_time in ends]
+                pictures = tuple(render_gaussians(part, view, backend=self._backend).image[0] for part in lit)
+            gaussians = lit[0]
             boxes = self._boxes(gaussians, view)
             drawn = boxes.drawn()
-            known = _FrozenView(picture, seen[drawn], boxes[drawn], len(seen))
+            known = _FrozenView(pictures, seen[drawn], boxes[drawn], len(seen))
             self._is_full = self.n_bytes + known.n_bytes > self._max_bytes
             if self._is_full:
                 return None

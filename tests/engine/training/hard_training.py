@@ -18,7 +18,7 @@ from engine.capture.clip import split_clips
 from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.clip_files.compact import write_compact_clip
 from engine.images.psnr import psnr_of, squared_error
-from engine.metrics.clips.trained_clip import TrainedClip, camera_gain
+from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.clip_model import load_clip_model
 from engine.model.clip_view import View, render_gaussians
 from engine.progress import Progress
@@ -129,13 +129,13 @@ class Trained:
         rows = {role: torch.zeros(0, dtype=torch.int64) for role in clip.model.roles()}
         rows["static"] = torch.arange(len(clip.model.anchor_set("static")))
         image = render_gaussians(clip.model.decode(0.0, rows), view, backend=backend_called("cpu")).image[0].numpy()
-        return image * camera_gain(clip.base, rig.names[camera])
+        return clip.colors.in_camera(image, rig, camera, 0.0)
 
     def _clip(self, clip_index: int) -> TrainedClip:
         if clip_index not in self._clips:
             model = load_clip_model(self.states[clip_index], self.states[0], backend=backend_called("cpu"))
             clip = split_clips(self.scene.n_frames, self.scene.clip_length)[clip_index]
-            self._clips[clip_index] = TrainedClip(clip, model, self.states[0])
+            self._clips[clip_index] = TrainedClip(clip, model, self.states[0], self.states[clip_index].drift)
         return self._clips[clip_index]
 
 

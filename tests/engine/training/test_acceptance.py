@@ -163,7 +163,9 @@ def flicker_of_still_clips(tiny: Tiny, prep_dir, **settings) -> list[PairRow]:
         training.prepare()
         state = finish(training)
         reference = reference or state
-        trained = TrainedClip(clip, load_clip_model(state, reference, backend=backend_called("cpu")), reference)
+        trained = TrainedClip(
+            clip, load_clip_model(state, reference, backend=backend_called("cpu")), reference, state.drift
+        )
         evaluation.measure(trained, before=before, on_pair=pairs.append)
         before = trained
     return pairs

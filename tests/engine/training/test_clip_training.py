@@ -149,7 +149,10 @@ def test_a_source_clip_adds_residual_anchors_and_leaves_everything_inherited_unt
     assert training.held_out_psnr() > first
     cameras = [setting.holdout[0], training.camera_indices[0]]
     trained = TrainedClip(
-        training.clip, load_clip_model(state, setting.reference, backend=backend_called("cpu")), setting.reference
+        training.clip,
+        load_clip_model(state, setting.reference, backend=backend_called("cpu")),
+        setting.reference,
+        state.drift,
     )
     evaluation = Evaluation(setting.capture, cameras=cameras, holdout=setting.holdout)
     rows = evaluation.measure(trained, frames=[training.clip.start])

@@ -117,14 +117,14 @@ def picture(tiny: Tiny, state: ClipState, reference: ClipState | None, *, frame:
     """What a training camera sees of a saved clip, by frame in the clip. [H, W, 3] float32"""
     model = load_clip_model(state, reference, backend=backend_called("cpu"))
     base = state if reference is None or state.is_reference else reference
-    return _picture(tiny, TrainedClip(tiny.clips[state.header.clip_index], model, base), frame)
+    return _picture(tiny, TrainedClip(tiny.clips[state.header.clip_index], model, base, state.drift), frame)
 
 
 def live_picture(tiny: Tiny, training: ClipTraining, *, frame: int = 1) -> np.ndarray:
     """Likewise of the model that a training holds, before anything is saved."""
     base = training.state() if training.reference is None else training.reference
     with torch.no_grad():
-        return _picture(tiny, TrainedClip(training.clip, training.model, base), frame)
+        return _picture(tiny, TrainedClip(training.clip, training.model, base, training.drift), frame)
 
 
 def _picture(tiny: Tiny, clip: TrainedClip, frame: int) -> np.ndarray:

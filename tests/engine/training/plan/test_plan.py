@@ -98,6 +98,15 @@ def test_a_source_clip_counts_what_the_reference_has():
     assert "not trained yet" in texts(plan(clip=NEXT, is_source=True))["static anchors"][1]
 
 
+def test_a_source_clip_says_how_far_it_lies_from_its_reference():
+    far = dataclasses.replace(NEXT, clip_index=12)
+    lines = texts(plan(clip=far, is_source=True, reference=header(), exposure=(-0.0412, 0.0004)))
+    assert lines["distance"] == (12, "from clip 0, which it inherits from")
+    assert lines["exposure"][0] == "-4.1 to +0.0 %"
+    assert texts(plan(clip=far, is_source=True, exposure=(-0.0002, 0.0)))["exposure"][0] == "unchanged"
+    assert not {"distance", "exposure"} & texts(plan()).keys()
+
+
 def test_one_frame():
     lines = texts(plan(clip=dataclasses.replace(CLIP, n_frames=1)))
     assert lines["pictures"][0] == 27

@@ -1,0 +1,101 @@
+"""The light of a source clip: on its static anchors where it meets its neighbours, and in what cameras see of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import torch
+
+from engine.camera.rig import CameraRig
+from engine.clip_files.roles import STATIC
+from engine.cloud.background.exposure import Exposure
+from engine.cloud.background.light import WINDOW_FRAMES, AnchorLight, joined
+from engine.model.clip_model import ClipModel
+from engine.model.clip_view import View, render_gaussians
+from engine.model.host_array import host_array
+from engine.progress import Progress, ReportProgress
+from engine.training.preparation.cloud_preparation import Backgrounds
+from engine.training.preparation.training_pictures import TrainingPictures
+
+STAGE = "Measuring light"
+_DARK = 0.03
+"""Sum over RGB of a render below which its brightness says nothing."""
+
+
+def measure_light(
+    model: ClipModel,
+    pictures: TrainingPictures,
+    rig: CameraRig,
+    backgrounds: Backgrounds,
+    exposures: Sequence[Exposure] | None,
+    report: ReportProgress,
+) -> None:
+    """Give a model whose static anchors never change the light on them at the start and the end of its clip.
+
+    Args:
+        model: Of a source clip; one whose static anchors learn stays as it is.
+        pictures: Of the clip, in the exposure of the backgrounds.
+        rig: Training cameras.
+        backgrounds: What they see in the reference clip when nothing moves.
+        exposures: That of each background; None where no camera's exposure is looked at.
+        report: Gets one line.
+    """
+    if not model.is_constant(STATIC):
+        return
+    clip, n_frames = pictures.clip, pictures.capture.n_frames
+    points = host_array(model.anchor_set(STATIC).positions).astype(np.float64)
+    measure = AnchorLight(points, rig, backgrounds.images)
+
+    def light_in(start: int, stop: int) -> np.ndarray:
+        return measure.at(_frames_in(range(start, stop), pictures, exposures))
+
+    first = light_in(clip.start, clip.start + WINDOW_FRAMES)
+    last = light_in(clip.stop - WINDOW_FRAMES, clip.stop)
+    before = light_in(clip.start - WINDOW_FRAMES, clip.start) if clip.start > 0 else first
+    after = light_in(clip.stop, clip.stop + WINDOW_FRAMES) if clip.stop < n_frames else last
+    logs = np.stack([joined(before, first, own=first), joined(last, after, own=last)], axis=1)
+    share = 100 * float((logs != 0).any(1).mean())
+    if share:
+        model.light = torch.from_numpy(logs)
+    said = f"it differs from the reference clip's on {share:.1f} % of the static anchors"
+    report(Progress(STAGE, 1.0, said if share else "as in the reference clip"))
+
+
+def _frames_in(
+    frames: range, pictures: TrainingPictures, exposures: Sequence[Exposure] | None
+) -> Callable[[int], list[np.ndarray]]:
+    """Camera row to its pictures of some frames, as far as the capture has them, in the backgrounds' exposure."""
+    clip, capture = pictures.clip, pictures.capture
+    inside = [index for index in frames if index in clip.frame_indices()]
+    outside = [index for index in frames if index not in clip.frame_indices() and 0 <= index < capture.n_frames]
+
+    def frames_of(row: int) -> list[np.ndarray]:
+        own = [pictures.picture(row, index - clip.start) for index in inside]
+        if not outside:
+            return own
+        others = capture.frames_of(pictures.camera_indices[row], outside)
+        return [*own, *(others if exposures is None else exposures[row].applied_to(others))]
+
+    return frames_of
+
+
+def brightness_in(model: ClipModel, views: Sequence[View]) -> Callable[[int, int], np.ndarray]:
+    """By which factor light changes what stands still: (row of the views, frame in clip) -> [H, W, 1] float32."""
+    times = (0.0, model.n_frames / model.clip_length)
+    ends = [np.stack([_light_in(model, view, clip_time) for clip_time in times]) for view in views]
+
+    def brightness(row: int, frame_in_clip: int) -> np.ndarray:
+        weights = model.light_weights(frame_in_clip / model.clip_length)
+        return np.tensordot(np.array(weights, np.float32), ends[row], 1)
+
+    return brightness
+
+
+def _light_in(model: ClipModel, view: View, clip_time: float) -> np.ndarray:
+    with torch.no_grad():
+        plain, lit = (
+            host_array(render_gaussians(gaussians, view, backend=model.backend).image[0]).sum(-1, keepdims=True)
+            for gaussians in (model.constant_gaussians(STATIC), model.lit_gaussians(STATIC, clip_time))
+        )
+    return np.where(plain > _DARK, lit / np.maximum(plain, _DARK), 1.0).astype(np.float32)
