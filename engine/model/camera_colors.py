@@ -60,13 +60,15 @@ class CameraColors:
         return exposure_elsewhere(rig, [rig.names.index(known) for known in self.camera_names], at_time, camera)
 
     def in_camera(self, image: np.ndarray, rig: CameraRig, camera: int, clip_time: float) -> np.ndarray:
-        """A picture in the scene's colours as the camera takes it. [H, W, 3] float"""
-        return to_camera(image * self.gain(rig.names[camera]), self.exposure(rig, camera, clip_time))
+        """A picture in the scene's colours as the camera takes it, white staying white. [H, W, 3] float"""
+        return to_camera(image, self._whole_gain(rig, camera, clip_time))
 
     def in_scene(self, pixels: np.ndarray, rig: CameraRig, camera: int, clip_time: float) -> np.ndarray:
         """What a camera took in the scene's colours, rounded. [H, W, 3] uint8"""
-        gain = self.gain(rig.names[camera]) * self.exposure(rig, camera, clip_time)
-        return to_reference(pixels, gain)
+        return to_reference(pixels, self._whole_gain(rig, camera, clip_time))
+
+    def _whole_gain(self, rig: CameraRig, camera: int, clip_time: float) -> np.ndarray:
+        return self.gain(rig.names[camera]) * self.exposure(rig, camera, clip_time)
 
 
 def exposure_elsewhere(rig: CameraRig, known: list[int], exposures: np.ndarray, camera: int) -> np.ndarray:
