@@ -331,7 +331,7 @@ class ClipTraining:
             DiskError: The backgrounds that source clips share could not be kept; nothing has changed.
         """
         if self._base is None and self.phases[self._phase_index][0] != "static":
-            self._preparation.keep_backgrounds(self.backgrounds)
+            self._preparation.keep_backgrounds(self.model, self.gains, self.backgrounds)
         state = self.state()
         self._trained = self.model
         entries = None if self.method.keeps_unread_entries else self.model.entries_in_use()

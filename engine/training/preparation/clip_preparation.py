@@ -6,7 +6,7 @@ been trained. Source clip: `source_parts` does all of it at once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from engine.cloud.background.exposure import Exposure
 from engine.cloud.keeping import Keep
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
-from engine.errors import DiskError, PreparationError, ProjectError
+from engine.errors import PreparationError, ProjectError
 from engine.gate.regions import GateRegion
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, render_gaussians
@@ -47,6 +47,7 @@ from engine.training.preparation.cloud_preparation import (
     moving_cloud,
     read_backgrounds,
     seen_still,
+    shown_elsewhere,
     static_cloud,
     write_backgrounds,
 )
@@ -164,10 +165,6 @@ class ClipPreparation:
         masks = self._motion_masks(parts, pictures)
         cloud, moving_spacing = self._moving_cloud(parts, pictures, masks)
         parts = replace(parts, backgrounds=seen_still(backgrounds, pictures, masks))
-        try:
-            self.keep_backgrounds(parts.backgrounds)
-        except DiskError as error:  # clips after this one need them, this one does not: tried again at its end
-            self._say("Checking backgrounds", f"{error.message} Tried again when the clip is finished")
         if len(cloud.points):
             parts.model.add_set("moving", moving_anchors(cloud, np.ones(len(cloud.points), bool), self._config))
         self._say("Carving what moves", f"{len(cloud.points)} moving anchors")
@@ -208,12 +205,13 @@ class ClipPreparation:
         reasons = self._make_dynamic(parts, cloud)
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage)
 
-    def keep_backgrounds(self, backgrounds: Backgrounds) -> None:
-        """Keep a reference clip's corrected backgrounds for source clips, unless they are kept already.
+    def keep_backgrounds(self, model: ClipModel, gains: nn.Parameter, backgrounds: Backgrounds) -> None:
+        """Keep a trained reference clip's backgrounds for source clips, unless they are kept already.
 
         Raises:
             DiskError: The disk refused.
         """
+        backgrounds = shown_elsewhere(backgrounds, self._render_static(model, gains))
         key = self._key_of_corrected()
         kept = read_backgrounds(self._prep_dir, key)
         if kept is None or not kept.equals(backgrounds):
@@ -275,7 +273,8 @@ class ClipPreparation:
         estimated = self._estimated(exposures)
         keep = self._keep_after(model, gains, estimated)
         backgrounds = self._corrected(estimated, model, gains, pictures, keep)
-        return seen_still(backgrounds, pictures, motion_masks(pictures, backgrounds, None, self._report))
+        seen = seen_still(backgrounds, pictures, motion_masks(pictures, backgrounds, None, self._report))
+        return shown_elsewhere(seen, self._render_static(model, gains))
 
     def _corrected(
         self,
@@ -285,10 +284,11 @@ class ClipPreparation:
         pictures: TrainingPictures,
         keep: Keep,
     ) -> Backgrounds:
-        def render(camera_row: int) -> np.ndarray:
-            return _render_static(model, self._views[camera_row], gains[camera_row])
+        return correct_backgrounds(backgrounds, pictures, self._render_static(model, gains), self._report, keep)
 
-        return correct_backgrounds(backgrounds, pictures, render, self._report, keep)
+    def _render_static(self, model: ClipModel, gains: nn.Parameter) -> Callable[[int], np.ndarray]:
+        """Camera row to the static anchors alone in that camera's colours. [H, W, 3] float32 in 0..1"""
+        return lambda camera_row: _render_static(model, self._views[camera_row], gains[camera_row])
 
     def _key_of_corrected(self) -> dict:
         return key_of_corrected(self._capture, self._camera_indices, self._config)

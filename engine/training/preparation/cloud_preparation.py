@@ -217,19 +217,40 @@ def seen_still(backgrounds: Backgrounds, pictures: TrainingPictures, masks: np.n
 
     Args:
         masks: What moves, of the same pictures. [M, C, H, W] bool
+    Returns:
+        Trusted are the pixels that were seen so; the others are as they were.
     """
     n_frames = len(masks)
 
-    def seen(row: int) -> np.ndarray:
+    def seen(row: int) -> tuple[np.ndarray, np.ndarray]:
         is_still = ~masks[:, row]
         sums = np.zeros(backgrounds.images[row].shape, np.int32)
         for frame in range(n_frames):
             sums += np.where(is_still[frame, ..., None], pictures.picture(row, frame), np.uint8(0))
         n_still = is_still.sum(0)[..., None]
         means = np.floor(sums / np.maximum(n_still, 1) + 0.5).astype(np.uint8)
-        return np.where(2 * n_still > n_frames, means, backgrounds.images[row])
+        is_seen = 2 * n_still > n_frames
+        return np.where(is_seen, means, backgrounds.images[row]), is_seen[..., 0]
 
-    return Backgrounds(np.stack(map_ordered(seen, range(masks.shape[1]))), backgrounds.is_stable)
+    images, is_seen = zip(*map_ordered(seen, range(masks.shape[1])), strict=True)
+    return Backgrounds(np.stack(images), np.stack(is_seen))
+
+
+def shown_elsewhere(backgrounds: Backgrounds, render_static: Callable[[int], np.ndarray]) -> Backgrounds:
+    """Backgrounds of a trained clip: where nothing was seen to stand still, what its static anchors show instead.
+
+    There a person stood, or a shadow lay, and the anchors may have taken on its darkness: clips that inherit them have
+    to compare with that.
+
+    Args:
+        render_static: Camera row to the static render in that camera's colours. [H, W, 3] float
+    """
+    images = backgrounds.images.copy()
+    for row, is_seen in enumerate(backgrounds.is_stable):
+        render = render_static(row)
+        is_shown = ~is_seen & np.asarray(np.isfinite(render).all(-1))
+        images[row][is_shown] = np.floor(np.clip(render[is_shown], 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    return Backgrounds(images, backgrounds.is_stable)
 
 
 def moving_cloud(

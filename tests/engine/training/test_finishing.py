@@ -37,7 +37,6 @@ def test_a_checkpoint_of_a_finished_clip_only_has_to_be_written(tiny, tmp_path, 
 
 
 def test_backgrounds_that_cannot_be_kept_hold_up_the_end_of_the_reference_and_nothing_else(tiny, tmp_path, monkeypatch):
-    said = []
     replace = os.replace
 
     def refuse(source, target):
@@ -46,12 +45,9 @@ def test_backgrounds_that_cannot_be_kept_hold_up_the_end_of_the_reference_and_no
         replace(source, target)
 
     monkeypatch.setattr("os.replace", refuse)
-    training = tiny.training(
-        0, is_source=False, prep_dir=tmp_path, report=lambda progress: said.append(progress.message)
-    )
+    training = tiny.training(0, is_source=False, prep_dir=tmp_path)
     training.prepare()
-    trained = finish(training)  # through the change of phase, where they are made
-    assert any("backgrounds could not be written" in message for message in said)
+    trained = finish(training)
     with pytest.raises(DiskError, match="No space left"):
         training.finish()
     assert training.state().fingerprint == trained.fingerprint
