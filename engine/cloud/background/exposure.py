@@ -2,11 +2,11 @@
 
 Most of a picture shows the same surfaces as a still picture of the same camera, a person or a shadow does not. The
 ratio that most pixels share is the camera's gain: the densest ratio is found first, whatever else there is, and refined
-from the ratios near it. Only pixels that are neither dark nor white count. Changes that the estimate cannot tell from
-none are none, so that nothing changes where a camera does not.
+from the ratios near it. Only pixels that are neither dark nor white count. Changes too small
+to be told from noise are dropped, so that a camera that does not change is left alone.
 
-Not a light model: what changes in all cameras alike, such as daylight, is told apart from the cameras by nobody, and
-counts as their gain.
+Not a light model: what changes in all cameras alike, such as daylight, cannot be told from their exposure, and counts
+as that.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ DARKEST, BRIGHTEST = 16.0, 235.0
 MIN_PIXELS = 200
 """With fewer usable ones nothing is said: no change."""
 LARGEST_LOG_GAIN = 0.7
-"""Ratios beyond a factor of two are no exposure of a camera that records one take."""
+"""Larger ratios come from other things than the exposure of a camera within one take: a factor of two."""
 N_BINS = 140
 """Of the histogram in which the densest ratio is looked for: a hundredth wide."""
 REACH = 0.06
 """Ratios further from the gain than that say nothing of it, log: biweight of Tukey."""
 N_ROUNDS = 5
 NO_CHANGE = 0.0015
-"""Log gains up to this are no change, those from twice this on count in full, and in between there is no jump. Frames
+"""Log gains up to this count as unchanged, those from twice this on count in full, and nothing jumps in between. Frames
 of a real capture scatter by 0.0004."""
 
 

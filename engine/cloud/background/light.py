@@ -2,8 +2,8 @@
 
 A shadow, a lamp or what a person reflects changes a surface for every camera that sees it. So each camera says, pixel
 by pixel, how bright it finds what stands still; an anchor takes the median of the cameras that see it, and only where
-most of them agree, which those that see a person in front of the surface do not. Neighbours are averaged. Changes as
-small as the estimate errs are none, so that a surface on which nothing changes keeps its colours to the bit.
+most of them agree, which those that see a person in front of the surface do not. Neighbours are averaged. Changes too
+small to be told from noise are dropped, so that a surface on which nothing changes keeps its colours to the bit.
 
 Brightness alone, no colour: with a colour per anchor, still pixels of cameras left out came out no better.
 """
@@ -29,10 +29,10 @@ AGREED_LOG = 0.03
 AGREED_SHARE = 0.6
 N_NEIGHBORS = 24
 MIN_KNOWN_SHARE = 0.25
-"""Of the neighbours; where fewer are known nobody says anything, and nothing changes."""
+"""Of the neighbours; where fewer are known, the brightness is left as it was."""
 NO_CHANGE = 0.005
-"""Log brightness up to this is no change, twice this counts in full, in between there is no jump. Anchors of a real
-capture scatter by 0.003 where nothing changes."""
+"""Log brightness up to this counts as unchanged, twice this counts in full, and nothing jumps in between. Anchors of a
+real capture scatter by 0.003 where nothing changes."""
 LARGEST_LOG = 0.7
 JUMP_LOG = 0.02
 """Sides of a border that differ by more than this differ in truth."""
