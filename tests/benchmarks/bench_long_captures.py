@@ -97,46 +97,52 @@ def write_missing(folder: Path, scene: SyntheticScene, chosen: Sequence[str]) ->
 
 
 def train(capture: Path, project: Path, seed: int, options: argparse.Namespace) -> None:
-    """Train the clips that are not trained yet; a failure ends the program."""
-    arguments = ["train", str(capture), "--project", str(project), "--clips", f"0:{options.clips}", "--quiet"]
-    arguments += ["--clip-length", str(options.clip_length), "--preset", options.preset, "--seed", str(seed)]
+    """Train the chosen clips that are not trained yet; a failure ends the program."""
+    arguments = ["--quiet", "--clip-length", str(options.clip_length), "--preset", options.preset, "--seed", str(seed)]
     arguments += [part for setting in (*SETTINGS, *options.set) for part in ("--set", setting)]
-    if code := clipgstream(arguments):
-        sys.exit(code)
+    for i in chosen_clips(options):
+        which = ["--project", str(project), "--clips", f"{i}:{i + 1}"]
+        if code := clipgstream(["train", str(capture), *which, *arguments]):
+            sys.exit(code)
 
 
-def measure(project: Path, scene: SyntheticScene, n_clips: int) -> dict[str, Any]:
+def chosen_clips(options: argparse.Namespace) -> range:
+    """Clips to train and to measure; the first is always among them."""
+    return range(0, options.clips, options.every)
+
+
+def measure(project: Path, scene: SyntheticScene, clip_indices: Sequence[int]) -> dict[str, Any]:
     """Figures of a trained capture; see COLUMNS. Also the PSNR of every clip, as a list."""
     opened = open_trained(open_project(project, is_writable=False))
     document = evaluate_project(
         opened,
-        clip_indices=range(n_clips),
+        clip_indices=clip_indices,
         cameras=opened.capture.camera_indices(opened.project.settings.holdout),
         metrics="quick",
         on_progress=lambda n_done, n_rows, row: None,
     )
-    clips = [document["means"]["clips"][str(i)]["held_out"] for i in range(n_clips)]
+    clips = [document["means"]["clips"][str(i)]["held_out"] for i in clip_indices]
     levels = [clip["psnr"] for clip in clips]
     pairs = document["seams"]["rows"]
     noise = mean_of([pair["truth_change_static"] for pair in pairs])
     flicker = flicker_figures(pairs)
     return {
         **{name: document["means"]["held_out"][name] for name in BY_PROGRAM},
-        "psnr_still": still_psnr(opened, scene, n_clips),
+        "psnr_still": still_psnr(opened, scene, clip_indices),
         "psnr_first": levels[0],
         "psnr_since": statistics.mean(levels[1:]) - levels[0] if levels[1:] else None,
         "psnr_last": levels[-1],
         "flicker_inside": flicker["flicker_inside"],
         "flicker_borders": flicker["flicker_borders"],
         "noise": None if noise is None else 255.0 * noise,
-        **costs(opened, n_clips),
+        **costs(opened, clip_indices),
         "by_clip": {name: [clip[name] for clip in clips] for name in BY_PROGRAM},
     }
 
 
-def still_psnr(opened: TrainedProject, scene: SyntheticScene, n_clips: int) -> float | None:
+def still_psnr(opened: TrainedProject, scene: SyntheticScene, clip_indices: Sequence[int]) -> float | None:
     """PSNR of pixels that show nothing that moves, mean over held-out cameras and frames, dB."""
-    frames = [frame for clip in opened.clips[:n_clips] for frame in clip.frame_indices()][::STILL_EVERY]
+    frames = [frame for i in clip_indices for frame in opened.clips[i].frame_indices()][::STILL_EVERY]
     found: list[float | None] = []
     for camera in opened.capture.camera_indices(opened.project.settings.holdout):
         for frame, levels in render_frames(opened, camera_index=camera, frame_indices=frames):
@@ -151,10 +157,10 @@ def is_still(scene: SyntheticScene, camera_index: int, frame_index: int) -> np.n
     return np.logical_not(binary_dilation(is_moving, iterations=NEAR_MOTION_PX))
 
 
-def costs(opened: TrainedProject, n_clips: int) -> dict[str, Any]:
+def costs(opened: TrainedProject, clip_indices: Sequence[int]) -> dict[str, Any]:
     """Seconds, memory and bytes of the source clips, early ones against late ones; None where there are none."""
-    headers = [opened.header(i) for i in range(1, n_clips)]
-    sizes = [opened.project.clip_path(i).stat().st_size for i in range(1, n_clips)]
+    headers = [opened.header(i) for i in clip_indices[1:]]
+    sizes = [opened.project.clip_path(i).stat().st_size for i in clip_indices[1:]]
     seconds = [header.figures.seconds for header in headers if header.figures.seconds is not None]
     memory = [header.figures.memory_mb for header in headers if header.figures.memory_mb is not None]
     n = min(MOST_CLIPS, len(seconds) // 2)
@@ -208,6 +214,7 @@ def main() -> None:
     parser.add_argument("--changes", default=",".join(CHANGES), help="names, separated by commas")
     parser.add_argument("--frames", type=int, default=300)
     parser.add_argument("--clips", type=int, help="how many clips, from the first; all by default")
+    parser.add_argument("--every", type=int, default=1, help="only every n-th clip")
     parser.add_argument("--clip-length", type=int, default=10)
     parser.add_argument("--cameras", type=int, default=12)
     parser.add_argument("--width", type=int, default=160, help="of the pictures, which are 4:3")
@@ -235,10 +242,10 @@ def main() -> None:
             project = options.out / options.projects / f"{name}-seed{seed}"
             train(options.out / "captures" / name, project, seed, options)
             with ending_on_bad_input():
-                results.append(measure(project, scene, options.clips))
+                results.append(measure(project, scene, chosen_clips(options)))
         rows[name] = over_seeds(results)
         load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
-        size = f"{options.clips} clips of {options.clip_length} frames"
+        size = f"{len(chosen_clips(options))} of {n_clips} clips of {options.clip_length} frames"
         print(f"\n{size}, preset {options.preset}, {options.seeds} seeds{load}")
         print(table_text(compared(rows)), flush=True)
     if options.json:
