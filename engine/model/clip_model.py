@@ -403,7 +403,8 @@ def _read_light(state: ClipState, reference: ClipState) -> Tensor | None:
     record = state.anchors.get(STATIC)
     if record is None or record.light is None:
         return None
-    shape = (reference.header.n_anchors.get(STATIC, 0), 2)
+    inherited = reference.anchors.get(STATIC, AnchorRecord()).own
+    shape = (0 if inherited is None else len(inherited), 2)
     if record.light.shape != shape or record.light.dtype != np.float32 or not (np.abs(record.light) < 3.0).all():
         raise ValueError(f"light of static anchors is {record.light.dtype} {record.light.shape}, not float32 {shape}")
     return _tensor(record.light)

@@ -41,4 +41,6 @@ def with_features(model: ClipModel, features: Features) -> ClipModel:
         clip_length=model.clip_length,
         n_frames=model.n_frames,
         backend=model.backend,
+        light=model.light,
+        hidden=model.hidden,
     )

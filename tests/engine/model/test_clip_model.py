@@ -237,3 +237,50 @@ def test_every_head_changes_the_output():
         assert any(not torch.equal(a, b) for a, b in zip(before, after, strict=True)), head
         before = [tensor.clone() for tensor in after]
     assert np.isfinite(before[0].numpy()).all()
+
+
+def test_light_changes_static_colours_from_the_start_to_the_end_and_nothing_else():
+    reference = state_of(make_reference(), role="reference")
+    source = make_source(reference)
+    plain = {clip_time: source.decode(clip_time) for clip_time in (0.0, 0.5)}
+    source.light = torch.zeros(20, 2)
+    source.light[:8, 0], source.light[:8, 1] = 0.2, -0.4
+    n_lit, n_static = 8 * K, 20 * K
+    for clip_time, factor in ((0.0, np.exp(0.2)), (0.5, (np.exp(0.2) + np.exp(-0.4)) / 2)):
+        lit = source.decode(clip_time)
+        torch.testing.assert_close(lit.colors[:n_lit], plain[clip_time].colors[:n_lit] * float(factor))
+        assert torch.equal(lit.colors[n_lit:n_static], plain[clip_time].colors[n_lit:n_static])  # to the bit
+        assert torch.equal(lit.colors[n_static:], plain[clip_time].colors[n_static:])
+        assert torch.equal(lit.means, plain[clip_time].means)
+    assert source.has_light
+    assert not make_reference().has_light  # its static anchors learn
+
+
+def test_light_is_stored_and_comes_back():
+    reference = state_of(make_reference(), role="reference")
+    source = make_source(reference)
+    source.light = torch.linspace(-0.3, 0.3, 40).reshape(20, 2)
+    state = state_of(source, role="source", clip_index=1, reference=reference)
+    loaded = load_clip_model(state, reference, backend=backend_called("cpu"))
+    assert loaded.light is not None
+    assert torch.equal(loaded.light, source.light)
+    with torch.no_grad():
+        assert torch.equal(loaded.decode(0.5).colors, source.decode(0.5).colors)
+
+
+@pytest.mark.parametrize(
+    "light",
+    [
+        np.zeros((19, 2), np.float32),
+        np.zeros((20, 3), np.float32),
+        np.full((20, 2), np.nan, np.float32),
+        np.zeros((20, 2)),
+    ],
+    ids=["rows", "columns", "not finite", "float64"],
+)
+def test_light_that_does_not_fit_is_a_damaged_clip(light):
+    reference = state_of(make_reference(), role="reference")
+    state = state_of(make_source(reference), role="source", clip_index=1, reference=reference)
+    damaged = ClipState(state.arrays | {"inherited.static.light": light}, state.header)
+    with pytest.raises(ProjectError, match="light"):
+        load_clip_model(damaged, reference, backend=backend_called("cpu"))

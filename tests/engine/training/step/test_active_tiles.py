@@ -60,6 +60,32 @@ def test_the_same_is_learned_bit_for_bit(half, settings):
     assert 0.1 < np.mean(shares) < 0.9
 
 
+def lit(training: ClipTraining) -> ClipTraining:
+    """The same clip, in which the light on half of the static anchors changes from its start to its end."""
+    n_anchors = len(training.model.anchor_set("static"))
+    light = torch.rand(n_anchors, 2, generator=torch.Generator().manual_seed(3)) - 0.5
+    light[n_anchors // 2 :] = 0.0
+    training.model.light = light
+    return training
+
+
+def test_in_changing_light_pictures_are_those_of_all_tiles(half):
+    """Up to rounding: what lies outside is the mean of two pictures instead of the picture of mean colours."""
+    training = lit(half.prepared(1, source_steps=N_STEPS))
+    take_steps(training, 3)
+    for camera_row, clip_time, part in pictures_of(training):
+        view = training._views[training.camera_indices[camera_row]]
+        assert part.tile_mask is not None
+        assert part.rest is not None
+        outside = ~pixels_of(part.tile_mask, view.height, view.width)
+        with torch.no_grad():
+            whole = training.model.decode(clip_time, training._sight.rows(camera_row, clip_time))
+            image = render_gaussians(whole, view, backend=backend_called("cpu")).image[0]
+            drawn = render_gaussians(part.gaussians, view, tile_mask=part.tile_mask, backend=backend_called("cpu"))
+        found = torch.where(outside[..., None], part.rest, drawn.image[0])
+        torch.testing.assert_close(found, image, rtol=0.0, atol=2e-6)
+
+
 def test_loss_and_gradient_are_those_of_the_whole_picture_up_to_a_constant(half):
     changes = {}
     for tiles in ("all", "active"):
