@@ -35,12 +35,12 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
 
 def _inspect_capture(options: argparse.Namespace) -> int:
     """What a capture is, and how the exposure of its cameras changes."""
+    capture = open_capture(options.path, follow_links=options.follow_links)
     use_threads(None)
     from app.cli.exposure_lines import exposure_document, exposure_lines
     from engine.capture.capture_summary import describe
     from engine.cloud.background.exposure_survey import survey_exposure
 
-    capture = open_capture(options.path, follow_links=options.follow_links)
     found, survey = describe(capture), survey_exposure(capture)
     capture.close()
     if options.json:

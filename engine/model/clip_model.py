@@ -184,20 +184,30 @@ class ClipModel(nn.Module):
             )
             for role in self.roles()
         ]
-        return decode_anchors(chosen, self.decoder, self.field, self.knots(clip_time), backend=self.backend)
+        gaussians = decode_anchors(chosen, self.decoder, self.field, self.knots(clip_time), backend=self.backend)
+        if self.light is None or self.is_constant(STATIC):  # constant ones are lit already
+            return gaussians
+        lit_rows, k = chosen[0].rows, self.decoder.gaussians_per_anchor  # static anchors come first
+        n_lit, factors = k * len(lit_rows), self._light_factors(clip_time)[lit_rows].repeat_interleave(k)[:, None]
+        colors = torch.cat([gaussians.colors[:n_lit] * factors, gaussians.colors[n_lit:]])
+        return replace(gaussians, colors=colors)
 
     def constant_gaussians(self, role: str) -> Gaussians:
         """Gaussians of a whole set that `is_constant`, K per anchor, decoded at the first call."""
         if role not in self._frozen:
-            everything = ChosenAnchors(anchors=self.anchor_set(role), rows=self._all_rows(role))
-            with torch.no_grad():
-                self._frozen[role] = decode_anchors([everything], self.decoder, None, [(0, 1.0)], backend=self.backend)
+            self._frozen[role] = self.static_gaussians(role)
         return self._frozen[role]
+
+    @torch.no_grad()
+    def static_gaussians(self, role: str) -> Gaussians:
+        """Gaussians of a whole static set as it is now, in the light of the reference clip. K per anchor"""
+        everything = ChosenAnchors(anchors=self.anchor_set(role), rows=self._all_rows(role))
+        return decode_anchors([everything], self.decoder, None, [(0, 1.0)], backend=self.backend)
 
     @property
     def has_light(self) -> bool:
         """Whether light on what stands still differs from the reference clip's somewhere."""
-        return self.light is not None and self.is_constant(STATIC)
+        return self.light is not None
 
     def light_weights(self, clip_time: float) -> tuple[float, float]:
         """Weights of the light at the start and at the end of the clip."""
@@ -210,17 +220,24 @@ class ClipModel(nn.Module):
         gaussians = self.constant_gaussians(role)
         if role != STATIC or self.light is None:
             return gaussians
-        weights = self.light_weights(clip_time)
-        if weights[1] not in self._lit:
+        weight = self.light_weights(clip_time)[1]
+        if weight not in self._lit:
             if len(self._lit) > self.n_frames:  # times between frames, as playback asks for
                 self._lit.clear()
-            is_hidden = self.hidden.get(role)
-            light = self.light if is_hidden is None else self.light[~is_hidden]
-            factors = (torch.exp(light.to(gaussians.colors)) @ gaussians.colors.new_tensor(weights)).repeat_interleave(
-                self.decoder.gaussians_per_anchor
-            )
-            self._lit[weights[1]] = replace(gaussians, colors=gaussians.colors * factors[:, None])
-        return self._lit[weights[1]]
+            self._lit[weight] = self.in_light(gaussians, clip_time)
+        return self._lit[weight]
+
+    def in_light(self, gaussians: Gaussians, clip_time: float) -> Gaussians:
+        """Gaussians of all static anchors, K per anchor, in the light of a time of the clip."""
+        factors = self._light_factors(clip_time).repeat_interleave(self.decoder.gaussians_per_anchor)
+        return replace(gaussians, colors=gaussians.colors * factors[:, None])
+
+    def _light_factors(self, clip_time: float) -> Tensor:
+        """Of the static anchors. [A]"""
+        assert self.light is not None
+        is_hidden, features = self.hidden.get(STATIC), self.anchor_set(STATIC).features
+        light = (self.light if is_hidden is None else self.light[~is_hidden]).to(features.device, features.dtype)
+        return torch.exp(light) @ features.new_tensor(self.light_weights(clip_time))
 
     def anchors(self, clip_time: float | None = None) -> AnchorView:
         """Positions for display: all, or those that exist at a time of the clip, in [0, 1)."""

@@ -28,6 +28,8 @@ AGREED_LOG = 0.03
 """Cameras agree within this of their median, log brightness."""
 AGREED_SHARE = 0.6
 N_NEIGHBORS = 24
+ALIKE_LOG = 0.05
+"""Neighbours that differ by more than this lie in another light; an anchor alone scatters by 0.015."""
 MIN_KNOWN_SHARE = 0.25
 """Of the neighbours; where fewer are known, the brightness is left as it was."""
 NO_CHANGE = 0.005
@@ -35,7 +37,7 @@ NO_CHANGE = 0.005
 real capture scatter by 0.003 where nothing changes."""
 LARGEST_LOG = 0.7
 JUMP_LOG = 0.02
-"""Sides of a border that differ by more than this differ in truth."""
+"""Instants that differ by more than this differ in truth."""
 HIDDEN = -1
 BEHIND_SHARE = 0.03
 """Anchors that lie further behind the nearest one, as a share of its depth, are hidden."""
@@ -103,6 +105,23 @@ def joined(before: np.ndarray, after: np.ndarray, *, own: np.ndarray) -> np.ndar
     return np.where(np.abs(before - after) < JUMP_LOG, (before + after) / 2, own)
 
 
+def steady(first: np.ndarray, half_way: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Light at the start and the end of a clip, where it goes evenly from one to the other: there half way agrees.
+
+    Elsewhere, as under a lamp that is switched on in between, what has to change is left to anchors that move: only as
+    much counts as there is at all three instants.
+
+    Args:
+        first, half_way, last: Log brightness. [A]
+    Returns:
+        [A, 2]
+    """
+    at_all = np.stack([first, half_way, last])
+    is_even = np.abs(half_way - (first + last) / 2) < JUMP_LOG
+    least = np.where((at_all > 0).all(0), at_all.min(0), np.where((at_all < 0).all(0), at_all.max(0), 0.0))
+    return np.stack([np.where(is_even, first, least), np.where(is_even, last, least)], axis=1).astype(first.dtype)
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _visible_pixels(points, projection, step, depths, pixels):
     """Writes in which working pixel each point lies that the camera sees unhidden by others. depths: infinite."""
@@ -157,10 +176,15 @@ def _agree(seen, ranked, values, n_agreed):
 
 
 def _smooth(near: np.ndarray, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Weighted mean over the nearest anchors; 0 where too few of them are known. [A] float32"""
-    total = weights[near].sum(1)
-    means = (values * weights)[near].sum(1) / np.maximum(total, 1e-9)
-    is_known = (weights[near] > 0).mean(1) >= MIN_KNOWN_SHARE
+    """Weighted mean over the nearest anchors that differ little; 0 where too few of them are known. [A] float32
+
+    Edges of a shadow stay edges: smeared, they would be a light that explains half of them.
+    """
+    around, of_each = values[near], weights[near]
+    is_like = (np.abs(around - values[:, None]) < ALIKE_LOG) | (weights == 0)[:, None]
+    is_known = (of_each > 0).mean(1) >= MIN_KNOWN_SHARE
+    of_each = of_each * is_like
+    means = (around * of_each).sum(1) / np.maximum(of_each.sum(1), 1e-9)
     return np.where(is_known, means, 0.0).astype(np.float32)
 
 

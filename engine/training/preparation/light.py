@@ -10,7 +10,7 @@ import torch
 from engine.camera.rig import CameraRig
 from engine.clip_files.roles import STATIC
 from engine.cloud.background.exposure import Exposure
-from engine.cloud.background.light import WINDOW_FRAMES, AnchorLight, joined
+from engine.cloud.background.light import WINDOW_FRAMES, AnchorLight, joined, steady
 from engine.model.clip_model import ClipModel
 from engine.model.clip_view import View, render_gaussians
 from engine.model.host_array import host_array
@@ -31,20 +31,21 @@ def measure_light(
     exposures: Sequence[Exposure] | None,
     report: ReportProgress,
 ) -> None:
-    """Give a model whose static anchors never change the light on them at the start and the end of its clip.
+    """Give a model that inherits static anchors as they are the light on them at the start and the end of its clip.
 
     Args:
-        model: Of a source clip; one whose static anchors learn stays as it is.
+        model: Of a clip; one whose static anchors learn, or change over time, stays as it is.
         pictures: Of the clip, in the exposure of the backgrounds.
         rig: Training cameras.
         backgrounds: What they see in the reference clip when nothing moves.
         exposures: That of each background; None where no camera's exposure is looked at.
         report: Gets one line.
     """
-    if not model.is_constant(STATIC):
+    anchors = model.anchor_set(STATIC)
+    if anchors.is_trainable or anchors.is_dynamic:
         return
     clip, n_frames = pictures.clip, pictures.capture.n_frames
-    points = host_array(model.anchor_set(STATIC).positions).astype(np.float64)
+    points = host_array(anchors.positions).astype(np.float64)
     measure = AnchorLight(points, rig, backgrounds.images)
 
     def light_in(start: int, stop: int) -> np.ndarray:
@@ -52,9 +53,11 @@ def measure_light(
 
     first = light_in(clip.start, clip.start + WINDOW_FRAMES)
     last = light_in(clip.stop - WINDOW_FRAMES, clip.stop)
+    middle = (clip.start + clip.stop - WINDOW_FRAMES) // 2
+    half_way = light_in(middle, middle + WINDOW_FRAMES)
     before = light_in(clip.start - WINDOW_FRAMES, clip.start) if clip.start > 0 else first
     after = light_in(clip.stop, clip.stop + WINDOW_FRAMES) if clip.stop < n_frames else last
-    logs = np.stack([joined(before, first, own=first), joined(last, after, own=last)], axis=1)
+    logs = steady(joined(before, first, own=first), half_way, joined(last, after, own=last))
     share = 100 * float((logs != 0).any(1).mean())
     if share:
         model.light = torch.from_numpy(logs)
@@ -93,9 +96,10 @@ def brightness_in(model: ClipModel, views: Sequence[View]) -> Callable[[int, int
 
 
 def _light_in(model: ClipModel, view: View, clip_time: float) -> np.ndarray:
+    still = model.static_gaussians(STATIC)
     with torch.no_grad():
         plain, lit = (
             host_array(render_gaussians(gaussians, view, backend=model.backend).image[0]).sum(-1, keepdims=True)
-            for gaussians in (model.constant_gaussians(STATIC), model.lit_gaussians(STATIC, clip_time))
+            for gaussians in (still, model.in_light(still, clip_time))
         )
     return np.where(plain > _DARK, lit / np.maximum(plain, _DARK), 1.0).astype(np.float32)

@@ -64,17 +64,17 @@ def train(
 @pytest.fixture(scope="module")
 def by_kernels(tiny, tmp_path_factory) -> list[tuple[list[float], ClipState]]:
     """Clips 0 and 1 by the compiled kernels."""
-    folder = tmp_path_factory.mktemp("cpu")
+    folder = tmp_path_factory.getbasetemp() / "by_kernels"
     first = train(tiny, backend_called("cpu"), 0, None, folder)
     return [first, train(tiny, backend_called("cpu"), 1, first[1], folder)]
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64], ids=str)
-def test_plain_torch_learns_the_same_but_for_rounding(tiny, by_kernels, tmp_path, dtype):
+def test_plain_torch_learns_the_same_but_for_rounding(tiny, by_kernels, tmp_path, tmp_path_factory, dtype):
     backend = ReferenceBackend(dtype=dtype)
     reference = by_kernels[0][1]
     found = [train(tiny, backend, 0, None, tmp_path / "own")]
-    found.append(train(tiny, backend, 1, reference, tmp_path / "shared"))
+    found.append(train(tiny, backend, 1, reference, tmp_path_factory.getbasetemp() / "by_kernels"))
     for (losses, state), (expected_losses, expected) in zip(found, by_kernels, strict=True):
         # float32 differs from step to step by 1e-6, and a hundred times that after steps of Adam along its sign
         assert losses == pytest.approx(expected_losses, rel=1e-3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from safetensors.numpy import load_file
 
@@ -23,8 +24,11 @@ def still(tiny, monkeypatch):
     images = load_file(tiny.prep_dir / BACKGROUNDS_FILE)["images"]
 
     class StillPictures(TrainingPictures):
-        def raw(self, camera_row, frame_in_clip):
+        def picture(self, camera_row, frame_in_clip):
             return images[camera_row]
+
+        def of_camera(self, camera_row):
+            return np.stack([images[camera_row]] * self.clip.n_frames)
 
     monkeypatch.setattr(clip_preparation, "TrainingPictures", StillPictures)
     return tiny.prepared(1)

@@ -94,6 +94,7 @@ def make_tiny(folder: Path, built_once: BuiltOnce, *, scale: float = 0.25) -> Ti
         training = make_training(capture, holdout, clip=clips[0], reference=None, prep_dir=folder / "prep")
         training.prepare()
         write_clip_state(folder / "reference.safetensors", finish(training))
+        training.finish()  # keeps the backgrounds
 
     built_once.copy(f"tiny-{scale}", folder, train, sources=["tests/engine/training/tiny_training.py"])
     return Tiny(capture, clips, holdout, folder / "prep", read_clip_state(folder / "reference.safetensors"))
