@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-REFERENCE_STAGES = ("Reading pictures", "Looking for what stands still", "Building the static cloud")
+REFERENCE_STAGES = (
+    "Reading pictures",
+    "Measuring exposure",
+    "Looking for what stands still",
+    "Building the static cloud",
+)
 SOURCE_STAGES = (
     "Reading pictures",
     "Taking over the reference",
+    "Measuring exposure",
+    "Measuring light",
     "Finding what moves",
     "Carving what moves",
     "Comparing with the reference",
