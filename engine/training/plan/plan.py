@@ -358,9 +358,8 @@ def _distance_lines(clip: Clip, reference: ClipHeader | None, exposure: tuple[fl
     lines = []
     if reference is not None:
         distance = abs(clip.clip_index - reference.clip_index)
-        lines.append(
-            PlanLine("distance", distance, "clips", f"from clip {reference.clip_index}, which it inherits from")
-        )
+        reason = f"from clip {reference.clip_index}, which it inherits from"
+        lines.append(PlanLine("distance", distance, "clip" if distance == 1 else "clips", reason))
     if exposure is not None:
         low, high = (round(100 * share, 1) + 0.0 for share in exposure)
         shown = "unchanged" if low == high == 0 else f"{low:+.1f} to {high:+.1f} %"
