@@ -182,8 +182,7 @@ class Playback:
         colors = None if request is None else self.decoder.colors(request)
         if request is None or colors is None:
             return None
-        clip_time = request.clip.clip_time(request.frame_index)
-        gain = colors.gain(opened.rig.names[camera_index]) * colors.exposure(opened.rig, camera_index, clip_time)
+        gain = colors.whole_gain(opened.rig, camera_index, request.clip.clip_time(request.frame_index))
         return None if (gain == 1.0).all() else (float(gain[0]), float(gain[1]), float(gain[2]))
 
     # ---------------------------------------------------------------- threads

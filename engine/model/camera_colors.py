@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.camera.rig import CameraRig
-from engine.images.exposure_curve import to_camera, to_reference
+from engine.images.exposure_curve import to_camera
 
 RIDGE = 0.3
 """Weight of the penalty on slopes, in cameras: chosen on the training cameras of a real capture, each left out once,
@@ -61,13 +61,10 @@ class CameraColors:
 
     def in_camera(self, image: np.ndarray, rig: CameraRig, camera: int, clip_time: float) -> np.ndarray:
         """A picture in the scene's colours as the camera takes it, white staying white. [H, W, 3] float"""
-        return to_camera(image, self._whole_gain(rig, camera, clip_time))
+        return to_camera(image, self.whole_gain(rig, camera, clip_time))
 
-    def in_scene(self, pixels: np.ndarray, rig: CameraRig, camera: int, clip_time: float) -> np.ndarray:
-        """What a camera took in the scene's colours, rounded. [H, W, 3] uint8"""
-        return to_reference(pixels, self._whole_gain(rig, camera, clip_time))
-
-    def _whole_gain(self, rig: CameraRig, camera: int, clip_time: float) -> np.ndarray:
+    def whole_gain(self, rig: CameraRig, camera: int, clip_time: float) -> np.ndarray:
+        """Gain and exposure together, for engine.images.exposure_curve. [3] float32"""
         return self.gain(rig.names[camera]) * self.exposure(rig, camera, clip_time)
 
 

@@ -158,7 +158,10 @@ def _log_gain(picture, look, ratios, counts, logs):
 
 def without_noise(gains: np.ndarray) -> np.ndarray:
     """Gains whose smallest changes are none, see NO_CHANGE: of the same dtype, exactly 1 where nothing changes."""
-    logs = np.log(gains.astype(np.float64))
+    return np.exp(without_smallest(np.log(gains.astype(np.float64)), NO_CHANGE)).astype(gains.dtype)
+
+
+def without_smallest(logs: np.ndarray, limit: float) -> np.ndarray:
+    """Firm shrinkage: values up to a limit become 0, from twice the limit on they stay, nothing jumps in between."""
     size = np.abs(logs)
-    kept = np.sign(logs) * np.clip(2.0 * (size - NO_CHANGE), 0.0, size)
-    return np.exp(kept).astype(gains.dtype)
+    return np.sign(logs) * np.clip(2.0 * (size - limit), 0.0, size)

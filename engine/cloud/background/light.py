@@ -18,7 +18,7 @@ from scipy.spatial import KDTree
 
 from engine.camera.projection import projection_matrices
 from engine.camera.rig import CameraRig
-from engine.cloud.background.exposure import BRIGHTEST, DARKEST, at_working_size
+from engine.cloud.background.exposure import BRIGHTEST, DARKEST, at_working_size, without_smallest
 from engine.parallel import map_ordered, n_cores
 
 WINDOW_FRAMES = 3
@@ -91,7 +91,8 @@ class AnchorLight:
         seen = np.stack(map_ordered(seen_by, range(n_cameras)))  # [C, A]
         values, n_agreed = np.zeros((2, n_points), np.float32)
         _agree(seen, np.empty(n_cameras, np.float32), values, n_agreed)
-        return _without_noise(_smooth(self._near, values, n_agreed))
+        smooth = np.clip(_smooth(self._near, values, n_agreed), -LARGEST_LOG, LARGEST_LOG)
+        return without_smallest(smooth, NO_CHANGE).astype(np.float32)
 
 
 def joined(before: np.ndarray, after: np.ndarray, *, own: np.ndarray) -> np.ndarray:
@@ -186,8 +187,3 @@ def _smooth(near: np.ndarray, values: np.ndarray, weights: np.ndarray) -> np.nda
     of_each = of_each * is_like
     means = (around * of_each).sum(1) / np.maximum(of_each.sum(1), 1e-9)
     return np.where(is_known, means, 0.0).astype(np.float32)
-
-
-def _without_noise(logs: np.ndarray) -> np.ndarray:
-    size = np.minimum(np.abs(logs), LARGEST_LOG)
-    return (np.sign(logs) * np.clip(2.0 * (size - NO_CHANGE), 0.0, size)).astype(np.float32)

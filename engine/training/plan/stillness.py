@@ -44,11 +44,14 @@ def looks_still(
     last = clip.n_frames - 1
     instants = dict.fromkeys((last // 2, last, 0))  # each once; most motion shows in the first picture or two
     return not any(
-        motion_mask(_in_exposure_of(background, capture.frame(camera, clip.start + instant)), background).any()
+        motion_mask(_seen(capture.frame(camera, clip.start + instant), background, config), background).any()
         for instant in instants
         for camera, background in zip(camera_indices, backgrounds.images, strict=True)
     )
 
 
-def _in_exposure_of(background: np.ndarray, picture: np.ndarray) -> np.ndarray:
+def _seen(picture: np.ndarray, background: np.ndarray, config: TrainConfig) -> np.ndarray:
+    """The picture as training compares it: in the background's exposure, where exposure counts."""
+    if config.color == "off":
+        return picture
     return Exposure.of_background(background).applied_to(picture[None])[0]
