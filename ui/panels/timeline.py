@@ -366,7 +366,7 @@ def _draw_playhead(draw: imgui.ImDrawList, track: Rect, frame_index: int, n_fram
     draw.add_line_v(x, track.y0 + 10, track.y1, white, 2)
     flag = _flag_rect(track, frame_index, n_frames)
     draw.add_rect_filled(flag.low, flag.high, white, 3)
-    draw.add_text(ImVec2(flag.x0 + 6, track.y0 + 1), theme.u32(theme.VOID), str(frame_index))
+    draw.add_text(ImVec2(flag.x0 + 6, track.y0 + 1), theme.u32(theme.TEXT_ON_PLAYHEAD), str(frame_index))
     ui.mark_rect("timeline.playhead", flag)
 
 

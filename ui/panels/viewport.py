@@ -21,6 +21,7 @@ from ui.panels.toolbar import TOOLBAR_HEIGHT, draw_toolbar
 from ui.panels.welcome import WelcomeNeeds, draw_welcome
 from ui.panels.widgets import chip
 from ui.style import theme
+from ui.style.theme import ON_PICTURE
 from ui.viewport.hud_text import captured_words, pane_text
 from ui.viewport.region_layer import ShownRegions
 from ui.viewport.scene import Scene, SceneNeeds, SceneView
@@ -189,7 +190,7 @@ class ViewportPanel:
             else pane_text(captured_words(captured.has_scene_colors), *frames)
         )
         rendered_words = pane_text(shown.kind, *frames[::-1])
-        color = theme.YELLOW if None not in frames and frames[0] != frames[1] else theme.TEXT
+        color = ON_PICTURE.yellow if None not in frames and frames[0] != frames[1] else ON_PICTURE.text
         if session.overlays.compare == "side":
             if captured is not None:
                 draw.add_image(imgui.ImTextureRef(captured.texture.glo), area.low, area.high)
@@ -202,7 +203,7 @@ class ViewportPanel:
             draw.add_image(
                 imgui.ImTextureRef(captured.texture.glo), area.low, ImVec2(x, area.y1), ImVec2(0, 0), ImVec2(share, 1)
             )
-        white = theme.u32(theme.PLAYHEAD)
+        white = theme.u32(ON_PICTURE.playhead)
         draw.add_line_v(x, area.y0, area.y1, white, 2)
         middle = area.center[1]
         draw.add_circle_filled(ImVec2(x, middle), 9, white)
