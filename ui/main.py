@@ -133,6 +133,7 @@ def _run_window(options: argparse.Namespace) -> int:
     # Sizes are pixels of the screen, of which ui.style.ui_scale makes units; on macOS they are the system's points.
     pyglet.options.dpi_scaling = "stretch" if sys.platform == "darwin" else "real"
     from app.session.commands import OpenCapture
+    from app.session.preferences import PreferencesFile
     from app.session.session import Session
     from app.session.window_memory import read_window_memory
     from ui.shell.window import StudioWindow
@@ -142,7 +143,7 @@ def _run_window(options: argparse.Namespace) -> int:
     if "ui_scale" in options:
         memory.ui_scale = options.ui_scale
     session = Session()
-    window = StudioWindow(session, width=width, height=height, memory=memory)
+    window = StudioWindow(session, width=width, height=height, memory=memory, preferences=PreferencesFile())
     try:
         if options.path is not None:
             session.dispatch(OpenCapture(options.path, follow_links=options.follow_links))

@@ -44,6 +44,7 @@ class WindowMemory:
         layout: Where the panels are, as text of ImGui's; empty before the first time.
         mark_size, mark_opacity: Of anchor marks; None where none was chosen.
         views: By project folder, the one used last at the end; see `view_of` and `show_again`.
+        failure: Why the file could not be written; empty while it could.
     """
 
     path: Path
@@ -55,7 +56,7 @@ class WindowMemory:
     mark_opacity: float | None = None
     views: dict[str, dict[str, Any]] = field(default_factory=dict)
     _saved: dict[str, Any] = field(default_factory=dict, repr=False)
-    _has_failed: bool = False
+    failure: str = ""
 
     def keep_view(self, folder: str, view: dict[str, Any]) -> None:
         """Keep what was looked at in a project; the one that was not used for longest is forgotten."""
@@ -81,9 +82,9 @@ class WindowMemory:
         try:
             write_checked_json(self.path, document)
         except (OSError, EngineError) as error:
-            level = logging.DEBUG if self._has_failed else logging.WARNING  # once is enough
+            level = logging.DEBUG if self.failure else logging.WARNING  # once is enough
             logger.log(level, "the look of the window could not be kept (%s) - %s", error, self.path)
-            self._has_failed = True
+            self.failure = getattr(error, "strerror", None) or str(error)
         self._saved = document
 
 

@@ -11,7 +11,10 @@ from dataclasses import dataclass, field
 from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import Command
+from app.session.preferences import Preferences
 from ui.gl.image import Rect as PixelRect
+from ui.panels.actions.key_map import KeyMap
+from ui.panels.wishes import Wishes
 from ui.style.theme import Fonts
 from ui.style.ui_scale import UiScale
 from ui.viewport.region_tool import RegionTool
@@ -19,6 +22,9 @@ from ui.viewport.region_tool import RegionTool
 VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
 PANELS = (CAPTURE, TRAINING, REGIONS, TIMELINE)
 """Titles of the panels around the picture."""
+LAYOUT_WORDS = {"Standard": "as in the beginning", "Long capture": "with a tall timeline, for long captures"}
+LAYOUTS = tuple(LAYOUT_WORDS)
+"""Layouts of the panels that the program brings; the first is the one to begin with."""
 Dispatch = Callable[[Command], None]
 """Takes one command of app.session.commands."""
 
@@ -54,6 +60,11 @@ class UiState:
     Attributes:
         fonts: Loaded faces.
         scale: How large everything is drawn.
+        preferences: Of the user; changed in place.
+        keys: Which keys run which action.
+        wishes: What is asked of the shell.
+        is_picture_only: Are the panels around the picture hidden?
+        keyed_panel: Title of the panel that arrow keys, Enter and Space belong to, or None.
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
         regions: The region that is being chosen, and the one that stands out.
         is_popup_open: Is a menu or another popup open, so that keys belong to it?
@@ -66,11 +77,16 @@ class UiState:
 
     fonts: Fonts = field(default_factory=Fonts)
     scale: UiScale = field(default_factory=UiScale)
+    preferences: Preferences = field(default_factory=Preferences)
+    keys: KeyMap = field(default_factory=KeyMap)
+    wishes: Wishes = field(default_factory=Wishes)
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
     wanted_panel: str | None = None
     is_quality_open: bool = False
     is_quality_seen: bool = False
+    is_picture_only: bool = False
+    keyed_panel: str | None = None
     is_help_open: bool = False
     is_popup_open: bool = False
     is_menu_wanted: bool = False

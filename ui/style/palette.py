@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 from ui.style import colors
 from ui.style.colors import Color, rgb
@@ -113,8 +114,8 @@ DARK = Palette(
     grid=rgb(255, 255, 255, 0.10),
     stripe=rgb(255, 255, 255, 0.02),
     shade=rgb(0, 0, 0, 0.45),
-    untrained=rgb(96, 104, 118),
-    queued=rgb(126, 134, 148),
+    untrained=rgb(139, 147, 161),
+    queued=rgb(150, 159, 173),
     held_out=rgb(214, 137, 180),
 )
 
@@ -146,8 +147,8 @@ LIGHT = Palette(
     grid=rgb(0, 0, 0, 0.10),
     stripe=rgb(0, 0, 0, 0.03),
     shade=rgb(0, 0, 0, 0.30),
-    untrained=rgb(128, 136, 148),
-    queued=rgb(104, 112, 126),
+    untrained=rgb(94, 102, 114),
+    queued=rgb(80, 88, 100),
     inherited=_SKY,
     residual=_ORANGE,
     held_out=_PURPLE,
@@ -161,6 +162,12 @@ LIGHT = Palette(
     },
     region_colors={"static": _SKY, "dynamic": _VERMILLION},
 )
+THEMES: dict[Literal["dark", "light", "system"], str] = {
+    "dark": "dark",
+    "light": "light",
+    "system": "as the desktop",
+}
+"""What can be chosen, and its words."""
 PALETTES = {palette.name: palette for palette in (DARK, LIGHT)}
 
 

@@ -14,6 +14,7 @@ import imgui_bundle
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
 from ui.style.colors import Color
+from ui.style.colors import rgb as rgb  # looked up as theme.rgb by the panels
 from ui.style.palette import DARK, PALETTES, Palette, contrast
 
 logger = logging.getLogger(__name__)

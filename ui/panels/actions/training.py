@@ -27,6 +27,10 @@ def _stop_training(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> Non
         dispatch(StopTraining())
 
 
+def _nothing_trains(session: ActionNeeds) -> str:
+    return "Nothing is being trained." if session.training.state in ("idle", "failed", "stopping") else ""
+
+
 def _toggle_quality(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_quality_open = not ui.is_quality_open
     if ui.is_quality_open:
@@ -36,5 +40,5 @@ def _toggle_quality(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> No
 ACTIONS = (
     Action("train.quality", "Quality over clips, in the training panel", TRAIN, _toggle_quality, keys=("6",)),
     Action("train.next", "Train the next clip, pause or resume", TRAIN, _train, keys=("T",)),
-    Action("train.stop", "Stop training and keep what was learned", TRAIN, _stop_training, keys=("Ctrl+T",)),
+    Action("train.stop", "Stop training and keep what was learned", TRAIN, _stop_training, keys=("Ctrl+T",), lacks=_nothing_trains),
 )

@@ -1,0 +1,151 @@
+"""What the palette offers: every action of the table, and what depends on what is open: projects, cameras, clips, kept
+layouts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from app.session.commands import LookThrough, SetFrame
+from engine.capture.clip import Clip
+from engine.text import one_line
+from ui.panels.actions.action import ActionNeeds
+from ui.panels.actions.table import ACTIONS
+from ui.panels.state import Dispatch, UiState
+from ui.panels.welcome import WelcomeNeeds, open_recent
+from ui.shell.fuzzy import match
+
+MOST_SHOWN = 200
+"""Entries that are listed; who wants another one types more."""
+
+
+class PaletteNeeds(ActionNeeds, WelcomeNeeds, Protocol):
+    """What the palette reads."""
+
+    @property
+    def clips(self) -> Sequence[Clip]: ...
+
+
+Run = Callable[[PaletteNeeds, Dispatch, UiState], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One thing to choose.
+
+    Attributes:
+        id: Its name among those that were used lately.
+        text: What it does.
+        group: What it belongs to.
+        keys: Its keys as text; empty where it has none.
+        why_not: Why it cannot be run now; empty when it can.
+    """
+
+    id: str
+    text: str
+    group: str
+    run: Run
+    keys: str = ""
+    why_not: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """An entry that what was typed stands for, and which letters of its text were meant."""
+
+    entry: Entry
+    positions: tuple[int, ...] = ()
+
+
+def entries(session: PaletteNeeds, ui: UiState) -> list[Entry]:
+    """Everything there is to choose now: actions in the order of their table, then the rest."""
+    actions = [
+        Entry(
+            action.id, action.text, action.group, action.run, ", ".join(ui.keys.labels(action)), action.why_not(session, ui)
+        )
+        for action in ACTIONS
+        if action.id != "window.palette"
+    ]
+    return [*actions, *_layouts(ui), *_projects(session), *_cameras(session), *_clips(session)]
+
+
+def found(typed: str, offered: Sequence[Entry], used: Sequence[str]) -> list[Found]:
+    """What was typed as entries, best first; without anything typed, those used lately come first.
+
+    Args:
+        used: Ids of entries used lately, newest first.
+    """
+    rank = {entry_id: index for index, entry_id in enumerate(used)}
+    if not typed.strip():
+        order = sorted(offered, key=lambda entry: rank.get(entry.id, len(rank)))
+        return [Found(entry) for entry in order[:MOST_SHOWN]]
+    hits = []
+    for place, entry in enumerate(offered):
+        hit = match(typed, f"{entry.text} {entry.group}")
+        if hit is not None:
+            n = len(entry.text)
+            positions = tuple(position for position in hit.positions if position < n)
+            is_meant = len(positions) == len(hit.positions)
+            # an entry that cannot be run, or is found by its group alone, gives way to one that matches as well
+            score = hit.score - (0.0 if is_meant else 2.0) - (1.0 if entry.why_not else 0.0)
+            hits.append((-score, rank.get(entry.id, len(rank)), place, Found(entry, positions)))
+    return [hit[3] for hit in sorted(hits, key=lambda hit: hit[:3])[:MOST_SHOWN]]
+
+
+def _projects(session: PaletteNeeds) -> list[Entry]:
+    def opening(index: int) -> Run:
+        recent = session.recent.entries[index]
+        return lambda session, dispatch, ui: dispatch(open_recent(recent))
+
+    return [
+        Entry(
+            f"open:{recent.folder}",
+            f"Open {one_line(recent.name)}",
+            "Recent projects",
+            opening(index),
+            why_not="It is not there any more." if recent.folder in session.recent.missing else "",
+        )
+        for index, recent in enumerate(session.recent.entries)
+    ]
+
+
+def _cameras(session: PaletteNeeds) -> list[Entry]:
+    def looking(camera_index: int | None) -> Run:
+        return lambda session, dispatch, ui: dispatch(LookThrough(camera_index))
+
+    if session.capture is None:
+        return []
+    free = Entry("camera:", "Free view", "Cameras", looking(None))
+    names = session.rig.names
+    return [free, *(Entry(f"camera:{n}", f"Go to camera {one_line(n)}", "Cameras", looking(i)) for i, n in enumerate(names))]
+
+
+def _clips(session: PaletteNeeds) -> list[Entry]:
+    def going(frame_index: int) -> Run:
+        return lambda session, dispatch, ui: dispatch(SetFrame(frame_index))
+
+    return [
+        Entry(f"clip:{clip.clip_index}", f"Go to clip {clip.clip_index}", "Clips", going(clip.start))
+        for clip in session.clips
+    ]
+
+
+def _layouts(ui: UiState) -> list[Entry]:
+    def showing(name: str) -> Run:
+        def show(session: PaletteNeeds, dispatch: Dispatch, ui: UiState) -> None:
+            ui.wishes.layout = name
+
+        return show
+
+    def removing(name: str) -> Run:
+        def remove(session: PaletteNeeds, dispatch: Dispatch, ui: UiState) -> None:
+            ui.wishes.layout_removed = name
+
+        return remove
+
+    names = list(ui.preferences.layouts)
+    shown = [Entry(f"layout:{name}", f"Layout: {one_line(name)}", "Window", showing(name)) for name in names]
+    removed = [Entry(f"layout removed:{name}", f"Remove the layout {one_line(name)}", "Window", removing(name)) for name in names]
+    return [*shown, *removed]
