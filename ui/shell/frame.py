@@ -153,6 +153,7 @@ class Frame:
         self._failed_panels: set[str] = set()
         self._floating_panels: set[str] = set()
         self._dock_ids: dict[str, int] = {}
+        self._is_welcome = False
         self._panels: tuple[tuple[str, Callable[[FrameNeeds, Dispatch, UiState], None], bool], ...] = (
             (VIEWPORT, self.viewport.draw, False),
             (CAPTURE, self.capture.draw, True),
@@ -262,6 +263,9 @@ class Frame:
             ui.wanted_panel = TRAINING  # of the two that lie over each other
             lay_out(dock_id, layout or LAYOUTS[0])
             self._redraw.request(FIRST_FRAMES)
+        elif (is_welcome := session.capture is None) != self._is_welcome:
+            self._is_welcome = is_welcome
+            ui.wanted_panel = VIEWPORT if is_welcome else ui.wanted_panel  # its list is moved in by arrow keys
         step_panel(ui)
         self._dock_ids.clear()
         for title, draw_panel, has_padding in self._panels:
@@ -316,7 +320,7 @@ class Frame:
         is_visible, _ = imgui.begin(title, None, flags)
         if is_bare:
             imgui.pop_style_color()
-        if is_wanted and self.ui.keyed_panel == title:
+        if is_wanted and (self.ui.keyed_panel == title or (title == VIEWPORT and self._is_welcome)):
             imgui.internal.nav_init_window(imgui.internal.get_current_window(), True)
             imgui.set_nav_cursor_visible(True)
         (self._floating_panels.discard if imgui.is_window_docked() else self._floating_panels.add)(title)

@@ -19,6 +19,8 @@ from ui.shell.fuzzy import match
 
 MOST_SHOWN = 200
 """Entries that are listed; who wants another one types more."""
+FOUND_BY_GROUP, CANNOT_BE_RUN = 2.0, 1.0
+"""By how much such entries give way to others that match as well."""
 
 
 class PaletteNeeds(ActionNeeds, WelcomeNeeds, Protocol):
@@ -83,14 +85,16 @@ def found(typed: str, offered: Sequence[Entry], used: Sequence[str]) -> list[Fou
         return [Found(entry) for entry in order[:MOST_SHOWN]]
     hits = []
     for place, entry in enumerate(offered):
-        hit = match(typed, f"{entry.text} {entry.group}")
-        if hit is not None:
-            n = len(entry.text)
-            positions = tuple(position for position in hit.positions if position < n)
-            is_meant = len(positions) == len(hit.positions)
-            # an entry that cannot be run, or is found by its group alone, gives way to one that matches as well
-            score = hit.score - (0.0 if is_meant else 2.0) - (1.0 if entry.why_not else 0.0)
-            hits.append((-score, rank.get(entry.id, len(rank)), place, Found(entry, positions)))
+        hit = match(typed, entry.text)
+        score = 0.0 if hit is None else hit.score
+        if hit is None:
+            hit = match(typed, f"{entry.text} {entry.group}")
+            if hit is None:
+                continue
+            score = hit.score - FOUND_BY_GROUP
+        score -= CANNOT_BE_RUN if entry.why_not else 0.0
+        positions = tuple(position for position in hit.positions if position < len(entry.text))
+        hits.append((-score, rank.get(entry.id, len(rank)), place, Found(entry, positions)))
     return [hit[3] for hit in sorted(hits, key=lambda hit: hit[:3])[:MOST_SHOWN]]
 
 
