@@ -133,7 +133,7 @@ class Frame:
         self.ui = UiState(fonts=theme.load_fonts(), scale=self.scale, preferences=values, keys=keys)
         self._theme = ThemeInUse()
         self._theme.follow(values.theme)
-        self.viewport = ViewportPanel(Scene(ctx))
+        self.viewport = ViewportPanel(lambda: Scene(ctx))
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
         self.notices = NoticesPanel()
         self.dialog = OpenFolderDialog()
