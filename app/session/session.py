@@ -251,6 +251,7 @@ class Session:
         if found.project is None:  # it is open already
             self.view.home()
             return
+        self._keep_recent()  # the one that is left
         generation = 1 if self.opened is None else self.opened.generation + 1
         opened = opened_project(found.capture, found.project, generation)
         self.marking.open(found.project)  # first: keeps what was marked in the project that is left
@@ -273,6 +274,8 @@ class Session:
     def _keep_recent(self) -> None:
         if self.opened is not None and self.live_training.service is not None:
             self.recent.keep(self.opened, self.live_training.service.catalog)
+            if self._is_preloading:
+                self.recent.pictures.keep(self.opened, self.shown_gaussians(), self.view)
 
     def _fail(self, job_name: str, error: Exception) -> None:
         self.notices.add_failure(f"{job_name} has failed", error)
@@ -303,7 +306,8 @@ class Session:
     def _news_key(self) -> tuple[object, ...]:
         """Differs whenever a thread has finished something, or there is something else to tell."""
         jobs = tuple((job.name, job.done, job.message) for job in self.jobs)
-        return self.playback.finished, self.live_training.finished, jobs, self.notices.revision, self.recent.missing
+        finished = self.playback.finished, self.live_training.finished, self.recent.pictures.revision
+        return *finished, jobs, self.notices.revision, self.recent.missing
 
     def _release_snapshot(self) -> None:
         """Give a snapshot back once it was read, or where nobody looks at its clip."""

@@ -15,7 +15,7 @@ from app.session.preferences import Preferences
 from ui.gl.image import Rect as PixelRect
 from ui.panels.actions.key_map import KeyMap
 from ui.panels.wishes import Wishes
-from ui.style.theme import Fonts
+from ui.style.fonts import Fonts
 from ui.style.ui_scale import UiScale
 from ui.viewport.region_tool import RegionTool
 

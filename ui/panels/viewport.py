@@ -12,6 +12,7 @@ from app.session.commands import ActivateView
 from ui.panels.hud import Hud
 from ui.panels.panes import view_areas
 from ui.panels.picture_pane import PictureNeeds, PicturePane
+from ui.panels.recent_rows import RecentRows
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.toolbar import TOOLBAR_HEIGHT, ToolbarNeeds, draw_toolbar
 from ui.panels.welcome import WelcomeNeeds, draw_welcome
@@ -36,7 +37,8 @@ class ViewportPanel:
         make_scene: Makes what one picture is drawn with. GL thread only.
     """
 
-    def __init__(self, make_scene: Callable[[], Scene]) -> None:
+    def __init__(self, make_scene: Callable[[], Scene], recent_rows: RecentRows) -> None:
+        self.recent_rows = recent_rows
         self._make_scene = make_scene
         self._panes = [PicturePane(make_scene())]
         self._active = 0
@@ -45,6 +47,7 @@ class ViewportPanel:
         """Free GL objects. GL thread only."""
         for pane in self._panes:
             pane.release()
+        self.recent_rows.release()
 
     @property
     def active(self) -> PicturePane:
@@ -87,7 +90,7 @@ class ViewportPanel:
         area = Rect(start.x, start.y, start.x + room.x, start.y + room.y)
         if session.capture is None:
             imgui.get_window_draw_list().add_rect_filled(area.low, area.high, theme.u32(theme.VOID))
-            draw_welcome(session, dispatch, ui, area)
+            draw_welcome(session, dispatch, ui, area, self.recent_rows)
             return
         bar = Rect(area.x0, area.y0, area.x1, area.y0 + TOOLBAR_HEIGHT)
         imgui.get_window_draw_list().add_rect_filled(bar.low, bar.high, theme.u32(theme.PANEL))

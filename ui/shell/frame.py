@@ -24,6 +24,7 @@ from ui.panels.actions.table import ACTIONS, handle_keys
 from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.notices import NoticesNeeds, NoticesPanel
 from ui.panels.panel_keys import step_panel
+from ui.panels.recent_rows import RecentRows
 from ui.panels.regions import draw_regions
 from ui.panels.state import CAPTURE, LAYOUTS, REGIONS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
 from ui.panels.timeline import TimelineNeeds, draw_timeline
@@ -43,6 +44,7 @@ from ui.shell.remembering import Remembering, RememberNeeds
 from ui.shell.status_bar import HEIGHT as STATUS_BAR_HEIGHT
 from ui.shell.status_bar import StatusNeeds, draw_status_bar
 from ui.style import theme
+from ui.style.fonts import load_fonts
 from ui.style.theme_in_use import ThemeInUse
 from ui.style.ui_scale import UiScale
 from ui.viewport.scene import Scene
@@ -130,10 +132,10 @@ class Frame:
         values = Preferences() if preferences is None else preferences.values
         keys = KeyMap(values.keys)
         keys.drop_unknown(ACTIONS)
-        self.ui = UiState(fonts=theme.load_fonts(), scale=self.scale, preferences=values, keys=keys)
+        self.ui = UiState(fonts=load_fonts(), scale=self.scale, preferences=values, keys=keys)
         self._theme = ThemeInUse()
         self._theme.follow(values.theme)
-        self.viewport = ViewportPanel(lambda: Scene(ctx))
+        self.viewport = ViewportPanel(lambda: Scene(ctx), RecentRows(lambda: ImageTexture(ctx)))
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
         self.notices = NoticesPanel()
         self.dialog = OpenFolderDialog()

@@ -13,8 +13,9 @@ from engine.capture.clip import Clip
 from engine.text import one_line
 from ui.panels.actions.action import ActionNeeds
 from ui.panels.actions.table import ACTIONS
+from ui.panels.recent_rows import open_recent
 from ui.panels.state import Dispatch, UiState
-from ui.panels.welcome import WelcomeNeeds, open_recent
+from ui.panels.welcome import WelcomeNeeds
 from ui.shell.fuzzy import match
 
 MOST_SHOWN = 200

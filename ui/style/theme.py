@@ -1,24 +1,17 @@
-"""Colours, fonts and spacing of the whole window. Draws nothing by itself.
+"""Colours, symbols and spacing of the whole window. Draws nothing by itself.
 
 The colours themselves are those of a palette (ui.style.palette), which can be changed while the window is open.
 """
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
 
-import imgui_bundle
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
 from ui.style.colors import Color
 from ui.style.colors import rgb as rgb  # looked up as theme.rgb by the panels
 from ui.style.palette import DARK, PALETTES, Palette, contrast
-
-logger = logging.getLogger(__name__)
-
 
 def faded(color: Color, alpha: float) -> Color:
     """The same hue at another opacity."""
@@ -134,37 +127,6 @@ CLIP_ICONS: dict[str, str] = {
     "stale": Icon.CLOCK_BACK,
     "damaged": Icon.BROKEN,
 }
-
-
-@dataclass(frozen=True)
-class Fonts:
-    """The loaded faces and the sizes used with them, in points of the logical window."""
-
-    bold: imgui.ImFont | None = None
-    body_size: float = 15.0
-    small_size: float = 13.0
-    title_size: float = 26.0
-
-
-def load_fonts() -> Fonts:
-    """Load text and icon faces from the installed imgui-bundle; the built-in face serves when they are missing."""
-    folder = Path(imgui_bundle.__file__).parent / "assets" / "fonts"
-    faces = [folder / "Roboto" / "Roboto-Regular.ttf", folder / "Roboto" / "Roboto-Bold.ttf"]
-    icons = folder / "Font_Awesome_6_Free-Solid-900.otf"
-    if not all(path.is_file() for path in (*faces, icons)):
-        logger.info("Text fonts were not found beside imgui-bundle; using its built-in face - %s", folder)
-        return Fonts()
-    atlas = imgui.get_io().fonts
-    loaded = []
-    for face in faces:  # the first one loaded is the default of the context
-        font = atlas.add_font_from_file_ttf(str(face), Fonts.body_size)
-        merge = imgui.ImFontConfig()
-        merge.merge_mode = True
-        merge.glyph_min_advance_x = Fonts.body_size
-        merge.glyph_offset = ImVec2(0.0, 1.0)
-        atlas.add_font_from_file_ttf(str(icons), Fonts.body_size - 2.0, merge)
-        loaded.append(font)
-    return Fonts(bold=loaded[1])
 
 
 def apply_style() -> None:
