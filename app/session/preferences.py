@@ -1,5 +1,5 @@
-"""What the user prefers, whatever is open: theme, keys, layouts of the panels, memory for decoded frames. A checked JSON
-file beside the other preferences.
+"""What the user prefers, whatever is open: theme, keys, layouts of the panels, memory for decoded frames. A checked
+JSON file beside the other preferences.
 
 Knows no window: names of keys and actions, and layouts, are plain values that mean something to `ui` alone.
 """

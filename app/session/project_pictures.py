@@ -16,6 +16,7 @@ from app.playback.orbit_view import OrbitView
 from app.playback.render import RenderRequest, render
 from app.project.opened_project import OpenedProject
 from app.project.project_picture import SIZE, picture_path, read_picture, write_picture
+from engine.kernels.cache import is_cache_warm
 
 logger = logging.getLogger(__name__)
 
@@ -44,17 +45,14 @@ class ProjectPictures:
             view: From where.
         """
         folder = opened.project.folder.resolve()
-        if gaussians is not None:
-            request = _request(gaussians, view)
+        request = None if gaussians is None else _request(gaussians, view)
 
-            def work(context: JobContext) -> None:
+        def work(context: JobContext) -> None:
+            if request is not None and is_cache_warm():  # compiling kernels for it would take a minute
                 prepare_drawing()
                 write_picture(folder, render(request).image)
-        else:
-
-            def work(context: JobContext) -> None:
-                if not picture_path(folder).is_file():
-                    write_picture(folder, opened.capture.frame(0, 0))
+            elif not picture_path(folder).is_file():
+                write_picture(folder, opened.capture.frame(0, 0))
 
         self._jobs.start("Picture of the project", work, lambda _: None, _note)
 

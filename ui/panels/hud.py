@@ -17,8 +17,8 @@ from ui.panels.regions import draw_region_mark
 from ui.panels.state import Rect, UiState
 from ui.panels.timeline import STATE_WORDS
 from ui.style import theme
-from ui.style.numbers import format_count
 from ui.style.colors import Color
+from ui.style.numbers import format_count
 from ui.style.theme import ON_PICTURE, Icon
 from ui.viewport.hud_text import HudText, count_text, hud_text
 from ui.viewport.picture_rate import PictureRate

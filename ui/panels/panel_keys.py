@@ -1,5 +1,5 @@
-"""From panel to panel by keyboard. Usually the arrow keys, Enter, Space and Tab act on time and the view; once F6 went to
-a panel they move inside of it, until Escape, a click, or F6 comes round to the picture.
+"""From panel to panel by keyboard. Usually the arrow keys, Enter, Space and Tab act on time and the view; once F6 went
+to a panel they move inside of it, until Escape, a click, or F6 comes round to the picture.
 """
 
 from __future__ import annotations

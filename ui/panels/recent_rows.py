@@ -1,5 +1,5 @@
-"""Projects that were opened lately, as rows of the first screen: a small picture, the name, how far it is trained, where
-it lies, when it was open.
+"""Projects that were opened lately, as rows of the first screen: a small picture, the name, how far it is trained,
+where it lies, when it was open.
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ from engine.gate.regions import GateRegion
 from ui.panels.state import REGIONS, Dispatch, Rect, UiState
 from ui.panels.widgets import chip, primary_button, text_right, text_wrapped_dim
 from ui.style import theme
-from ui.style.palette import Palette
 from ui.style.numbers import format_count
+from ui.style.palette import Palette
 from ui.style.theme import Icon
 from ui.viewport.region_tool import REGION_WORDS
 
@@ -181,7 +181,7 @@ def _draw_row(index: int, region: GateRegion, can_mark: bool, ui: UiState) -> bo
 
 
 def draw_region_mark(draw: imgui.ImDrawList, middle: ImVec2, treat: str, palette: Palette | None = None) -> None:
-    """The small sign of a treatment: a whole ring for static, a dashed one for moving. palette: Other than in panels."""
+    """The small sign of a treatment: a whole ring for static, a dashed one for moving. palette: Not that of panels."""
     color = theme.u32((theme.REGION_COLORS if palette is None else palette.region_colors)[treat])
     if treat == "static":
         draw.add_circle(middle, 6, color, 0, 2)

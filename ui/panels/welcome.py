@@ -40,7 +40,9 @@ def draw_welcome(session: WelcomeNeeds, dispatch: Dispatch, ui: UiState, area: R
     imgui.push_style_color(imgui.Col_.child_bg, ImVec4(*theme.PANEL))
     padding = (36, 30) if height == CARD_SIZE[1] else (20, 14)
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(*padding))
-    imgui.begin_child("welcome", ImVec2(width, height), imgui.ChildFlags_.always_use_window_padding | imgui.ChildFlags_.nav_flattened)
+    imgui.begin_child(
+        "welcome", ImVec2(width, height), imgui.ChildFlags_.always_use_window_padding | imgui.ChildFlags_.nav_flattened
+    )
     imgui.pop_style_var()
     push_bold(ui, ui.fonts.title_size)
     imgui.text("ClipGStream Studio")

@@ -1,5 +1,6 @@
-"""Wishes: what actions, menus and the palette ask of the shell, which lies above them. Taken up in the same frame or the
-next."""
+"""Wishes: what actions, menus and the palette ask of the shell, which lies above them. They are taken up in the same
+frame or in the next one.
+"""
 
 from __future__ import annotations
 

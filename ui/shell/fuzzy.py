@@ -61,7 +61,9 @@ def _best(word: str, text: str) -> Match | None:
         if at < 0:
             return None
     n = len(text)
-    bonus = [LETTER + (WORD_START if _starts_word(text, i) else 0.0) + (TEXT_START if i == 0 else 0.0) for i in range(n)]
+    bonus = [
+        LETTER + (WORD_START if _starts_word(text, i) else 0.0) + (TEXT_START if i == 0 else 0.0) for i in range(n)
+    ]
     scores = [bonus[i] if text[i] == word[0] else _NEVER for i in range(n)]
     came_from: list[list[int]] = []
     for letter in word[1:]:

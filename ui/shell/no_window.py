@@ -1,5 +1,5 @@
-"""What is said where no window can be opened: OpenGL is too old or missing, or the display does not answer. Plain words,
-no traceback. Imports no window library: it may be that one which is broken.
+"""What is said where no window can be opened: OpenGL is too old or missing, or the display does not answer. In plain
+words, without a traceback. Imports no window library: it may be that one which is broken.
 """
 
 from __future__ import annotations

@@ -66,7 +66,12 @@ def entries(session: PaletteNeeds, ui: UiState) -> list[Entry]:
     """Everything there is to choose now: actions in the order of their table, then the rest."""
     actions = [
         Entry(
-            action.id, action.text, action.group, action.run, ", ".join(ui.keys.labels(action)), action.why_not(session, ui)
+            action.id,
+            action.text,
+            action.group,
+            action.run,
+            ", ".join(ui.keys.labels(action)),
+            action.why_not(session, ui),
         )
         for action in ACTIONS
         if action.id != "window.palette"
@@ -124,7 +129,10 @@ def _cameras(session: PaletteNeeds) -> list[Entry]:
         return []
     free = Entry("camera:", "Free view", "Cameras", looking(None))
     names = session.rig.names
-    return [free, *(Entry(f"camera:{n}", f"Go to camera {one_line(n)}", "Cameras", looking(i)) for i, n in enumerate(names))]
+    return [
+        free,
+        *(Entry(f"camera:{n}", f"Go to camera {one_line(n)}", "Cameras", looking(i)) for i, n in enumerate(names)),
+    ]
 
 
 def _clips(session: PaletteNeeds) -> list[Entry]:
@@ -152,5 +160,8 @@ def _layouts(ui: UiState) -> list[Entry]:
 
     names = list(ui.preferences.layouts)
     shown = [Entry(f"layout:{name}", f"Layout: {one_line(name)}", "Window", showing(name)) for name in names]
-    removed = [Entry(f"layout removed:{name}", f"Remove the layout {one_line(name)}", "Window", removing(name)) for name in names]
+    removed = [
+        Entry(f"layout removed:{name}", f"Remove the layout {one_line(name)}", "Window", removing(name))
+        for name in names
+    ]
     return [*shown, *removed]

@@ -45,7 +45,11 @@ class PreferencesDialog:
     """Owns which page is shown."""
 
     def __init__(self) -> None:
-        self._pages: dict[str, Page] = {"General": _Plain(draw_general), "Memory": _Plain(draw_memory), "Keys": KeysPage()}
+        self._pages: dict[str, Page] = {
+            "General": _Plain(draw_general),
+            "Memory": _Plain(draw_memory),
+            "Keys": KeysPage(),
+        }
         self._shown = "General"
         self._n_popups = 0
         self.why_unsaved = ""
@@ -151,6 +155,6 @@ def draw_memory(ui: UiState) -> None:
         preferences.cache_mb = min(max(typed if is_changed else shown, CACHE_MB[0]), CACHE_MB[1])
     imgui.set_cursor_pos_x(LABEL_WIDTH)
     text_wrapped_dim(
-        "Frames that were decoded once are shown again at once. More memory holds more of them. It counts for a project "
-        "that is opened from now on."
+        "Frames that were decoded once are shown again at once. More memory holds more of them. It counts for "
+        "projects that are opened from now on."
     )

@@ -178,7 +178,5 @@ def contrast(first: Color, second: Color) -> float:
 
 
 def _luminance(color: Color) -> float:
-    red, green, blue = (
-        value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in color[:3]
-    )
+    red, green, blue = (value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in color[:3])
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue

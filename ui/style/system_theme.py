@@ -45,7 +45,12 @@ class SystemTheme:
             return
         try:
             done = subprocess.run(
-                _COMMANDS[platform], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=TIMEOUT_S, check=False
+                _COMMANDS[platform],
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                timeout=TIMEOUT_S,
+                check=False,
             )
         except (OSError, subprocess.SubprocessError, ValueError):
             return

@@ -13,6 +13,7 @@ from ui.style.colors import Color
 from ui.style.colors import rgb as rgb  # looked up as theme.rgb by the panels
 from ui.style.palette import DARK, PALETTES, Palette, contrast
 
+
 def faded(color: Color, alpha: float) -> Color:
     """The same hue at another opacity."""
     return (color[0], color[1], color[2], alpha)

@@ -56,7 +56,9 @@ def test_a_value_that_makes_no_sense_costs_that_value_only(
     with caplog.at_level(logging.WARNING):
         values = PreferencesFile(path).values
     assert getattr(values, name) == getattr(Preferences(), name)
-    assert [getattr(values, other) for other in good if other != name] == [good[other] for other in good if other != name]
+    assert [getattr(values, other) for other in good if other != name] == [
+        good[other] for other in good if other != name
+    ]
     assert name in caplog.text
 
 

@@ -9,11 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.playback.arrays import GaussianArrays
+from app.playback.arrays import GaussianArrays, Picture
 from app.playback.orbit_view import OrbitView
+from app.playback.render import RenderRequest
 from app.project import project_picture
 from app.project.opened_project import OpenedProject
 from app.project.project_picture import SIZE, fitted, picture_path, read_picture, write_picture
+from app.session import project_pictures
 from app.session.project_pictures import ProjectPictures
 
 
@@ -57,8 +59,17 @@ def test_a_damaged_picture_counts_as_none(tmp_path: Path, content: bytes) -> Non
 
 
 def test_a_project_gets_what_the_first_camera_took_and_later_what_was_looked_at(
-    make_opened: Callable[..., OpenedProject],
+    make_opened: Callable[..., OpenedProject], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    asked: list[RenderRequest] = []
+
+    def draw(request: RenderRequest) -> Picture:  # the rasterizer has tests of its own
+        asked.append(request)
+        return Picture(np.full((request.height, request.width, 3), (200, 30, 30), np.uint8), "red")
+
+    monkeypatch.setattr(project_pictures, "prepare_drawing", lambda: None)
+    monkeypatch.setattr(project_pictures, "is_cache_warm", lambda: True)
+    monkeypatch.setattr(project_pictures, "render", draw)
     opened = make_opened("a")
     folder = opened.project.folder.resolve()
     pictures = ProjectPictures()
@@ -66,13 +77,14 @@ def test_a_project_gets_what_the_first_camera_took_and_later_what_was_looked_at(
     poll(pictures, lambda: picture_path(folder).is_file())
     first = read_picture(folder)
     pictures.keep(opened, _one_gaussian(), OrbitView(opened.rig))
-    poll(pictures, lambda: not pictures._jobs.statuses)
-    pictures.close()
+    pictures.close()  # waits for it
     second = read_picture(folder)
     assert first is not None
     assert second is not None
     assert (first != second).any()
-    assert second[:, :, 0].max() > second[:, :, 2].max() + 60, "the red Gaussian was drawn"
+    assert second[:, :, 0].min() > second[:, :, 2].max() + 60, "what is looked at was drawn"
+    np.testing.assert_array_equal(asked[0].world_to_camera, OrbitView(opened.rig).world_to_camera())
+    assert (asked[0].width, asked[0].height) == SIZE
     reader = ProjectPictures()
     reader.read((folder, folder / "gone"))
     poll(reader, lambda: reader.revision > 0)

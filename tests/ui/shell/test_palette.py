@@ -110,7 +110,12 @@ def test_names_are_shown_as_they_are(pilot: Pilot) -> None:
     pilot.session.rig = dataclasses.replace(pilot.session.rig, names=names)
     pilot.session.recent.entries.insert(0, RecentProject("/p/x##y", "/c", "x##y %d\n", 1, 2))
     shown = [entry.text for entry in entries(pilot.session, pilot.studio.frame.ui)]
-    for text in ("Go to camera a##b", "Go to camera 100 %s%n", "Go to camera two\\nlines", "Go to camera \u05d0\u05d1\u05d2"):
+    for text in (
+        "Go to camera a##b",
+        "Go to camera 100 %s%n",
+        "Go to camera two\\nlines",
+        "Go to camera \u05d0\u05d1\u05d2",
+    ):
         assert text in shown
     assert "Open x##y %d\\n" in shown
     assert open_palette(pilot, "a##b")[0] == "camera:a##b"

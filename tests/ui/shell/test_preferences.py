@@ -187,9 +187,7 @@ def test_unknown_actions_in_the_file_are_dropped_and_the_rest_counts(
 
 
 @pytest.mark.parametrize(("size", "scale"), [((900, 600), 1.0), ((900, 600), 2.0), ((640, 420), 1.0)])
-def test_every_page_fits(
-    open_pilot: Callable[..., Pilot], tmp_path: Path, size: tuple[int, int], scale: float
-) -> None:
+def test_every_page_fits(open_pilot: Callable[..., Pilot], tmp_path: Path, size: tuple[int, int], scale: float) -> None:
     memory = WindowMemory(tmp_path / "window.json", ui_scale=scale)
     pilot = open_pilot(size=(round(size[0] * scale), round(size[1] * scale)), memory=memory)
     pilot.key(key.COMMA, modifiers=(CTRL,))

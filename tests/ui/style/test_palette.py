@@ -1,4 +1,4 @@
-"""Colours: words stand out from what is behind them in both themes, states stay apart for every eye, nobody keeps one."""
+"""Colours: words stand out from what is behind them in both themes, states stay apart for every eye, none is kept."""
 
 from __future__ import annotations
 
@@ -65,8 +65,8 @@ def test_contrast_is_that_of_the_standard() -> None:
     black, white = (0.0, 0.0, 0.0, 1.0), (1.0, 1.0, 1.0, 1.0)
     assert contrast(black, white) == contrast(white, black) == pytest.approx(21.0)
     assert contrast(white, white) == 1.0
-    grey = tuple([0x76 / 255] * 3) + (1.0,)
-    assert contrast(grey, white) == pytest.approx(4.54, abs=0.01)  # type: ignore[arg-type]
+    grey = (0x76 / 255, 0x76 / 255, 0x76 / 255, 1.0)
+    assert contrast(grey, white) == pytest.approx(4.54, abs=0.01)
 
 
 def test_taking_a_palette_changes_every_colour_that_the_panels_look_up() -> None:

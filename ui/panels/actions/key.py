@@ -89,7 +89,7 @@ def parse_key(label: str) -> Key:
 
 
 def pressed_label() -> str:
-    """The key that was pressed since the last frame, with the modifiers held, as `parse_key` reads it; empty if none was.
+    """The key that was pressed since the last frame with the modifiers held, as `parse_key` reads it; else empty.
 
     Modifiers alone are no key.
     """

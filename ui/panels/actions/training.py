@@ -40,5 +40,12 @@ def _toggle_quality(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> No
 ACTIONS = (
     Action("train.quality", "Quality over clips, in the training panel", TRAIN, _toggle_quality, keys=("6",)),
     Action("train.next", "Train the next clip, pause or resume", TRAIN, _train, keys=("T",)),
-    Action("train.stop", "Stop training and keep what was learned", TRAIN, _stop_training, keys=("Ctrl+T",), lacks=_nothing_trains),
+    Action(
+        "train.stop",
+        "Stop training and keep what was learned",
+        TRAIN,
+        _stop_training,
+        keys=("Ctrl+T",),
+        lacks=_nothing_trains,
+    ),
 )

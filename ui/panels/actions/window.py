@@ -133,7 +133,13 @@ ACTIONS = (
     ),
     Action("window.fullscreen", "Fill the screen", WINDOW, _fullscreen, keys=("F11",), **_ALWAYS),
     *(
-        Action(f"window.layout.{name.lower().replace(' ', '_')}", f"Layout: {LAYOUT_WORDS[name]}", WINDOW, _layout(name), **_LAYOUTS)
+        Action(
+            f"window.layout.{name.lower().replace(' ', '_')}",
+            f"Layout: {LAYOUT_WORDS[name]}",
+            WINDOW,
+            _layout(name),
+            **_LAYOUTS,
+        )
         for name in LAYOUTS
     ),
     Action("window.save_layout", "Save the layout as ...", WINDOW, _save_layout, **_LAYOUTS),
