@@ -20,6 +20,7 @@ from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.project import Project, check_settings
 from app.project.recents import project_name
+from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
@@ -38,6 +39,7 @@ from app.status import (
     PlanStatus,
     ProjectStatus,
     RegionsStatus,
+    ResidualStatus,
     TrainingStatus,
     WantedFrame,
 )
@@ -150,6 +152,11 @@ class Session:
         return self.views.current.overlays
 
     @property
+    def residual_status(self) -> ResidualStatus:
+        """What is measured of every picture."""
+        return self.residuals.status
+
+    @property
     def jobs(self) -> list[JobStatus]:
         """Short jobs that run."""
         return self._jobs.statuses
@@ -205,6 +212,10 @@ class Session:
                 if name not in OVERLAY_NAMES:
                     raise ValueError(f"overlays are {', '.join(OVERLAY_NAMES)}, not {name!r}")
                 setattr(self.overlays, name, not getattr(self.overlays, name))
+            case commands.ShowHeat(kind=kind):
+                if kind and kind not in HEAT_KINDS:
+                    raise ValueError(f"heat maps are {', '.join(HEAT_KINDS)}, not {kind!r}")
+                self.overlays.heat = kind
             case commands.SetHoldout() | commands.SetClipLength() | commands.SetTrainSetting() | commands.SetPreset():
                 self._change_settings(command)
             case commands.HomeView():
@@ -392,6 +403,11 @@ class Session:
     def compared_picture(self, camera_index: int, max_width: int) -> Picture | None:
         """What a camera took at the playhead, to be set beside the render; see Playback.compared_picture."""
         return self.playback.compared_picture(self.timeline, camera_index, max_width)
+
+    def heat(self, kind: str) -> HeatMap | None:
+        """The residual heat map of the playhead and the camera looked through; see Residuals.heat."""
+        camera_index = self.view.look_through
+        return None if camera_index is None else self.residuals.heat(self.timeline, camera_index, kind)
 
 
 _TITLES: dict[type, str] = {
