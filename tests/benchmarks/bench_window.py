@@ -143,9 +143,10 @@ def measure(desk: Desk, options: argparse.Namespace) -> float:
     phases = [("nothing trains", "")]
     if not options.no_training:
         phases += [("while a clip is prepared", "preparing"), ("while a clip trains", "running")]
+    phases = [phase for phase in phases if phase[1] in os.environ.get("PHASES", ",preparing,running").split(",")]
     worst = 0.0
     for title, state_name in phases:
-        if state_name == "preparing":
+        if state_name and desk.state["training"]["state"] == "idle":
             desk.click("training.next")
         if state_name:
             wanted = (state_name, "running")
