@@ -47,6 +47,7 @@ class LatestWorker(Generic[Request, Result]):
         self._running: list[Request] = []  # zero or one
         self._lane: Hashable = None  # of what runs; None where that was planned
         self._finished: tuple[Request, Result] | None = None
+        self._finished_in: dict[Hashable, tuple[Request, Result]] = {}
         self._error: tuple[Request, Exception] | None = None
         self._failed: dict[Hashable, Request] = {}  # at most one a lane
         self._failed_ahead: list[Request] = []
@@ -104,6 +105,11 @@ class LatestWorker(Generic[Request, Result]):
         """The result finished last of those asked for, with its request; None before the first."""
         return self._finished
 
+    def newest_in(self, lane: Hashable) -> tuple[Request, Result] | None:
+        """The same for one lane."""
+        with self._condition:
+            return self._finished_in.get(lane)
+
     @property
     def n_ahead(self) -> int:
         """How many planned results were finished so far."""
@@ -119,7 +125,7 @@ class LatestWorker(Generic[Request, Result]):
         with self._condition:
             self._generation += 1
             self._pending, self._failed, self._planned, self._failed_ahead = {}, {}, [], []
-            self._finished = None
+            self._finished, self._finished_in = None, {}
             self._error = None
 
     def has_failed(self, request: Request) -> bool:
@@ -210,7 +216,7 @@ class LatestWorker(Generic[Request, Result]):
                 if error is not None:
                     self._failed_ahead = [*self._failed_ahead, request][-MAX_FAILED:]
             elif is_wanted and outcome is not None:
-                self._finished = outcome
+                self._finished = self._finished_in[lane] = outcome
             elif is_wanted and error is not None:
                 self._failed[lane] = request
                 self._error = (request, error)
