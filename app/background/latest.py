@@ -154,9 +154,7 @@ class LatestWorker(Generic[Request, Result]):
     def wait_idle(self, timeout_s: float) -> bool:
         """Block until nothing waits, runs or is planned; for tests and headless use. False when the time is up."""
         with self._condition:
-            return self._condition.wait_for(
-                lambda: not (self._pending or self._running or self._planned), timeout_s
-            )
+            return self._condition.wait_for(lambda: not (self._pending or self._running or self._planned), timeout_s)
 
     def close(self, timeout_s: float = 2.0) -> None:
         """Stop after the running request; later requests are ignored."""

@@ -91,9 +91,7 @@ class Ahead:
         self._planned_of = identity
         missing = [request for request in coming if not self._is_ready(request.key)]
         look_keys = {asked.full.key for asked in self._looks.values()}
-        self._decoder.plan(
-            missing[: max(self._decoder.n_that_fit - SPARE, 0)], lambda key: course.distance(key[-1])
-        )
+        self._decoder.plan(missing[: max(self._decoder.n_that_fit - SPARE, 0)], lambda key: course.distance(key[-1]))
         self._renderer.plan(list(self._drawable(coming)), lambda key: _picture_distance(key, course, look_keys))
 
     def _is_settled(self, course: Course) -> bool:
@@ -122,9 +120,7 @@ class Ahead:
         """Whether a frame can be shown at once, as it is looked at now."""
         if not self._looks:
             return self._decoder.is_ready(key)
-        return all(
-            any(self._renderer.is_ready(key, look) for look in asked.sizes) for asked in self._looks.values()
-        )
+        return all(any(self._renderer.is_ready(key, look) for look in asked.sizes) for asked in self._looks.values())
 
     def runs(self, state_of: StateOf, is_current: Callable[[FrameKey], bool]) -> list[tuple[int, int]]:
         """Frames that can be shown at once as they are looked at now: first and stop of each run, in order.

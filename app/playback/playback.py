@@ -140,24 +140,29 @@ class Playback:
         look = Look.of(view, width, height, mode=mode)
         full = look if full_size in (None, (width, height)) else Look.of(view, *full_size, mode=mode)
         self.ahead.note(view_id, AskedLook(look, full))
-        for size in (full, look):
-            picture = self.renderer.known(request.key, size, view_id=view_id)
+        shown: ShownFrame | None = None
+        picture = self._known_picture(request.key, (full, look), view_id)
+        if picture is None:
+            shown = self.decoder.frame(request)
+        if shown is None:
+            return picture
+        key = shown.gaussians.key
+        if key == request.key:
+            return self.renderer.picture(request.key, shown.gaussians, look, view_id=view_id)
+        # Until the frame was decoded, the newest one there is, drawn from the view as it is now.
+        assert isinstance(key, tuple)
+        picture = self._known_picture(key, (full, look), view_id)
+        if picture is None:
+            picture = self.renderer.picture(key, shown.gaussians, look, view_id=view_id)
+        return None if picture is None else replace(picture, is_stale=True)
+
+    def _known_picture(self, key: FrameKey, looks: tuple[Look, ...], view_id: Hashable) -> Picture | None:
+        """The first of these that is there."""
+        for look in looks:
+            picture = self.renderer.known(key, look, view_id=view_id)
             if picture is not None:
                 return picture
-        shown = self.decoder.frame(request)
-        if shown is None:
-            return None
-        if shown.gaussians.key == request.key:
-            return self.renderer.picture(request.key, shown.gaussians, look, view_id=view_id)
-        return self._render_meanwhile(request, shown, look, view_id)
-
-    def _render_meanwhile(
-        self, request: FrameRequest, shown: ShownFrame, look: Look, view_id: Hashable
-    ) -> Picture | None:
-        """What is shown until the frame was decoded: the newest picture there is, drawn from the view as it is now."""
-        assert isinstance(shown.gaussians.key, tuple)
-        picture = self.renderer.picture(shown.gaussians.key, shown.gaussians, look, view_id=view_id)
-        return None if picture is None else replace(picture, is_stale=True)
+        return None
 
     def work_ahead(self, timeline: Timeline, *, is_busy: bool = False) -> None:
         """Make ready what comes next while nothing is asked for. Called in every turn of the loop.

@@ -44,9 +44,7 @@ class Look:
     @classmethod
     def of(cls, view: OrbitView, width: int, height: int, *, mode: Hashable = COLOR) -> Look:
         """As a view is now."""
-        return cls(
-            view.look_key, width, height, mode, view.look_through, view.world_to_camera(), view.K(width, height)
-        )
+        return cls(view.look_key, width, height, mode, view.look_through, view.world_to_camera(), view.K(width, height))
 
 
 PictureKey = tuple[FrameKey, Look]
@@ -91,9 +89,7 @@ class Renderer:
             self._asked.pop(view_id, None)
         return picture
 
-    def picture(
-        self, key: FrameKey, gaussians: GaussianArrays, look: Look, *, view_id: Hashable = 0
-    ) -> Picture | None:
+    def picture(self, key: FrameKey, gaussians: GaussianArrays, look: Look, *, view_id: Hashable = 0) -> Picture | None:
         """The picture if it is ready; otherwise it is asked for, and the view's newest one is returned as stale.
 
         Args:

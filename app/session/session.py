@@ -382,9 +382,7 @@ class Session:
         """A cloud for frames that are not trained; see Playback.cloud."""
         return self.playback.cloud(self.view)
 
-    def request_render(
-        self, width: int, height: int, *, full_size: tuple[int, int] | None = None
-    ) -> Picture | None:
+    def request_render(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
         """The rasterizer's picture of the frame and view; see Playback.render."""
         return self.playback.render(self.timeline, self.view, width, height, full_size=full_size)
 

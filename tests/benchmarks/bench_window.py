@@ -103,7 +103,10 @@ def report(title: str, answers: dict[str, list[float]], log: list[dict[str, Any]
     print(f"median {statistics.median(frames):.1f} ms, max {max(frames):.1f} ms")
     for line in log:
         if "slow" in line and line["at_s"] >= since_s:
-            print(f"  {line['slow']}: {line['wall_ms']} ms, of it computing {line['computed_ms']}, waiting for a core ", end="")
+            print(
+                f"  {line['slow']}: {line['wall_ms']} ms, of it computing {line['computed_ms']}, waiting for a core ",
+                end="",
+            )
             print(f"{line['waited_for_a_core_ms']}; other threads computed {line['other_threads_computed_ms']}")
             for text in (*line["stacks"], *line["others"]):
                 print(f"      {text}")
