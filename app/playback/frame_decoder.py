@@ -8,7 +8,7 @@ what the thread finishes for the one before is dropped. A new revision of a live
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -105,6 +105,7 @@ class FrameDecoder:
         self._models: OrderedDict[ModelKey, LoadedClip] = OrderedDict()
         self._reference: tuple[tuple[str, int], ClipState] | None = None
         self._last: ShownFrame | None = None
+        self._frame_bytes = 0  # of the newest one
         self.worker: LatestWorker[FrameRequest, ShownFrame] = LatestWorker(
             "playback", self._compute, prepare=prepare_decoding
         )
@@ -123,6 +124,37 @@ class FrameDecoder:
         if newest is not None:
             self._last = newest[1]
         return self._last
+
+    def known(self, key: FrameKey) -> ShownFrame | None:
+        """A frame that is ready; nothing is asked for."""
+        return self._cache.get(key)
+
+    def is_ready(self, key: FrameKey) -> bool:
+        """Whether a frame can be shown at once."""
+        return key in self._cache
+
+    def ready_keys(self) -> list[FrameKey]:
+        """All frames that can be shown at once."""
+        return self._cache.keys()
+
+    @property
+    def revision(self) -> int:
+        """Another number whenever other frames are ready."""
+        return self._cache.revision
+
+    @property
+    def n_that_fit(self) -> int:
+        """How many frames like the newest one can be kept."""
+        return max(self._cache.max_bytes // max(self._frame_bytes, 1), 1)
+
+    def plan(self, requests: Sequence[FrameRequest], distance: Callable[[FrameKey], float]) -> None:
+        """Decode these, in this order, while nothing is asked for.
+
+        Args:
+            distance: How far off it is that a frame is shown; the farthest go when memory is needed.
+        """
+        self._cache.distance = distance
+        self.worker.plan([request for request in requests if request.key not in self._cache])
 
     def anchors(self, request: FrameRequest) -> AnchorArrays | None:
         """All anchors of a state; None until it was loaded."""
@@ -160,6 +192,9 @@ class FrameDecoder:
 
         from engine.model.host_array import host_array
 
+        known = self._cache.get(request.key)
+        if known is not None:  # it was asked for and planned
+            return known
         loaded = self._load(request)
         clip_time = request.clip.clip_time(request.frame_index)
         with torch.no_grad():
@@ -173,6 +208,7 @@ class FrameDecoder:
         shown = ShownFrame(arrays, anchors)
         if self.worker.is_still_wanted:
             n_bytes = arrays.n_bytes + anchors.inherited_positions.nbytes + anchors.own_positions.nbytes
+            self._frame_bytes = n_bytes
             self._cache.put(request.key, shown, n_bytes)
         return shown
 

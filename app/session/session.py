@@ -304,6 +304,7 @@ class Session:
         self._release_snapshot()
         has_changed |= bool(events) | self.marking.poll()
         self._tell_failures()
+        self.playback.work_ahead(self.timeline, is_busy=self.live_training.is_busy)
         seen = self._news_key()
         has_changed |= seen != self._seen
         self._seen = seen
@@ -392,9 +393,13 @@ class Session:
         """A cloud for frames that are not trained; see Playback.cloud."""
         return self.playback.cloud(self.view)
 
-    def request_render(self, width: int, height: int) -> Picture | None:
+    def request_render(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
         """The rasterizer's picture of the frame and view; see Playback.render."""
-        return self.playback.render(self.timeline, self.view, width, height)
+        return self.playback.render(self.timeline, self.view, width, height, full_size=full_size)
+
+    def cached_frames(self) -> list[tuple[int, int]]:
+        """Frames that can be shown at once: first and stop of each run, in order."""
+        return self.playback.cached_frames()
 
     def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None:
         """The captured picture, at most `max_width` pixels wide; None until it was decoded."""

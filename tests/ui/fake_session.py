@@ -254,7 +254,7 @@ class FakeSession:
             is_loaded=is_trained,
         )
 
-    def request_render(self, width: int, height: int) -> Picture | None:
+    def request_render(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
         """A gradient that depends on the frame, for trained clips."""
         if not self._is_trained():
             return None
