@@ -98,8 +98,8 @@ class Playback:
         self.decoder.frame(request)
         return self.decoder.is_loaded(request)
 
-    def wanted(self, timeline: Timeline, view: OrbitView) -> WantedFrame | None:
-        """What ought to be on screen; None without a project."""
+    def wanted(self, timeline: Timeline, view: OrbitView, *, view_id: Hashable = 0) -> WantedFrame | None:
+        """What ought to be on screen in a place; None without a project."""
         clip, request = timeline.clip, self._request(timeline)
         if clip is None:
             return None
@@ -110,7 +110,7 @@ class Playback:
             wanted,
             revision=request.revision,
             is_loaded=self.decoder.is_loaded(request),
-            has_failed=self.decoder.has_failed(request) or self.renderer.has_failed(),
+            has_failed=self.decoder.has_failed(request) or self.renderer.has_failed(view_id),
         )
 
     def render(
@@ -163,6 +163,10 @@ class Playback:
             if picture is not None:
                 return picture
         return None
+
+    def favour(self, view_id: Hashable) -> None:
+        """Draw what is asked for this place first."""
+        self.renderer.worker.active_lane = view_id
 
     def work_ahead(self, timeline: Timeline, *, is_busy: bool = False) -> None:
         """Make ready what comes next while nothing is asked for. Called in every turn of the loop.

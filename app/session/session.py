@@ -222,8 +222,10 @@ class Session:
                 self.view.home()
             case commands.ShowViews(n=n):
                 self.views.show(n)
+                self.playback.favour(self.views.active_index)
             case commands.ActivateView(index=index):
                 self.views.activate(index)
+                self.playback.favour(self.views.active_index)
             case commands.DismissNotice(index=index):
                 self.notices.dismiss(index)
             case _ if isinstance(command, commands.EditCommand):
@@ -376,7 +378,7 @@ class Session:
 
     def wanted_frame(self) -> WantedFrame | None:
         """What ought to be on screen; None without a capture. What is there says itself what it is."""
-        return self.playback.wanted(self.timeline, self.view)
+        return self.playback.wanted(self.timeline, self.view, view_id=self.views.current_index)
 
     def shown_gaussians(self) -> GaussianArrays | None:
         """Gaussians of the shown frame; the newest ones there are until those are decoded; None where nothing is
@@ -395,7 +397,10 @@ class Session:
 
     def request_render(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
         """The rasterizer's picture of the frame and view; see Playback.render."""
-        return self.playback.render(self.timeline, self.view, width, height, full_size=full_size)
+        views = self.views
+        return self.playback.render(
+            self.timeline, self.view, width, height, full_size=full_size, view_id=views.current_index
+        )
 
     def cached_frames(self) -> list[tuple[int, int]]:
         """Frames that can be shown at once: first and stop of each run, in order."""
