@@ -20,6 +20,7 @@ from app.playback.timeline import Timeline
 from app.project.opened_project import OpenedProject
 from app.status import WantedFrame
 from app.training.service import ShownState
+from engine.capture.clip import Clip
 
 StateOf = Callable[[int], ShownState | None]
 """The state of a clip to look at; None where it has none."""
@@ -131,14 +132,18 @@ class Playback:
 
     def _request(self, timeline: Timeline) -> FrameRequest | None:
         """What is to be decoded for the playhead; None where nothing is trained."""
-        opened, clip = self._opened, timeline.clip
-        state = None if opened is None or clip is None else self._state_of(clip.clip_index)
-        if opened is None or clip is None or state is None:
+        return None if timeline.clip is None else self.request(timeline.clip, timeline.frame_index)
+
+    def request(self, clip: Clip, frame_index: int) -> FrameRequest | None:
+        """What is to be loaded and decoded for a frame of a clip; None where the clip has no state."""
+        opened = self._opened
+        state = None if opened is None else self._state_of(clip.clip_index)
+        if opened is None or state is None:
             return None
         return FrameRequest(
             clip_index=clip.clip_index,
             revision=state.revision,
-            frame_index=timeline.frame_index,
+            frame_index=frame_index,
             path=state.file,
             generation=opened.generation,
             reference_path=opened.inherited_path(clip.clip_index),
