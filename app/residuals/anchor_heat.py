@@ -7,7 +7,7 @@ first few stand around the whole scene; each one more refines what is shown. Mad
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,7 @@ from app.playback.playback import Playback
 from app.playback.timeline import Timeline
 from app.project.opened_project import OpenedProject
 from app.residuals.clip_pictures import ClipPictures, captured
+from app.residuals.heat import sentence
 from app.residuals.heat_map import LEVELS
 from engine.byte_cache import ByteCache
 from engine.camera.rig import CameraRig
@@ -76,11 +77,16 @@ class _Moment:
 
 
 @dataclass(frozen=True, slots=True)
-class _Request:
+class AnchorRequest:
     """The maps of the first so many cameras."""
 
     moment: _Moment
     n_cameras: int
+
+    @property
+    def states(self) -> tuple[FrameRequest | None, ...]:
+        """States of clips that it is made of."""
+        return self.moment.main, self.moment.before
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,14 +110,18 @@ class AnchorHeats:
     Args:
         playback: Says which state of a clip is to be shown.
         pictures: Shared with others.
+        why_none: Why there is nothing to show of a clip: "clip 2 is not trained".
     """
 
-    def __init__(self, playback: Playback, pictures: ClipPictures) -> None:
-        self._playback, self._pictures = playback, pictures
+    def __init__(self, playback: Playback, pictures: ClipPictures, why_none: Callable[[int], str]) -> None:
+        self._playback, self._pictures, self._why_none = playback, pictures, why_none
+        self._reasons: dict[_Moment, str] = {}
         self._cache: ByteCache[_Moment, _Sums] = ByteCache(CACHE_BYTES)
         self._order: tuple[int, tuple[int, ...]] | None = None
         self._last: dict[str, AnchorHeat] = {}
-        self.worker: LatestWorker[_Request, _Sums] = LatestWorker("anchor heat", self._compute, prepare=prepare_drawing)
+        self.worker: LatestWorker[AnchorRequest, _Sums] = LatestWorker(
+            "anchor heat", self._compute, prepare=prepare_drawing
+        )
 
     def anchor_heat(self, opened: OpenedProject, timeline: Timeline, column: str) -> AnchorHeat | None:
         """What is known at the playhead; each call may ask for one more camera. Until the first was looked at, the last
@@ -128,20 +138,22 @@ class AnchorHeats:
         frame_index = timeline.frame_index
         main = self._playback.request(clip, frame_index)
         if main is None:
-            return _nothing(column, clip.clip_index, frame_index, f"Clip {clip.clip_index} is not trained.")
+            return _nothing(column, clip.clip_index, frame_index, sentence(self._why_none(clip.clip_index)))
         neighbour = timeline.clip_of(frame_index - 1)
         before = None if neighbour is None else self._playback.request(neighbour, frame_index - 1)
         if column == "E" and neighbour is None:
             return _nothing(column, clip.clip_index, frame_index, "Frame 0 has no frame before it.")
         if column == "E" and before is None:
             assert neighbour is not None
-            note = f"Clip {neighbour.clip_index}, to which the frame before belongs, is not trained."
+            note = f"There is no render of the frame before: {self._why_none(neighbour.clip_index)}."
             return _nothing(column, clip.clip_index, frame_index, note)
         moment = _Moment(opened.generation, main, before, opened.capture, self._cameras(opened))
         known = self._cache.get(moment)
         n_known = 0 if known is None else known.n_cameras
         if n_known < len(moment.cameras):
-            self.worker.request(_Request(moment, n_known + 1))
+            self.worker.request(AnchorRequest(moment, n_known + 1))
+        if known is None and moment in self._reasons:
+            return _nothing(column, clip.clip_index, frame_index, self._reasons[moment])
         if known is None:
             last = self._last.get(column)
             return None if last is None else replace(last, is_stale=True)
@@ -151,9 +163,14 @@ class AnchorHeats:
             self._last[column] = last
         return last
 
+    def note_failure(self, request: AnchorRequest, reason: str) -> None:
+        """A picture could not be looked at; from now on it says why where there is nothing else."""
+        self._reasons[request.moment] = reason
+
     def clear(self) -> None:
         """Forget everything, as when another project is opened."""
         self.worker.forget()
+        self._reasons.clear()
         self._cache.clear()
         self._last.clear()
         self._order = None
@@ -169,7 +186,7 @@ class AnchorHeats:
 
     # ---------------------------------------------------------------- on the thread
 
-    def _compute(self, request: _Request) -> _Sums:
+    def _compute(self, request: AnchorRequest) -> _Sums:
         from engine.metrics.clips.anchor_shares import anchor_shares, anchors_at
 
         moment = request.moment

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -43,6 +44,11 @@ class HeatRequest:
     other: FrameRequest | None
     capture: Capture = field(compare=False)
 
+    @property
+    def states(self) -> tuple[FrameRequest | None, ...]:
+        """States of clips that it is made of."""
+        return self.main, self.other
+
 
 class Heat:
     """Maps on demand. Methods are for one thread, not the one it owns, and never wait.
@@ -50,10 +56,11 @@ class Heat:
     Args:
         playback: Says which state of a clip is to be shown.
         pictures: Shared with others.
+        why_none: Why there is nothing to show of a clip: "clip 2 is not trained".
     """
 
-    def __init__(self, playback: Playback, pictures: ClipPictures) -> None:
-        self._playback, self._pictures = playback, pictures
+    def __init__(self, playback: Playback, pictures: ClipPictures, why_none: Callable[[int], str]) -> None:
+        self._playback, self._pictures, self._why_none = playback, pictures, why_none
         self._cache: ByteCache[HeatRequest, HeatMap] = ByteCache(CACHE_BYTES)
         self._last: dict[tuple[str, int], HeatMap] = {}
         self._reasons: dict[HeatRequest, str] = {}
@@ -113,7 +120,7 @@ class Heat:
         if kind != "G":
             main = self._playback.request(clip, frame_index)
             if main is None:
-                return f"Clip {clip.clip_index} is not trained."
+                return sentence(self._why_none(clip.clip_index))
         other_frame = frame_index - 1
         if kind == "clips":
             side = _other_side(timeline, clip, frame_index)
@@ -125,8 +132,8 @@ class Heat:
             assert neighbour is not None
             other = self._playback.request(neighbour, other_frame)
             if other is None:
-                why = "with which it is compared" if kind == "clips" else "to which the frame before belongs"
-                return f"Clip {neighbour.clip_index}, {why}, is not trained."
+                whose = "the neighbour's picture" if kind == "clips" else "the frame before"
+                return f"There is no render of {whose}: {self._why_none(neighbour.clip_index)}."
         return HeatRequest(
             opened.generation, kind, clip.clip_index, frame_index, camera_index, main, other, opened.capture
         )
@@ -208,6 +215,11 @@ def _other_side(timeline: Timeline, clip: Clip, frame_index: int) -> int | str:
     if frame_index in (clip.start, clip.stop - 1):
         return f"No other clip meets clip {clip.clip_index} at frame {frame_index}."
     return f"Frame {frame_index} lies inside clip {clip.clip_index}; two clips meet at its first and last frame only."
+
+
+def sentence(clause: str) -> str:
+    """A clause as a sentence of its own."""
+    return f"{clause[:1].upper()}{clause[1:]}."
 
 
 def _prepare() -> None:
