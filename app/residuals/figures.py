@@ -14,8 +14,8 @@ import numpy as np
 from app.residuals.heat_map import LEVELS
 from app.status import CELL_COLUMNS, SeamStatus
 from engine.capture.clip import Clip
-from engine.metrics.clips.seams import PairRow, score_of
-from engine.metrics.clips.summary import EvalRow
+from engine.metrics.clips.seams import PairRow, ratio_of, score_of
+from engine.metrics.clips.summary import EvalRow, mean_of
 
 N_SEAMS_PER_CALL = 20
 """Scores that are made at a time: about half a millisecond each with thirty cameras."""
@@ -44,13 +44,14 @@ class PairFigures:
 
     Attributes:
         excess: Mean E over all pixels, 0..1
-        excess_static: Mean E over static pixels, 0..1
+        excess_static, change_static: Mean E and mean R over static pixels, 0..1
     """
 
     frame_index: int
     camera_index: int
     excess: float | None
     excess_static: float | None
+    change_static: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +77,11 @@ def row_figures(row: EvalRow, camera_index: int, *, has_flip: bool = True) -> Ro
 
 def pair_figures(pair: PairRow, camera_index: int) -> PairFigures:
     """What the window shows of a pair."""
-    return PairFigures(pair.frame_index, camera_index, mean_excess(pair), pair.excess_static)
+    return PairFigures(pair.frame_index, camera_index, mean_excess(pair), pair.excess_static, pair.change_static)
+
+
+def _known(values: np.ndarray) -> list[float]:
+    return values[np.isfinite(values)].tolist()
 
 
 def _number(value: float | None) -> float:
@@ -108,6 +113,7 @@ class Figures:
     seams: list[SeamStatus] = field(init=False)
     revision: int = 0
     _excess_static: np.ndarray = field(init=False)
+    _change_static: np.ndarray = field(init=False)
     _stale_seams: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
@@ -115,7 +121,7 @@ class Figures:
         self.cells = {column: np.full(shape, np.nan) for column in CELL_COLUMNS}
         self.has_row, self.has_pair = (np.zeros(shape, bool) for _ in range(2))
         self.is_wanted, self.is_wanted_pair = (np.zeros(shape[0], bool) for _ in range(2))
-        self._excess_static = np.full(shape, np.nan)
+        self._excess_static, self._change_static = (np.full(shape, np.nan) for _ in range(2))
         self.seams = [SeamStatus(clip.clip_index, clip.start) for clip in self.clips[1:]]
 
     def set_trained(self, trained: Iterable[int]) -> None:
@@ -135,10 +141,11 @@ class Figures:
         frames = slice(clip.start, clip.stop)
         for column in CELL_COLUMNS:
             self.cells[column][frames] = np.nan
-        self._excess_static[frames] = np.nan
+        self._excess_static[frames] = self._change_static[frames] = np.nan
         self.has_row[frames] = self.has_pair[frames] = False
         if clip.stop < len(self.has_pair):
-            self.cells["E"][clip.stop] = self._excess_static[clip.stop] = np.nan
+            for values in (self.cells["E"], self._excess_static, self._change_static):
+                values[clip.stop] = np.nan
             self.has_pair[clip.stop] = False
         for later in (clip_index, clip_index + 1):
             if 0 < later < len(self.clips):
@@ -158,6 +165,7 @@ class Figures:
             at = pair.frame_index, pair.camera_index
             self.cells["E"][at] = LEVELS * _number(pair.excess)
             self._excess_static[at] = _number(pair.excess_static)
+            self._change_static[at] = _number(pair.change_static)
             self.has_pair[at] = True
         if found.pairs:
             self._stale_seams |= self._seams_of(found.clip_index)
@@ -181,17 +189,18 @@ class Figures:
 
     def _seam(self, later: int) -> SeamStatus:
         before, after = self.clips[later - 1], self.clips[later]
-        interior = np.concatenate([self._excess_static[clip.start + 1 : clip.stop] for clip in (before, after)], axis=0)
+        inside = np.r_[before.start + 1 : before.stop, after.start + 1 : after.stop]
+        interior = self._excess_static[inside]
         scores: dict[int, float] = {}
         for camera in np.flatnonzero(np.isfinite(self._excess_static[after.start])):
-            around = interior[:, camera]
-            score = score_of(float(self._excess_static[after.start, camera]), around[np.isfinite(around)].tolist())
+            score = score_of(float(self._excess_static[after.start, camera]), _known(interior[:, camera]))
             if score is not None:
                 scores[int(camera)] = score
+        ratio = ratio_of(_known(self._change_static[after.start]), _known(self._change_static[inside]))
         if not scores:
-            return SeamStatus(later, after.start)
+            return SeamStatus(later, after.start, ratio=ratio)
         worst = max(scores, key=lambda camera: scores[camera])
-        return SeamStatus(later, after.start, float(np.mean(list(scores.values()))), len(scores), worst)
+        return SeamStatus(later, after.start, mean_of(list(scores.values())), ratio, len(scores), worst)
 
     # ---------------------------------------------------------------- what is left
 

@@ -224,7 +224,12 @@ def score_of(excess_static: float | None, around: Sequence[float]) -> float | No
 
 def ratio(boundary: Sequence[PairRow], interior: Sequence[PairRow], name: str) -> float | None:
     """Mean of a field of PairRow over the first pairs / its mean over the others; None where there is no such value."""
-    above, below = (mean_of([getattr(row, name) for row in rows]) for rows in (boundary, interior))
+    return ratio_of(*([getattr(row, name) for row in rows] for rows in (boundary, interior)))
+
+
+def ratio_of(boundary: Sequence[float | None], interior: Sequence[float | None]) -> float | None:
+    """Mean of the first values / mean of the others; None where there is none, or the latter is 0."""
+    above, below = mean_of(boundary), mean_of(interior)
     return None if above is None or not below else above / below
 
 
