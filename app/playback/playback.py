@@ -22,6 +22,7 @@ from app.playback.timeline import Timeline
 from app.project.opened_project import OpenedProject
 from app.status import WantedFrame
 from app.training.service import ShownState
+from engine.capture.clip import Clip
 
 StateOf = Callable[[int], ShownState | None]
 """The state of a clip to look at; None where it has none."""
@@ -191,9 +192,14 @@ class Playback:
         return self._request_at(timeline, timeline.frame_index)
 
     def _request_at(self, timeline: Timeline, frame_index: int) -> FrameRequest | None:
-        opened, clip = self._opened, timeline.clip_of(frame_index)
-        state = None if opened is None or clip is None else self._state_of(clip.clip_index)
-        if opened is None or clip is None or state is None:
+        clip = timeline.clip_of(frame_index)
+        return None if clip is None else self.request(clip, frame_index)
+
+    def request(self, clip: Clip, frame_index: int) -> FrameRequest | None:
+        """What is to be loaded and decoded for a frame of a clip; None where the clip has no state."""
+        opened = self._opened
+        state = None if opened is None else self._state_of(clip.clip_index)
+        if opened is None or state is None:
             return None
         return FrameRequest(
             clip_index=clip.clip_index,
