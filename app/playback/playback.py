@@ -14,9 +14,11 @@ from app.playback.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.capture_pictures import CapturedPictures, Gain
 from app.playback.clouds import CloudRequest, Clouds
 from app.playback.frame_decoder import FrameDecoder, FrameRequest, ShownFrame
+from app.playback.mode_arrays import ModeArrays
 from app.playback.orbit_view import OrbitView
 from app.playback.render import Renderer
 from app.playback.timeline import Timeline
+from app.playback.view_modes import PLAIN, ShownAs, decoded_as
 from app.project.opened_project import OpenedProject
 from app.status import WantedFrame
 from app.training.service import ShownState
@@ -53,6 +55,7 @@ class Playback:
     def __init__(self, state_of: StateOf) -> None:
         self.decoder, self.renderer = FrameDecoder(), Renderer()
         self.captured, self.clouds = CapturedPictures(), Clouds()
+        self._modes = ModeArrays()
         self._opened: OpenedProject | None = None
         self._state_of = state_of
 
@@ -66,6 +69,7 @@ class Playback:
         if self._opened is not None and self._opened.generation != opened.generation:
             for store in (self.decoder, self.renderer, self.captured, self.clouds):
                 store.clear()
+            self._modes.clear()
         self._opened = opened
 
     def build_first_cloud(self, jobs: Jobs) -> None:
@@ -75,11 +79,12 @@ class Playback:
 
     # ---------------------------------------------------------------- frames of clips
 
-    def frame(self, timeline: Timeline) -> ShownFrame | None:
+    def frame(self, timeline: Timeline, shown_as: ShownAs = PLAIN) -> ShownFrame | None:
         """What is drawn of the frame under the playhead, or the newest there is until that was decoded; None where
         nothing is trained. It says itself what it is of."""
-        request = self._request(timeline)
-        return None if request is None else self.decoder.frame(request)
+        request = self._request(timeline, shown_as)
+        shown = None if request is None else self.decoder.frame(request)
+        return None if shown is None else replace(shown, gaussians=self._modes.of(shown, shown_as))
 
     def live_anchors(self, timeline: Timeline) -> AnchorArrays | None:
         """All anchors of the clip under the playhead while it trains; None before a state of it was loaded."""
@@ -94,12 +99,18 @@ class Playback:
         self.decoder.frame(request)
         return self.decoder.is_loaded(request)
 
-    def wanted(self, timeline: Timeline, view: OrbitView) -> WantedFrame | None:
+    def wanted(self, timeline: Timeline, view: OrbitView, shown_as: ShownAs = PLAIN) -> WantedFrame | None:
         """What ought to be on screen; None without a project."""
-        clip, request = timeline.clip, self._request(timeline)
+        clip, request = timeline.clip, self._request(timeline, shown_as)
         if clip is None:
             return None
-        wanted = WantedFrame(clip.clip_index, timeline.frame_index, camera_index=view.look_through, look=view.look_key)
+        wanted = WantedFrame(
+            clip.clip_index,
+            timeline.frame_index,
+            camera_index=view.look_through,
+            look=view.look_key,
+            shown_as=shown_as.label,
+        )
         if request is None:
             return wanted
         return replace(
@@ -109,27 +120,23 @@ class Playback:
             has_failed=self.decoder.has_failed(request) or self.renderer.has_failed,
         )
 
-    def render(self, timeline: Timeline, view: OrbitView, width: int, height: int) -> Picture | None:
+    def render(
+        self, timeline: Timeline, view: OrbitView, width: int, height: int, shown_as: ShownAs = PLAIN
+    ) -> Picture | None:
         """The rasterizer's picture of the frame and view; None where nothing is trained or ready.
 
         Stale where it is of another frame, view, size or state of the clip; it says of which.
         """
-        request = self._request(timeline)
-        shown = None if request is None else self.decoder.frame(request)
+        request, shown = self._request(timeline, shown_as), self.frame(timeline, shown_as)
         if request is None or shown is None:
             return None
-        picture = self.renderer.picture(shown.gaussians, view, width, height)
+        picture = self.renderer.picture(shown.gaussians, view, width, height, shown_as)
         if picture is None or picture.is_stale:
             return picture
-        source = picture.source
-        is_of_now = (source.clip_index, source.frame_index, source.revision) == (
-            request.clip_index,
-            request.frame_index,
-            request.revision,
-        )
+        is_of_now = shown.anchors.key == request.key
         return picture if is_of_now else replace(picture, is_stale=True)
 
-    def _request(self, timeline: Timeline) -> FrameRequest | None:
+    def _request(self, timeline: Timeline, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
         """What is to be decoded for the playhead; None where nothing is trained."""
         opened, clip = self._opened, timeline.clip
         state = None if opened is None or clip is None else self._state_of(clip.clip_index)
@@ -144,6 +151,7 @@ class Playback:
             reference_path=opened.inherited_path(clip.clip_index),
             clip=clip,
             is_live=state.is_live,
+            shown_as=decoded_as(shown_as),
         )
 
     # ---------------------------------------------------------------- beside them

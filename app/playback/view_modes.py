@@ -42,7 +42,7 @@ class ViewMode:
 
 
 BIRTH_HUES = (hues.SKY, hues.GREEN, hues.ORANGE)
-"""By code of a birth: see engine.model.provenance."""
+"""By code of a birth: see app.playback.contents."""
 
 _NORMAL_LEGEND = (
     ((1.0, 0.5, 0.5), "red: faces right (x)"),
@@ -66,9 +66,7 @@ MODES = MappingProxyType(
                 "viridis",
                 is_picture=True,
             ),
-            ViewMode(
-                "opacity", "Opacity", "How much of what lies behind is covered", "", "gray", is_picture=True
-            ),
+            ViewMode("opacity", "Opacity", "How much of what lies behind is covered", "", "gray", is_picture=True),
             ViewMode(
                 "normals",
                 "Normals",
@@ -152,6 +150,12 @@ class ShownAs:
 
 PLAIN = ShownAs()
 """The scene as it is."""
+
+
+def decoded_as(shown_as: ShownAs) -> ShownAs:
+    """What has to be decoded for it: most modes are made of the same Gaussians as the scene in its own colours."""
+    return shown_as if shown_as.mode == "changed" else ShownAs(content=shown_as.content)
+
 
 _DEPTH_REACH = 2.0
 """Depths are shown up to this many times the usual distance from a camera to what all of them look at."""
