@@ -1,7 +1,7 @@
 """FrameDecoder: a frame of a trained clip as arrays to draw. Loads states and decodes on one thread; keeps results by
 key.
 
-A key is (generation, path, clip_index, revision, frame_index, shown_as). The generation goes up when another project
+A key is (generation, path, clip_index, revision, shown_as, frame_index). The generation goes up when another project
 is opened: what the thread finishes for the one before is dropped. A new revision of a live clip makes its older frames
 worthless.
 """
@@ -9,7 +9,7 @@ worthless.
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,8 +40,8 @@ MAX_MODELS = 3
 
 ModelKey = tuple[int, str, int, str]
 """generation, path, clip_index, revision"""
-FrameKey = tuple[int, str, int, str, int, ShownAs]
-"""the same, frame_index, and what is decoded of the frame"""
+FrameKey = tuple[int, str, int, str, ShownAs, int]
+"""the same, what is decoded of the frame, and frame_index"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +76,7 @@ class FrameRequest:
     @property
     def key(self) -> FrameKey:
         """Identity of the result."""
-        return *self.model_key, self.frame_index, self.shown_as
+        return *self.model_key, self.shown_as, self.frame_index
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +112,7 @@ class FrameDecoder:
         self._models: OrderedDict[ModelKey, LoadedClip] = OrderedDict()
         self._reference: tuple[tuple[str, int], ClipState] | None = None
         self._last: ShownFrame | None = None
+        self._frame_bytes = 0  # of the newest one
         self.worker: LatestWorker[FrameRequest, ShownFrame] = LatestWorker(
             "playback", self._compute, prepare=prepare_decoding
         )
@@ -130,6 +131,37 @@ class FrameDecoder:
         if newest is not None:
             self._last = newest[1]
         return self._last
+
+    def known(self, key: FrameKey) -> ShownFrame | None:
+        """A frame that is ready; nothing is asked for."""
+        return self._cache.get(key)
+
+    def is_ready(self, key: FrameKey) -> bool:
+        """Whether a frame can be shown at once."""
+        return key in self._cache
+
+    def ready_keys(self) -> list[FrameKey]:
+        """All frames that can be shown at once."""
+        return self._cache.keys()
+
+    @property
+    def revision(self) -> int:
+        """Another number whenever other frames are ready."""
+        return self._cache.revision
+
+    @property
+    def n_that_fit(self) -> int:
+        """How many frames like the newest one can be kept."""
+        return max(self._cache.max_bytes // max(self._frame_bytes, 1), 1)
+
+    def plan(self, requests: Sequence[FrameRequest], distance: Callable[[FrameKey], float]) -> None:
+        """Decode these, in this order, while nothing is asked for.
+
+        Args:
+            distance: How far off it is that a frame is shown; the farthest go when memory is needed.
+        """
+        self._cache.distance = distance
+        self.worker.plan([request for request in requests if request.key not in self._cache])
 
     def anchors(self, request: FrameRequest) -> AnchorArrays | None:
         """All anchors of a state; None until it was loaded."""
@@ -165,6 +197,9 @@ class FrameDecoder:
     def _compute(self, request: FrameRequest) -> ShownFrame:
         from engine.model.host_array import host_array
 
+        known = self._cache.get(request.key)
+        if known is not None:  # it was asked for and planned
+            return known
         loaded = self._load(request)
         clip_time = request.clip.clip_time(request.frame_index)
         content = request.shown_as.content
@@ -191,6 +226,7 @@ class FrameDecoder:
         shown = ShownFrame(arrays, anchors)
         if self.worker.is_still_wanted:
             n_bytes = arrays.n_bytes + anchors.inherited_positions.nbytes + anchors.own_positions.nbytes
+            self._frame_bytes = n_bytes
             self._cache.put(request.key, shown, n_bytes)
         return shown
 

@@ -24,30 +24,34 @@ MAX_KEPT = 8
 """Frames in a mode that are kept: those of all views, and some that were shown before."""
 
 
+def drawn_arrays(shown: ShownFrame, mode: str) -> GaussianArrays:
+    """The Gaussians that are drawn of a frame in a mode; they say themselves in which.
+
+    Those of the frame where they are the same, and where the mode needs what was not decoded with them.
+    """
+    gaussians = shown.gaussians
+    if mode not in _MADE or (mode == "changed" and gaussians.changes is None):
+        return gaussians
+    shown_as = ShownAs(mode, gaussians.source.shown_as.content)
+    return replace(_MADE[mode](shown), key=(gaussians.key, mode), source=replace(gaussians.source, shown_as=shown_as))
+
+
 class ModeArrays:
-    """Frames in a mode. Keeps the newest ones, so that what is drawn again keeps its key."""
+    """Keeps the newest frames in a mode, so that what is drawn again has the same arrays."""
 
     def __init__(self) -> None:
         self._kept: OrderedDict[object, GaussianArrays] = OrderedDict()
 
-    def of(self, shown: ShownFrame, shown_as: ShownAs) -> GaussianArrays:
-        """The Gaussians that are drawn of a frame in a mode, which they say themselves.
-
-        The frame's own where they are the same, and where the mode needs what was not decoded with them.
-        """
-        lacks_changes = shown_as.mode == "changed" and shown.gaussians.changes is None
-        if shown_as.mode not in _MADE or lacks_changes:
+    def of(self, shown: ShownFrame, mode: str) -> GaussianArrays:
+        """See `drawn_arrays`."""
+        if mode not in _MADE:
             return shown.gaussians
-        key = (shown.gaussians.key, shown_as)
+        key = (shown.gaussians.key, mode)
         known = self._kept.pop(key, None)
-        if known is None:
-            made = _MADE[shown_as.mode](shown)
-            content = made.source.shown_as.content
-            known = replace(made, key=key, source=replace(made.source, shown_as=ShownAs(shown_as.mode, content)))
-        self._kept[key] = known
+        self._kept[key] = made = drawn_arrays(shown, mode) if known is None else known
         while len(self._kept) > MAX_KEPT:
             self._kept.popitem(last=False)
-        return known
+        return made
 
     def clear(self) -> None:
         """Forget everything."""

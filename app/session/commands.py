@@ -92,6 +92,13 @@ class ToggleOverlay:
 
 
 @dataclass(frozen=True, slots=True)
+class ShowHeat:
+    """Show a residual heat map over the picture, by its name; an empty one takes it away."""
+
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
 class SetHoldout:
     """Camera indices that training never sees. Only before the first clip is trained."""
 
@@ -220,6 +227,7 @@ Command = (
     | LookThrough
     | SetCompare
     | ToggleOverlay
+    | ShowHeat
     | SettingCommand
     | EditCommand
     | HomeView

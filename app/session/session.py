@@ -21,6 +21,7 @@ from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.project import Project, check_settings
 from app.project.recents import project_name
+from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
@@ -39,6 +40,7 @@ from app.status import (
     PlanStatus,
     ProjectStatus,
     RegionsStatus,
+    ResidualStatus,
     TrainingStatus,
     WantedFrame,
 )
@@ -155,6 +157,11 @@ class Session:
         return ShownAs(self.overlays.mode, self.overlays.content)
 
     @property
+    def residual_status(self) -> ResidualStatus:
+        """What is measured of every picture."""
+        return self.residuals.status
+
+    @property
     def jobs(self) -> list[JobStatus]:
         """Short jobs that run."""
         return self._jobs.statuses
@@ -210,6 +217,10 @@ class Session:
                 if name not in OVERLAY_NAMES:
                     raise ValueError(f"overlays are {', '.join(OVERLAY_NAMES)}, not {name!r}")
                 setattr(self.overlays, name, not getattr(self.overlays, name))
+            case commands.ShowHeat(kind=kind):
+                if kind and kind not in HEAT_KINDS:
+                    raise ValueError(f"heat maps are {', '.join(HEAT_KINDS)}, not {kind!r}")
+                self.overlays.heat = kind
             case commands.SetHoldout() | commands.SetClipLength() | commands.SetTrainSetting() | commands.SetPreset():
                 self._change_settings(command)
             case commands.SetMode(mode=mode):
@@ -306,6 +317,7 @@ class Session:
         self._release_snapshot()
         has_changed |= bool(events) | self.marking.poll()
         self._tell_failures()
+        self.playback.work_ahead(self.timeline, is_busy=self.live_training.is_busy)
         seen = self._news_key()
         has_changed |= seen != self._seen
         self._seen = seen
@@ -394,9 +406,16 @@ class Session:
         """A cloud for frames that are not trained; see Playback.cloud."""
         return self.playback.cloud(self.view)
 
-    def request_render(self, width: int, height: int) -> Picture | None:
+    def request_render(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
         """The rasterizer's picture of the frame and view; see Playback.render."""
-        return self.playback.render(self.timeline, self.view, width, height, self._shown_as)
+        view_id = self.views.current_index
+        return self.playback.render(
+            self.timeline, self.view, width, height, full_size=full_size, shown_as=self._shown_as, view_id=view_id
+        )
+
+    def cached_frames(self) -> list[tuple[int, int]]:
+        """Frames that can be shown at once: first and stop of each run, in order."""
+        return self.playback.cached_frames()
 
     def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None:
         """The captured picture, at most `max_width` pixels wide; None until it was decoded."""
@@ -405,6 +424,11 @@ class Session:
     def compared_picture(self, camera_index: int, max_width: int) -> Picture | None:
         """What a camera took at the playhead, to be set beside the render; see Playback.compared_picture."""
         return self.playback.compared_picture(self.timeline, camera_index, max_width)
+
+    def heat(self, kind: str) -> HeatMap | None:
+        """The residual heat map of the playhead and the camera looked through; see Residuals.heat."""
+        camera_index = self.view.look_through
+        return None if camera_index is None else self.residuals.heat(self.timeline, camera_index, kind)
 
 
 _TITLES: dict[type, str] = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from ui.panels.actions import compare, marking, modes, time, training, view, window
+from ui.panels.actions import compare, heat, marking, modes, time, training, view, window
 from ui.panels.actions.action import Action, ActionNeeds
 from ui.panels.state import Dispatch, UiState
 
@@ -13,6 +13,7 @@ ACTIONS: tuple[Action, ...] = (
     *view.ACTIONS,
     *compare.ACTIONS,
     *modes.ACTIONS,
+    *heat.ACTIONS,
     *marking.ACTIONS,
     *training.ACTIONS,
     *window.ACTIONS,
