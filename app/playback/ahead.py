@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from app.playback.course import Course
 from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest
 from app.playback.render import Look, PictureKey, Renderer, RenderRequest
+from app.playback.view_modes import PLAIN, ShownAs, decoded_as
 
 PLAYING_S = 1.5
 """This much of what comes is made ready while it plays."""
@@ -19,8 +20,8 @@ SETTLED_S = 0.3
 SPARE = 2
 """Frames that memory holds beside those that come: the one shown, and the newest."""
 
-RequestOf = Callable[[int], FrameRequest | None]
-"""What is to be decoded for a frame; None where nothing is trained."""
+RequestOf = Callable[[int, ShownAs], FrameRequest | None]
+"""What is to be decoded for a frame and how it is shown; None where nothing is trained."""
 StateOf = Callable[[int], Hashable]
 """What tells states of a clip apart."""
 
@@ -82,7 +83,8 @@ class Ahead:
             n = 0
         elif course.is_playing:
             n = min(round(PLAYING_S * course.frames_per_s), MAX_PLAYING)
-        requests = [request_of(frame) for frame in course.ahead(n)]
+        parts = dict.fromkeys(decoded_as(asked.look.shown_as) for asked in self._looks.values()) or (PLAIN,)
+        requests = [request_of(frame, part) for frame in course.ahead(n) for part in parts]
         # A snapshot of a running training is replaced before long: not worth the cores while nothing plays.
         coming = [one for one in requests if one is not None and (course.is_playing or not one.is_live)]
         identity = (course, coming, tuple(self._looks.items()), self._decoder.revision)
@@ -108,11 +110,12 @@ class Ahead:
             for asked in self._looks.values():
                 if place >= len(asked.sizes):
                     continue
+                of_look = [one for one in coming if one.shown_as == decoded_as(asked.look.shown_as)]
                 n_that_fit = self._renderer.n_that_fit(asked.full) // len(self._looks) - SPARE
-                for request in coming[: max(n_that_fit, 0)]:
+                for request in of_look[: max(n_that_fit, 0)]:
                     shown = self._decoder.known(request.key)
                     if shown is not None and not (place == 0 and self._renderer.is_ready(request.key, asked.full)):
-                        yield RenderRequest(request.key, asked.sizes[place], shown.gaussians)
+                        yield RenderRequest(request.key, asked.sizes[place], shown)
 
     # ---------------------------------------------------------------- what is ready
 
@@ -120,7 +123,10 @@ class Ahead:
         """Whether a frame can be shown at once, as it is looked at now."""
         if not self._looks:
             return self._decoder.is_ready(key)
-        return all(any(self._renderer.is_ready(key, look) for look in asked.sizes) for asked in self._looks.values())
+        return all(
+            any(self._renderer.is_ready((*key[:-2], decoded_as(look.shown_as), key[-1]), look) for look in asked.sizes)
+            for asked in self._looks.values()
+        )
 
     def runs(self, state_of: StateOf, is_current: Callable[[FrameKey], bool]) -> list[tuple[int, int]]:
         """Frames that can be shown at once as they are looked at now: first and stop of each run, in order.

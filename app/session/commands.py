@@ -162,6 +162,20 @@ class HomeView:
 
 
 @dataclass(frozen=True, slots=True)
+class SetMode:
+    """Let colours mean something else. mode: See app.playback.view_modes.MODES."""
+
+    mode: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetContent:
+    """Draw a part of the clips. content: See app.playback.view_modes.CONTENTS."""
+
+    content: str
+
+
+@dataclass(frozen=True, slots=True)
 class ShowViews:
     """Show one, two or four views side by side."""
 
@@ -217,6 +231,8 @@ Command = (
     | SettingCommand
     | EditCommand
     | HomeView
+    | SetMode
+    | SetContent
     | ShowViews
     | ActivateView
     | CloseQuestion

@@ -16,6 +16,7 @@ from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArra
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
+from app.playback.view_modes import CONTENTS, MODES, ShownAs
 from app.playback.views import Views
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
@@ -155,6 +156,10 @@ class Session:
         return self.views.current.overlays
 
     @property
+    def _shown_as(self) -> ShownAs:
+        return ShownAs(self.overlays.mode, self.overlays.content)
+
+    @property
     def residual_status(self) -> ResidualStatus:
         """What is measured of every picture."""
         return self.residuals.status
@@ -221,6 +226,14 @@ class Session:
                 self.overlays.heat = kind
             case commands.SetHoldout() | commands.SetClipLength() | commands.SetTrainSetting() | commands.SetPreset():
                 self._change_settings(command)
+            case commands.SetMode(mode=mode):
+                if mode not in MODES:
+                    raise ValueError(f"modes are {', '.join(MODES)}, not {mode!r}")
+                self.overlays.mode = mode
+            case commands.SetContent(content=content):
+                if content not in CONTENTS:
+                    raise ValueError(f"parts of a clip are {', '.join(CONTENTS)}, not {content!r}")
+                self.overlays.content = content
             case commands.HomeView():
                 self.view.home()
             case commands.ShowViews(n=n):
@@ -392,17 +405,17 @@ class Session:
 
     def wanted_frame(self) -> WantedFrame | None:
         """What ought to be on screen; None without a capture. What is there says itself what it is."""
-        return self.playback.wanted(self.timeline, self.view, view_id=self.views.current_index)
+        return self.playback.wanted(self.timeline, self.view, self._shown_as, view_id=self.views.current_index)
 
     def shown_gaussians(self) -> GaussianArrays | None:
         """Gaussians of the shown frame; the newest ones there are until those are decoded; None where nothing is
         trained."""
-        shown = self.playback.frame(self.timeline)
+        shown = self.playback.frame(self.timeline, self._shown_as)
         return None if shown is None else shown.gaussians
 
     def shown_anchors(self) -> AnchorArrays | None:
         """Anchors that exist at the shown frame; those of the newest frame there is until it was decoded."""
-        shown = self.playback.frame(self.timeline)
+        shown = self.playback.frame(self.timeline, self._shown_as)
         return None if shown is None else shown.anchors
 
     def shown_points(self) -> PointArrays | None:
@@ -411,9 +424,9 @@ class Session:
 
     def request_render(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
         """The rasterizer's picture of the frame and view; see Playback.render."""
-        views = self.views
+        view_id = self.views.current_index
         return self.playback.render(
-            self.timeline, self.view, width, height, full_size=full_size, view_id=views.current_index
+            self.timeline, self.view, width, height, full_size=full_size, shown_as=self._shown_as, view_id=view_id
         )
 
     def cached_frames(self) -> list[tuple[int, int]]:

@@ -201,6 +201,10 @@ class FakeSession:
                 self.overlays.compare = mode
             case commands.ToggleOverlay(name=name):
                 setattr(self.overlays, name, not getattr(self.overlays, name))
+            case commands.SetMode(mode=mode):
+                self.overlays.mode = mode
+            case commands.SetContent(content=content):
+                self.overlays.content = content
             case commands.ShowHeat(kind=kind):
                 self.overlays.heat = kind
             case commands.HomeView():

@@ -77,7 +77,8 @@ class PicturePane:
         self.pointer.navigate(session, dispatch, ui, panes)
         # Looking through a camera may just have ended; the picture then fills the area from the next frame on.
         self._draw_picture(session, dispatch, ui, area, panes, is_active=is_active)
-        self.hud.draw(session, ui, self.heat.beside(area), self.scene)
+        value = self._value_under_pointer(panes.rendered)
+        self.hud.draw(session, ui, self.heat.beside(area), self.scene, value=value)
         if ui.regions.is_active and is_active:
             top = panes.captured.y0 + 44 if panes.captured is not None else area.y0 + 12  # below what names the pane
             free = Rect(area.x0 + 12, top, area.x1, area.y1)
@@ -135,6 +136,12 @@ class PicturePane:
         if panes.captured is not None:
             self._draw_captured(session, draw, panes)
         draw.pop_clip_rect()
+
+    def _value_under_pointer(self, pane: Rect) -> float | None:
+        pointer = imgui.get_io().mouse_pos
+        if not imgui.is_item_hovered() or not pane.contains(pointer.x, pointer.y):
+            return None
+        return self.scene.value_at((pointer.x - pane.x0) / pane.width, (pointer.y - pane.y0) / pane.height)
 
     def _point_at_camera(self, session: PictureNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """The camera under the pointer stands out; one that was pressed is remembered for the click."""

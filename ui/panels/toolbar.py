@@ -12,14 +12,17 @@ from app.session.commands import LookThrough, ShowHeat, ShowViews, ToggleOverlay
 from app.status import COMPARE_MODES
 from ui.panels.actions.action import ActionNeeds
 from ui.panels.actions.compare import cloud_overlay, set_compare, shown_compare
+from ui.panels.mode_box import draw_mode_box
 from ui.panels.regions import begin_choosing
 from ui.panels.state import Dispatch, UiState
 from ui.style import theme
 from ui.style.theme import Icon
 
 TOOLBAR_HEIGHT = 38.0
-TOOLBAR_WIDTH = 610.0
+TOOLBAR_WIDTH = 736.0
 """With less room, words give way to symbols."""
+MODE_WIDTHS = (124.0, 108.0)
+"""Of the box of modes, where there is room and where there is little, units."""
 MARK_SLIDER = imgui.SliderFlags_.always_clamp
 COMPARE_WORDS = {"off": "Off", "wipe": "Wipe", "side": "Side by side"}
 
@@ -39,7 +42,7 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None
     if is_roomy:
         imgui.text_disabled("View")
         imgui.same_line()
-    imgui.set_next_item_width(150 if is_roomy else min(120, max(room - 230, 40)))
+    imgui.set_next_item_width(150 if is_roomy else min(120, max(room - 238 - MODE_WIDTHS[1], 40)))
     if imgui.begin_combo("##camera", "Free" if shown is None else names[shown]):
         if imgui.selectable("Free", shown is None)[0]:
             dispatch(LookThrough(None))
@@ -55,6 +58,8 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None
         imgui.end_combo()
     ui.mark("viewport.camera")
     imgui.set_item_tooltip("Look through a capture camera ([ and ])")
+    imgui.same_line(0, 8)
+    draw_mode_box(session, dispatch, ui, MODE_WIDTHS[0] if is_roomy else MODE_WIDTHS[1])
     imgui.same_line(0, 18 if is_roomy else 8)
     if is_roomy:
         imgui.text_disabled("Compare")
