@@ -22,6 +22,7 @@ from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.project import Project, check_settings
 from app.project.recents import project_name
+from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.residuals.residuals import Residuals
 from app.session import commands
@@ -440,6 +441,10 @@ class Session:
     def compared_picture(self, camera_index: int, max_width: int) -> Picture | None:
         """What a camera took at the playhead, to be set beside the render; see Playback.compared_picture."""
         return self.playback.compared_picture(self.timeline, camera_index, max_width)
+
+    def anchor_heat(self, column: str) -> AnchorHeat | None:
+        """The residual of each anchor at the playhead; see Residuals.anchor_heat."""
+        return self.residuals.anchor_heat(self.timeline, column)
 
     def heat(self, kind: str) -> HeatMap | None:
         """The residual heat map of the playhead and the camera looked through; see Residuals.heat."""

@@ -30,6 +30,7 @@ from ui.gl import (
     Target,
     is_software,
 )
+from ui.viewport.anchor_heat_layer import AnchorHeatLayer, AnchorHeatNeeds
 from ui.viewport.anchor_marks import nearest_under
 from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
 from ui.viewport.mark_layer import AnchorCounts, MarkLayer, MarkNeeds
@@ -44,7 +45,7 @@ _CLOUD_KINDS = {"static": CLOUD, "moment": FIRST_CLOUD, "pictures": HINT}
 NO_REGIONS = ShownRegions()
 
 
-class SceneNeeds(MarkNeeds, Protocol):
+class SceneNeeds(MarkNeeds, AnchorHeatNeeds, Protocol):
     """What the picture is made from."""
 
     @property
@@ -130,6 +131,7 @@ class Scene:
         self._cloud = PointRenderer(ctx)
         self.marks = MarkLayer(ctx)
         self.regions = RegionLayer(ctx)
+        self._anchor_heat = AnchorHeatLayer(ctx)
         self._drawn_key: Hashable = None
         self._asked_sizes: tuple[tuple[int, int], tuple[int, int]] | None = None
         self._asked_capture: tuple[int, int] | None = None
@@ -152,6 +154,7 @@ class Scene:
             self._cloud,
             self.marks,
             self.regions,
+            self._anchor_heat,
         )
         for thing in owned:
             thing.release()
@@ -208,14 +211,26 @@ class Scene:
         if base_key is None:
             shown = self._without_render(shown, points_key, captured)
         is_rendered = base_key is not None
-        marks_key = self.marks.take(session, view, session.shown_gaussians() if is_rendered else None)
+        gaussians = session.shown_gaussians() if is_rendered else None
+        marks_key = self.marks.take(session, view, gaussians)
+        heat_key = self._anchor_heat.take(session, view, gaussians)
         regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
         self.shown = shown
-        if self.is_software and is_rendered and regions.is_empty and self.marks.is_empty(session):
+        has_marks = not (regions.is_empty and self.marks.is_empty(session) and self._anchor_heat.is_empty)
+        if self.is_software and is_rendered and not has_marks:
             # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
             self._drawn_key = None
             return Composed(self._picture.texture, shown)
-        key = (view.key, base_key, points_key, captured_key, marks_key, regions_key)
+        key = (
+            view.key,
+            base_key,
+            points_key,
+            captured_key,
+            marks_key,
+            regions_key,
+            heat_key,
+            session.overlays.heat_opacity,
+        )
         if key != self._drawn_key or self._splats.is_order_stale:
             self._drawn_key = key
             self._draw(view, base_key, points_key, captured_key, session)
@@ -377,6 +392,7 @@ class Scene:
             self._cloud.draw(target, *camera, near, shape="circle", size=size, unit=unit, is_depth_tested=True)
         elif captured_key is not None:
             target.draw_image(self._captured)
+        self._anchor_heat.draw(target, view, session.overlays.heat_opacity, self.marks.pixels_per_unit)
         self.marks.draw(target, view, session)
         self.regions.draw(target, camera)
         target.resolve(BACKGROUND)
