@@ -15,7 +15,7 @@ PLAYING_S = 1.5
 MAX_PLAYING, STANDING = 64, 8
 """At most so many frames while it plays; so many once the playhead stands."""
 SETTLED_S = 0.3
-"""The view, and the playhead unless it plays, have to stand still for so long: until then cores are for what is shown."""
+"""The view, and the playhead unless it plays, have to stand still for so long: until then cores are for what shows."""
 SPARE = 2
 """Frames that memory holds beside those that come: the one shown, and the newest."""
 
@@ -89,9 +89,10 @@ class Ahead:
         if identity == self._planned_of:
             return
         self._planned_of = identity
-        missing = [request for request in coming if not self._is_ready(request.key)]
+        kept = coming[: max(self._decoder.n_that_fit - SPARE, 0)]
+        missing = [request for request in kept if not self._is_ready(request.key)]
         look_keys = {asked.full.key for asked in self._looks.values()}
-        self._decoder.plan(missing[: max(self._decoder.n_that_fit - SPARE, 0)], lambda key: course.distance(key[-1]))
+        self._decoder.plan(missing, lambda key: course.distance(key[-1]))
         self._renderer.plan(list(self._drawable(coming)), lambda key: _picture_distance(key, course, look_keys))
 
     def _is_settled(self, course: Course) -> bool:

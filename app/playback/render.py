@@ -119,7 +119,8 @@ class Renderer:
 
     def ready_keys(self) -> list[FrameKey]:
         """Frames of which there is a picture, whatever it looks like."""
-        return list({gaussians_key for gaussians_key, _ in self._cache.keys()})
+        keys = self._cache.keys()
+        return list({gaussians_key for gaussians_key, _ in keys})
 
     @property
     def revision(self) -> int:
