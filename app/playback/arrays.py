@@ -27,6 +27,8 @@ class GaussianArrays:
         key: Changes when the content does.
         near_plane: Nearest depth that should be drawn, scene units.
         source: The frame, and the state of the clip it was decoded from.
+        n_still: So many rows come first and differ in nothing but their colours between arrays of one `still_key`.
+        still_key: None where no rows are known to be so.
     """
 
     means: np.ndarray
@@ -37,6 +39,8 @@ class GaussianArrays:
     key: Hashable
     near_plane: float = 0.01
     source: PictureSource = UNKNOWN
+    n_still: int = 0
+    still_key: Hashable = None
 
     def __len__(self) -> int:
         return len(self.means)

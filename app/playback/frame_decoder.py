@@ -204,7 +204,14 @@ class FrameDecoder:
         )
         anchors = _anchor_arrays(loaded.model.anchors(clip_time), request.key, source)
         values = [np.ascontiguousarray(host_array(tensor)) for tensor in gaussians.tensors()]
-        arrays = GaussianArrays(*values, key=request.key, near_plane=loaded.near_plane, source=source)
+        arrays = GaussianArrays(
+            *values,
+            key=request.key,
+            near_plane=loaded.near_plane,
+            source=source,
+            n_still=loaded.model.n_constant_rows(),
+            still_key=request.model_key,
+        )
         shown = ShownFrame(arrays, anchors)
         if self.worker.is_still_wanted:
             n_bytes = arrays.n_bytes + anchors.inherited_positions.nbytes + anchors.own_positions.nbytes

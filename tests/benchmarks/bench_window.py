@@ -164,7 +164,9 @@ def measure_play(desk: Desk) -> list[str]:
         rate = frames_per_s(log, since_s, until_s)
         shown = [line["width"] for line in log if line.get("frame_s", 0) >= since_s]
         says = (desk.state["hud"] or {}).get("rate", "")
-        lines.append(f"play, {title} {PLAY_S:g} s: {rate:.1f} frames/s, {min(shown)} to {max(shown)} px wide, says '{says}'")
+        lines.append(
+            f"play, {title} {PLAY_S:g} s: {rate:.1f} frames/s, {min(shown)} to {max(shown)} px wide, says '{says}'"
+        )
     desk.key("space")
     time.sleep(0.5)
     return [*lines, *slow_turns(desk.log_lines(), began_s)]

@@ -82,7 +82,9 @@ def image_gaps_ms(log: Log, since_s: float, until_s: float) -> list[float]:
 
 def frames_per_s(log: Log, since_s: float, until_s: float) -> float:
     """Rendered frames that followed each other on screen, per second."""
-    shown = [line["frame"] for line in _frames(log) if since_s <= line["at_s"] <= until_s and line["kind"] == "Rendered"]
+    shown = [
+        line["frame"] for line in _frames(log) if since_s <= line["at_s"] <= until_s and line["kind"] == "Rendered"
+    ]
     return sum(a != b for a, b in pairwise(shown)) / (until_s - since_s)
 
 
