@@ -9,18 +9,21 @@ from dataclasses import dataclass
 from app.playback.course import Course
 from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest
 from app.playback.render import Look, PictureKey, Renderer, RenderRequest
+from app.playback.view_modes import PLAIN, ShownAs, decoded_as
 
 PLAYING_S = 1.5
 """This much of what comes is made ready while it plays."""
 MAX_PLAYING, STANDING = 64, 8
 """At most so many frames while it plays; so many once the playhead stands."""
 SETTLED_S = 0.3
-"""The view, and the playhead unless it plays, have to stand still for so long: until then cores are for what shows."""
+"""The view, and the playhead unless it plays, have to stand still so long: until then cores are for what is shown."""
+MOST_UNASKED = 30
+"""After so many turns of the loop in which nobody asked for a picture, none are drawn ahead."""
 SPARE = 2
 """Frames that memory holds beside those that come: the one shown, and the newest."""
 
-RequestOf = Callable[[int], FrameRequest | None]
-"""What is to be decoded for a frame; None where nothing is trained."""
+RequestOf = Callable[[int, ShownAs], FrameRequest | None]
+"""What is to be decoded for a frame and how it is shown; None where nothing is trained."""
 StateOf = Callable[[int], Hashable]
 """What tells states of a clip apart."""
 
@@ -54,6 +57,7 @@ class Ahead:
         self._decoder, self._renderer, self._settled_s = decoder, renderer, settled_s
         self._looks: dict[Hashable, AskedLook] = {}
         self._asked: dict[Hashable, AskedLook] = {}
+        self._unasked: dict[Hashable, int] = {}
         self._still: object = None
         self._still_since_s = 0.0
         self._planned_of: object = None
@@ -66,7 +70,8 @@ class Ahead:
 
     def clear(self) -> None:
         """Another project was opened."""
-        self._looks, self._asked, self._planned_of, self._runs_of, self._runs = {}, {}, None, None, []
+        self._looks, self._asked, self._unasked = {}, {}, {}
+        self._planned_of, self._runs_of, self._runs = None, None, []
 
     # ---------------------------------------------------------------- planning
 
@@ -76,13 +81,14 @@ class Ahead:
         Args:
             is_busy: Whether something else, such as a training, needs the cores while the playhead stands.
         """
-        self._looks, self._asked = self._asked or self._looks, {}
+        self._take_looks()
         n = STANDING
         if not self._is_settled(course) or (is_busy and not course.is_playing):
             n = 0
         elif course.is_playing:
             n = min(round(PLAYING_S * course.frames_per_s), MAX_PLAYING)
-        requests = [request_of(frame) for frame in course.ahead(n)]
+        parts = dict.fromkeys(decoded_as(asked.look.shown_as) for asked in self._looks.values()) or (PLAIN,)
+        requests = [request_of(frame, part) for frame in course.ahead(n) for part in parts]
         # A snapshot of a running training is replaced before long: not worth the cores while nothing plays.
         coming = [one for one in requests if one is not None and (course.is_playing or not one.is_live)]
         identity = (course, coming, tuple(self._looks.items()), self._decoder.revision)
@@ -94,6 +100,15 @@ class Ahead:
         look_keys = {asked.full.key for asked in self._looks.values()}
         self._decoder.plan(missing, lambda key: course.distance(key[-1]))
         self._renderer.plan(list(self._drawable(coming)), lambda key: _picture_distance(key, course, look_keys))
+
+    def _take_looks(self) -> None:
+        """What is shown now; a place that has not said so for some turns of the loop is gone."""
+        self._unasked = {view_id: 0 if view_id in self._asked else n + 1 for view_id, n in self._unasked.items()}
+        self._unasked |= dict.fromkeys(self._asked, 0)
+        looks = self._looks | self._asked
+        self._looks = {view_id: look for view_id, look in looks.items() if self._unasked[view_id] <= MOST_UNASKED}
+        self._unasked = {view_id: self._unasked[view_id] for view_id in self._looks}
+        self._asked = {}
 
     def _is_settled(self, course: Course) -> bool:
         views = tuple((view_id, asked.full) for view_id, asked in self._looks.items())
@@ -109,11 +124,12 @@ class Ahead:
             for asked in self._looks.values():
                 if place >= len(asked.sizes):
                     continue
+                of_look = [one for one in coming if one.shown_as == decoded_as(asked.look.shown_as)]
                 n_that_fit = self._renderer.n_that_fit(asked.full) // len(self._looks) - SPARE
-                for request in coming[: max(n_that_fit, 0)]:
+                for request in of_look[: max(n_that_fit, 0)]:
                     shown = self._decoder.known(request.key)
                     if shown is not None and not (place == 0 and self._renderer.is_ready(request.key, asked.full)):
-                        yield RenderRequest(request.key, asked.sizes[place], shown.gaussians)
+                        yield RenderRequest(request.key, asked.sizes[place], shown)
 
     # ---------------------------------------------------------------- what is ready
 
@@ -121,7 +137,10 @@ class Ahead:
         """Whether a frame can be shown at once, as it is looked at now."""
         if not self._looks:
             return self._decoder.is_ready(key)
-        return all(any(self._renderer.is_ready(key, look) for look in asked.sizes) for asked in self._looks.values())
+        return all(
+            any(self._renderer.is_ready((*key[:-2], decoded_as(look.shown_as), key[-1]), look) for look in asked.sizes)
+            for asked in self._looks.values()
+        )
 
     def runs(self, state_of: StateOf, is_current: Callable[[FrameKey], bool]) -> list[tuple[int, int]]:
         """Frames that can be shown at once as they are looked at now: first and stop of each run, in order.

@@ -7,21 +7,26 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from app.background.kernels import prepare_drawing
 from app.background.latest import LatestWorker
 from app.playback.arrays import BACKGROUND, GaussianArrays, Picture
-from app.playback.frame_decoder import FrameKey
+from app.playback.frame_decoder import FrameKey, ShownFrame
+from app.playback.mode_arrays import drawn_arrays
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
+from app.playback.view_modes import MODES, PLAIN, ShownAs, range_of
 from engine.backends.table import backend_called
 from engine.byte_cache import ByteCache
 
+if TYPE_CHECKING:
+    from engine.raster import Gaussians
+
 CACHE_BYTES = 256 << 20
 """Finished pictures kept in memory."""
-COLOR = "color"
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,21 +35,25 @@ class Look:
 
     Attributes:
         key: Of the view, whatever the size; see OrbitView.look_key.
-        mode: How it is drawn.
+        shown_as: What its colours mean, and of which part of a clip.
+        value_range: Of the numbers that its colours stand for.
     """
 
     key: Hashable
     width: int
     height: int
-    mode: Hashable = COLOR
+    shown_as: ShownAs = PLAIN
+    value_range: tuple[float, float] = field(default=(0.0, 1.0), compare=False)
     camera_index: int | None = field(default=None, compare=False)
     world_to_camera: np.ndarray = field(default_factory=lambda: np.eye(4), compare=False)
     K: np.ndarray = field(default_factory=lambda: np.eye(3), compare=False)
 
     @classmethod
-    def of(cls, view: OrbitView, width: int, height: int, *, mode: Hashable = COLOR) -> Look:
+    def of(cls, view: OrbitView, width: int, height: int, *, shown_as: ShownAs = PLAIN) -> Look:
         """As a view is now."""
-        return cls(view.look_key, width, height, mode, view.look_through, view.world_to_camera(), view.K(width, height))
+        value_range = range_of(shown_as.mode, view.rig)
+        matrices = view.world_to_camera(), view.K(width, height)
+        return cls(view.look_key, width, height, shown_as, value_range, view.look_through, *matrices)
 
 
 PictureKey = tuple[FrameKey, Look]
@@ -52,21 +61,22 @@ PictureKey = tuple[FrameKey, Look]
 
 @dataclass(frozen=True, slots=True)
 class RenderRequest:
-    """Gaussians, looked at. Equal requests give equal pictures."""
+    """A frame, looked at. Equal requests give equal pictures."""
 
-    gaussians_key: FrameKey
+    frame_key: FrameKey
     look: Look
-    gaussians: GaussianArrays = field(compare=False)
+    shown: ShownFrame = field(compare=False)
 
     @property
     def key(self) -> PictureKey:
         """Identity of the picture."""
-        return self.gaussians_key, self.look
+        return self.frame_key, self.look
 
     @property
     def source(self) -> PictureSource:
         """What the picture is of."""
-        return replace(self.gaussians.source, camera_index=self.look.camera_index, look=self.look.key)
+        look, source = self.look, self.shown.gaussians.source
+        return replace(source, camera_index=look.camera_index, look=look.key, shown_as=look.shown_as)
 
 
 class Renderer:
@@ -81,25 +91,25 @@ class Renderer:
         self._taken_up: dict[Hashable, object] = {}
         self._last_pictures: dict[Hashable, Picture] = {}
 
-    def known(self, gaussians_key: FrameKey, look: Look, *, view_id: Hashable = 0) -> Picture | None:
+    def known(self, frame_key: FrameKey, look: Look, *, view_id: Hashable = 0) -> Picture | None:
         """A finished picture; nothing is asked for."""
-        picture = self._cache.get((gaussians_key, look))
+        picture = self._cache.get((frame_key, look))
         if picture is not None:
             self._last_pictures[view_id] = picture
             self._asked.pop(view_id, None)
         return picture
 
-    def picture(self, key: FrameKey, gaussians: GaussianArrays, look: Look, *, view_id: Hashable = 0) -> Picture | None:
+    def picture(self, key: FrameKey, shown: ShownFrame, look: Look, *, view_id: Hashable = 0) -> Picture | None:
         """The picture if it is ready; otherwise it is asked for, and the view's newest one is returned as stale.
 
         Args:
-            key: Of the Gaussians.
+            key: Of the frame.
             view_id: Of the place where it is shown: each has one newest request.
         """
         known = self.known(key, look, view_id=view_id)
         if known is not None:
             return known
-        request = RenderRequest(key, look, gaussians)
+        request = RenderRequest(key, look, shown)
         self._asked[view_id] = request
         self.worker.request(request, lane=view_id)
         return self.newest(view_id)
@@ -113,14 +123,13 @@ class Renderer:
         last = self._last_pictures.get(view_id)
         return None if last is None else replace(last, is_stale=True)
 
-    def is_ready(self, gaussians_key: FrameKey, look: Look) -> bool:
+    def is_ready(self, frame_key: FrameKey, look: Look) -> bool:
         """Whether a picture can be shown at once."""
-        return (gaussians_key, look) in self._cache
+        return (frame_key, look) in self._cache
 
     def ready_keys(self) -> list[FrameKey]:
         """Frames of which there is a picture, whatever it looks like."""
-        keys = self._cache.keys()
-        return list({gaussians_key for gaussians_key, _ in keys})
+        return list({frame_key for frame_key, _ in self._cache.keys()})  # noqa: SIM118 - a cache, not a dict
 
     @property
     def revision(self) -> int:
@@ -161,24 +170,33 @@ class Renderer:
             return known
         picture = render(request)
         if self.worker.is_still_wanted:
-            self._cache.put(request.key, picture, picture.image.nbytes)
+            n_bytes = picture.image.nbytes + (0 if picture.values is None else picture.values.nbytes)
+            self._cache.put(request.key, picture, n_bytes)
         return picture
 
 
 def render(request: RenderRequest) -> Picture:
     """Rasterize one request over BACKGROUND. Runs on the renderer's thread, or wherever no window waits."""
+    started_s = time.perf_counter()
+    mode = MODES[request.look.shown_as.mode]
+    arrays, values = drawn_arrays(request.shown, mode.name), None
+    if mode.is_picture:
+        image, values = _numbers(arrays, request.look)
+    else:
+        image = _colors(arrays, request.look)
+    duration_s = time.perf_counter() - started_s
+    return Picture(image, request.key, duration_s=duration_s, source=request.source, values=values)
+
+
+def _colors(arrays: GaussianArrays, look: Look) -> np.ndarray:
+    """[H, W, 3] uint8"""
     import torch
 
-    from engine.raster import Gaussians, rasterize
+    from engine.raster import rasterize
 
-    started_s = time.perf_counter()
-    arrays, look = request.gaussians, request.look
-    gaussians = Gaussians(
-        *(torch.from_numpy(a) for a in (arrays.means, arrays.quats, arrays.scales, arrays.opacities, arrays.colors))
-    )
     with torch.no_grad():
         rendering = rasterize(
-            gaussians,
+            _gaussians(arrays),
             torch.from_numpy(look.world_to_camera.astype(np.float32))[None],
             torch.from_numpy(look.K.astype(np.float32))[None],
             look.width,
@@ -187,5 +205,25 @@ def render(request: RenderRequest) -> Picture:
             background=torch.tensor(BACKGROUND),
             near_plane=arrays.near_plane,
         )
-        image = (rendering.image[0].clamp(0.0, 1.0) * 255.0 + 0.5).to(torch.uint8).numpy()
-    return Picture(image, request.key, duration_s=time.perf_counter() - started_s, source=request.source)
+        return (rendering.image[0].clamp(0.0, 1.0) * 255.0 + 0.5).to(torch.uint8).numpy()
+
+
+def _numbers(arrays: GaussianArrays, look: Look) -> tuple[np.ndarray, np.ndarray | None]:
+    """Picture and values, see app.playback.mode_pictures."""
+    import torch
+
+    from app.playback.mode_pictures import mode_picture
+    from engine.raster.pinhole_view import pinhole_views
+
+    poses, Ks = (torch.from_numpy(m.astype(np.float32))[None] for m in (look.world_to_camera, look.K))
+    (view,) = pinhole_views(poses, Ks, look.width, look.height, arrays.near_plane)
+    return mode_picture(look.shown_as.mode, _gaussians(arrays), view, look.value_range)
+
+
+def _gaussians(arrays: GaussianArrays) -> Gaussians:
+    import torch
+
+    from engine.raster import Gaussians
+
+    columns = (arrays.means, arrays.quats, arrays.scales, arrays.opacities, arrays.colors)
+    return Gaussians(*(torch.from_numpy(column) for column in columns))

@@ -218,7 +218,7 @@ def with_desk(path: Path, work: Callable[[Desk], list[str]]) -> list[str]:
             desk.close()
 
 
-def wait_for_picture(desk: Desk, timeout_s: float = 60.0) -> None:
+def wait_for_picture(desk: Desk, timeout_s: float = 180.0) -> None:
     """Until a trained frame is there in full."""
     desk.wait_for("a trained picture", lambda s: s["shows"] == "Rendered" and not s["hud"]["pending"], timeout_s)
 

@@ -19,6 +19,7 @@ from app.playback.arrays import BACKGROUND, GaussianArrays, Picture, PointArrays
 from app.playback.picture_source import PictureSource
 from app.playback.pointing import pixel_ray, seen_point
 from app.playback.timeline import Timeline
+from app.playback.view_modes import MODES
 from app.status import RegionsStatus, WantedFrame
 from engine.camera.projection import camera_center
 from ui.gl import (
@@ -136,6 +137,8 @@ class Scene:
         self._moving_size = MovingSize()
         self._cloud_kind = CLOUD
         self._point_size = 0.0
+        self._is_picture = self.is_software
+        self._values: np.ndarray | None = None
         self._picture_key: Hashable = None
         self._captured_key: Hashable = None
 
@@ -186,7 +189,7 @@ class Scene:
         is_cloud_chosen = bool(session.overlays.show_cloud)
         points_key = self._take_points(session) if is_cloud_chosen else None
         is_cloud_chosen = points_key is not None
-        self._asked_sizes = None
+        self._asked_sizes = self._values = None
         shown = ShownPicture(
             source=PictureSource(camera_index=session.view.look_through, look=session.view.look_key),
             size=(view.width, view.height),
@@ -195,7 +198,8 @@ class Scene:
         )
         base_key = None
         if not is_cloud_chosen:
-            take = self._take_picture if self.is_software else self._take_gaussians
+            self._is_picture = self.is_software or MODES[session.overlays.mode].is_picture
+            take = self._take_picture if self._is_picture else self._take_gaussians
             base_key, shown = take(session, view, shown)
             points_key = self._take_points(session) if base_key is None and session.overlays.show_points else None
         needs_capture = base_key is None and points_key is None and session.view.look_through is not None
@@ -207,7 +211,7 @@ class Scene:
         marks_key = self.marks.take(session, view, session.shown_gaussians() if is_rendered else None)
         regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
         self.shown = shown
-        if self.is_software and base_key is not None and regions.is_empty and self.marks.is_empty(session):
+        if self.is_software and is_rendered and regions.is_empty and self.marks.is_empty(session):
             # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
             self._drawn_key = None
             return Composed(self._picture.texture, shown)
@@ -268,7 +272,7 @@ class Scene:
             return None, shown
         if self._picture.set(picture.image, key=picture.key) and picture.duration_s > 0:
             self._moving_size.note_picture(picture.size[0] / full_size[0], picture.duration_s * 1e3)
-        self._picture_key = picture.key
+        self._picture_key, self._values = picture.key, picture.values
         is_coarse = is_quick and picture.size[0] < full_size[0] and not timeline.is_playing
         return picture.key, replace(
             shown,
@@ -315,6 +319,19 @@ class Scene:
             self._point_size = CLOUD_OVERLAP * cloud.spacing
         return key
 
+    def value_at(self, x: float, y: float) -> float | None:
+        """The number that the picture's colour stands for at a place; None where nothing is, and where colours are no
+        numbers.
+
+        Args:
+            x, y: As shares of the picture's width and height, from its upper left corner.
+        """
+        if self._values is None or not (0.0 <= x < 1.0 and 0.0 <= y < 1.0):
+            return None
+        height, width = self._values.shape
+        value = float(self._values[int(y * height), int(x * width)])
+        return None if np.isnan(value) else value
+
     def anchor_text(self, session: SceneNeeds, view: SceneView, x: float, y: float) -> str:
         """What the anchor under a pixel of the view is and why; empty where none is shown or that is unknown. It stands
         out from the next frame on."""
@@ -353,7 +370,7 @@ class Scene:
         target = self._target
         target.clear(BACKGROUND)
         if base_key is not None:
-            if self.is_software:
+            if self._is_picture:
                 target.draw_image(self._picture)
             else:
                 self._splats.draw(target, *camera, self._near)
@@ -376,5 +393,8 @@ class Scene:
 
 
 def _project_of(gaussians: GaussianArrays) -> Hashable:
-    """Frames of two projects differ in the first part of their keys."""
-    return gaussians.key[0] if isinstance(gaussians.key, tuple) else None
+    """Frames of two projects differ in the first part of their keys; in a mode that lies in another key."""
+    key = gaussians.key
+    while isinstance(key, tuple):
+        key = key[0]
+    return key
