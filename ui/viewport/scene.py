@@ -182,7 +182,7 @@ class Scene:
             captured = session.compared_picture(*self._asked_capture)
             if captured is not None and captured.key != self._captured_key:
                 return True
-        return False
+        return self._splats.has_news
 
     # ---- the picture -----------------------------------------------------------------------------------------
 
@@ -304,7 +304,12 @@ class Scene:
         gaussians, wanted = session.shown_gaussians(), session.wanted_frame()
         if gaussians is None:
             return None, shown
-        self._splats.upload(gaussians)
+        before = self._splats.drawn
+        is_of_another_project = isinstance(before, GaussianArrays) and _project_of(before) != _project_of(gaussians)
+        self._splats.upload(gaussians, at_once=is_of_another_project)
+        self._splats.update()
+        assert isinstance(self._splats.drawn, GaussianArrays)
+        gaussians = self._splats.drawn  # the last ones, until those were sorted
         self._near = gaussians.near_plane
         shown = replace(
             shown,
@@ -401,3 +406,11 @@ class Scene:
         """Fewer points are drawn larger, so that a thin cloud still reads as surfaces."""
         per_point_px2 = view.width * view.height / max(len(self._cloud), 1)
         return float(np.clip(0.45 * np.sqrt(per_point_px2), 2.0, 5.0))
+
+
+def _project_of(gaussians: GaussianArrays) -> Hashable:
+    """Frames of two projects differ in the first part of their keys; in a mode that lies in another key."""
+    key = gaussians.key
+    while isinstance(key, tuple):
+        key = key[0]
+    return key
