@@ -248,8 +248,9 @@ class FrameDecoder:
         loaded = LoadedClip(model, parts, anchors, state.header.near_plane, state.header.step, colors)
         if not self.worker.is_still_wanted:
             return loaded
-        self._cache.drop(lambda key: key[2] == request.clip_index and key[3] != request.revision)
-        kept = [(key, value) for key, value in models.items() if key[2] != request.clip_index]
+        # another revision of the same file is worthless now; another file may be a version that it is compared with
+        self._cache.drop(lambda key: key[:3] == identity[:3] and key[3] != request.revision)
+        kept = [(key, value) for key, value in models.items() if key[:3] != identity[:3]]
         # replaced as a whole, so that the other thread never sees it half changed
         self._models = OrderedDict([*kept[-(MAX_MODELS - 1) :], (identity, loaded)])
         return loaded

@@ -32,6 +32,7 @@ from app.session.recent_projects import RecentProjects
 from app.session.setting_changes import changed_settings
 from app.session.settings import Settings
 from app.status import (
+    CAPTURED,
     COMPARE_MODES,
     OVERLAY_NAMES,
     ClipStatus,
@@ -223,6 +224,10 @@ class Session:
                 self.overlays.heat = kind
             case commands.SetHoldout() | commands.SetClipLength() | commands.SetTrainSetting() | commands.SetPreset():
                 self._change_settings(command)
+            case commands.SetCompareWith(other=other):
+                if other != CAPTURED and other not in MODES:
+                    raise ValueError(f"pictures to compare with are {CAPTURED}, {', '.join(MODES)}, not {other!r}")
+                self.overlays.compare_with = other
             case commands.SetMode(mode=mode):
                 if mode not in MODES:
                     raise ValueError(f"modes are {', '.join(MODES)}, not {mode!r}")
@@ -411,6 +416,14 @@ class Session:
         view_id = self.views.current_index
         return self.playback.render(
             self.timeline, self.view, width, height, full_size=full_size, shown_as=self._shown_as, view_id=view_id
+        )
+
+    def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
+        """The rasterizer's picture that the rendered one is compared with, where that is not a captured one."""
+        shown_as = ShownAs(self.overlays.compare_with, self.overlays.content)
+        view_id = ("other", self.views.current_index)
+        return self.playback.render(
+            self.timeline, self.view, width, height, full_size=full_size, shown_as=shown_as, view_id=view_id
         )
 
     def cached_frames(self) -> list[tuple[int, int]]:

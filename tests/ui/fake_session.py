@@ -14,6 +14,7 @@ from app.playback.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
+from app.playback.view_modes import ShownAs
 from app.playback.views import Views
 from app.project.recents import RecentProject
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
@@ -201,6 +202,8 @@ class FakeSession:
                 self.overlays.compare = mode
             case commands.ToggleOverlay(name=name):
                 setattr(self.overlays, name, not getattr(self.overlays, name))
+            case commands.SetCompareWith(other=other):
+                self.overlays.compare_with = other
             case commands.SetMode(mode=mode):
                 self.overlays.mode = mode
             case commands.SetContent(content=content):
@@ -281,6 +284,16 @@ class FakeSession:
                 camera_index=self.view.look_through,
                 look=self.view.look_key,
             ),
+        )
+
+    def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
+        """The same in green."""
+        picture = self.request_render(width, height, full_size=full_size)
+        if picture is None:
+            return None
+        source = replace(picture.source, shown_as=ShownAs(self.overlays.compare_with))
+        return replace(
+            picture, image=picture.image * np.array([0, 1, 0], np.uint8), key=("other", picture.key), source=source
         )
 
     def shown_gaussians(self) -> None:

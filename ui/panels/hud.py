@@ -15,6 +15,7 @@ from app.playback.view_modes import MODES, range_of
 from app.status import ClipStatus, Overlays, RegionsStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from ui.panels.color_bar import COLOR_BAR_SIZE, draw_color_bar
+from ui.panels.comparison import shown_compare
 from ui.panels.regions import draw_region_mark
 from ui.panels.state import Rect, UiState
 from ui.panels.timeline import STATE_WORDS
@@ -89,7 +90,7 @@ class Hud:
             if self.text.pending or scene.shown.is_on_its_way:
                 ui.redraw_within(BUSY_REDRAW_S)
         if scene.shows == RENDERED:
-            self._draw_color_bar(session, ui, scene, value)
+            self._draw_color_bars(session, ui, scene, value)
         if not ui.regions.is_active or area.width >= LEGEND_WIDTH:  # what is being chosen needs the room
             self._draw_legend(session, ui, scene, area)
 
@@ -154,24 +155,31 @@ class Hud:
             x, row_height = plate.x1 + GAP, max(row_height, height)
         ui.mark_rect("viewport.free", Rect(area.x0, area.y0, area.x1, bottom - row_height))
 
-    def _draw_color_bar(self, session: HudNeeds, ui: UiState, scene: Scene, value: float | None) -> None:
-        """What the colours of the picture on screen mean, at its lower right, above the plates."""
-        mode = MODES[scene.shown.source.shown_as.mode]
-        if not mode.map_name:
-            return
-        free = ui.rects["viewport.free"]
+    def _draw_color_bars(self, session: HudNeeds, ui: UiState, scene: Scene, value: float | None) -> None:
+        """What the colours of the picture on screen mean, at its lower right above the plates, and at its lower left
+        those of the picture that it is compared with."""
+        shown = scene.shown.source.shown_as.mode
+        self._draw_color_bar(session, ui, shown, value, is_left=False)
+        other = session.overlays.compare_with
+        if shown_compare(session) != "off" and other in MODES and other != shown:
+            self._draw_color_bar(session, ui, other, None, is_left=True)
+
+    def _draw_color_bar(self, session: HudNeeds, ui: UiState, name: str, value: float | None, *, is_left: bool) -> None:
+        mode, free = MODES[name], ui.rects["viewport.free"]
         width, height = COLOR_BAR_SIZE
+        if not mode.map_name or free.width < 2 * (width + 2 * MARGIN) * is_left:
+            return
         if free.width < width + 2 * MARGIN or free.height < height + 2 * MARGIN:
             return
-        x, y = free.x1 - MARGIN, free.y1 - 6
+        x, y = (free.x0 + MARGIN + width if is_left else free.x1 - MARGIN), free.y1 - 6
         plate = Rect(x - width, y - height, x, y)
         low, high = range_of(mode.name, session.rig)
         draw_color_bar(imgui.get_window_draw_list(), plate, mode.map_name, low, high, mode.unit, value)
-        ui.mark_rect("viewport.color_bar", plate)
+        ui.mark_rect("viewport.other_color_bar" if is_left else "viewport.color_bar", plate)
 
     def _draw_legend(self, session: HudNeeds, ui: UiState, scene: Scene, area: Rect) -> None:
         draw = imgui.get_window_draw_list()
-        is_labelled = session.overlays.compare == "wipe" and session.view.look_through is not None
+        is_labelled = shown_compare(session) in ("wipe", "blink")
         y = (ui.rects["viewport.rendered"].y0 + 44) if is_labelled else area.y0 + 12
         for shape, color, text in legend_rows(session, scene):
             width = imgui.calc_text_size(text).x

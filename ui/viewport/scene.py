@@ -19,7 +19,8 @@ from app.playback.arrays import BACKGROUND, GaussianArrays, Picture, PointArrays
 from app.playback.picture_source import PictureSource
 from app.playback.pointing import pixel_ray, seen_point
 from app.playback.timeline import Timeline
-from app.playback.view_modes import MODES
+from app.playback.view_modes import MODES, ShownAs
+from app.status import CAPTURED as CAPTURED_PICTURE
 from app.status import RegionsStatus, WantedFrame
 from engine.camera.projection import camera_center
 from ui.gl import (
@@ -65,6 +66,8 @@ class SceneNeeds(MarkNeeds, Protocol):
 
     def compared_picture(self, camera_index: int, max_width: int) -> Picture | None: ...
 
+    def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None: ...
+
 
 @dataclass(frozen=True)
 class SceneView:
@@ -104,17 +107,19 @@ class Composed:
 
 @dataclass(frozen=True)
 class CapturedPicture:
-    """A captured picture on the GPU.
+    """A picture on the GPU that the rendered one is compared with: a captured one, or one in another mode.
 
     Attributes:
         frame_index: The frame it was taken at, which need not be that of the playhead yet.
         has_scene_colors: Whether it was brought into the scene's colours, those of the render.
+        shown_as: What its colours mean; None of a captured picture.
     """
 
     texture: moderngl.Texture
     frame_index: int | None
     is_stale: bool
     has_scene_colors: bool = False
+    shown_as: ShownAs | None = None
 
 
 class Scene:
@@ -133,6 +138,7 @@ class Scene:
         self._drawn_key: Hashable = None
         self._asked_sizes: tuple[tuple[int, int], tuple[int, int]] | None = None
         self._asked_capture: tuple[int, int] | None = None
+        self._asked_other: tuple[tuple[int, int], tuple[int, int]] | None = None
         self._near = NEAR
         self._moving_size = MovingSize()
         self._cloud_kind = CLOUD
@@ -178,6 +184,11 @@ class Scene:
         if self._asked_capture is not None:
             captured = session.compared_picture(*self._asked_capture)
             if captured is not None and captured.key != self._captured_key:
+                return True
+        if self._asked_other is not None:
+            size, full_size = self._asked_other
+            other = session.request_other(*size, full_size=full_size)
+            if other is not None and other.key != self._captured_key:
                 return True
         return False
 
@@ -241,6 +252,27 @@ class Scene:
         return CapturedPicture(
             self._captured.texture, source.frame_index, picture.is_stale, has_scene_colors=source.has_scene_colors
         )
+
+    def other(self, session: SceneNeeds, view: SceneView) -> CapturedPicture | None:
+        """What the rendered picture is compared with: see `captured`, or the same frame in another mode."""
+        self._asked_other = None
+        if session.overlays.compare_with == CAPTURED_PICTURE:
+            return self.captured(session, view.width)
+        self._asked_capture = None
+        share = min(MAX_PICTURE_WIDTH / view.width, 1.0)
+        full_size = picture_size(view.width, view.height, share)
+        moving = self._moving_size.share if view.is_moving else 1.0
+        self._asked_other = picture_size(view.width, view.height, share * moving), full_size
+        picture = session.request_other(*self._asked_other[0], full_size=full_size)
+        if picture is None:
+            return None
+        self._captured.set(picture.image, key=picture.key)
+        self._captured_key, source = picture.key, picture.source
+        return CapturedPicture(self._captured.texture, source.frame_index, picture.is_stale, shown_as=source.shown_as)
+
+    def forget_other(self) -> None:
+        """Nothing is compared any more: ask for no other picture."""
+        self._asked_other = None
 
     def _without_render(
         self, shown: ShownPicture, points_key: Hashable, captured: CapturedPicture | None
