@@ -253,17 +253,21 @@ class JobStatus:
 
 CELL_COLUMNS = ("psnr", "flip", "E")
 """Figures of single pictures: PSNR in dB, mean FLIP, and mean excess flicker against the frame before in 1/255."""
-CELL_RANGES = {"psnr": (20.0, 40.0), "flip": (0.0, 0.3), "E": (0.0, 5.0)}
+CELL_RANGES = {"psnr": (20.0, 40.0), "flip": (0.0, 0.3), "E": (0.0, 2.0)}
 """What the colours of cells span, one range for all projects. PSNR: below 20 dB a picture is plainly wrong, above 40 dB
-nobody sees a difference. FLIP: trained clips lie around 0.1, and 0.3 is bad everywhere. E: half a level is the noise of a
-good clip, at 5 levels of 255 on average a whole picture flickers."""
+nobody sees a difference. FLIP: trained clips lie around 0.1, and 0.3 is bad everywhere. E: trained clips lie around 0.3
+levels of a display, mostly where something moves; two on average are plain flicker."""
 LOW_IS_BAD = frozenset({"psnr"})
 """Columns in which higher figures are better."""
-SEAM_RANGE = (1.0, 3.0)
-"""What the colours of seam scores span, 1/255: below one level of a display a step cannot be seen, three can hardly be
-missed on a still background."""
-SEAM_FLAGGED = 2.0
-"""Scores above it are pointed out: two levels are seen by most people who look for them."""
+SEAM_RANGE = (0.0, 1.0)
+"""What the colours of seam scores span, 1/255, one range for all projects. Where everything is inherited scores are
+0.01 to 0.1; with heads of their own clips are 0.4 to 0.8 apart, and independent ones 1.4 and more."""
+SEAM_FLAGGED = 0.3
+"""Scores above it are pointed out."""
+SEAM_RATIO_RANGE = (1.0, 3.0)
+"""What the colours of seam ratios span: 1 is no seam; inheriting clips have 1.0 to 1.4, others 10 and more."""
+SEAM_RATIO_FLAGGED = 2.0
+"""Ratios above it are pointed out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,6 +279,8 @@ class SeamStatus:
         frame_index: Its first frame.
         score: Excess flicker of static pixels there, less what is normal inside the two clips, in 1/255, a mean over
             cameras: see engine.metrics.clips.seams. None where no camera was measured in both clips.
+        ratio: Change of static pixels there / inside the two clips, over all cameras; 1 is no seam. None where nothing
+            changes inside, or nothing was measured.
         n_cameras: Cameras behind the score.
         worst_camera: The camera with the highest score; None without one.
     """
@@ -282,6 +288,7 @@ class SeamStatus:
     clip_index: int
     frame_index: int
     score: float | None = None
+    ratio: float | None = None
     n_cameras: int = 0
     worst_camera: int | None = None
 

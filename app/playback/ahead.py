@@ -16,7 +16,7 @@ PLAYING_S = 1.5
 MAX_PLAYING, STANDING = 64, 8
 """At most so many frames while it plays; so many once the playhead stands."""
 SETTLED_S = 0.3
-"""The view, and the playhead unless it plays, have to stand still for so long: until then cores are for what is shown."""
+"""The view, and the playhead unless it plays, have to stand still so long: until then cores are for what is shown."""
 SPARE = 2
 """Frames that memory holds beside those that come: the one shown, and the newest."""
 

@@ -25,10 +25,10 @@ from app.playback.view_modes import PLAIN, ShownAs
 from engine.backends.table import backend_called
 from engine.byte_cache import ByteCache
 from engine.capture.clip import Clip
-from engine.clip_files.array_names import GAINS
 from engine.clip_files.clip_state import ClipState, read_clip_state
 
 if TYPE_CHECKING:
+    from engine.metrics.clips.trained_clip import TrainedClip
     from engine.model.camera_colors import CameraColors
     from engine.model.clip_model import AnchorView, ClipModel  # brings torch, which only the thread needs
 
@@ -85,6 +85,7 @@ class LoadedClip:
 
     Attributes:
         colors: What the cameras make of the scene's colours; None where the files do not say.
+        trained: The clip as cameras see it; None in the same case.
         parts: What else can be decoded of it.
     """
 
@@ -94,6 +95,7 @@ class LoadedClip:
     near_plane: float
     step: int | None = None
     colors: CameraColors | None = None
+    trained: TrainedClip | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,13 +106,47 @@ class ShownFrame:
     anchors: AnchorArrays
 
 
+class ClipFiles:
+    """Reads states of clips. For one thread; the reference clip, which all of them need, is read once."""
+
+    def __init__(self) -> None:
+        self._reference: tuple[tuple[str, int], ClipState] | None = None
+
+    def read(self, request: FrameRequest) -> LoadedClip:
+        """The clip of a request.
+
+        Raises:
+            ProjectError: The file is missing or damaged, or does not fit its reference.
+        """
+        from engine.metrics.clips.trained_clip import TrainedClip
+        from engine.model.clip_model import load_clip_model
+
+        state = read_clip_state(request.path)
+        reference = None if state.is_reference else self._read_reference(request.reference_path)
+        model = load_clip_model(state, reference, backend=backend_called())
+        header = state.header
+        spacing = min(header.spacing, header.moving_spacing or header.spacing)
+        anchors = _anchor_arrays(model.anchors(), request.model_key, spacing)
+        trained = TrainedClip.of_state(request.clip, model, state, reference)
+        colors, parts = None if trained is None else trained.colors, ClipParts(model, state, reference)
+        return LoadedClip(model, parts, anchors, header.near_plane, header.step, colors, trained)
+
+    def _read_reference(self, path: Path | None) -> ClipState | None:
+        if path is None or not path.is_file():
+            return None
+        identity = (str(path), path.stat().st_mtime_ns)
+        if self._reference is None or self._reference[0] != identity:
+            self._reference = (identity, read_clip_state(path))
+        return self._reference[1]
+
+
 class FrameDecoder:
     """Frames to arrays on one thread; the newest request wins. Methods are for one other thread."""
 
     def __init__(self, *, cache_bytes: int = CACHE_BYTES) -> None:
         self._cache: ByteCache[FrameKey, ShownFrame] = ByteCache(cache_bytes)
         self._models: OrderedDict[ModelKey, LoadedClip] = OrderedDict()
-        self._reference: tuple[tuple[str, int], ClipState] | None = None
+        self._files = ClipFiles()
         self._last: ShownFrame | None = None
         self._frame_bytes = 0  # of the newest one
         self.worker: LatestWorker[FrameRequest, ShownFrame] = LatestWorker(
@@ -173,6 +209,10 @@ class FrameDecoder:
         loaded = self._models.get(request.model_key)
         return None if loaded is None else loaded.colors
 
+    def loaded(self, request: FrameRequest) -> LoadedClip | None:
+        """The clip of a request if it is in memory. May be asked on any thread."""
+        return self._models.get(request.model_key)
+
     def is_loaded(self, request: FrameRequest) -> bool:
         """Whether the file of this state is not needed any more."""
         return request.model_key in self._models
@@ -186,7 +226,8 @@ class FrameDecoder:
         self.worker.forget()  # first: from here on the thread keeps nothing of what it is working on
         self._cache.clear()
         self._models = OrderedDict()
-        self._reference = self._last = None
+        self._files = ClipFiles()
+        self._last = None
 
     def close(self) -> None:
         """End the thread."""
@@ -236,16 +277,7 @@ class FrameDecoder:
         if identity in models:
             models.move_to_end(identity)
             return models[identity]
-        from engine.model.clip_model import load_clip_model
-
-        state = read_clip_state(request.path)
-        reference = None if state.is_reference else self._read_reference(request.reference_path)
-        model = load_clip_model(state, reference, backend=backend_called())
-        header = state.header
-        spacing = min(header.spacing, header.moving_spacing or header.spacing)
-        anchors = _anchor_arrays(model.anchors(), identity, spacing)
-        colors, parts = _camera_colors(state, reference), ClipParts(model, state, reference)
-        loaded = LoadedClip(model, parts, anchors, state.header.near_plane, state.header.step, colors)
+        loaded = self._files.read(request)
         if not self.worker.is_still_wanted:
             return loaded
         # another revision of the same file is worthless now; another file may be a version that it is compared with
@@ -254,24 +286,6 @@ class FrameDecoder:
         # replaced as a whole, so that the other thread never sees it half changed
         self._models = OrderedDict([*kept[-(MAX_MODELS - 1) :], (identity, loaded)])
         return loaded
-
-    def _read_reference(self, path: Path | None) -> ClipState | None:
-        if path is None or not path.is_file():
-            return None
-        identity = (str(path), path.stat().st_mtime_ns)
-        if self._reference is None or self._reference[0] != identity:
-            self._reference = (identity, read_clip_state(path))
-        return self._reference[1]
-
-
-def _camera_colors(state: ClipState, reference: ClipState | None) -> CameraColors | None:
-    from engine.model.camera_colors import CameraColors
-
-    base = state if reference is None else reference
-    gains, names = base.arrays.get(GAINS), tuple(base.header.camera_names)
-    if gains is None or len(gains) != len(names):
-        return None
-    return CameraColors(names, gains, state.drift, state.header.clip_length)
 
 
 def _anchor_arrays(view: AnchorView, key: Hashable, spacing: float, source: PictureSource = UNKNOWN) -> AnchorArrays:

@@ -24,6 +24,7 @@ from app.playback.view_modes import PLAIN, ShownAs, decoded_as
 from app.project.opened_project import OpenedProject
 from app.status import WantedFrame
 from app.training.service import ShownState
+from engine.capture.clip import Clip
 
 StateOf = Callable[[int], ShownState | None]
 """The state of a clip to look at; None where it has none."""
@@ -102,8 +103,10 @@ class Playback:
         self.decoder.frame(request)
         return self.decoder.is_loaded(request)
 
-    def wanted(self, timeline: Timeline, view: OrbitView, shown_as: ShownAs = PLAIN) -> WantedFrame | None:
-        """What ought to be on screen; None without a project."""
+    def wanted(
+        self, timeline: Timeline, view: OrbitView, shown_as: ShownAs = PLAIN, *, view_id: Hashable = 0
+    ) -> WantedFrame | None:
+        """What ought to be on screen in a place; None without a project."""
         clip, request = timeline.clip, self._request(timeline, shown_as)
         if clip is None:
             return None
@@ -120,7 +123,7 @@ class Playback:
             wanted,
             revision=request.revision,
             is_loaded=self.decoder.is_loaded(request),
-            has_failed=self.decoder.has_failed(request) or self.renderer.has_failed(),
+            has_failed=self.decoder.has_failed(request) or self.renderer.has_failed(view_id),
         )
 
     def render(
@@ -174,6 +177,10 @@ class Playback:
                 return picture
         return None
 
+    def favour(self, view_id: Hashable) -> None:
+        """Draw what is asked for this place first."""
+        self.renderer.worker.active_lane = view_id
+
     def work_ahead(self, timeline: Timeline, *, is_busy: bool = False) -> None:
         """Make ready what comes next while nothing is asked for. Called in every turn of the loop.
 
@@ -198,9 +205,14 @@ class Playback:
         return self._request_at(timeline, timeline.frame_index, shown_as)
 
     def _request_at(self, timeline: Timeline, frame_index: int, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
-        opened, clip = self._opened, timeline.clip_of(frame_index)
-        state = None if opened is None or clip is None else self._state_of(clip.clip_index)
-        if opened is None or clip is None or state is None:
+        clip = timeline.clip_of(frame_index)
+        return None if clip is None else self.request(clip, frame_index, shown_as)
+
+    def request(self, clip: Clip, frame_index: int, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
+        """What is to be loaded and decoded for a frame of a clip; None where the clip has no state."""
+        opened = self._opened
+        state = None if opened is None else self._state_of(clip.clip_index)
+        if opened is None or state is None:
             return None
         return FrameRequest(
             clip_index=clip.clip_index,

@@ -129,7 +129,7 @@ class Renderer:
 
     def ready_keys(self) -> list[FrameKey]:
         """Frames of which there is a picture, whatever it looks like."""
-        return list({frame_key for frame_key, _ in self._cache.keys()})
+        return list({frame_key for frame_key, _ in self._cache.keys()})  # noqa: SIM118 - a cache, not a dict
 
     @property
     def revision(self) -> int:

@@ -1,8 +1,9 @@
 """Session: the one owner of live state, and the one thing a window talks to. `dispatch` takes commands, `poll` lets
 finished work in. Belongs to one thread; nothing here blocks. Draws nothing.
 
-It composes: `playback` prepares what is shown, `live_training` trains, `marking` holds the edits, `recent` what was
-opened before. What is open is one immutable value that each of them is handed.
+It composes: `playback` prepares what is shown, `live_training` trains, `residuals` compares with what the cameras took,
+`marking` holds the edits, `recent` what was opened before. What is open is one immutable value that each of them is
+handed.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from app.project.opening import Opened, open_for_window
 from app.project.project import Project, check_settings
 from app.project.recents import project_name
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
+from app.residuals.residuals import Residuals
 from app.session import commands
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
@@ -99,6 +101,7 @@ class Session:
             self._jobs, self.notices, launch=self._launch_worker, can_measure=is_preloading
         )
         self.playback = Playback(self.live_training.state_of)
+        self.residuals = Residuals(self.playback)
         self.marking = Marking()
         self.regions: RegionsStatus = self.marking.status([])
         self.recent = RecentProjects(Settings() if settings is None else settings)
@@ -240,8 +243,10 @@ class Session:
                 self.view.home()
             case commands.ShowViews(n=n):
                 self.views.show(n)
+                self.playback.favour(self.views.active_index)
             case commands.ActivateView(index=index):
                 self.views.activate(index)
+                self.playback.favour(self.views.active_index)
             case commands.DismissNotice(index=index):
                 self.notices.dismiss(index)
             case _ if isinstance(command, commands.EditCommand):
@@ -269,6 +274,7 @@ class Session:
         changed_project = opened_project(opened.capture, opened.project, opened.generation)
         self._show(changed_project)
         self.live_training.open(changed_project)
+        self._open_residuals(changed_project)
         self.timeline.seek(frame_index)
 
     # ---------------------------------------------------------------- opening
@@ -285,6 +291,7 @@ class Session:
         self.marking.open(found.project)  # first: keeps what was marked in the project that is left
         self._show(opened)
         self.live_training.open(opened, found.catalog)
+        self._open_residuals(opened)
         self.views.look_at(opened.rig)
         self._keep_recent()
         for sentence in opened.capture.warnings:
@@ -298,6 +305,10 @@ class Session:
         self.opened = opened
         self.timeline = Timeline(opened.clips, fps=opened.capture.fps)
         self.playback.show(opened)
+
+    def _open_residuals(self, opened: OpenedProject) -> None:
+        if self.live_training.service is not None:
+            self.residuals.open(opened, self.live_training.service.catalog)
 
     def _keep_recent(self) -> None:
         if self.opened is not None and self.live_training.service is not None:
@@ -321,6 +332,10 @@ class Session:
             self._keep_recent()
         self._release_snapshot()
         has_changed |= bool(events) | self.marking.poll()
+        is_training = self.live_training.is_busy and self.training.state != "paused"
+        if self._is_preloading:
+            self.residuals.look_at(self.timeline, self.view.look_through)
+        has_changed |= self.residuals.poll(is_training=is_training)
         self._tell_failures()
         self.playback.work_ahead(self.timeline, is_busy=self.live_training.is_busy)
         seen = self._news_key()
@@ -345,7 +360,7 @@ class Session:
 
     def _tell_failures(self) -> None:
         told = []
-        for failure in self.playback.take_failures():
+        for failure in [*self.playback.take_failures(), *self.residuals.take_failures()]:
             if failure.is_live:
                 self.live_training.replace_snapshot(failure.error)
                 continue
@@ -385,6 +400,7 @@ class Session:
         if self.project is not None:
             self.project.close()
         self.recent.close()
+        self.residuals.close()
         self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)
         self.playback.close()
         if self.capture is not None:
@@ -394,7 +410,7 @@ class Session:
 
     def wanted_frame(self) -> WantedFrame | None:
         """What ought to be on screen; None without a capture. What is there says itself what it is."""
-        return self.playback.wanted(self.timeline, self.view, self._shown_as)
+        return self.playback.wanted(self.timeline, self.view, self._shown_as, view_id=self.views.current_index)
 
     def shown_gaussians(self) -> GaussianArrays | None:
         """Gaussians of the shown frame; the newest ones there are until those are decoded; None where nothing is

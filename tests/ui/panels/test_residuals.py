@@ -33,7 +33,7 @@ def test_one_bad_frame_is_seen_at_its_place_however_many_there_are(n_frames: int
     cells[bad, 1] = low
     picture = matrix_picture(cells, "psnr", width, 9)
     assert picture.shape == (9, width, 3)
-    is_bad = (picture == cell_colors(np.float32(low), "psnr")).all(axis=2)
+    is_bad = (picture == cell_colors(np.array(low), "psnr")).all(axis=2)
     rows, columns = np.nonzero(is_bad)
     assert set(rows) == {3, 4, 5}
     n = frames_per_column(n_frames, width)
@@ -56,7 +56,7 @@ def test_a_place_outside_of_the_matrix_is_no_cell() -> None:
 def test_bad_is_bright_in_every_column() -> None:
     for column, (low, high) in CELL_RANGES.items():
         good, bad = (high, low) if column == "psnr" else (low, high)
-        assert cell_colors(np.float32(bad), column).sum() > cell_colors(np.float32(good), column).sum()
+        assert cell_colors(np.array(bad), column).sum() > cell_colors(np.array(good), column).sum()
 
 
 def test_seams_without_a_score_are_left_out() -> None:
