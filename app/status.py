@@ -10,7 +10,16 @@ import numpy as np
 
 from engine.gate.regions import GateRegion
 
-OVERLAY_NAMES = ("show_frusta", "show_inherited", "show_residual", "show_points", "show_cloud", "show_regions")
+OVERLAY_NAMES = (
+    "show_frusta",
+    "show_inherited",
+    "show_residual",
+    "show_points",
+    "show_cloud",
+    "show_regions",
+    "show_coverage",
+    "show_trails",
+)
 COMPARE_MODES = ("off", "wipe", "side", "blink")
 CAPTURED = "captured"
 """Of Overlays.compare_with: what the camera took."""
@@ -25,6 +34,8 @@ class Overlays:
     Attributes:
         show_points: The point cloud where a clip is not trained.
         show_cloud: The point cloud in place of the picture of a trained clip.
+        show_coverage: The space that inherited anchors cover, and how far residual anchors lie from it.
+        show_trails: The ways that Gaussians took over the last frames.
         compare: "off", "wipe", "side" or "blink": another picture over, beside or in turn with the rendered one.
         compare_with: The other picture: CAPTURED, or the name of a mode (app.playback.view_modes).
         wipe_position: Share of the width that shows the other picture, 0..1.
@@ -43,6 +54,8 @@ class Overlays:
     show_points: bool = True
     show_cloud: bool = False
     show_regions: bool = True
+    show_coverage: bool = False
+    show_trails: bool = False
     compare: str = "off"
     compare_with: str = CAPTURED
     blink_hz: float = 1.0

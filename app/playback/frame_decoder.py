@@ -204,6 +204,12 @@ class FrameDecoder:
         loaded = self._models.get(request.model_key)
         return None if loaded is None else loaded.anchors
 
+    def model(self, request: FrameRequest) -> ClipModel | None:
+        """The model of a state, not to be decoded on another thread but in parts (app.playback.contents.part_of); None
+        until it was loaded."""
+        loaded = self._models.get(request.model_key)
+        return None if loaded is None else loaded.model
+
     def colors(self, request: FrameRequest) -> CameraColors | None:
         """What the cameras make of the scene's colours in a state; None until it was loaded, or where unknown."""
         loaded = self._models.get(request.model_key)

@@ -13,9 +13,11 @@ from pathlib import Path
 
 from app.background.jobs import Jobs
 from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
+from app.playback.coverage import Coverage
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
+from app.playback.trails import Trails
 from app.playback.view_modes import CONTENTS, MODES, ShownAs
 from app.playback.views import Views
 from app.project.opened_project import OpenedProject, opened_project
@@ -423,6 +425,14 @@ class Session:
         shown = self.playback.frame(self.timeline, self._shown_as)
         return None if shown is None else shown.anchors
 
+    def shown_coverage(self) -> Coverage | None:
+        """What inherited anchors cover; see Playback.coverage."""
+        return self.playback.coverage(self.timeline)
+
+    def shown_trails(self) -> Trails | None:
+        """The ways of what moves; see Playback.trails."""
+        return self.playback.trails(self.timeline)
+
     def shown_points(self) -> PointArrays | None:
         """A cloud for frames that are not trained; see Playback.cloud."""
         return self.playback.cloud(self.view)
@@ -435,7 +445,9 @@ class Session:
         )
 
     def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
-        """The rasterizer's picture that the rendered one is compared with, where that is not a captured one."""
+        """The rasterizer's picture that the rendered one is compared with; None where that is a captured one."""
+        if self.overlays.compare_with not in MODES:
+            return None
         shown_as = ShownAs(self.overlays.compare_with, self.overlays.content)
         view_id = ("other", self.views.current_index)
         return self.playback.render(

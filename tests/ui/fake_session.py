@@ -304,6 +304,14 @@ class FakeSession:
         """Anchors of trained clips."""
         return self._anchors if self._is_trained() else None
 
+    def shown_coverage(self) -> None:
+        """Nothing is measured here."""
+        return
+
+    def shown_trails(self) -> None:
+        """Nothing moves here."""
+        return
+
     def shown_points(self) -> PointArrays:
         """A coloured ball of points."""
         return PointArrays(self._points, self._colors, ("points", 0))

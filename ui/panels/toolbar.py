@@ -150,6 +150,8 @@ def _draw_overlay_menu(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -
         ("show_residual", "Residual anchors (diamonds)", "3"),
         (cloud_overlay(session), "Point cloud", "4"),
         ("show_regions", "Marked regions", "5"),
+        ("show_coverage", "Covered by inherited anchors", "9"),
+        ("show_trails", "Trails of what moves", "0"),
     )
     for name, label, key_label in rows:
         if imgui.menu_item(label, key_label, bool(getattr(session.overlays, name)), True)[0]:

@@ -32,6 +32,7 @@ from ui.gl import (
     is_software,
 )
 from ui.viewport.anchor_marks import nearest_under
+from ui.viewport.explaining_layer import ExplainingLayer, ExplainingNeeds
 from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
 from ui.viewport.mark_layer import AnchorCounts, MarkLayer, MarkNeeds
 from ui.viewport.picture_size import MAX_PICTURE_WIDTH, MovingSize, picture_size
@@ -45,7 +46,7 @@ _CLOUD_KINDS = {"static": CLOUD, "moment": FIRST_CLOUD, "pictures": HINT}
 NO_REGIONS = ShownRegions()
 
 
-class SceneNeeds(MarkNeeds, Protocol):
+class SceneNeeds(MarkNeeds, ExplainingNeeds, Protocol):
     """What the picture is made from."""
 
     @property
@@ -135,6 +136,7 @@ class Scene:
         self._cloud = PointRenderer(ctx)
         self.marks = MarkLayer(ctx)
         self.regions = RegionLayer(ctx)
+        self.explaining = ExplainingLayer(ctx)
         self._drawn_key: Hashable = None
         self._asked_sizes: tuple[tuple[int, int], tuple[int, int]] | None = None
         self._asked_capture: tuple[int, int] | None = None
@@ -158,6 +160,7 @@ class Scene:
             self._cloud,
             self.marks,
             self.regions,
+            self.explaining,
         )
         for thing in owned:
             thing.release()
@@ -220,19 +223,24 @@ class Scene:
             shown = self._without_render(shown, points_key, captured)
         is_rendered = base_key is not None
         marks_key = self.marks.take(session, view, session.shown_gaussians() if is_rendered else None)
+        explaining_key = self.explaining.take(session, view)
         regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
         self.shown = shown
-        if self.is_software and is_rendered and regions.is_empty and self.marks.is_empty(session):
+        if self.is_software and is_rendered and self._has_no_marks(session, regions):
             # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
             self._drawn_key = None
             return Composed(self._picture.texture, shown)
-        key = (view.key, base_key, points_key, captured_key, marks_key, regions_key)
+        key = (view.key, base_key, points_key, captured_key, marks_key, regions_key, explaining_key)
         if key != self._drawn_key or self._splats.is_order_stale:
             self._drawn_key = key
             self._draw(view, base_key, points_key, captured_key, session)
         if self._splats.is_order_stale:
             self.shown = shown = replace(shown, is_on_its_way=True)
         return Composed(self._target.texture, shown)
+
+    def _has_no_marks(self, session: SceneNeeds, regions: ShownRegions) -> bool:
+        """Is nothing to be drawn over the picture?"""
+        return regions.is_empty and self.marks.is_empty(session) and self.explaining.is_empty
 
     def captured(self, session: SceneNeeds, width_px: int) -> CapturedPicture | None:
         """What the camera looked through took at the playhead's frame, or at another one until that was decoded; None
@@ -409,6 +417,7 @@ class Scene:
             self._cloud.draw(target, *camera, near, shape="circle", size=size, unit=unit, is_depth_tested=True)
         elif captured_key is not None:
             target.draw_image(self._captured)
+        self.explaining.draw(target, view, self.marks.pixels_per_unit)
         self.marks.draw(target, view, session)
         self.regions.draw(target, camera)
         target.resolve(BACKGROUND)

@@ -148,4 +148,6 @@ ACTIONS = (
         is_on=_is_cloud_shown,
     ),
     _overlay("show_regions", "Show or hide marked regions", "5"),
+    _overlay("show_coverage", "Show or hide what inherited anchors cover", "9"),
+    _overlay("show_trails", "Show or hide the trails of what moves", "0"),
 )
