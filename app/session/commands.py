@@ -79,7 +79,7 @@ class LookThrough:
 
 @dataclass(frozen=True, slots=True)
 class SetCompare:
-    """Compare with the captured picture: "off", "wipe" or "side"."""
+    """Compare with another picture: "off", "wipe", "side" or "blink"."""
 
     mode: str
 
@@ -89,6 +89,13 @@ class ToggleOverlay:
     """Switch one of the overlays: show_frusta, show_inherited, show_residual, show_points, show_cloud, show_regions."""
 
     name: str
+
+
+@dataclass(frozen=True, slots=True)
+class ShowHeat:
+    """Show a residual heat map over the picture, by its name; an empty one takes it away."""
+
+    kind: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +162,27 @@ class HomeView:
 
 
 @dataclass(frozen=True, slots=True)
+class SetCompareWith:
+    """What to compare with. other: See Overlays.compare_with."""
+
+    other: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetMode:
+    """Let colours mean something else. mode: See app.playback.view_modes.MODES."""
+
+    mode: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetContent:
+    """Draw a part of the clips. content: See app.playback.view_modes.CONTENTS."""
+
+    content: str
+
+
+@dataclass(frozen=True, slots=True)
 class ShowViews:
     """Show one, two or four views side by side."""
 
@@ -206,9 +234,13 @@ Command = (
     | LookThrough
     | SetCompare
     | ToggleOverlay
+    | ShowHeat
     | SettingCommand
     | EditCommand
     | HomeView
+    | SetCompareWith
+    | SetMode
+    | SetContent
     | ShowViews
     | ActivateView
     | CloseQuestion

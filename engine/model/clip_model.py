@@ -148,6 +148,15 @@ class ClipModel(nn.Module):
         is_learning = anchors.features.requires_grad or any(p.requires_grad for p in self.decoder.parameters())
         return not anchors.is_dynamic and not is_learning
 
+    def n_constant_rows(self) -> int:
+        """How many Gaussians of `decode` come first and are the same at all times, but for the light on them."""
+        n = 0
+        for role in self.roles():
+            if not self.is_constant(role) or self.anchor_set(role).presence is not None:
+                break
+            n += self.decoder.gaussians_per_anchor * len(self.anchor_set(role))
+        return n
+
     def knots(self, clip_time: float) -> list[tuple[int, float]]:
         """Frames of the clip around this time and their weights."""
         if self.field is not None:
@@ -221,11 +230,12 @@ class ClipModel(nn.Module):
         if role != STATIC or self.light is None:
             return gaussians
         weight = self.light_weights(clip_time)[1]
-        if weight not in self._lit:
+        lit = self._lit.get(weight)
+        if lit is None:  # may be asked for on several threads
             if len(self._lit) > self.n_frames:  # times between frames, as playback asks for
                 self._lit.clear()
-            self._lit[weight] = self.in_light(gaussians, clip_time)
-        return self._lit[weight]
+            self._lit[weight] = lit = self.in_light(gaussians, clip_time)
+        return lit
 
     def in_light(self, gaussians: Gaussians, clip_time: float) -> Gaussians:
         """Gaussians of all static anchors, K per anchor, in the light of a time of the clip."""

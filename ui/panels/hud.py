@@ -9,10 +9,14 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
+from app.playback.color_maps import SIGNED
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
+from app.playback.view_modes import MODES, range_of
 from app.status import ClipStatus, Overlays, RegionsStatus, WantedFrame
 from engine.camera.rig import CameraRig
+from ui.panels.color_bar import COLOR_BAR_SIZE, draw_color_bar
+from ui.panels.comparison import shown_compare
 from ui.panels.regions import draw_region_mark
 from ui.panels.state import Rect, UiState
 from ui.panels.timeline import STATE_WORDS
@@ -20,7 +24,7 @@ from ui.style import theme
 from ui.style.colors import Color
 from ui.style.numbers import format_count
 from ui.style.theme import ON_PICTURE, Icon
-from ui.viewport.hud_text import HudText, count_text, hud_text
+from ui.viewport.hud_text import RENDERED, HudText, count_text, hud_text
 from ui.viewport.picture_rate import PictureRate
 from ui.viewport.region_tool import REGION_WORDS
 from ui.viewport.scene import Scene
@@ -80,13 +84,15 @@ class Hud:
         self.text: HudText | None = None
         """What the newest frame says."""
 
-    def draw(self, session: HudNeeds, ui: UiState, area: Rect, scene: Scene) -> None:
-        """Everything that stands over the picture."""
+    def draw(self, session: HudNeeds, ui: UiState, area: Rect, scene: Scene, *, value: float | None = None) -> None:
+        """Everything that stands over the picture. value: Under the pointer, where colours stand for numbers."""
         self.text = self._text(session, scene)
         if self.text is not None:
             self._draw_plates(self.text, ui, area)
             if self.text.pending or scene.shown.is_on_its_way:
                 ui.redraw_within(BUSY_REDRAW_S)
+        if scene.shows == RENDERED:
+            self._draw_color_bars(session, ui, scene, value)
         if not ui.regions.is_active or area.width >= LEGEND_WIDTH:  # what is being chosen needs the room
             self._draw_legend(session, ui, scene, area)
 
@@ -151,9 +157,35 @@ class Hud:
             x, row_height = plate.x1 + GAP, max(row_height, height)
         ui.mark_rect("viewport.free", Rect(area.x0, area.y0, area.x1, bottom - row_height))
 
+    def _draw_color_bars(self, session: HudNeeds, ui: UiState, scene: Scene, value: float | None) -> None:
+        """What the colours of the picture on screen mean, at its lower right above the plates, and at its lower left
+        those of the picture that it is compared with."""
+        free, (width, height) = ui.rects["viewport.free"], COLOR_BAR_SIZE
+        shown, other, coverage = (
+            scene.shown.source.shown_as.mode,
+            session.overlays.compare_with,
+            scene.explaining.coverage,
+        )
+        bars = [(True, "viewport.color_bar", *_bar_of(shown, session.rig), value)]
+        if shown_compare(session) != "off" and other in MODES and other != shown:
+            bars.append((False, "viewport.other_color_bar", *_bar_of(other, session.rig), None))
+        if coverage is not None and len(coverage.points):
+            span = coverage.range
+            bars.append((True, "viewport.coverage_bar", SIGNED, -span, span, "units off covered space", None))
+        bottoms = {True: free.y1 - 6, False: free.y1 - 6}
+        for is_right, name, map_name, low, high, unit, pointed in bars:
+            has_room = free.width >= (width + 2 * MARGIN) * (1 if is_right else 2)
+            if not map_name or not has_room or bottoms[is_right] - height < free.y0 + MARGIN:
+                continue
+            x = free.x1 - MARGIN if is_right else free.x0 + MARGIN + width
+            plate = Rect(x - width, bottoms[is_right] - height, x, bottoms[is_right])
+            bottoms[is_right] = plate.y0 - 4
+            draw_color_bar(imgui.get_window_draw_list(), plate, map_name, low, high, unit, pointed)
+            ui.mark_rect(name, plate)
+
     def _draw_legend(self, session: HudNeeds, ui: UiState, scene: Scene, area: Rect) -> None:
         draw = imgui.get_window_draw_list()
-        is_labelled = session.overlays.compare == "wipe" and session.view.look_through is not None
+        is_labelled = shown_compare(session) in ("wipe", "blink")
         y = (ui.rects["viewport.rendered"].y0 + 44) if is_labelled else area.y0 + 12
         for shape, color, text in legend_rows(session, scene):
             width = imgui.calc_text_size(text).x
@@ -163,12 +195,19 @@ class Hud:
             middle = ImVec2(x + 14, y + 12)
             if shape in REGION_WORDS:
                 draw_region_mark(draw, middle, shape, ON_PICTURE)
+            elif shape == "disc":
+                draw.add_circle_filled(middle, 6, theme.u32(color))
             elif shape == "circle":
                 draw.add_circle(middle, 5, theme.u32(color), 0, 2)
             else:
                 draw.add_ngon_filled(middle, 6, theme.u32(color), 4)
             draw.add_text(ImVec2(x + 26, y + 3), theme.u32(ON_PICTURE.text), text)
             y += 28
+
+
+def _bar_of(mode: str, rig: CameraRig) -> tuple[str, float, float, str]:
+    """Map, range and unit of a mode; without a map where its colours stand for no numbers."""
+    return MODES[mode].map_name, *range_of(mode, rig), MODES[mode].unit
 
 
 def _draw_busy(draw: imgui.ImDrawList, middle: ImVec2, color: Color) -> None:
@@ -180,7 +219,8 @@ def _draw_busy(draw: imgui.ImDrawList, middle: ImVec2, color: Color) -> None:
 
 def legend_rows(session: HudNeeds, scene: Scene) -> list[tuple[str, Color, str]]:
     """Shape, colour and words of what is marked."""
-    counts, rows = scene.counts, []
+    counts = scene.counts
+    rows = [("disc", (*hue, 1.0), words) for hue, words in MODES[scene.shown.source.shown_as.mode].legend]
     clip_index, frame_index = counts.source.clip_index, counts.source.frame_index
     status = None if clip_index is None else session.clip_states[clip_index]
     n_inherited, n_own = (0, 0) if status is None else (status.n_inherited, status.n_own)

@@ -10,7 +10,10 @@ from typing import Protocol
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
+from app.status import CAPTURED
 from ui.panels.actions.action import ActionNeeds
+from ui.panels.comparison import covered_share, is_held, kind_words, other_label, shown_compare
+from ui.panels.heat_overlay import HeatNeeds, HeatOverlay
 from ui.panels.hud import Hud, HudNeeds
 from ui.panels.panes import Panes, arrange
 from ui.panels.pointer import MOVING_S, Pointer
@@ -19,30 +22,32 @@ from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import chip
 from ui.style import theme
 from ui.style.theme import ON_PICTURE
-from ui.viewport.hud_text import captured_words, pane_text
+from ui.viewport.hud_text import RENDERED, captured_words, pane_text
 from ui.viewport.region_layer import ShownRegions
 from ui.viewport.scene import Scene, SceneNeeds, SceneView
 
 TOOLTIP_AWAY = 22.0
 
 
-class PictureNeeds(SceneNeeds, HudNeeds, ActionNeeds, Protocol):
+class PictureNeeds(SceneNeeds, HudNeeds, ActionNeeds, HeatNeeds, Protocol):
     """What the picture, and everything that lies over it, is made from."""
 
 
 class PicturePane:
     """Owns the GL objects of one view and the drag in progress there."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    def __init__(self, scene: Scene, heat: HeatOverlay) -> None:
+        self.scene, self.heat = scene, heat
         self.pointer = Pointer()
         self.hud = Hud()
         self._aimed_at = (0.0, 0.0)
         self._captured_frame: int | None = None
+        self._is_held = False
 
     def release(self) -> None:
         """Free GL objects. GL thread only."""
         self.scene.release()
+        self.heat.release()
 
     def shows_playhead(self, session: PictureNeeds) -> bool:
         """Is the frame under the playhead on screen, in every picture that is compared?"""
@@ -72,11 +77,13 @@ class PicturePane:
         if shown is not None:
             width, height = session.rig.image_sizes[shown]
             image_size = (int(width), int(height))
-        panes = arrange(area, image_size, session.overlays.compare)
+        self._is_held = is_active and is_held(session, ui)
+        panes = arrange(area, image_size, "wipe" if self._is_held else shown_compare(session))
         self.pointer.navigate(session, dispatch, ui, panes)
         # Looking through a camera may just have ended; the picture then fills the area from the next frame on.
         self._draw_picture(session, dispatch, ui, area, panes, is_active=is_active)
-        self.hud.draw(session, ui, area, self.scene)
+        value = self._value_under_pointer(panes.rendered)
+        self.hud.draw(session, ui, self.heat.beside(area), self.scene, value=value)
         if ui.regions.is_active and is_active:
             top = panes.captured.y0 + 44 if panes.captured is not None else area.y0 + 12  # below what names the pane
             free = Rect(area.x0 + 12, top, area.x1, area.y1)
@@ -116,6 +123,7 @@ class PicturePane:
             shown = ShownRegions(session.regions.regions, tool.highlighted, tool.sphere)
         composed = self.scene.compose(session, view, shown)
         draw.add_image(imgui.ImTextureRef(composed.texture.glo), pane.low, pane.high)
+        self.heat.draw(session, ui, pane)
         if self.pointer.is_moving:
             ui.redraw_within(MOVING_S)
         elif imgui.is_item_hovered() and self.pointer.drag is None and not tool.is_active:
@@ -130,9 +138,17 @@ class PicturePane:
         else:
             self.scene.marks.pointed_anchor = None
         self._captured_frame = None
-        if panes.captured is not None:
-            self._draw_captured(session, draw, panes)
+        if panes.captured is None:
+            self.scene.forget_other()
+        else:
+            self._draw_captured(session, draw, ui, view, panes)
         draw.pop_clip_rect()
+
+    def _value_under_pointer(self, pane: Rect) -> float | None:
+        pointer = imgui.get_io().mouse_pos
+        if not imgui.is_item_hovered() or not pane.contains(pointer.x, pointer.y):
+            return None
+        return self.scene.value_at((pointer.x - pane.x0) / pane.width, (pointer.y - pane.y0) / pane.height)
 
     def _point_at_camera(self, session: PictureNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """The camera under the pointer stands out; one that was pressed is remembered for the click."""
@@ -168,43 +184,54 @@ class PicturePane:
         tool.place(self.scene.point_under(session, view, *pixels, depth), eye=view.eye)
         tool.is_placed |= is_click
 
-    def _draw_captured(self, session: PictureNeeds, draw: imgui.ImDrawList, panes: Panes) -> None:
+    def _draw_captured(
+        self, session: PictureNeeds, draw: imgui.ImDrawList, ui: UiState, view: SceneView, panes: Panes
+    ) -> None:
         area = panes.captured
         assert area is not None
-        captured = self.scene.captured(session, round(area.width))
+        other = self.scene.other(session, view)
         shown = self.scene.shown
-        self._captured_frame = None if captured is None else captured.frame_index
-        frames = (None if captured is None else captured.frame_index, shown.source.frame_index)
-        words = (
-            "Captured picture is being read"
-            if captured is None
-            else pane_text(captured_words(captured.has_scene_colors), *frames)
-        )
-        rendered_words = pane_text(shown.kind, *frames[::-1])
+        self._captured_frame = None if other is None else other.frame_index
+        frames = (None if other is None else other.frame_index, shown.source.frame_index)
+        if other is None:
+            is_captured = session.overlays.compare_with == CAPTURED
+            words = (
+                "Captured picture is being read" if is_captured else f"{other_label(session.overlays)} is being drawn"
+            )
+        elif other.shown_as is None:
+            words = pane_text(captured_words(other.has_scene_colors), *frames)
+        else:
+            words = pane_text(kind_words(RENDERED, other.shown_as.label), *frames)
+        rendered_words = pane_text(kind_words(shown.kind, shown.source.shown_as.label), *frames[::-1])
         color = ON_PICTURE.yellow if None not in frames and frames[0] != frames[1] else ON_PICTURE.text
-        if session.overlays.compare == "side":
-            if captured is not None:
-                draw.add_image(imgui.ImTextureRef(captured.texture.glo), area.low, area.high)
+        compare = session.overlays.compare
+        if compare == "side" and not self._is_held:
+            if other is not None:
+                draw.add_image(imgui.ImTextureRef(other.texture.glo), area.low, area.high)
             chip(draw, area.x0 + 10, area.y0 + 10, words, color=color)
             chip(draw, panes.rendered.x0 + 10, panes.rendered.y0 + 10, rendered_words, color=color)
             return
-        share = session.overlays.wipe_position
+        share = covered_share(session, ui, is_held=self._is_held)
         x = area.x0 + area.width * share
-        if captured is not None:
+        if other is not None:
             draw.add_image(
-                imgui.ImTextureRef(captured.texture.glo), area.low, ImVec2(x, area.y1), ImVec2(0, 0), ImVec2(share, 1)
+                imgui.ImTextureRef(other.texture.glo), area.low, ImVec2(x, area.y1), ImVec2(0, 0), ImVec2(share, 1)
             )
-        white = theme.u32(ON_PICTURE.playhead)
-        draw.add_line_v(x, area.y0, area.y1, white, 2)
-        middle = area.center[1]
-        draw.add_circle_filled(ImVec2(x, middle), 9, white)
-        dark = theme.u32(theme.VOID)
-        draw.add_triangle_filled(ImVec2(x - 6, middle), ImVec2(x - 2, middle - 4), ImVec2(x - 2, middle + 4), dark)
-        draw.add_triangle_filled(ImVec2(x + 6, middle), ImVec2(x + 2, middle + 4), ImVec2(x + 2, middle - 4), dark)
+        if compare == "wipe" and not self._is_held:
+            _draw_handle(draw, area, x)
         if share > 0.15:
             chip(draw, area.x0 + 10, area.y0 + 10, words, color=color)
         if share < 0.85:
             chip(draw, area.x1 - 10, area.y0 + 10, rendered_words, color=color, is_right=True)
+
+
+def _draw_handle(draw: imgui.ImDrawList, area: Rect, x: float) -> None:
+    """The line between the two pictures, and the knob that moves it."""
+    white, dark, middle = theme.u32(ON_PICTURE.playhead), theme.u32(theme.VOID), area.center[1]
+    draw.add_line_v(x, area.y0, area.y1, white, 2)
+    draw.add_circle_filled(ImVec2(x, middle), 9, white)
+    draw.add_triangle_filled(ImVec2(x - 6, middle), ImVec2(x - 2, middle - 4), ImVec2(x - 2, middle + 4), dark)
+    draw.add_triangle_filled(ImVec2(x + 6, middle), ImVec2(x + 2, middle + 4), ImVec2(x + 2, middle - 4), dark)
 
 
 def _pixels(pane: Rect, density: float) -> tuple[float, float]:

@@ -22,11 +22,14 @@ from ui.gl import ImageTexture, free_dropped, n_changes
 from ui.panels.actions.key_map import KeyMap
 from ui.panels.actions.table import ACTIONS, handle_keys
 from ui.panels.capture import CaptureNeeds, CapturePanel
+from ui.panels.heat_overlay import HeatOverlay
 from ui.panels.notices import NoticesNeeds, NoticesPanel
 from ui.panels.panel_keys import step_panel
+from ui.panels.picture_pane import PicturePane
 from ui.panels.recent_rows import RecentRows
 from ui.panels.regions import draw_regions
-from ui.panels.state import CAPTURE, LAYOUTS, REGIONS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
+from ui.panels.residuals.panel import ResidualsNeeds, ResidualsPanel
+from ui.panels.state import CAPTURE, LAYOUTS, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
 from ui.panels.timeline import TimelineNeeds, draw_timeline
 from ui.panels.training import draw_training
 from ui.panels.viewport import ViewportNeeds, ViewportPanel
@@ -73,6 +76,7 @@ class FrameNeeds(
     QuestionNeeds,
     RememberNeeds,
     NoticesNeeds,
+    ResidualsNeeds,
     Protocol,
 ):
     """Everything that the window and its panels use of a session."""
@@ -135,8 +139,10 @@ class Frame:
         self.ui = UiState(fonts=load_fonts(), scale=self.scale, preferences=values, keys=keys)
         self._theme = ThemeInUse()
         self._theme.follow(values.theme)
-        self.viewport = ViewportPanel(lambda: Scene(ctx), RecentRows(lambda: ImageTexture(ctx)))
+        rows = RecentRows(lambda: ImageTexture(ctx))
+        self.viewport = ViewportPanel(lambda: PicturePane(Scene(ctx), HeatOverlay(ctx)), rows)
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
+        self.residuals = ResidualsPanel(lambda: ImageTexture(ctx))
         self.notices = NoticesPanel()
         self.dialog = OpenFolderDialog()
         self.questions = QuestionDialogs()
@@ -161,6 +167,7 @@ class Frame:
             (CAPTURE, self.capture.draw, True),
             (TRAINING, draw_training, True),
             (REGIONS, draw_regions, True),
+            (RESIDUALS, self.residuals.draw, True),
             (TIMELINE, draw_timeline, True),
         )
 
@@ -359,4 +366,5 @@ class Frame:
         """Release GL objects and ImGui. The GL context must still be current."""
         self.viewport.release()
         self.capture.release()
+        self.residuals.release()
         self.backend.close()

@@ -9,9 +9,10 @@ from collections.abc import Mapping
 
 from imgui_bundle import ImVec2, imgui
 
-from ui.panels.state import CAPTURE, LAYOUTS, REGIONS, TIMELINE, TRAINING, VIEWPORT
+from ui.panels.state import CAPTURE, LAYOUTS, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT
 
-SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: (236.0, 0.0), REGIONS: (236.0, 0.0), TIMELINE: (0.0, 140.0)}
+SIDE = (236.0, 0.0)
+SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: SIDE, REGIONS: SIDE, RESIDUALS: SIDE, TIMELINE: (0.0, 140.0)}
 """Width and height of docked panels, units. The timeline has its buttons, ruler and bands at this height."""
 SMALLEST_PICTURE = (300.0, 150.0)
 TALL_TIMELINE = 0.42
@@ -21,7 +22,7 @@ WIDE_UNITS = 1240.0
 
 
 def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
-    """Capture left, training and regions right, timeline below, the picture in the rest.
+    """Capture left, training, regions and residuals right, timeline below, the picture in the rest.
 
     Args:
         name: One of LAYOUTS; others are laid out as the first.
@@ -45,6 +46,7 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
         (CAPTURE, left),
         (TRAINING, right),
         (REGIONS, right),
+        (RESIDUALS, right),
         (TIMELINE, bottom),
     ):
         internal.dock_builder_dock_window(title, node_id)

@@ -7,6 +7,7 @@ faster, so its picture is uploaded instead. Redrawn only when the key of what it
 
 from __future__ import annotations
 
+import time
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
@@ -18,6 +19,8 @@ from app.playback.arrays import BACKGROUND, GaussianArrays, Picture, PointArrays
 from app.playback.picture_source import PictureSource
 from app.playback.pointing import pixel_ray, seen_point
 from app.playback.timeline import Timeline
+from app.playback.view_modes import MODES, ShownAs
+from app.status import CAPTURED as CAPTURED_PICTURE
 from app.status import RegionsStatus, WantedFrame
 from engine.camera.projection import camera_center
 from ui.gl import (
@@ -28,10 +31,12 @@ from ui.gl import (
     Target,
     is_software,
 )
+from ui.viewport.anchor_heat_layer import AnchorHeatLayer, AnchorHeatNeeds
 from ui.viewport.anchor_marks import nearest_under
+from ui.viewport.explaining_layer import ExplainingLayer, ExplainingNeeds
 from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
 from ui.viewport.mark_layer import AnchorCounts, MarkLayer, MarkNeeds
-from ui.viewport.picture_size import MAX_PICTURE_WIDTH, MOVING_SHARES, moving_share, picture_size
+from ui.viewport.picture_size import MAX_PICTURE_WIDTH, MovingSize, picture_size
 from ui.viewport.region_layer import RegionLayer, ShownRegions
 
 CLOUD_OVERLAP = 1.5
@@ -42,7 +47,7 @@ _CLOUD_KINDS = {"static": CLOUD, "moment": FIRST_CLOUD, "pictures": HINT}
 NO_REGIONS = ShownRegions()
 
 
-class SceneNeeds(MarkNeeds, Protocol):
+class SceneNeeds(MarkNeeds, AnchorHeatNeeds, ExplainingNeeds, Protocol):
     """What the picture is made from."""
 
     @property
@@ -57,9 +62,13 @@ class SceneNeeds(MarkNeeds, Protocol):
 
     def shown_points(self) -> PointArrays | None: ...
 
-    def request_render(self, width: int, height: int) -> Picture | None: ...
+    def request_render(
+        self, width: int, height: int, *, full_size: tuple[int, int] | None = None
+    ) -> Picture | None: ...
 
     def compared_picture(self, camera_index: int, max_width: int) -> Picture | None: ...
+
+    def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None: ...
 
 
 @dataclass(frozen=True)
@@ -100,17 +109,19 @@ class Composed:
 
 @dataclass(frozen=True)
 class CapturedPicture:
-    """A captured picture on the GPU.
+    """A picture on the GPU that the rendered one is compared with: a captured one, or one in another mode.
 
     Attributes:
         frame_index: The frame it was taken at, which need not be that of the playhead yet.
         has_scene_colors: Whether it was brought into the scene's colours, those of the render.
+        shown_as: What its colours mean; None of a captured picture.
     """
 
     texture: moderngl.Texture
     frame_index: int | None
     is_stale: bool
     has_scene_colors: bool = False
+    shown_as: ShownAs | None = None
 
 
 class Scene:
@@ -126,13 +137,18 @@ class Scene:
         self._cloud = PointRenderer(ctx)
         self.marks = MarkLayer(ctx)
         self.regions = RegionLayer(ctx)
+        self._anchor_heat = AnchorHeatLayer(ctx)
+        self.explaining = ExplainingLayer(ctx)
         self._drawn_key: Hashable = None
-        self._asked_size: tuple[int, int] | None = None
+        self._asked_sizes: tuple[tuple[int, int], tuple[int, int]] | None = None
         self._asked_capture: tuple[int, int] | None = None
+        self._asked_other: tuple[tuple[int, int], tuple[int, int]] | None = None
         self._near = NEAR
-        self._moving_share = MOVING_SHARES[1]
+        self._moving_size = MovingSize()
         self._cloud_kind = CLOUD
         self._point_size = 0.0
+        self._is_picture = self.is_software
+        self._values: np.ndarray | None = None
         self._picture_key: Hashable = None
         self._captured_key: Hashable = None
 
@@ -146,6 +162,8 @@ class Scene:
             self._cloud,
             self.marks,
             self.regions,
+            self._anchor_heat,
+            self.explaining,
         )
         for thing in owned:
             thing.release()
@@ -164,15 +182,21 @@ class Scene:
 
     def has_news(self, session: SceneNeeds) -> bool:
         """Did a picture arrive since the last compose? Asks again for what was asked last."""
-        if self._asked_size is not None:
-            picture = session.request_render(*self._asked_size)
+        if self._asked_sizes is not None:
+            size, full_size = self._asked_sizes
+            picture = session.request_render(*size, full_size=full_size)
             if picture is not None and picture.key != self._picture_key:
                 return True
         if self._asked_capture is not None:
             captured = session.compared_picture(*self._asked_capture)
             if captured is not None and captured.key != self._captured_key:
                 return True
-        return False
+        if self._asked_other is not None:
+            size, full_size = self._asked_other
+            other = session.request_other(*size, full_size=full_size)
+            if other is not None and other.key != self._captured_key:
+                return True
+        return self._splats.has_news
 
     # ---- the picture -----------------------------------------------------------------------------------------
 
@@ -182,7 +206,7 @@ class Scene:
         is_cloud_chosen = bool(session.overlays.show_cloud)
         points_key = self._take_points(session) if is_cloud_chosen else None
         is_cloud_chosen = points_key is not None
-        self._asked_size = None
+        self._asked_sizes = self._values = None
         shown = ShownPicture(
             source=PictureSource(camera_index=session.view.look_through, look=session.view.look_key),
             size=(view.width, view.height),
@@ -191,7 +215,8 @@ class Scene:
         )
         base_key = None
         if not is_cloud_chosen:
-            take = self._take_picture if self.is_software else self._take_gaussians
+            self._is_picture = self.is_software or MODES[session.overlays.mode].is_picture
+            take = self._take_picture if self._is_picture else self._take_gaussians
             base_key, shown = take(session, view, shown)
             points_key = self._take_points(session) if base_key is None and session.overlays.show_points else None
         needs_capture = base_key is None and points_key is None and session.view.look_through is not None
@@ -200,20 +225,29 @@ class Scene:
         if base_key is None:
             shown = self._without_render(shown, points_key, captured)
         is_rendered = base_key is not None
-        marks_key = self.marks.take(session, view, session.shown_gaussians() if is_rendered else None)
+        gaussians = session.shown_gaussians() if is_rendered else None
+        marks_key = self.marks.take(session, view, gaussians)
+        heat_key = self._anchor_heat.take(session, view, gaussians)
+        explaining_key = self.explaining.take(session, view)
         regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
         self.shown = shown
-        if self.is_software and base_key is not None and regions.is_empty and self.marks.is_empty(session):
+        if self.is_software and is_rendered and self._has_no_marks(session, regions):
             # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
             self._drawn_key = None
             return Composed(self._picture.texture, shown)
-        key = (view.key, base_key, points_key, captured_key, marks_key, regions_key)
+        over_key = (marks_key, regions_key, explaining_key, heat_key, session.overlays.heat_opacity)
+        key = (view.key, base_key, points_key, captured_key, over_key)
         if key != self._drawn_key or self._splats.is_order_stale:
             self._drawn_key = key
             self._draw(view, base_key, points_key, captured_key, session)
         if self._splats.is_order_stale:
             self.shown = shown = replace(shown, is_on_its_way=True)
         return Composed(self._target.texture, shown)
+
+    def _has_no_marks(self, session: SceneNeeds, regions: ShownRegions) -> bool:
+        """Is nothing to be drawn over the picture?"""
+        are_empty = regions.is_empty and self.explaining.is_empty and self._anchor_heat.is_empty
+        return are_empty and self.marks.is_empty(session)
 
     def captured(self, session: SceneNeeds, width_px: int) -> CapturedPicture | None:
         """What the camera looked through took at the playhead's frame, or at another one until that was decoded; None
@@ -234,6 +268,27 @@ class Scene:
             self._captured.texture, source.frame_index, picture.is_stale, has_scene_colors=source.has_scene_colors
         )
 
+    def other(self, session: SceneNeeds, view: SceneView) -> CapturedPicture | None:
+        """What the rendered picture is compared with: see `captured`, or the same frame in another mode."""
+        self._asked_other = None
+        if session.overlays.compare_with == CAPTURED_PICTURE:
+            return self.captured(session, view.width)
+        self._asked_capture = None
+        share = min(MAX_PICTURE_WIDTH / view.width, 1.0)
+        full_size = picture_size(view.width, view.height, share)
+        moving = self._moving_size.share if view.is_moving else 1.0
+        self._asked_other = picture_size(view.width, view.height, share * moving), full_size
+        picture = session.request_other(*self._asked_other[0], full_size=full_size)
+        if picture is None:
+            return None
+        self._captured.set(picture.image, key=picture.key)
+        self._captured_key, source = picture.key, picture.source
+        return CapturedPicture(self._captured.texture, source.frame_index, picture.is_stale, shown_as=source.shown_as)
+
+    def forget_other(self) -> None:
+        """Nothing is compared any more: ask for no other picture."""
+        self._asked_other = None
+
     def _without_render(
         self, shown: ShownPicture, points_key: Hashable, captured: CapturedPicture | None
     ) -> ShownPicture:
@@ -252,23 +307,27 @@ class Scene:
 
     def _take_picture(self, session: SceneNeeds, view: SceneView, shown: ShownPicture) -> tuple[Hashable, ShownPicture]:
         full = min(MAX_PICTURE_WIDTH / view.width, 1.0)
-        share = full * (self._moving_share if view.is_moving else 1.0)
-        self._asked_size = picture_size(view.width, view.height, share)
-        picture = session.request_render(*self._asked_size)
+        full_size = picture_size(view.width, view.height, full)
+        timeline, now_s = session.timeline, time.perf_counter()
+        is_hurried = self._moving_size.is_hurried(timeline.frame_index, now_s, is_playing=timeline.is_playing)
+        is_quick = is_hurried or view.is_moving
+        share = full * (self._moving_size.share if is_quick else 1.0)
+        self._asked_sizes = picture_size(view.width, view.height, share), full_size
+        picture = session.request_render(*self._asked_sizes[0], full_size=full_size)
         if picture is None:
             self._picture_key = None
             return None, shown
         if self._picture.set(picture.image, key=picture.key) and picture.duration_s > 0:
-            drawn_share = picture.image.shape[1] / (view.width * full)
-            self._moving_share = moving_share(drawn_share, picture.duration_s * 1e3)
-        self._picture_key = picture.key
+            self._moving_size.note_picture(picture.size[0] / full_size[0], picture.duration_s * 1e3)
+        self._picture_key, self._values = picture.key, picture.values
+        is_coarse = is_quick and picture.size[0] < full_size[0] and not timeline.is_playing
         return picture.key, replace(
             shown,
             kind=RENDERED,
             source=picture.source,
             size=picture.size,
-            full_size=picture_size(view.width, view.height, full),
-            is_on_its_way=picture.is_stale or (view.is_moving and share < full),
+            full_size=full_size,
+            is_on_its_way=picture.is_stale or is_coarse,
         )
 
     def _take_gaussians(
@@ -277,7 +336,12 @@ class Scene:
         gaussians, wanted = session.shown_gaussians(), session.wanted_frame()
         if gaussians is None:
             return None, shown
-        self._splats.upload(gaussians)
+        before = self._splats.drawn
+        is_of_another_project = isinstance(before, GaussianArrays) and _project_of(before) != _project_of(gaussians)
+        self._splats.upload(gaussians, at_once=is_of_another_project)
+        self._splats.update()
+        assert isinstance(self._splats.drawn, GaussianArrays)
+        gaussians = self._splats.drawn  # the last ones, until those were sorted
         self._near = gaussians.near_plane
         shown = replace(
             shown,
@@ -301,6 +365,19 @@ class Scene:
         else:
             self._point_size = CLOUD_OVERLAP * cloud.spacing
         return key
+
+    def value_at(self, x: float, y: float) -> float | None:
+        """The number that the picture's colour stands for at a place; None where nothing is, and where colours are no
+        numbers.
+
+        Args:
+            x, y: As shares of the picture's width and height, from its upper left corner.
+        """
+        if self._values is None or not (0.0 <= x < 1.0 and 0.0 <= y < 1.0):
+            return None
+        height, width = self._values.shape
+        value = float(self._values[int(y * height), int(x * width)])
+        return None if np.isnan(value) else value
 
     def anchor_text(self, session: SceneNeeds, view: SceneView, x: float, y: float) -> str:
         """What the anchor under a pixel of the view is and why; empty where none is shown or that is unknown. It stands
@@ -340,7 +417,7 @@ class Scene:
         target = self._target
         target.clear(BACKGROUND)
         if base_key is not None:
-            if self.is_software:
+            if self._is_picture:
                 target.draw_image(self._picture)
             else:
                 self._splats.draw(target, *camera, self._near)
@@ -352,6 +429,8 @@ class Scene:
             self._cloud.draw(target, *camera, near, shape="circle", size=size, unit=unit, is_depth_tested=True)
         elif captured_key is not None:
             target.draw_image(self._captured)
+        self._anchor_heat.draw(target, view, session.overlays.heat_opacity, self.marks.pixels_per_unit)
+        self.explaining.draw(target, view, self.marks.pixels_per_unit)
         self.marks.draw(target, view, session)
         self.regions.draw(target, camera)
         target.resolve(BACKGROUND)
@@ -360,3 +439,11 @@ class Scene:
         """Fewer points are drawn larger, so that a thin cloud still reads as surfaces."""
         per_point_px2 = view.width * view.height / max(len(self._cloud), 1)
         return float(np.clip(0.45 * np.sqrt(per_point_px2), 2.0, 5.0))
+
+
+def _project_of(gaussians: GaussianArrays) -> Hashable:
+    """Frames of two projects differ in the first part of their keys; in a mode that lies in another key."""
+    key = gaussians.key
+    while isinstance(key, tuple):
+        key = key[0]
+    return key

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from ui.panels.actions import compare, marking, time, training, view, window
+from ui.panels.actions import compare, heat, marking, modes, time, training, view, window
 from ui.panels.actions.action import Action, ActionNeeds
 from ui.panels.panel_keys import belongs_to_panel
 from ui.panels.state import Dispatch, UiState
@@ -13,6 +13,8 @@ ACTIONS: tuple[Action, ...] = (
     *time.ACTIONS,
     *view.ACTIONS,
     *compare.ACTIONS,
+    *modes.ACTIONS,
+    *heat.ACTIONS,
     *marking.ACTIONS,
     *training.ACTIONS,
     *window.ACTIONS,
@@ -25,7 +27,8 @@ MOUSE_HELP: tuple[tuple[str, str], ...] = (
     ("Click, wheel", "While a region is chosen: fix its place, change its size (Ctrl + wheel moves the view)"),
     ("Camera click", "Look through the camera whose pyramid it is"),
     ("Timeline drag", "Move through time"),
-    ("White line drag", "Wipe between render and captured picture"),
+    ("White line drag", "Wipe between the two pictures that are compared"),
+    ("Hold B", "See the picture that the render is compared with, alone"),
     ("Folder drop", "Open it: a capture or a project"),
 )
 
