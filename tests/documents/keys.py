@@ -18,5 +18,9 @@ def key_tables() -> str:
     """Every row of the table of actions, in its order."""
     parts = []
     for group, rows in groupby(ACTIONS, key=lambda row: row.group):
-        parts.append(f"**{group}**\n\n{table(('key', 'does'), [(keys(row), row.text) for row in rows if row.keys])}")
+        listed = list(rows)
+        parts.append(f"**{group}**\n\n{table(('key', 'does'), [(keys(row), row.text) for row in listed if row.keys])}")
+        keyless = "; ".join(row.text for row in listed if not row.keys)
+        if keyless:
+            parts.append(f"No key of their own: {keyless}.")
     return "\n\n".join(parts)

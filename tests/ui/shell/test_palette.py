@@ -15,7 +15,7 @@ from app.session.commands import LookThrough, OpenProject, SetFrame, TrainNextCl
 from engine.capture.clip import split_clips
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, Pilot
-from ui.panels.actions.menus import Menu, menus
+from ui.panels.actions.menus import MOST_ITEMS, Menu, menus
 from ui.panels.actions.table import ACTIONS
 from ui.shell.palette_entries import MOST_SHOWN, entries, found
 
@@ -43,6 +43,12 @@ def test_every_action_is_reached_by_the_palette_and_by_key_or_listed_as_having_n
         assert found(action.text, list(listed.values()), ())[0].entry.id == action.id
     in_menus = [item.id for menu in menus() for item in _actions(menu)]
     assert sorted(in_menus) == sorted(action.id for action in ACTIONS), "each stands in one menu"
+    too_long = {menu.title: len(menu.items) for menu in _all(menus()) if len(menu.items) > MOST_ITEMS}
+    assert not too_long, "these do not fit into the smallest window"
+
+
+def _all(some: list[Menu]) -> list[Menu]:
+    return [found for menu in some for found in (menu, *_all([x for x in menu.items if isinstance(x, Menu)]))]
 
 
 def _actions(menu: Menu) -> list:

@@ -91,7 +91,7 @@ def parse_key(label: str) -> Key:
 def pressed_label() -> str:
     """The key that was pressed since the last frame with the modifiers held, as `parse_key` reads it; else empty.
 
-    Modifiers alone are no key.
+    A modifier alone does not count as one.
     """
     io = imgui.get_io()
     for name, printed in _PRINTED.items():

@@ -1,4 +1,4 @@
-"""Which menu each action stands in: that of its group, unless the action names another one.
+"""Which menu each action stands in: the one that it names, else that of the first part of its id, else of its group.
 
 A path such as "View/Theme" is a menu inside a menu. Actions of a group that is not listed here get a menu of that name,
 so that none is left out.
@@ -11,9 +11,19 @@ from dataclasses import dataclass, field
 from ui.panels.actions.action import COMPARE, MARK, TIME, TRAIN, VIEW, WINDOW, Action
 from ui.panels.actions.table import ACTIONS
 
+MOST_ITEMS = 24
+"""As many fit into the smallest window."""
 MENUS = ("File", "View", "Time", "Train", "Mark", "Window")
 """From left to right; others follow before the last."""
 _MENU_OF_GROUP = {TIME: "Time", VIEW: "View", COMPARE: "View", MARK: "Mark", TRAIN: "Train", WINDOW: "Window"}
+_MENU_OF_TOPIC = {
+    "compare": "View/Compare",
+    "content": "View/Draw only",
+    "heat": "View/Residuals",
+    "mode": "View/Mode",
+    "show": "View/Show",
+}
+"""By what an id begins with, up to the first dot."""
 
 
 @dataclass
@@ -37,12 +47,18 @@ class Menu:
         return made
 
 
+def menu_path(action: Action) -> str:
+    """Titles of the menus in which an action stands, joined by slashes."""
+    topic = action.id.partition(".")[0]
+    return action.menu or _MENU_OF_TOPIC.get(topic) or _MENU_OF_GROUP.get(action.group, action.group)
+
+
 def menus(actions: tuple[Action, ...] = ACTIONS) -> list[Menu]:
     """All menus with every action in exactly one of them."""
     top = {title: Menu(title) for title in MENUS}
     groups: dict[str, str] = {}
     for action in actions:
-        path = (action.menu or _MENU_OF_GROUP.get(action.group, action.group)).split("/")
+        path = menu_path(action).split("/")
         menu = top.setdefault(path[0], Menu(path[0]))
         for title in path[1:]:
             menu = menu.inside(title)
