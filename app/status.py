@@ -158,6 +158,26 @@ class ClipStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class SeamStatus:
+    """A boundary between two clips.
+
+    Attributes:
+        clip_index: The later clip.
+        frame_index: Its first frame.
+        score: Excess flicker at the boundary against that inside the two clips: 1 where nothing can be seen, and above
+            2 worth a look. None where it was not measured.
+        n_cameras: Cameras that it was measured with.
+        worst_camera: The one with the largest score; None where it was not measured.
+    """
+
+    clip_index: int
+    frame_index: int
+    score: float | None = None
+    n_cameras: int = 0
+    worst_camera: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class SettingStatus:
     """A training setting that the user may change before the first clip is trained.
 

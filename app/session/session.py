@@ -7,7 +7,7 @@ opened before. What is open is one immutable value that each of them is handed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from app.background.jobs import Jobs
@@ -20,6 +20,7 @@ from app.project.opening import Opened, open_for_window
 from app.project.project import Project, check_settings
 from app.project.recents import project_name
 from app.session import commands
+from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
 from app.session.notices import Notices
@@ -37,6 +38,7 @@ from app.status import (
     PlanStatus,
     ProjectStatus,
     RegionsStatus,
+    SeamStatus,
     TrainingStatus,
     WantedFrame,
 )
@@ -139,6 +141,16 @@ class Session:
         return 0 if self.opened is None else self.opened.reference_index
 
     @property
+    def seams(self) -> Sequence[SeamStatus]:
+        """Boundaries between clips and how much they can be seen."""
+        return ()
+
+    @property
+    def cached_frames(self) -> Sequence[tuple[int, int]]:
+        """Runs of frames that are decoded in memory: first frame of each and one past its last, rising."""
+        return ()
+
+    @property
     def jobs(self) -> list[JobStatus]:
         """Short jobs that run."""
         return self._jobs.statuses
@@ -174,6 +186,9 @@ class Session:
             case commands.TrainClip(clip_index=clip_index, is_confirmed=is_confirmed):
                 self.question = None
                 self.question = live.train(clip_index, is_confirmed=is_confirmed)
+            case commands.TrainClips(clip_indices=clip_indices):
+                self.question = None
+                live.train_unfinished(clip_indices)
             case commands.PauseTraining():
                 live.pause()
             case commands.ResumeTraining():
@@ -184,6 +199,9 @@ class Session:
                 self.timeline.seek(frame_index)
             case commands.TogglePlay():
                 self.timeline.toggle_play()
+            case commands.FollowTraining(is_on=is_on):
+                self.timeline.hold()
+                self.timeline.is_following = is_on
             case commands.LookThrough(camera_index=camera_index):
                 self.view.look(camera_index)
             case commands.SetCompare(mode=mode):
@@ -221,11 +239,11 @@ class Session:
             return
         check_settings(changed, opened.capture)
         opened.project.update(changed)
-        frame_index = self.timeline.frame_index
+        before = self.timeline
         changed_project = opened_project(opened.capture, opened.project, opened.generation)
         self._show(changed_project)
         self.live_training.open(changed_project)
-        self.timeline.seek(frame_index)
+        self.timeline.take_over(before)
 
     # ---------------------------------------------------------------- opening
 
@@ -316,6 +334,7 @@ class Session:
 
     def _refresh(self) -> None:
         """Remake the status values."""
+        follow_training(self.timeline, self.live_training)
         live, clip, opened = self.live_training, self.timeline.clip, self.opened
         live.note_anchors(self.playback.live_anchors(self.timeline))
         self.training = live.status(None if clip is None else clip.clip_index)
