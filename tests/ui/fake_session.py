@@ -14,6 +14,7 @@ from app.playback.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
+from app.playback.views import Views
 from app.project.recents import RecentProject
 from app.session import commands
 from app.session.marking import after_marking
@@ -26,6 +27,7 @@ from app.status import (
     PlanStatus,
     ProjectStatus,
     RegionsStatus,
+    SeamStatus,
     SettingStatus,
     TrainingStatus,
     WantedFrame,
@@ -82,7 +84,6 @@ class FakeSession:
         self.commands: list[commands.Command] = []
         self.notices = Notices()
         self.jobs: list[JobStatus] = []
-        self.overlays = Overlays()
         self.recent = FakeRecent(
             entries=[
                 RecentProject("/projects/kitchen-toy", "/captures/kitchen", "kitchen-toy", 2, 3),
@@ -125,11 +126,20 @@ class FakeSession:
         self.rig: CameraRig = NO_CAMERAS
         self.clips: list[Clip] = []
         self.clip_states: list[ClipStatus] = []
+        self.seams: list[SeamStatus] = []
+        self.cached_frames: list[tuple[int, int]] = []
         self.project = None
-        self.timeline = Timeline()
-        self.view = OrbitView()
+        self.timeline, self.views = Timeline(), Views()
         if has_capture:
             self._open(FakeCapture(make_rig()))
+
+    @property
+    def view(self) -> OrbitView:
+        return self.views.current.view
+
+    @property
+    def overlays(self) -> Overlays:
+        return self.views.current.overlays
 
     def _open(self, capture: FakeCapture) -> None:
         self.capture, self.rig = capture, capture.rig
@@ -137,7 +147,7 @@ class FakeSession:
         self.clip_states = [ClipStatus() for _ in self.clips]
         self.project_status = ProjectStatus("juggling", Path("/projects/juggling"), 1, len(self.clips))
         self.timeline = Timeline(self.clips, fps=capture.fps)
-        self.view = OrbitView(capture.rig)
+        self.views.look_at(capture.rig)
         self.regions = RegionsStatus(can_mark=True, effect="Marks apply to clips whose training starts from now on.")
 
     def dispatch(self, command: commands.Command) -> None:
@@ -151,6 +161,8 @@ class FakeSession:
                 self.timeline.seek(command.frame_index)
             case commands.TogglePlay():
                 self.timeline.toggle_play()
+            case commands.FollowTraining(is_on=is_on):
+                self.timeline.is_following = is_on
             case commands.LookThrough():
                 self.view.look(command.camera_index)
             case commands.SetCompare(mode=mode):
@@ -159,6 +171,10 @@ class FakeSession:
                 setattr(self.overlays, name, not getattr(self.overlays, name))
             case commands.HomeView():
                 self.view.home()
+            case commands.ShowViews(n=n):
+                self.views.show(n)
+            case commands.ActivateView(index=index):
+                self.views.activate(index)
             case commands.MarkRegion():
                 sphere = sphere_region(command.treat, command.center, command.radius)
                 self._set_regions(after_marking(self.regions.regions, [sphere]))

@@ -15,7 +15,7 @@ from app.status import ClipStatus, Overlays, RegionsStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from ui.panels.regions import draw_region_mark
 from ui.panels.state import Rect, UiState
-from ui.panels.timeline import STATE_WORDS
+from ui.panels.timeline.clip_words import STATE_WORDS
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.theme import Icon

@@ -23,7 +23,8 @@ from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.notices import NoticesNeeds, NoticesPanel
 from ui.panels.regions import draw_regions
 from ui.panels.state import CAPTURE, REGIONS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
-from ui.panels.timeline import TimelineNeeds, draw_timeline
+from ui.panels.timeline.needs import TimelineNeeds
+from ui.panels.timeline.panel import draw_timeline
 from ui.panels.training import draw_training
 from ui.panels.viewport import ViewportNeeds, ViewportPanel
 from ui.shell.dialogs import OpenFolderDialog, draw_help
@@ -114,7 +115,7 @@ class Frame:
         self._on_input = on_input
         self.ui = UiState(fonts=theme.load_fonts(), scale=self.scale)
         theme.apply_style()
-        self.viewport = ViewportPanel(Scene(ctx))
+        self.viewport = ViewportPanel(lambda: Scene(ctx))
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
         self.notices = NoticesPanel()
         self.dialog = OpenFolderDialog()

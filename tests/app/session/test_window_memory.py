@@ -19,7 +19,17 @@ def test_what_was_kept_is_read_again(tmp_path: Path) -> None:
     memory.keep_view("/somewhere", view_of(FakeSession()))
     memory.save()
     again = read_window_memory(memory.path)
-    for name in ("size", "is_maximized", "ui_scale", "layout", "mark_size", "mark_opacity", "time_unit", "folded_lanes", "views"):
+    for name in (
+        "size",
+        "is_maximized",
+        "ui_scale",
+        "layout",
+        "mark_size",
+        "mark_opacity",
+        "time_unit",
+        "folded_lanes",
+        "views",
+    ):
         assert getattr(again, name) == getattr(memory, name), name
 
 
