@@ -47,19 +47,35 @@ def draw_clip_lane(stage: Stage, session: TimelineNeeds) -> None:
             stage.ui.mark_rect(f"timeline.clip{index}", band)
             _draw_band(stage.draw, band, session, session.clips[index], session.clip_states[index])
     else:
-        for begin, last, state in state_runs(session, stage, (first, stop)):
-            band = _band(stage, session, begin, last)
-            stage.ui.mark_rect(f"timeline.clip{begin}", band)
-            draw_run(stage.draw, band, begin, last, state)
+        _draw_runs(stage, session, (first, stop))
     if stage.is_pointed_at(CLIPS) and stage.pointer is not None:
         _draw_note(session, stage.scale.frame_at(stage.pointer[0]))
 
 
-def state_runs(session: TimelineNeeds, stage: Stage, in_sight: tuple[int, int]) -> list[tuple[int, int, str]]:
-    """First clip, last clip and state of every run. Clips that are narrower than can be seen count together, as the
-    one among them that matters most."""
+def _draw_runs(stage: Stage, session: TimelineNeeds, in_sight: tuple[int, int]) -> None:
+    """Runs of one state. There may be hundreds of them, hardly wider than a line: those are drawn with one call."""
+    row, scale, draw, rects = stage.rows[CLIPS], stage.scale, stage.draw, stage.ui.rects
+    y0, y1 = row.y0, row.y1
+    packed = {state: theme.u32(theme.faded(theme.status_color(state), 0.62)) for state in STATES}
+    x_of_start, per_clip = scale.left_of(0.0), session.clips[0].clip_length * scale.per_frame
+    for begin, last, state in state_runs(session, stage, in_sight, MIN_GROUP_WIDTH):
+        if (last - begin + 1) * per_clip < MIN_HATCH_WIDTH:
+            x0, x1 = x_of_start + begin * per_clip, x_of_start + (last + 1) * per_clip
+            draw.add_rect_filled(ImVec2(x0, y0), ImVec2(x1, y1), packed[state])
+            rects[f"timeline.clip{begin}"] = Rect(x0, y0, x1, y1)
+        else:
+            band = _band(stage, session, begin, last)
+            rects[f"timeline.clip{begin}"] = band
+            _draw_run(draw, band, begin, last, state)
+
+
+def state_runs(
+    session: TimelineNeeds, stage: Stage, in_sight: tuple[int, int], smallest: float
+) -> list[tuple[int, int, str]]:
+    """First clip, last clip and state of every run. Clips that are narrower than `smallest` count together, as the one
+    among them that matters most."""
     first, stop = in_sight
-    size = group_size(session.clips[0].clip_length * stage.scale.per_frame, MIN_GROUP_WIDTH)
+    size = group_size(session.clips[0].clip_length * stage.scale.per_frame, smallest)
     first -= first % size  # the same clips together wherever the view is moved to
     codes = largest_of_groups(stage.ui.timeline.columns(session.clip_states).states[first:stop], size)
     return [
@@ -76,13 +92,9 @@ def _band(stage: Stage, session: TimelineNeeds, first: int, last: int) -> Rect:
     return Rect(x0, row.y0, max(x1, x0 + 1), row.y1)
 
 
-def draw_run(draw: imgui.ImDrawList, band: Rect, first: int, last: int, state: str) -> None:
+def _draw_run(draw: imgui.ImDrawList, band: Rect, first: int, last: int, state: str) -> None:
     """Many clips in one state as one band."""
     color = theme.status_color(state)
-    if band.width < MIN_HATCH_WIDTH:
-        draw.add_rect_filled(band.low, band.high, theme.u32(theme.faded(color, 0.62)))
-        draw.add_rect_filled(ImVec2(band.x0, band.y1 - 3), band.high, theme.u32(color))
-        return
     draw.add_rect_filled(band.low, band.high, theme.u32(theme.RAISED), 3)
     draw.add_rect_filled(band.low, band.high, theme.u32(theme.faded(color, 0.38 if state == "trained" else 0.22)), 3)
     if state in WARNED:
@@ -90,11 +102,11 @@ def draw_run(draw: imgui.ImDrawList, band: Rect, first: int, last: int, state: s
     draw.add_rect_filled(ImVec2(band.x0, band.y1 - 3), band.high, theme.u32(color), 2)
     if band.width < MIN_WORDS_WIDTH:
         return
-    draw.push_clip_rect(band.low, band.high, True)
-    words = f"{theme.CLIP_ICONS.get(state, '')}  {state_words(state)}".strip()
+    icon = theme.CLIP_ICONS.get(state, "")
     title = f"Clips {first} to {last}" if last > first else f"Clip {first}"
-    _draw_lines(draw, band, title, words, theme.TEXT)
-    draw.pop_clip_rect()
+    words = f"{icon}  {state_words(state)}".strip()
+    title = next((text for text in (title, f"{first}-{last}") if _fits(text, band)), "")  # a part would mislead
+    _draw_lines(draw, band, title, words if _fits(words, band) else icon, theme.TEXT)
 
 
 def _draw_band(draw: imgui.ImDrawList, band: Rect, session: TimelineNeeds, clip: Clip, status: ClipStatus) -> None:
@@ -128,14 +140,16 @@ def _draw_words(draw: imgui.ImDrawList, band: Rect, session: TimelineNeeds, clip
     words = band_words(status, session.training, clip.clip_index, state_words(state))
     if status.held_out_psnr is not None:
         words = f"{words}, {status.held_out_psnr:.1f} dB"
-    if imgui.calc_text_size(title).x + 18 > band.width:
+    if not _fits(title, band):
         title = str(clip.clip_index)
     line_two = f"{icon}  {words}" if icon else words
-    if imgui.calc_text_size(line_two).x + 18 > band.width:
-        line_two = icon or words
-    draw.push_clip_rect(band.low, band.high, True)
+    if not _fits(line_two, band):
+        line_two = icon or ""
     _draw_lines(draw, band, title, line_two, theme.TEXT if state != "untrained" else theme.TEXT_DIM)
-    draw.pop_clip_rect()
+
+
+def _fits(text: str, band: Rect) -> bool:
+    return imgui.calc_text_size(text).x + 18 <= band.width
 
 
 def _draw_lines(draw: imgui.ImDrawList, band: Rect, title: str, words: str, color: theme.Color) -> None:

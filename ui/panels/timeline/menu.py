@@ -25,6 +25,7 @@ def draw_clip_menu(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> 
         ui.timeline.is_menu_wanted = False
         ui.timeline.menu_frame = session.timeline.frame_index
         imgui.open_popup(POPUP)
+        imgui.set_nav_cursor_visible(True)  # the keyboard goes on in it at once
     if not imgui.begin_popup(POPUP):
         return
     clip = session.timeline.clip_of(ui.timeline.menu_frame)
@@ -47,6 +48,8 @@ def _draw_training(clip: Clip, session: TimelineNeeds, dispatch: Dispatch, ui: U
     verb = "Train again" if is_finished else "Train" if status.resume_step is None else "Resume"
     if _item(ui, "train", f"{Icon.TRAIN}  {verb} this clip", is_enabled=is_free and has_reference):
         dispatch(TrainClip(index))
+    if imgui.is_window_appearing():
+        imgui.set_item_default_focus()
     if not has_reference:
         imgui.text_disabled(f"Clip {reference}, the reference, has to be trained first")
     later = unfinished(session, index)

@@ -15,6 +15,7 @@ from ui.panels.timeline.time_range import TimeRange, TimeScale, whole_range
 from ui.panels.timeline.view_state import TimelineView
 from ui.style import theme
 
+MIN_RUN_WIDTH = 4.0
 MIN_WINDOW_WIDTH = 8.0
 """The part that is shown is drawn no narrower, so that it can be taken hold of."""
 
@@ -29,7 +30,9 @@ def draw_overview(stage: Stage, row: Rect, session: TimelineNeeds) -> None:
     _drag(stage.ui.timeline, whole, timeline)
     draw.add_rect_filled(row.low, row.high, theme.u32(theme.BACKDROP), 3)
     if session.clip_states and session.clips:
-        for first, last, state in state_runs(session, replace(stage, scale=whole), (0, len(session.clip_states))):
+        for first, last, state in state_runs(
+            session, replace(stage, scale=whole), (0, len(session.clip_states)), MIN_RUN_WIDTH
+        ):
             x0, x1 = whole.left_of(session.clips[first].start), whole.left_of(session.clips[last].stop)
             color = theme.u32(theme.faded(theme.status_color(state), 0.75))
             draw.add_rect_filled(ImVec2(x0, row.y0 + 5), ImVec2(max(x1, x0 + 1), row.y1 - 5), color)

@@ -29,14 +29,16 @@ def draw_quality_lane(stage: Stage, session: TimelineNeeds) -> None:
     means = psnr if size == 1 else _means(psnr, size)
     heights = np.round(2 * (row.y1 - 2 - (row.height - 4) * _shares(means))) / 2  # equal where they look the same
     color = theme.u32(theme.GREEN)
-    end = (-1, 0.0)
+    end = (-2, 0.0)
+    edges = scale.left_of(session.clips[first].start) + np.arange(len(heights) + 1) * (
+        size * session.clips[0].clip_length * scale.per_frame
+    )
+    lefts = np.clip(edges, scale.x0, min(scale.x1, scale.left_of(scale.n_frames))).tolist()
+    levels = heights.tolist()
     for begin, last in runs_of(heights):
-        y = float(heights[begin])
-        if np.isnan(y):
+        y, x0, x1 = levels[begin], lefts[begin], lefts[last + 1]
+        if y != y:  # not measured
             continue
-        stop_clip = min(first + (last + 1) * size, stop) - 1
-        x0 = max(scale.left_of(session.clips[first + begin * size].start), scale.x0)
-        x1 = min(scale.left_of(session.clips[stop_clip].stop), scale.x1)
         if end[0] == begin - 1:
             draw.add_line_v(x0, min(end[1], y), max(end[1], y), color, 1.5)
         draw.add_line_h(x0, x1, y, color, 2)

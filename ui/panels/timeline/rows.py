@@ -51,7 +51,9 @@ def arrange_rows(height: float, folded: Collection[str], *, is_zoomed: bool) -> 
     left = height - sum(heights.values())
     for name in KEPT_FIRST:
         is_wanted = is_zoomed if name == OVERVIEW else name not in folded
-        if is_wanted and HEIGHTS[name] + GAP <= left:
+        if is_wanted and HEIGHTS[name] + GAP > left:
+            break  # a lower one that comes later would fit, and be there without the one that matters more
+        if is_wanted:
             heights[name] = HEIGHTS[name]
             left -= HEIGHTS[name] + GAP
     for name, largest in LARGEST.items():

@@ -30,7 +30,7 @@ def draw_ruler(stage: Stage, timeline: Timeline) -> None:
         x = scale.left_of(position)
         draw.add_line_v(x, row.y0 + 6, row.y1 - 1, theme.u32(theme.RAISED_ACTIVE))
         is_clear = x > flag.x1 or x + imgui.calc_text_size(label).x + 12 < flag.x0
-        if is_clear:  # half hidden it would read as another number
+        if is_clear and x >= scale.x0 - 4:  # half hidden it would read as another number
             draw.add_text(ImVec2(x + 4, row.y0 + 2), theme.u32(theme.TEXT_DIM), label)
 
 

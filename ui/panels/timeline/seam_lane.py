@@ -1,10 +1,12 @@
 """The lane of seams: one mark per boundary between clips, on a fixed scale of 1 to 3. A click plays around it.
 
-Height and colour say the same, from dark violet to light yellow; above FLAGGED a sign is added. Where a boundary was not
-measured, only its outline is drawn.
+Height and colour say the same, from dark violet to light yellow; above FLAGGED a sign is added. Where a boundary was
+not measured, only its outline is drawn.
 """
 
 from __future__ import annotations
+
+from functools import lru_cache
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -14,7 +16,7 @@ from ui.panels.timeline.clip_lane import clips_in_sight
 from ui.panels.timeline.columns import group_size, largest_of_groups
 from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.rows import SEAMS
-from ui.panels.timeline.stage import Stage, small_text, small_width
+from ui.panels.timeline.stage import Stage, small_text
 from ui.style import theme
 from ui.style.colors import Color, rgb
 
@@ -23,7 +25,10 @@ LOWEST, HIGHEST = 1.0, 3.0
 FLAGGED = 2.0
 COLORS = (rgb(116, 62, 160), rgb(190, 55, 110), rgb(237, 105, 37), rgb(251, 180, 26), rgb(252, 255, 164))
 """From LOWEST to HIGHEST in equal steps: lightness rises throughout."""
+N_STEPS = 100
 MARK_WIDTH = 7.0
+MIN_TEXT_ROOM = 36.0
+"""A score is written where the next mark is no nearer than this."""
 MIN_MARK_DISTANCE = 9.0
 """Seams closer together than this are shown as one, the worst of them."""
 REACH = 6.0
@@ -32,9 +37,15 @@ REACH = 6.0
 
 def seam_color(score: float) -> Color:
     """Colour of a score, held inside the scale."""
-    share = min(max((score - LOWEST) / (HIGHEST - LOWEST), 0.0), 1.0) * (len(COLORS) - 1)
-    low = min(int(share), len(COLORS) - 2)
-    weight = share - low
+    share = min(max((score - LOWEST) / (HIGHEST - LOWEST), 0.0), 1.0)
+    return _color_of_step(round(share * N_STEPS))
+
+
+@lru_cache
+def _color_of_step(step: int) -> Color:
+    place = step / N_STEPS * (len(COLORS) - 1)
+    low = min(int(place), len(COLORS) - 2)
+    weight = place - low
     red, green, blue, alpha = ((1 - weight) * a + weight * b for a, b in zip(COLORS[low], COLORS[low + 1], strict=True))
     return red, green, blue, alpha
 
@@ -90,9 +101,9 @@ def _draw_mark(stage: Stage, mark: Rect, score: float, room: float) -> None:
     share = min(max((score - LOWEST) / (HIGHEST - LOWEST), 0.0), 1.0)
     top = mark.y1 - mark.height * (0.3 + 0.7 * share)
     draw.add_rect_filled(ImVec2(mark.x0, top), mark.high, theme.u32(seam_color(score)), 1)
-    text = score_text(score)
-    if room < MARK_WIDTH + small_width(text) + 6:
-        text = "!" if score > FLAGGED and room >= MARK_WIDTH + 6 else ""
+    text = score_text(score) if room >= MIN_TEXT_ROOM else ""
+    if not text and score > FLAGGED and room >= MARK_WIDTH + 6:
+        text = "!"
     if text:
         color = theme.TEXT if score > FLAGGED else theme.TEXT_DIM
         small_text(draw, mark.x1 + 3, mark.y0 + 1, text, color)

@@ -10,7 +10,7 @@ from ui.panels.state import Rect, UiState
 from ui.panels.timeline.time_range import TimeScale
 from ui.style import theme
 
-SMALL_TEXT = 12.0
+SMALL_TEXT = 13.0
 """Size of the letters in rows that are too low for the usual ones, units."""
 
 

@@ -1,4 +1,4 @@
-"""Which frames the timeline shows, and where they lie on the screen. Arithmetic only, in frames and units of the screen.
+"""Which frames the timeline shows, and where they lie on the screen. Arithmetic only.
 
 A frame is a cell: frame i lies between i and i + 1, so that n frames reach from 0 to n.
 """
@@ -6,7 +6,7 @@ A frame is a cell: frame i lies between i and i + 1, so that n frames reach from
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 MIN_SHOWN_FRAMES = 4.0
 """Closer than this nothing more can be seen."""
@@ -79,22 +79,20 @@ class TimeScale:
         x0, x1: Left and right end.
         shown: The frames between them.
         n_frames: Of the capture.
+        width: From end to end.
+        per_frame: Width of one frame's cell.
     """
 
     x0: float
     x1: float
     shown: TimeRange
     n_frames: int
+    width: float = field(init=False)
+    per_frame: float = field(init=False)
 
-    @property
-    def width(self) -> float:
-        """From end to end."""
-        return max(self.x1 - self.x0, 1.0)
-
-    @property
-    def per_frame(self) -> float:
-        """Width of one frame's cell."""
-        return self.width / self.shown.length
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "width", max(self.x1 - self.x0, 1.0))
+        object.__setattr__(self, "per_frame", self.width / self.shown.length)
 
     def left_of(self, frame_index: float) -> float:
         """Left edge of a frame's cell; may lie outside of what is shown."""

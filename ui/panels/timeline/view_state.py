@@ -1,4 +1,4 @@
-"""What of time a window shows, and in which unit. State of the widgets; the program's state is app.playback.timeline."""
+"""What of time a window shows, and in which unit. State of widgets; the playhead is in app.playback.timeline."""
 
 from __future__ import annotations
 
