@@ -100,11 +100,11 @@ class Timeline:
 
     def set_range(self, in_frame: int | None, out_frame: int | None) -> None:
         """Play from one frame to another; None where the capture begins or ends. Clamped, and put in order."""
-        ends = [None if end is None else self.clamped(end) for end in (in_frame, out_frame)]
-        if ends[0] is not None and ends[1] is not None:
-            ends.sort()
-        self.in_frame, self.out_frame = ends
-        self.around = None
+        first = None if in_frame is None else self.clamped(in_frame)
+        last = None if out_frame is None else self.clamped(out_frame)
+        if first is not None and last is not None:
+            first, last = min(first, last), max(first, last)
+        self.in_frame, self.out_frame, self.around = first, last, None
 
     def set_in(self) -> None:
         """Playing begins at the playhead. An end before it is given up."""

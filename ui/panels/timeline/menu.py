@@ -21,7 +21,8 @@ def draw_clip_menu(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> 
     imgui.open_popup_on_item_click(POPUP, imgui.PopupFlags_.mouse_button_right)
     if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_blocked_by_popup) and imgui.is_mouse_released(1):
         ui.timeline.menu_frame = stage.scale.frame_at(imgui.get_io().mouse_pos.x)
-    if ui.timeline.is_menu_wanted:
+    is_by_key = ui.timeline.is_menu_wanted
+    if is_by_key:
         ui.timeline.is_menu_wanted = False
         ui.timeline.menu_frame = session.timeline.frame_index
         imgui.open_popup(POPUP)
@@ -33,13 +34,13 @@ def draw_clip_menu(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> 
         state = session.clip_states[clip.clip_index].state
         imgui.text_disabled(f"{clip_title(clip.clip_index, session.reference_index)}: {state_words(state)}")
         imgui.separator()
-        _draw_training(clip, session, dispatch, ui)
+        _draw_training(clip, session, dispatch, ui, is_by_key=is_by_key)
         imgui.separator()
         _draw_time(clip, session, dispatch, ui)
     imgui.end_popup()
 
 
-def _draw_training(clip: Clip, session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_training(clip: Clip, session: TimelineNeeds, dispatch: Dispatch, ui: UiState, *, is_by_key: bool) -> None:
     index, reference = clip.clip_index, session.reference_index
     status = session.clip_states[index]
     is_free = session.training.state in ("idle", "failed")
@@ -48,7 +49,7 @@ def _draw_training(clip: Clip, session: TimelineNeeds, dispatch: Dispatch, ui: U
     verb = "Train again" if is_finished else "Train" if status.resume_step is None else "Resume"
     if _item(ui, "train", f"{Icon.TRAIN}  {verb} this clip", is_enabled=is_free and has_reference):
         dispatch(TrainClip(index))
-    if imgui.is_window_appearing():
+    if is_by_key:
         imgui.set_item_default_focus()
     if not has_reference:
         imgui.text_disabled(f"Clip {reference}, the reference, has to be trained first")

@@ -56,7 +56,7 @@ def _means(psnr: np.ndarray, size: int) -> np.ndarray:
     return np.where(counts > 0, sums / np.maximum(counts, 1.0), np.nan)
 
 
-def _shares(decibels: np.ndarray) -> np.ndarray:
+def _shares(decibels: np.ndarray | np.float64) -> np.ndarray:
     """Places on the scale, 0 to 1."""
     return np.clip((decibels - LOWEST_DB) / (HIGHEST_DB - LOWEST_DB), 0.0, 1.0)
 
