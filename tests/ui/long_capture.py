@@ -7,7 +7,7 @@ import random
 import numpy as np
 
 from app.playback.timeline import Timeline
-from app.status import ClipStatus, SeamStatus
+from app.status import ClipStatus, ResidualStatus, SeamStatus
 from engine.capture.clip import split_clips
 from tests.ui.fake_session import FakeSession
 
@@ -27,11 +27,17 @@ def long_session(
     n_clips = len(session.clips)
     chance = random.Random(0)
     session.clip_states = [_clip(index, n_clips, chance, is_alternating=is_alternating) for index in range(n_clips)]
-    session.seams = [
-        SeamStatus(clip.clip_index, clip.start, 1.0 + 2.4 * chance.random() ** 6)
-        for clip in session.clips[1 : int(0.6 * n_clips)]
-    ]
-    session.cached_frames = [(0, 12), (13, 40), (n_frames // 2, n_frames // 2 + n_frames // 15)]
+    measured = int(0.6 * n_clips)
+    seams = tuple(
+        SeamStatus(clip.clip_index, clip.start, 0.1, 1.0 + 2.4 * chance.random() ** 6)
+        for clip in session.clips[1:measured]
+    )
+    psnr = 29.0 + 5.0 * np.sin(np.arange(n_frames) / n_frames * 9.0) + 0.8 * np.sin(np.arange(n_frames) / 3.0)
+    psnr[session.clips[measured].start :] = np.nan
+    cells = {"psnr": np.repeat(psnr[:, None], len(session.rig), axis=1).astype(np.float32)}
+    is_held_out = tuple(index in session.holdout for index in range(len(session.rig)))
+    session.measured = ResidualStatus(seams, cells, is_held_out, revision=1)
+    session.cached = [(0, 12), (13, 40), (n_frames // 2, n_frames // 2 + n_frames // 15)]
     session.timeline = Timeline(session.clips, fps=fps)
     for place, name in enumerate(MARKERS):
         session.timeline.markers.put((place * 2 + 1) * n_frames // 7, name)

@@ -6,18 +6,20 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.status import ClipStatus, SeamStatus
+from app.status import SEAM_RATIO_FLAGGED, ClipStatus, ResidualStatus, SeamStatus
 from ui.panels.timeline.clip_words import STATE_WORDS
 from ui.panels.timeline.columns import (
     STATES,
     clip_columns,
+    frame_psnr,
     group_size,
     largest_of_groups,
+    means_of_groups,
     merged_spans,
     runs_of,
-    seam_scores,
+    seam_ratios,
 )
-from ui.panels.timeline.seam_lane import COLORS, FLAGGED, HIGHEST, LOWEST, score_text, seam_color
+from ui.panels.timeline.seam_lane import HIGHEST, LOWEST, ratio_text, seam_color
 from ui.panels.timeline.view_state import TimelineView
 
 
@@ -67,22 +69,28 @@ def test_spans_are_joined_where_the_gap_cannot_be_seen(pairs):
     assert all(after[0] - before[1] >= 2.0 for before, after in itertools.pairwise(spans))
 
 
-def test_scores_belong_to_the_boundary_before_their_clip():
-    scores = seam_scores(
-        [SeamStatus(2, 20, 1.4), SeamStatus(3, 30), SeamStatus(99, 990, 3.0), SeamStatus(0, 0, 3.0)], 5
-    )
-    np.testing.assert_array_equal(scores, np.array([np.nan, np.nan, 1.4, np.nan, np.nan], np.float32))
+def test_ratios_belong_to_the_boundary_before_their_clip():
+    seams = [
+        SeamStatus(2, 20, 0.1, 1.4),
+        SeamStatus(3, 30),
+        SeamStatus(99, 990, 0.9, 3.0),
+        SeamStatus(0, 0, 0.9, 3.0),
+        SeamStatus(4, 40, 0.9),  # nothing changes inside, and much at the boundary
+        SeamStatus(5, 50, 0.01),
+    ]
+    nan = np.nan
+    np.testing.assert_array_equal(seam_ratios(seams, 6), np.array([nan, nan, 1.4, nan, HIGHEST, LOWEST], np.float32))
 
 
-def test_a_score_has_the_same_colour_everywhere_and_brighter_is_worse():
+def test_a_ratio_has_the_same_colour_everywhere_and_brighter_is_worse():
     lightness = [
         0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2]
-        for color in (seam_color(score) for score in np.linspace(LOWEST, HIGHEST, 20))
+        for color in (seam_color(ratio) for ratio in np.linspace(LOWEST, HIGHEST, 20))
     ]
     assert (np.diff(lightness) > 0).all()
-    assert seam_color(-5.0) == seam_color(LOWEST) == COLORS[0]
+    assert seam_color(-5.0) == seam_color(LOWEST)
     assert seam_color(99.0) == seam_color(HIGHEST)
-    assert [score_text(score) for score in (1.04, FLAGGED, 2.04, 3.4)] == ["1.0", "2.0", "2.0!", "3.4!"]
+    assert [ratio_text(ratio) for ratio in (1.04, SEAM_RATIO_FLAGGED, 2.04, 3.4)] == ["1.0", "2.0", "2.0!", "3.4!"]
 
 
 def test_columns_are_made_anew_only_when_a_clip_has_changed():
@@ -91,8 +99,26 @@ def test_columns_are_made_anew_only_when_a_clip_has_changed():
     assert view.columns([*states]) is columns
     states[1] = ClipStatus("training", 0.5)
     assert STATES[view.columns(states).states[1]] == "training"
-    seams = [SeamStatus(1, 10, 2.5)]
-    scores = view.scores(seams, 2)
-    assert view.scores(seams, 2) is scores
-    seams[0] = SeamStatus(1, 10, 1.5)
-    assert view.scores(seams, 2)[1] == 1.5
+    seams = [SeamStatus(1, 10, 0.1, 2.5)]
+    ratios = view.ratios(seams, 2)
+    assert view.ratios(seams, 2) is ratios
+    seams[0] = SeamStatus(1, 10, 0.1, 1.5)
+    assert view.ratios(seams, 2)[1] == 1.5
+
+
+def test_the_quality_of_a_frame_is_the_mean_of_its_held_out_cameras():
+    cells = np.array([[30.0, 20.0, 34.0], [np.nan, 20.0, 34.0], [np.nan, 20.0, np.nan]], np.float32)
+    status = ResidualStatus(cells={"psnr": cells}, is_held_out=(True, False, True))
+    np.testing.assert_array_equal(frame_psnr(status), np.array([32.0, 34.0, np.nan], np.float32))
+    nobody = ResidualStatus(cells={"psnr": cells}, is_held_out=(False, False, False))
+    np.testing.assert_array_equal(frame_psnr(nobody), np.array([28.0, 27.0, 20.0], np.float32))
+    assert frame_psnr(ResidualStatus()).shape == (0,)
+
+
+@given(st.lists(st.sampled_from([0.0, 2.0, 4.0, np.nan]), max_size=40), st.integers(1, 9))
+def test_of_a_group_the_mean_is_that_of_what_was_measured(values, size):
+    means = means_of_groups(np.array(values, np.float32), size)
+    groups = [values[start : start + size] for start in range(0, len(values), size)]
+    for found, group in zip(means, groups, strict=True):
+        measured = [value for value in group if value == value]
+        assert np.isnan(found) if not measured else abs(found - sum(measured) / len(measured)) < 1e-5

@@ -11,7 +11,7 @@ from pyglet.window import key, mouse
 
 from app.session.commands import FollowTraining, SetFrame, TrainClip, TrainClips
 from app.session.window_memory import WindowMemory, read_window_memory
-from app.status import ClipStatus, SeamStatus
+from app.status import ClipStatus, ResidualStatus, SeamStatus
 from tests.ui.fake_session import FakeSession
 from tests.ui.long_capture import MARKERS, long_session
 from tests.ui.pilot import CTRL, SHIFT, Pilot
@@ -150,8 +150,6 @@ def test_another_capture_begins_with_all_of_it(pilot: Pilot, tmp_path: Path) -> 
 
 def test_a_click_on_a_seam_plays_around_it_and_one_beside_it_scrubs(pilot: Pilot) -> None:
     timeline = pilot.session.timeline
-    pilot.session.seams = [SeamStatus(1, 10, 2.6)]
-    pilot.draw(2)
     pilot.click("timeline.seam2")
     assert (timeline.around, timeline.is_playing) == ((8, 29), True)
     timeline.hold()
@@ -171,11 +169,11 @@ def test_a_seam_that_is_worse_stands_out_more_and_its_colour_never_changes(pilot
         x, y = pilot.rects[f"timeline.seam{index}"].center[0], pilot.rects[f"timeline.seam{index}"].y1 - 2
         return pilot.picture()[int(y), int(x)].astype(float)
 
-    pilot.session.seams = [SeamStatus(1, 10, 1.2), SeamStatus(2, 20, 3.0)]
+    pilot.session.measured = ResidualStatus((SeamStatus(1, 10, 0.1, 1.2), SeamStatus(2, 20, 0.9, 3.0)))
     pilot.draw(3)
     mild, bad = colour_of(1), colour_of(2)
     assert bad.sum() > mild.sum() + 200
-    pilot.session.seams = [SeamStatus(1, 10, 1.2), SeamStatus(2, 20, 1.2)]
+    pilot.session.measured = ResidualStatus((SeamStatus(1, 10, 0.1, 1.2), SeamStatus(2, 20, 0.1, 1.2)))
     pilot.draw(3)
     np.testing.assert_allclose(colour_of(1), mild, atol=1)
     np.testing.assert_allclose(colour_of(2), mild, atol=1)

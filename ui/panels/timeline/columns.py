@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.status import ClipStatus, SeamStatus
+from app.status import SEAM_FLAGGED, SEAM_RATIO_RANGE, ClipStatus, ResidualStatus, SeamStatus
 
 MIN_GROUP_WIDTH = 2.0
 """Clips narrower than this are shown together, units of the screen."""
@@ -37,13 +37,47 @@ def clip_columns(clip_states: Sequence[ClipStatus]) -> ClipColumns:
     )
 
 
-def seam_scores(seams: Sequence[SeamStatus], n_clips: int) -> np.ndarray:
-    """Score of the boundary before each clip, NaN where not measured; the first clip has none. [n_clips] float32"""
-    scores = np.full(n_clips, np.nan, np.float32)
+def seam_ratios(seams: Sequence[SeamStatus], n_clips: int) -> np.ndarray:
+    """Ratio of the boundary before each clip, NaN where not measured; the first clip has none. [n_clips] float32"""
+    ratios = np.full(n_clips, np.nan, np.float32)
     for seam in seams:
-        if seam.score is not None and 0 < seam.clip_index < n_clips:
-            scores[seam.clip_index] = seam.score
-    return scores
+        ratio = shown_ratio(seam)
+        if ratio is not None and 0 < seam.clip_index < n_clips:
+            ratios[seam.clip_index] = ratio
+    return ratios
+
+
+def shown_ratio(seam: SeamStatus) -> float | None:
+    """The ratio of a seam; where nothing changes inside its clips, so that it has none, an end of the scale by its
+    score. None where it was not measured."""
+    if seam.ratio is not None or seam.score is None:
+        return seam.ratio
+    return SEAM_RATIO_RANGE[1] if seam.score > SEAM_FLAGGED else SEAM_RATIO_RANGE[0]
+
+
+def frame_psnr(status: ResidualStatus) -> np.ndarray:
+    """PSNR of each frame, mean over the held-out cameras that were measured, over all of them where none is held out;
+    NaN where none was. [F] float32, empty where nothing is measured"""
+    cells = status.cells.get("psnr")
+    if cells is None or not cells.size:
+        return np.zeros(0, np.float32)
+    is_held_out = np.array(status.is_held_out, bool)
+    values = cells[:, is_held_out] if len(is_held_out) == cells.shape[1] and is_held_out.any() else cells
+    is_known = np.isfinite(values)
+    counts = is_known.sum(axis=1)
+    sums = np.where(is_known, values, 0.0).sum(axis=1, dtype=np.float32)
+    return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan).astype(np.float32)
+
+
+def means_of_groups(values: np.ndarray, size: int) -> np.ndarray:
+    """Mean of each run of `size` neighbours that are not NaN; NaN where all are. [ceil(n / size)] float32"""
+    if size == 1 or len(values) == 0:
+        return values
+    is_known = np.isfinite(values)
+    places = np.arange(0, len(values), size)
+    sums = np.add.reduceat(np.where(is_known, values, 0.0), places)
+    counts = np.add.reduceat(is_known.astype(np.float32), places)
+    return np.where(counts > 0, sums / np.maximum(counts, 1.0), np.nan).astype(np.float32)
 
 
 def group_size(width: float, smallest: float) -> int:

@@ -16,8 +16,8 @@ WIDTH = 84.0
 LANES_BUTTON = 22.0
 POPUP = "lanes"
 NOTES = {
-    SEAMS: "How much the boundary between two clips can be seen: 1 not at all, above 2 worth a look",
-    QUALITY: "Held-out PSNR of each clip, 20 to 40 dB",
+    SEAMS: "How much more changes at the boundary of two clips than inside of them: 1 is no seam, above 2 worth a look",
+    QUALITY: "Held-out PSNR of each clip, and of each frame where it was measured; 20 to 40 dB",
     CACHE: "Frames that are decoded in memory and shown at once",
     MARKERS: "Markers: Ctrl+M at the playhead",
 }

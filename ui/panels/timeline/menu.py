@@ -54,11 +54,13 @@ def _draw_training(clip: Clip, session: TimelineNeeds, dispatch: Dispatch, ui: U
     if not has_reference:
         imgui.text_disabled(f"Clip {reference}, the reference, has to be trained first")
     later = unfinished(session, index)
-    words = "Train from here" if len(later) != 1 else "Train the one clip from here that is not trained"
+    words = f"{Icon.TRAIN}  Train from here ({len(later)})"
     if _item(ui, "train from here", words, is_enabled=bool(later) and (has_reference or reference in later)):
         dispatch(TrainClips(later))
     everything = unfinished(session, 0)
-    if _item(ui, "train all", f"Train all that is not trained ({len(everything)})", is_enabled=bool(everything)):
+    if _item(
+        ui, "train all", f"{Icon.TRAIN}  Train all that is not trained ({len(everything)})", is_enabled=bool(everything)
+    ):
         dispatch(TrainClips(everything))
 
 
@@ -66,16 +68,16 @@ def _draw_time(clip: Clip, session: TimelineNeeds, dispatch: Dispatch, ui: UiSta
     timeline = session.timeline
     if _item(ui, "go", f"{Icon.PLAY}  Go to its first frame"):
         dispatch(SetFrame(clip.start))
-    if _item(ui, "range", "Play this clip only", "I, O"):
+    if _item(ui, "range", f"{Icon.LOOP}  Play this clip only", "I, O"):
         timeline.set_range(clip.start, clip.stop - 1)
     has_range = timeline.in_frame is not None or timeline.out_frame is not None
-    if _item(ui, "no range", "Play the whole capture", "X", is_enabled=has_range):
+    if _item(ui, "no range", f"{Icon.LOOP}  Play the whole capture", "X", is_enabled=has_range):
         timeline.clear_range()
-    if clip.clip_index > 0 and _item(ui, "seam", "Play around its beginning", "/"):
+    if clip.clip_index > 0 and _item(ui, "seam", f"{Icon.LOOP}  Play around its beginning", "/"):
         timeline.play_around(clip.start)
-    if _item(ui, "zoom", "Show this clip only", "Z"):
+    if _item(ui, "zoom", f"{Icon.EYE}  Show this clip only", "Z"):
         ui.timeline.show_clip(clip, timeline.n_frames)
-    if _item(ui, "whole", "Show the whole capture", "Z", is_enabled=ui.timeline.is_zoomed):
+    if _item(ui, "whole", f"{Icon.EYE}  Show the whole capture", "Z", is_enabled=ui.timeline.is_zoomed):
         ui.timeline.show_all()
 
 

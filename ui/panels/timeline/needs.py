@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from app.playback.timeline import Timeline
-from app.status import ClipStatus, SeamStatus, TrainingStatus
+from app.status import ClipStatus, ResidualStatus, TrainingStatus
 from engine.capture.clip import Clip
 
 
@@ -26,13 +26,12 @@ class TimelineNeeds(Protocol):
     def clip_states(self) -> Sequence[ClipStatus]: ...
 
     @property
-    def seams(self) -> Sequence[SeamStatus]: ...
-
-    @property
-    def cached_frames(self) -> Sequence[tuple[int, int]]: ...
+    def residual_status(self) -> ResidualStatus: ...
 
     @property
     def training(self) -> TrainingStatus: ...
 
     @property
     def reference_index(self) -> int: ...
+
+    def cached_frames(self) -> Sequence[tuple[int, int]]: ...

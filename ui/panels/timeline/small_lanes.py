@@ -28,7 +28,7 @@ def draw_cache_lane(stage: Stage, session: TimelineNeeds) -> None:
     middle = (row.y0 + row.y1) / 2
     strip = Rect(scale.x0, middle - STRIP_HEIGHT / 2, scale.x1, middle + STRIP_HEIGHT / 2)
     stage.draw.add_rect_filled(strip.low, strip.high, theme.u32(theme.faded(theme.TEXT, 0.06)), 2)
-    runs = np.asarray(session.cached_frames, np.float64).reshape(-1, 2)
+    runs = np.asarray(session.cached_frames(), np.float64).reshape(-1, 2)
     if not len(runs):
         return
     in_sight = runs[(runs[:, 1] > scale.shown.start) & (runs[:, 0] < scale.shown.stop)]

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from app.playback.timeline import Timeline
-from app.status import ClipStatus, SeamStatus
+from app.status import ClipStatus, ResidualStatus, SeamStatus
 from engine.capture.clip import Clip
-from ui.panels.timeline.columns import ClipColumns, clip_columns, seam_scores
+from ui.panels.timeline.columns import ClipColumns, clip_columns, frame_psnr, seam_ratios
 from ui.panels.timeline.rows import LANES
 from ui.panels.timeline.time_range import TimeRange, range_around, whole_range
 from ui.panels.timeline.units import FRAMES, UNITS
@@ -55,7 +55,8 @@ class TimelineView:
     _of: object = None
     _seen_frame: int = 0
     _columns: tuple[tuple[ClipStatus, ...], ClipColumns] | None = field(default=None, repr=False)
-    _scores: tuple[tuple[SeamStatus, ...], int, np.ndarray] | None = field(default=None, repr=False)
+    _ratios: tuple[tuple[SeamStatus, ...], int, np.ndarray] | None = field(default=None, repr=False)
+    _frame_psnr: tuple[tuple[int, int], np.ndarray] | None = field(default=None, repr=False)
 
     def take_up(self, capture: object, timeline: Timeline) -> None:
         """Once per frame: all of a capture that was just opened, and the page with a playhead that has moved on."""
@@ -137,9 +138,17 @@ class TimelineView:
             self._columns = key, clip_columns(key)
         return self._columns[1]
 
-    def scores(self, seams: Sequence[SeamStatus], n_clips: int) -> np.ndarray:
+    def ratios(self, seams: Sequence[SeamStatus], n_clips: int) -> np.ndarray:
         """All seams as a column."""
         key = tuple(seams)
-        if self._scores is None or self._scores[1] != n_clips or self._scores[0] != key:
-            self._scores = key, n_clips, seam_scores(key, n_clips)
-        return self._scores[2]
+        if self._ratios is None or self._ratios[1] != n_clips or self._ratios[0] != key:
+            self._ratios = key, n_clips, seam_ratios(key, n_clips)
+        return self._ratios[2]
+
+    def frame_psnr(self, status: ResidualStatus) -> np.ndarray:
+        """All frames as a column."""
+        cells = status.cells.get("psnr")
+        key = (status.revision, id(cells))
+        if self._frame_psnr is None or self._frame_psnr[0] != key:
+            self._frame_psnr = key, frame_psnr(status)
+        return self._frame_psnr[1]
