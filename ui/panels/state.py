@@ -14,6 +14,7 @@ from app.session.commands import Command
 from app.session.preferences import Preferences
 from ui.gl.image import Rect as PixelRect
 from ui.panels.actions.key_map import KeyMap
+from ui.panels.timeline.view_state import TimelineView
 from ui.panels.wishes import Wishes
 from ui.style.fonts import Fonts
 from ui.style.ui_scale import UiScale
@@ -68,6 +69,7 @@ class UiState:
         keyed_panel: Title of the panel that arrow keys, Enter and Space belong to, or None.
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
         regions: The region that is being chosen, and the one that stands out.
+        timeline: What of time is shown.
         is_popup_open: Is a menu or another popup open, so that keys belong to it?
         is_menu_wanted: Open the first menu, for the keyboard.
         is_quality_open: Is the plot of quality over the clips folded out?
@@ -84,6 +86,7 @@ class UiState:
     wishes: Wishes = field(default_factory=Wishes)
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
+    timeline: TimelineView = field(default_factory=TimelineView)
     last_heat: str = ""
     wanted_panel: str | None = None
     is_quality_open: bool = False

@@ -34,7 +34,7 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
     internal.dock_builder_remove_node(dock_id)
     internal.dock_builder_add_node(dock_id, internal.DockNodeFlagsPrivate_.dock_space)
     internal.dock_builder_set_node_size(dock_id, size)
-    bottom_height = 176.0 if size.y >= 700.0 else 160.0
+    bottom_height = 244.0 if size.y >= 700.0 else 176.0
     if name == "Long capture":
         bottom_height = max(bottom_height, size.y * TALL_TIMELINE)
     _, bottom, top = internal.dock_builder_split_node_py(dock_id, imgui.Dir.down, bottom_height / max(size.y, 1.0))

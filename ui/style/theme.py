@@ -6,6 +6,7 @@ The colours themselves are those of a palette (ui.style.palette), which can be c
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
@@ -19,6 +20,7 @@ def faded(color: Color, alpha: float) -> Color:
     return (color[0], color[1], color[2], alpha)
 
 
+@lru_cache(maxsize=4096)
 def u32(color: Color) -> int:
     """The packed form that draw lists take."""
     return imgui.color_convert_float4_to_u32(ImVec4(*color))
@@ -90,6 +92,7 @@ class Icon:
     STEP_BACK = "\uf048"
     STEP_FORWARD = "\uf051"
     LOOP = "\uf01e"
+    FOLLOW = "\uf140"
     FOLDER = "\uf07c"
     CAMERA = "\uf03d"
     CHECK = "\uf00c"
