@@ -7,19 +7,20 @@ from __future__ import annotations
 import logging
 from pathlib import Path
 
-import numpy as np
-
 from app.background.jobs import JobContext, Jobs
 from app.background.kernels import prepare_drawing
-from app.playback.arrays import GaussianArrays, Picture
+from app.playback.arrays import Picture
+from app.playback.frame_decoder import ShownFrame
 from app.playback.orbit_view import OrbitView
-from app.playback.render import RenderRequest, render
+from app.playback.render import Look, RenderRequest, render
 from app.project.opened_project import OpenedProject
 from app.project.project_picture import SIZE, picture_path, read_picture, write_picture
 from engine.kernels.cache import is_cache_warm
 
 logger = logging.getLogger(__name__)
 
+NO_KEY = (0, "", 0, "", 0)
+"""Of the frame: nobody asks for this picture again."""
 CLOSE_S = 3.0
 """The last picture is waited for no longer than this."""
 
@@ -37,20 +38,20 @@ class ProjectPictures:
         self.revision = 0
         self._jobs = Jobs()
 
-    def keep(self, opened: OpenedProject, gaussians: GaussianArrays | None, view: OrbitView) -> None:
+    def keep(self, opened: OpenedProject, shown: ShownFrame | None, view: OrbitView) -> None:
         """Make the picture of a project.
 
         Args:
-            gaussians: What is shown of it; without them the capture's own picture serves, unless there is one.
+            shown: What is shown of it; without that the capture's own picture serves, unless there is one.
             view: From where.
         """
         folder = opened.project.folder.resolve()
-        request = None if gaussians is None else _request(gaussians, view)
+        look = Look.of(view, *SIZE)
 
         def work(context: JobContext) -> None:
-            if request is not None and is_cache_warm():  # compiling kernels for it would take a minute
+            if shown is not None and is_cache_warm():  # compiling kernels for it would take a minute
                 prepare_drawing()
-                write_picture(folder, render(request).image)
+                write_picture(folder, render(RenderRequest(NO_KEY, look, shown)).image)
             elif not picture_path(folder).is_file():
                 write_picture(folder, opened.capture.frame(0, 0))
 
@@ -77,12 +78,6 @@ class ProjectPictures:
     def close(self) -> None:
         """Let the last picture be written."""
         self._jobs.close(CLOSE_S)
-
-
-def _request(gaussians: GaussianArrays, view: OrbitView) -> RenderRequest:
-    width, height = SIZE
-    world_to_camera, K = np.array(view.world_to_camera()), np.array(view.K(width, height))
-    return RenderRequest(gaussians.key, b"", width, height, gaussians.source, gaussians, world_to_camera, K)
 
 
 def _note(error: Exception) -> None:

@@ -249,6 +249,8 @@ class Session:
                 if content not in CONTENTS:
                     raise ValueError(f"parts of a clip are {', '.join(CONTENTS)}, not {content!r}")
                 self.overlays.content = content
+            case commands.SetFrameMemory(megabytes=megabytes):
+                self.playback.decoder.keep_megabytes(megabytes)
             case commands.HomeView():
                 self.view.home()
             case commands.ShowViews(n=n):
@@ -325,7 +327,7 @@ class Session:
         if self.opened is not None and self.live_training.service is not None:
             self.recent.keep(self.opened, self.live_training.service.catalog)
             if self._is_preloading:
-                self.recent.pictures.keep(self.opened, self.shown_gaussians(), self.view)
+                self.recent.pictures.keep(self.opened, self.playback.frame(self.timeline), self.view)
 
     def _fail(self, job_name: str, error: Exception) -> None:
         self.notices.add_failure(f"{job_name} has failed", error)

@@ -15,7 +15,7 @@ import moderngl
 from imgui_bundle import ImVec2, ImVec4, imgui
 from pyglet.window import BaseWindow
 
-from app.session.commands import Command
+from app.session.commands import Command, SetFrameMemory
 from app.session.preferences import Preferences, PreferencesFile
 from app.session.window_memory import WindowMemory
 from ui.gl import ImageTexture, free_dropped, n_changes
@@ -138,6 +138,7 @@ class Frame:
         keys = KeyMap(values.keys)
         keys.drop_unknown(ACTIONS)
         self.ui = UiState(fonts=load_fonts(), scale=self.scale, preferences=values, keys=keys)
+        self._cache_mb: int | None = None
         self._theme = ThemeInUse()
         self._theme.follow(values.theme)
         rows = RecentRows(lambda: ImageTexture(ctx))
@@ -194,6 +195,9 @@ class Frame:
         has_news = self._drain()
         if self._theme.follow(self.ui.preferences.theme):
             self.forget_shown()
+        if self._cache_mb != self.ui.preferences.cache_mb:
+            self._cache_mb = self.ui.preferences.cache_mb
+            session.dispatch(SetFrameMemory(self._cache_mb))
         self.remembering.follow(session)
         has_news |= session.timeline.tick(min(dt_s, MAX_TICK_S), is_shown=self.viewport.shows_playhead(session))
         self._has_news |= has_news or self.viewport.has_news(session)

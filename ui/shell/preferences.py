@@ -20,7 +20,7 @@ TITLE = "Preferences###preferences"
 SIZE = (760.0, 520.0)
 PAGES_WIDTH = 150.0
 LABEL_WIDTH = 200.0
-USUAL_CACHE_MB = 512
+USUAL_CACHE_MB = 384
 
 
 class Page(Protocol):
@@ -155,6 +155,5 @@ def draw_memory(ui: UiState) -> None:
         preferences.cache_mb = min(max(typed if is_changed else shown, CACHE_MB[0]), CACHE_MB[1])
     imgui.set_cursor_pos_x(LABEL_WIDTH)
     text_wrapped_dim(
-        "Frames that were decoded once are shown again at once. More memory holds more of them. It counts for "
-        "projects that are opened from now on."
+        "Frames that were decoded once are shown again at once. More memory holds more of them."
     )

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.playback.arrays import GaussianArrays, Picture
+from app.playback.arrays import AnchorArrays, GaussianArrays, Picture
+from app.playback.frame_decoder import ShownFrame
 from app.playback.orbit_view import OrbitView
 from app.playback.render import RenderRequest
 from app.project import project_picture
@@ -65,7 +66,8 @@ def test_a_project_gets_what_the_first_camera_took_and_later_what_was_looked_at(
 
     def draw(request: RenderRequest) -> Picture:  # the rasterizer has tests of its own
         asked.append(request)
-        return Picture(np.full((request.height, request.width, 3), (200, 30, 30), np.uint8), "red")
+        look = request.look
+        return Picture(np.full((look.height, look.width, 3), (200, 30, 30), np.uint8), "red")
 
     monkeypatch.setattr(project_pictures, "prepare_drawing", lambda: None)
     monkeypatch.setattr(project_pictures, "is_cache_warm", lambda: True)
@@ -83,8 +85,8 @@ def test_a_project_gets_what_the_first_camera_took_and_later_what_was_looked_at(
     assert second is not None
     assert (first != second).any()
     assert second[:, :, 0].min() > second[:, :, 2].max() + 60, "what is looked at was drawn"
-    np.testing.assert_array_equal(asked[0].world_to_camera, OrbitView(opened.rig).world_to_camera())
-    assert (asked[0].width, asked[0].height) == SIZE
+    np.testing.assert_array_equal(asked[0].look.world_to_camera, OrbitView(opened.rig).world_to_camera())
+    assert (asked[0].look.width, asked[0].look.height) == SIZE
     reader = ProjectPictures()
     reader.read((folder, folder / "gone"))
     poll(reader, lambda: reader.revision > 0)
@@ -105,8 +107,9 @@ def test_a_cache_that_cannot_be_written_costs_the_picture_only(
     assert read_picture(opened.project.folder) is None
 
 
-def _one_gaussian() -> GaussianArrays:
-    return GaussianArrays(
+def _one_gaussian() -> ShownFrame:
+    nothing = np.zeros((0, 3), np.float32)
+    gaussians = GaussianArrays(
         means=np.zeros((1, 3), np.float32),
         quats=np.array([[1, 0, 0, 0]], np.float32),
         scales=np.full((1, 3), 0.8, np.float32),
@@ -114,3 +117,4 @@ def _one_gaussian() -> GaussianArrays:
         colors=np.array([[1.0, 0.1, 0.1]], np.float32),
         key="red",
     )
+    return ShownFrame(gaussians, AnchorArrays(nothing, nothing, key="none"))

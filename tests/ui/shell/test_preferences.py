@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pyglet.window import key
 
-from app.session.commands import TogglePlay, TrainNextClip
+from app.session.commands import SetFrameMemory, TogglePlay, TrainNextClip
 from app.session.preferences import PreferencesFile
 from app.session.window_memory import WindowMemory
 from tests.ui.fake_session import FakeSession
@@ -150,13 +150,14 @@ def test_scale_and_memory_are_chosen(pilot: Pilot) -> None:
     pilot.draw(2)
     preferences = pilot.studio.frame.ui.preferences
     assert preferences.is_motion_reduced
-    assert preferences.cache_mb == 512
+    assert preferences.cache_mb == 384
     pilot.tap(pilot.rects["preferences.cache"].x0 + 30, pilot.rects["preferences.cache"].center[1])
     pilot.key(key.A, modifiers=(CTRL,))
     pilot.type("3")
     pilot.key(key.ENTER)
     pilot.draw(2)
     assert preferences.cache_mb == 128, "held inside what makes sense"
+    assert pilot.sent(SetFrameMemory)[-1] == SetFrameMemory(128)
 
 
 def test_a_configuration_that_cannot_be_written_is_one_notice(open_pilot: Callable[..., Pilot], tmp_path: Path) -> None:

@@ -21,7 +21,9 @@ _MENU_OF_TOPIC = {
     "content": "View/Draw only",
     "heat": "View/Residuals",
     "mode": "View/Mode",
+    "play": "Time/Play",
     "show": "View/Show",
+    "timeline": "Time/Timeline",
 }
 """By what an id begins with, up to the first dot."""
 

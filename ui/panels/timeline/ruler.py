@@ -41,7 +41,7 @@ def draw_played(stage: Stage, timeline: Timeline) -> None:
     row, scale, draw, track = stage.rows[RULER], stage.scale, stage.draw, stage.track
     first, last = timeline.play_range
     x0, x1 = scale.left_of(first), scale.left_of(last + 1)
-    shade = theme.u32(theme.faded(theme.VOID, 0.45))
+    shade = theme.u32(theme.SHADE)
     draw.add_rect_filled(track.low, ImVec2(min(max(x0, track.x0), track.x1), track.y1), shade)
     draw.add_rect_filled(ImVec2(min(max(x1, track.x0), track.x1), track.y0), track.high, shade)
     color = theme.u32(theme.SKY if timeline.around is None else theme.ORANGE)
