@@ -1,6 +1,6 @@
 """`python -m tests.screenshots [NAME ...]`: pictures of the window for the documents, see `make screenshots`.
 
-Opens a trained project and trains nothing. Each screen is a small function over a window that shows the project; another
+Opens a trained project and trains nothing. Each screen is a small function over a window that shows the project; a new
 one is a function and a row in SCREENS.
 """
 
@@ -93,7 +93,9 @@ class Stage:
 
     def show_trained(self, frame_index: int | None = None) -> None:
         """Go to a frame, by default in the middle of the last trained clip, and wait for its picture."""
-        trained = [clip for clip, found in zip(self.session.clips, self.session.clip_states, strict=True) if found.n_own]
+        trained = [
+            clip for clip, found in zip(self.session.clips, self.session.clip_states, strict=True) if found.n_own
+        ]
         if frame_index is None and trained:
             frame_index = trained[-1].start + trained[-1].n_frames // 2
         if frame_index is not None:
@@ -118,7 +120,7 @@ class Stage:
         path.parent.mkdir(parents=True, exist_ok=True)
         image.save(path, optimize=True)
         if path.stat().st_size > MOST_BYTES:
-            image.quantize(256, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)
+            image.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)
         return path.stat().st_size
 
     def close(self) -> None:
@@ -171,7 +173,7 @@ def draw_preferences(stage: Stage) -> None:
 
 def draw_welcome(stage: Stage) -> None:
     """The first screen with projects that were opened lately."""
-    stage.studio.settle(8, until_idle_s=1.0)
+    stage.studio.settle(8)
 
 
 @dataclass(frozen=True)
@@ -223,7 +225,9 @@ def write_screens(project: Path, out: Path, names: list[str]) -> None:
         copy = shutil.copytree(project, folder / project.name)
         small: Any = None
         wanted = [screen for screen in SCREENS if not names or screen.name in names]
-        for screen in sorted(wanted, key=lambda screen: screen.is_empty):  # the first screen shows a picture of the others
+        for screen in sorted(
+            wanted, key=lambda screen: screen.is_empty
+        ):  # the first screen shows a picture of the others
             stage = Stage(None if screen.is_empty else copy, folder, screen.size, screen.scale, screen.theme)
             try:
                 if screen.is_empty:
@@ -248,8 +252,9 @@ def _picture_in(stage: Stage) -> Any:
 
 def _fill_recent(stage: Stage, name: str, small: Any) -> None:
     """Projects in the list of the first screen."""
+    stage.studio.settle(8, until_idle_s=1.0)  # pictures of real projects come first
     now = datetime.now(UTC)
-    rows = ((name, 4, 4, timedelta()), ("basketball", 2, 70, timedelta(days=1)), ("kitchen", 0, 12, timedelta(days=5)))
+    rows = ((name, 3, 3, timedelta()), ("basketball", 2, 70, timedelta(days=1)), ("kitchen", 0, 12, timedelta(days=5)))
     entries = [
         RecentProject(str(SHOWN_FOLDER / name), f"/captures/{name}", name, n_trained, n_clips, (now - age).isoformat())
         for name, n_trained, n_clips, age in rows

@@ -34,7 +34,6 @@ class Preferences(msgspec.Struct):
 
     Attributes:
         theme: Colours of the window; "system" follows the desktop.
-        is_motion_reduced: Show moves of the view at once, without easing.
         cache_mb: Memory for decoded frames; None for as much as is usual.
         keys: By the name of an action, the keys that the user gave it instead of its own; an empty list for none.
         layouts: By name, where the panels are, as text of the window's.
@@ -42,7 +41,6 @@ class Preferences(msgspec.Struct):
     """
 
     theme: Literal["dark", "light", "system"] = "dark"
-    is_motion_reduced: bool = False
     cache_mb: Annotated[int, Meta(ge=CACHE_MB[0], le=CACHE_MB[1])] | None = None
     keys: dict[Word, Annotated[list[Word], Meta(max_length=8)]] = msgspec.field(default_factory=dict)
     layouts: Annotated[dict[Word, Annotated[str, Meta(max_length=100_000)]], Meta(max_length=MAX_LAYOUTS)] = (

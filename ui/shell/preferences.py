@@ -109,7 +109,7 @@ def label(words: str) -> None:
 
 
 def draw_general(ui: UiState) -> None:
-    """Colours, sizes, motion."""
+    """Colours and sizes."""
     preferences = ui.preferences
     label("Theme")
     for name, words in THEMES.items():
@@ -131,11 +131,6 @@ def draw_general(ui: UiState) -> None:
             ui.mark(f"preferences.scale.{scale_text(choice)}")
         imgui.end_combo()
     ui.mark("preferences.scale")
-    label("Motion")
-    preferences.is_motion_reduced = imgui.checkbox("Reduce motion", preferences.is_motion_reduced)[1]
-    ui.mark("preferences.motion")
-    imgui.set_cursor_pos_x(LABEL_WIDTH)
-    text_wrapped_dim("The view jumps to its new place instead of gliding there.")
 
 
 def draw_memory(ui: UiState) -> None:
@@ -154,6 +149,4 @@ def draw_memory(ui: UiState) -> None:
         ui.mark("preferences.cache")
         preferences.cache_mb = min(max(typed if is_changed else shown, CACHE_MB[0]), CACHE_MB[1])
     imgui.set_cursor_pos_x(LABEL_WIDTH)
-    text_wrapped_dim(
-        "Frames that were decoded once are shown again at once. More memory holds more of them."
-    )
+    text_wrapped_dim("Frames that were decoded once are shown again at once. More memory holds more of them.")

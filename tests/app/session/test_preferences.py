@@ -14,7 +14,7 @@ from app.session.preferences import MAX_USED, Preferences, PreferencesFile
 def test_what_was_chosen_is_read_again(tmp_path: Path) -> None:
     file = PreferencesFile(tmp_path / "folder" / "preferences.json")
     assert file.values == Preferences()
-    file.values.theme, file.values.is_motion_reduced, file.values.cache_mb = "light", True, 1024
+    file.values.theme, file.values.cache_mb = "light", 1024
     file.values.keys["time.play"] = ["K", "Ctrl+\u05d0"]
     file.values.layouts["100 % ##\n"] = "[Window]\n"
     file.values.note_used("time.play")
@@ -40,7 +40,6 @@ def test_nothing_is_written_while_nothing_was_changed(tmp_path: Path) -> None:
         ("theme", 3),
         ("cache_mb", -1),
         ("cache_mb", 1e9),
-        ("is_motion_reduced", "yes"),
         ("keys", [1]),
         ("keys", "x"),
         ("layouts", 7),
@@ -51,7 +50,7 @@ def test_a_value_that_makes_no_sense_costs_that_value_only(
     tmp_path: Path, name: str, value: object, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / "preferences.json"
-    good = {"theme": "light", "cache_mb": 256, "is_motion_reduced": True, "used_actions": ["a"]}
+    good = {"theme": "light", "cache_mb": 256, "used_actions": ["a"]}
     path.write_text(json.dumps(good | {name: value}))
     with caplog.at_level(logging.WARNING):
         values = PreferencesFile(path).values

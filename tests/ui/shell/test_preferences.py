@@ -138,7 +138,6 @@ def test_the_desktop_s_theme_is_asked_for_what_it_says() -> None:
 def test_scale_and_memory_are_chosen(pilot: Pilot) -> None:
     pilot.key(key.COMMA, modifiers=(CTRL,))
     pilot.draw(3)
-    pilot.click("preferences.motion")
     pilot.click("preferences.scale")
     pilot.draw(2)
     pilot.click("preferences.scale.75 %")
@@ -149,7 +148,6 @@ def test_scale_and_memory_are_chosen(pilot: Pilot) -> None:
     pilot.click("preferences.cache_usual")
     pilot.draw(2)
     preferences = pilot.studio.frame.ui.preferences
-    assert preferences.is_motion_reduced
     assert preferences.cache_mb == 384
     pilot.tap(pilot.rects["preferences.cache"].x0 + 30, pilot.rects["preferences.cache"].center[1])
     pilot.key(key.A, modifiers=(CTRL,))

@@ -74,7 +74,9 @@ def draw_playhead(stage: Stage, timeline: Timeline) -> None:
     stage.draw.add_line_v((left + right) / 2, track.y0 + 10, track.y1, white, 2)
     flag = flag_rect(stage, timeline)
     stage.draw.add_rect_filled(flag.low, flag.high, white, 3)
-    stage.draw.add_text(ImVec2(flag.x0 + 6, track.y0 + 1), theme.u32(theme.TEXT_ON_PLAYHEAD), _flag_text(stage, timeline))
+    stage.draw.add_text(
+        ImVec2(flag.x0 + 6, track.y0 + 1), theme.u32(theme.TEXT_ON_PLAYHEAD), _flag_text(stage, timeline)
+    )
     stage.ui.mark_rect("timeline.playhead", flag)
 
 
