@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
@@ -24,7 +25,7 @@ from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import train
 from tests.clip_headers import with_header
 
-DEADLINE_S = 60.0
+DEADLINE_S = 20.0
 TRAINED_ON = ("1", "2", "3")
 
 
@@ -43,9 +44,21 @@ def color(path: Path, *, seed: int, reference: str | None = None) -> str:
     return stamped.header.fingerprint
 
 
+def write_still_capture(folder: Path) -> Path:
+    """Four cameras and six frames, in which a bright square moves over what stands still."""
+    write_capture(folder, size=(48, 32))
+    for camera in range(4):
+        still = np.random.default_rng(camera).integers(40, 120, (8, 12, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1)
+        for frame, path in enumerate(sorted((folder / "ims" / str(camera)).iterdir())):
+            picture = still.copy()
+            picture[8:20, 4 + 4 * frame : 14 + 4 * frame] = 230
+            Image.fromarray(picture).save(path, quality=95)
+    return folder
+
+
 def make_project(folder: Path) -> Path:
-    """A capture of four cameras and six frames, and a project with both clips trained."""
-    project = train(folder / "p", write_capture(folder / "ring", size=(48, 32)))
+    """A project of such a capture with both clips trained."""
+    project = train(folder / "p", write_still_capture(folder / "ring"))
     reference = color(project / "clips" / "0000.safetensors", seed=1)
     color(project / "clips" / "0001.safetensors", seed=2, reference=reference)
     return project
