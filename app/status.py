@@ -23,6 +23,10 @@ class Overlays:
         show_cloud: The point cloud in place of the picture of a trained clip.
         compare: "off", "wipe" or "side": the captured picture over or beside the rendered one.
         wipe_position: Share of the width that shows the captured picture, 0..1.
+        mode, content: What colours mean and which part of a clip is drawn, by name; see app.playback.view_modes.
+        heat: Name of the residual heat map over the picture, see app.residuals.heat_map.HEAT_KINDS; empty for none.
+            Where no camera is looked through, the residual of each anchor is shown in its place.
+        heat_opacity: Of the heat map, 0..1.
         mark_size: Of anchor marks, 1 as designed.
         mark_opacity: Of anchor marks that nothing hides, 0..1.
     """
@@ -35,6 +39,10 @@ class Overlays:
     show_regions: bool = True
     compare: str = "off"
     wipe_position: float = 0.5
+    mode: str = "color"
+    content: str = "all"
+    heat: str = ""
+    heat_opacity: float = 0.75
     mark_size: float = 1.0
     mark_opacity: float = 0.9
 
@@ -48,6 +56,7 @@ class WantedFrame:
         revision: The state of the clip that is to be shown; empty where none can be: it is not trained.
         camera_index: The capture camera looked through; None for a free view.
         look: From where and through which lens; see OrbitView.look_key.
+        shown_as: What colours mean and which part of the clip is drawn, in words; empty for the scene as it is.
         is_loaded: Whether the clip is in memory, so that only its frame has to be made.
         has_failed: Whether the frame or its picture could not be made, so that it is not on its way.
     """
@@ -57,6 +66,7 @@ class WantedFrame:
     revision: str = ""
     camera_index: int | None = None
     look: Hashable = None
+    shown_as: str = ""
     is_loaded: bool = False
     has_failed: bool = False
 

@@ -16,10 +16,13 @@ from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArra
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
+from app.playback.view_modes import CONTENTS, MODES, ShownAs
+from app.playback.views import Views
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.project import Project, check_settings
 from app.project.recents import project_name
+from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.residuals.residuals import Residuals
 from app.session import commands
 from app.session.live_training import LiveTraining
@@ -39,6 +42,7 @@ from app.status import (
     PlanStatus,
     ProjectStatus,
     RegionsStatus,
+    ResidualStatus,
     TrainingStatus,
     WantedFrame,
 )
@@ -56,7 +60,7 @@ class Session:
 
     Attributes:
         opened: What is open; None before.
-        timeline, view, overlays: What the user looks at; the window may change them directly.
+        timeline, views: What the user looks at; the window may change them directly.
         training, clip_states, plan, regions, project_status: Status values, remade by `poll` and `dispatch`. The plan
             is that of the next clip; None while something trains or nothing is left to train.
         question: What the user has to answer; None while there is nothing to ask.
@@ -83,7 +87,7 @@ class Session:
         is_preloading: bool = True,
     ) -> None:
         self.opened: OpenedProject | None = None
-        self.timeline, self.view, self.overlays = Timeline(), OrbitView(), Overlays()
+        self.timeline, self.views = Timeline(), Views()
         self.notices = Notices()
         self.question: Question | None = None
         self.training = TrainingStatus()
@@ -142,6 +146,25 @@ class Session:
         return 0 if self.opened is None else self.opened.reference_index
 
     @property
+    def view(self) -> OrbitView:
+        """From where the current view looks."""
+        return self.views.current.view
+
+    @property
+    def overlays(self) -> Overlays:
+        """What the current view shows."""
+        return self.views.current.overlays
+
+    @property
+    def _shown_as(self) -> ShownAs:
+        return ShownAs(self.overlays.mode, self.overlays.content)
+
+    @property
+    def residual_status(self) -> ResidualStatus:
+        """What is measured of every picture."""
+        return self.residuals.status
+
+    @property
     def jobs(self) -> list[JobStatus]:
         """Short jobs that run."""
         return self._jobs.statuses
@@ -197,10 +220,28 @@ class Session:
                 if name not in OVERLAY_NAMES:
                     raise ValueError(f"overlays are {', '.join(OVERLAY_NAMES)}, not {name!r}")
                 setattr(self.overlays, name, not getattr(self.overlays, name))
+            case commands.ShowHeat(kind=kind):
+                if kind and kind not in HEAT_KINDS:
+                    raise ValueError(f"heat maps are {', '.join(HEAT_KINDS)}, not {kind!r}")
+                self.overlays.heat = kind
             case commands.SetHoldout() | commands.SetClipLength() | commands.SetTrainSetting() | commands.SetPreset():
                 self._change_settings(command)
+            case commands.SetMode(mode=mode):
+                if mode not in MODES:
+                    raise ValueError(f"modes are {', '.join(MODES)}, not {mode!r}")
+                self.overlays.mode = mode
+            case commands.SetContent(content=content):
+                if content not in CONTENTS:
+                    raise ValueError(f"parts of a clip are {', '.join(CONTENTS)}, not {content!r}")
+                self.overlays.content = content
             case commands.HomeView():
                 self.view.home()
+            case commands.ShowViews(n=n):
+                self.views.show(n)
+                self.playback.favour(self.views.active_index)
+            case commands.ActivateView(index=index):
+                self.views.activate(index)
+                self.playback.favour(self.views.active_index)
             case commands.DismissNotice(index=index):
                 self.notices.dismiss(index)
             case _ if isinstance(command, commands.EditCommand):
@@ -246,7 +287,7 @@ class Session:
         self._show(opened)
         self.live_training.open(opened, found.catalog)
         self._open_residuals(opened)
-        self.view = OrbitView(opened.rig)
+        self.views.look_at(opened.rig)
         self._keep_recent()
         for sentence in opened.capture.warnings:
             self.notices.add("warn", "The capture is odd but usable", sentence)
@@ -287,8 +328,11 @@ class Session:
         self._release_snapshot()
         has_changed |= bool(events) | self.marking.poll()
         is_training = self.live_training.is_busy and self.training.state != "paused"
+        if self._is_preloading:
+            self.residuals.look_at(self.timeline, self.view.look_through)
         has_changed |= self.residuals.poll(is_training=is_training)
         self._tell_failures()
+        self.playback.work_ahead(self.timeline, is_busy=self.live_training.is_busy)
         seen = self._news_key()
         has_changed |= seen != self._seen
         self._seen = seen
@@ -361,26 +405,33 @@ class Session:
 
     def wanted_frame(self) -> WantedFrame | None:
         """What ought to be on screen; None without a capture. What is there says itself what it is."""
-        return self.playback.wanted(self.timeline, self.view)
+        return self.playback.wanted(self.timeline, self.view, self._shown_as, view_id=self.views.current_index)
 
     def shown_gaussians(self) -> GaussianArrays | None:
         """Gaussians of the shown frame; the newest ones there are until those are decoded; None where nothing is
         trained."""
-        shown = self.playback.frame(self.timeline)
+        shown = self.playback.frame(self.timeline, self._shown_as)
         return None if shown is None else shown.gaussians
 
     def shown_anchors(self) -> AnchorArrays | None:
         """Anchors that exist at the shown frame; those of the newest frame there is until it was decoded."""
-        shown = self.playback.frame(self.timeline)
+        shown = self.playback.frame(self.timeline, self._shown_as)
         return None if shown is None else shown.anchors
 
     def shown_points(self) -> PointArrays | None:
         """A cloud for frames that are not trained; see Playback.cloud."""
         return self.playback.cloud(self.view)
 
-    def request_render(self, width: int, height: int) -> Picture | None:
+    def request_render(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
         """The rasterizer's picture of the frame and view; see Playback.render."""
-        return self.playback.render(self.timeline, self.view, width, height)
+        view_id = self.views.current_index
+        return self.playback.render(
+            self.timeline, self.view, width, height, full_size=full_size, shown_as=self._shown_as, view_id=view_id
+        )
+
+    def cached_frames(self) -> list[tuple[int, int]]:
+        """Frames that can be shown at once: first and stop of each run, in order."""
+        return self.playback.cached_frames()
 
     def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None:
         """The captured picture, at most `max_width` pixels wide; None until it was decoded."""
@@ -389,6 +440,11 @@ class Session:
     def compared_picture(self, camera_index: int, max_width: int) -> Picture | None:
         """What a camera took at the playhead, to be set beside the render; see Playback.compared_picture."""
         return self.playback.compared_picture(self.timeline, camera_index, max_width)
+
+    def heat(self, kind: str) -> HeatMap | None:
+        """The residual heat map of the playhead and the camera looked through; see Residuals.heat."""
+        camera_index = self.view.look_through
+        return None if camera_index is None else self.residuals.heat(self.timeline, camera_index, kind)
 
 
 _TITLES: dict[type, str] = {

@@ -17,7 +17,8 @@ from ui.style.ui_scale import UiScale
 from ui.viewport.region_tool import RegionTool
 
 VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
-PANELS = (CAPTURE, TRAINING, REGIONS, TIMELINE)
+RESIDUALS = "Residuals"
+PANELS = (CAPTURE, TRAINING, REGIONS, RESIDUALS, TIMELINE)
 """Titles of the panels around the picture."""
 Dispatch = Callable[[Command], None]
 """Takes one command of app.session.commands."""
@@ -60,6 +61,7 @@ class UiState:
         is_menu_wanted: Open the first menu, for the keyboard.
         is_quality_open: Is the plot of quality over the clips folded out?
         is_quality_seen: Was it scrolled to since then?
+        last_heat: The heat map that was shown last, to be shown again; empty before the first.
         wanted_panel: Title of a panel that is to come to the front, or None.
         redraw_in_s: Shortest wait after which some panel wants to be drawn again, or None.
     """
@@ -68,6 +70,7 @@ class UiState:
     scale: UiScale = field(default_factory=UiScale)
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
+    last_heat: str = ""
     wanted_panel: str | None = None
     is_quality_open: bool = False
     is_quality_seen: bool = False
