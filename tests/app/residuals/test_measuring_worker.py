@@ -173,9 +173,10 @@ class Losing(Heard):
 
 def test_a_camera_whose_pictures_are_gone_costs_itself_alone(project):
     settings = open_project(project, is_writable=False).settings
+    lost = _camera_named(project, "3")
     heard = Losing(Path(settings.capture) / "ims" / "3")
     measure(job_of(project), heard)
-    assert {camera for _, camera in heard.rows} == {0, 1, 2, 3} - {_camera_named(project, "3")}
+    assert {camera for _, camera in heard.rows} == {0, 1, 2, 3} - {lost}
     assert any(isinstance(event, Trouble) for event in heard.events)
 
 
