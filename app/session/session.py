@@ -22,6 +22,7 @@ from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.project import Project, check_settings
 from app.project.recents import project_name
+from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.residuals.residuals import Residuals
 from app.session import commands
@@ -445,6 +446,10 @@ class Session:
         """The residual heat map of the playhead and the camera looked through; see Residuals.heat."""
         camera_index = self.view.look_through
         return None if camera_index is None else self.residuals.heat(self.timeline, camera_index, kind)
+
+    def anchor_heat(self, column: str) -> AnchorHeat | None:
+        """Error or excess flicker of each anchor at the playhead; see Residuals.anchor_heat."""
+        return self.residuals.anchor_heat(self.timeline, column)
 
 
 _TITLES: dict[type, str] = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +16,6 @@ from app.playback.timeline import Timeline
 from app.project.clip_catalog import ClipCatalog
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.project import Project, open_project
-from app.residuals.measuring_messages import MeasureJob
-from app.residuals.measuring_process import Measurer
 from app.residuals.residuals import Residuals
 from app.training.service import ShownState
 from engine.capture.capture import open_capture
@@ -82,7 +81,7 @@ class Opened:
         record = self.catalog[clip_index]
         return None if record.file is None else ShownState(record.file, record.revision)
 
-    def heat(self, camera: int, frame: int, kind: str):
+    def heat(self, camera: int, frame: int, kind: str) -> Any:
         """The finished map."""
         self.timeline.seek(frame)
         return until(lambda: self.residuals.heat(self.timeline, camera, kind), lambda map_: not map_.is_stale, self)
@@ -94,7 +93,7 @@ class Opened:
         self.opened.capture.close()
 
 
-def until(ask: Callable[[], object], is_right: Callable[[object], bool], opened: Opened):
+def until(ask: Callable[[], Any], is_right: Callable[[Any], bool], opened: Opened) -> Any:
     """Ask until something comes; what failed is raised."""
     until_s = time.monotonic() + DEADLINE_S
     while True:
@@ -124,6 +123,3 @@ def open_residuals(project: Path) -> Iterator[Callable[..., Opened]]:
     yield make
     for opened in made:
         opened.close()
-
-
-LaunchFake = Callable[[MeasureJob], Measurer]

@@ -268,7 +268,9 @@ def test_a_process_that_is_killed_is_told_once_and_nothing_is_lost(open_residual
     opened = open_residuals(launch=launch)
     opened.residuals.look_at(opened.timeline, None)
     poll_until(opened, lambda status: status.is_measuring)
-    os.kill(made[0].process.pid, signal.SIGKILL)
+    pid = made[0].process.pid
+    assert pid is not None
+    os.kill(pid, signal.SIGKILL)
     status = poll_until(opened, lambda status: not status.is_measuring)
     assert status.message == DIED
     poll(opened, 5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from app.residuals.figures import ClipFigures, Figures
 from app.residuals.heat_map import LEVELS
 from app.residuals.kept_reading import read_kept
 from app.residuals.measuring_messages import (
+    Command,
+    Event,
     LookAt,
     Measured,
     MeasureJob,
@@ -31,8 +34,9 @@ class Heard:
     """Takes down what is said; looks elsewhere after so many pictures."""
 
     def __init__(self, look: Look = Look(), *, then: Look | None = None, after: int = 0) -> None:  # noqa: B008
-        self.look, self._then, self._after = look, then, after
-        self.events: list[Measured | Trouble] = []
+        self.look: Look = look
+        self._then, self._after = then, after
+        self.events: list[Event] = []
         self.n_rests = 0
 
     def send(self, event) -> None:
@@ -86,7 +90,7 @@ def figures_of(project: Path, heard: Heard) -> Figures:
     return figures
 
 
-def nothing_left(*_):
+def nothing_left(*_: object, **__: object) -> Any:
     raise AssertionError("something is measured again")
 
 
@@ -113,6 +117,7 @@ def test_figures_are_those_of_eval_and_eval_takes_them_up(project):
     assert (seam.clip_index, seam.frame_index) == (1, boundary["frame_index"])
     assert seam.score == pytest.approx(boundary["score"], abs=1e-12)
     assert seam.ratio == pytest.approx(boundary["ratio_static"])
+    assert seam.worst_camera is not None
     assert names[seam.worst_camera] == boundary["worst_camera"]
     assert seam.n_cameras == sum(found["score"] is not None for found in boundary["cameras"].values())
     read = Figures(opened.clips, 4)
@@ -200,8 +205,8 @@ def test_order():
 class FakePipe:
     """A clock that passes while it is waited for messages."""
 
-    def __init__(self, *messages: tuple[float, object]) -> None:
-        self.now_s, self.cpu_s = 100.0, 5.0
+    def __init__(self, *messages: tuple[float, Command]) -> None:
+        self.now_s, self.cpu_s = 100.0, 0.0
         self._messages = list(messages)
         self.is_broken = False
 
@@ -224,7 +229,7 @@ class FakePipe:
 def talk_of(project, monkeypatch, pipe: FakePipe) -> Talk:
     monkeypatch.setattr(measuring_worker.time, "monotonic", lambda: pipe.now_s)
     monkeypatch.setattr(measuring_worker.time, "process_time", lambda: pipe.cpu_s)
-    return Talk(job_of(project), pipe, pipe)
+    return Talk(job_of(project), cast(Any, pipe), cast(Any, pipe))
 
 
 def test_while_a_clip_trains_it_rests_nineteen_times_as_long_as_it_computes(project, monkeypatch):
