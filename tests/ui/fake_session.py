@@ -14,8 +14,10 @@ from app.playback.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
+from app.playback.view_modes import ShownAs
 from app.playback.views import Views
 from app.project.recents import RecentProject
+from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands
 from app.session.marking import after_marking
@@ -155,11 +157,21 @@ class FakeSession:
             values[12, 5] = low if column == "psnr" else high
             cells[column] = values
         seams = tuple(
-            SeamStatus(clip.clip_index, clip.start, score, n_cameras - 2, 5)
+            SeamStatus(clip.clip_index, clip.start, score, n_cameras=n_cameras - 2, worst_camera=5)
             for clip, score in zip(self.clips[1:], (0.4, 2.6), strict=True)
         )
         held_out = tuple(index in self.holdout for index in range(n_cameras))
         return ResidualStatus(seams, cells, held_out, n_frames * (n_cameras - 2), n_frames * n_cameras, revision=1)
+
+    def anchor_heat(self, column: str) -> AnchorHeat | None:
+        """Rises with the anchors' number; some were not seen."""
+        positions = self._points[:1500]
+        values = np.linspace(0.0, 25.0, len(positions), dtype=np.float32)
+        values[::10] = np.nan
+        frame_index = self.timeline.frame_index
+        return AnchorHeat(
+            positions, values, column, (column, frame_index), 0, frame_index, n_cameras=8, n_cameras_all=8
+        )
 
     def heat(self, kind: str) -> HeatMap | None:
         """Grows from left to right over the range of its kind, differs between frames, and frame 0 has no E."""
@@ -201,6 +213,8 @@ class FakeSession:
                 self.overlays.compare = mode
             case commands.ToggleOverlay(name=name):
                 setattr(self.overlays, name, not getattr(self.overlays, name))
+            case commands.SetCompareWith(other=other):
+                self.overlays.compare_with = other
             case commands.SetMode(mode=mode):
                 self.overlays.mode = mode
             case commands.SetContent(content=content):
@@ -283,6 +297,16 @@ class FakeSession:
             ),
         )
 
+    def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
+        """The same in green."""
+        picture = self.request_render(width, height, full_size=full_size)
+        if picture is None:
+            return None
+        source = replace(picture.source, shown_as=ShownAs(self.overlays.compare_with))
+        return replace(
+            picture, image=picture.image * np.array([0, 1, 0], np.uint8), key=("other", picture.key), source=source
+        )
+
     def shown_gaussians(self) -> None:
         """No Gaussians here."""
         return
@@ -290,6 +314,14 @@ class FakeSession:
     def shown_anchors(self) -> AnchorArrays | None:
         """Anchors of trained clips."""
         return self._anchors if self._is_trained() else None
+
+    def shown_coverage(self) -> None:
+        """Nothing is measured here."""
+        return
+
+    def shown_trails(self) -> None:
+        """Nothing moves here."""
+        return
 
     def shown_points(self) -> PointArrays:
         """A coloured ball of points."""
