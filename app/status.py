@@ -278,7 +278,7 @@ SEAM_RANGE = (0.0, 1.0)
 SEAM_FLAGGED = 0.3
 """Scores above it are pointed out."""
 SEAM_RATIO_RANGE = (1.0, 3.0)
-"""What the colours of seam ratios span: 1 is no seam; inheriting clips have 1.0 to 1.4, others 10 and more."""
+"""What the colours of seam ratios span: at 1 nothing shows; inheriting clips have 1.0 to 1.4, others 10 and more."""
 SEAM_RATIO_FLAGGED = 2.0
 """Ratios above it are pointed out."""
 

@@ -46,7 +46,7 @@ def test_shares_are_weights_of_the_picture(project):
 
 
 def test_only_the_anchors_behind_hot_pixels_are_hot(project):
-    """What one Gaussian covers alone is told of its own anchor alone."""
+    """A pixel heats the anchors that it shows, and hardly any other."""
     trained = open_trained(open_project(project, is_writable=False))
     loaded, rig = trained.load(0), trained.capture.rig
     rows, positions = anchors_at(loaded, 0.0)
