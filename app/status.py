@@ -292,8 +292,8 @@ class SeamStatus:
         frame_index: Its first frame.
         score: Excess flicker of static pixels there, less what is normal inside the two clips, in 1/255, a mean over
             cameras: see engine.metrics.clips.seams. None where no camera was measured in both clips.
-        ratio: Change of static pixels there / inside the two clips, over all cameras; 1 is no seam. None where nothing
-            changes inside, or nothing was measured.
+        ratio: Change of static pixels there / inside the two clips, over all cameras; 1 where nothing shows. None where
+            nothing changes inside, or nothing was measured.
         n_cameras: Cameras behind the score.
         worst_camera: The camera with the highest score; None without one.
     """

@@ -476,10 +476,6 @@ class Session:
         camera_index = self.view.look_through
         return None if camera_index is None else self.residuals.heat(self.timeline, camera_index, kind)
 
-    def anchor_heat(self, column: str) -> AnchorHeat | None:
-        """Error or excess flicker of each anchor at the playhead; see Residuals.anchor_heat."""
-        return self.residuals.anchor_heat(self.timeline, column)
-
 
 _TITLES: dict[type, str] = {
     commands.TrainClip: "The clip cannot be trained",
