@@ -93,7 +93,7 @@ class LookThrough:
 
 @dataclass(frozen=True, slots=True)
 class SetCompare:
-    """Compare with the captured picture: "off", "wipe" or "side"."""
+    """Compare with another picture: "off", "wipe", "side" or "blink"."""
 
     mode: str
 
@@ -176,6 +176,13 @@ class HomeView:
 
 
 @dataclass(frozen=True, slots=True)
+class SetCompareWith:
+    """What to compare with. other: See Overlays.compare_with."""
+
+    other: str
+
+
+@dataclass(frozen=True, slots=True)
 class SetMode:
     """Let colours mean something else. mode: See app.playback.view_modes.MODES."""
 
@@ -247,6 +254,7 @@ Command = (
     | SettingCommand
     | EditCommand
     | HomeView
+    | SetCompareWith
     | SetMode
     | SetContent
     | ShowViews

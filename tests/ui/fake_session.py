@@ -14,8 +14,10 @@ from app.playback.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
+from app.playback.view_modes import ShownAs
 from app.playback.views import Views
 from app.project.recents import RecentProject
+from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands
 from app.session.marking import after_marking
@@ -169,6 +171,16 @@ class FakeSession:
         """Runs of frames in memory."""
         return self.cached
 
+    def anchor_heat(self, column: str) -> AnchorHeat | None:
+        """Rises with the anchors' number; some were not seen."""
+        positions = self._points[:1500]
+        values = np.linspace(0.0, 25.0, len(positions), dtype=np.float32)
+        values[::10] = np.nan
+        frame_index = self.timeline.frame_index
+        return AnchorHeat(
+            positions, values, column, (column, frame_index), 0, frame_index, n_cameras=8, n_cameras_all=8
+        )
+
     def heat(self, kind: str) -> HeatMap | None:
         """Grows from left to right over the range of its kind, differs between frames, and frame 0 has no E."""
         frame_index, camera_index = self.timeline.frame_index, self.view.look_through
@@ -211,6 +223,8 @@ class FakeSession:
                 self.overlays.compare = mode
             case commands.ToggleOverlay(name=name):
                 setattr(self.overlays, name, not getattr(self.overlays, name))
+            case commands.SetCompareWith(other=other):
+                self.overlays.compare_with = other
             case commands.SetMode(mode=mode):
                 self.overlays.mode = mode
             case commands.SetContent(content=content):
@@ -293,6 +307,16 @@ class FakeSession:
             ),
         )
 
+    def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
+        """The same in green."""
+        picture = self.request_render(width, height, full_size=full_size)
+        if picture is None:
+            return None
+        source = replace(picture.source, shown_as=ShownAs(self.overlays.compare_with))
+        return replace(
+            picture, image=picture.image * np.array([0, 1, 0], np.uint8), key=("other", picture.key), source=source
+        )
+
     def shown_gaussians(self) -> None:
         """No Gaussians here."""
         return
@@ -300,6 +324,14 @@ class FakeSession:
     def shown_anchors(self) -> AnchorArrays | None:
         """Anchors of trained clips."""
         return self._anchors if self._is_trained() else None
+
+    def shown_coverage(self) -> None:
+        """Nothing is measured here."""
+        return
+
+    def shown_trails(self) -> None:
+        """Nothing moves here."""
+        return
 
     def shown_points(self) -> PointArrays:
         """A coloured ball of points."""

@@ -59,7 +59,7 @@ def test_panes_keep_the_camera_s_aspect_and_do_not_overlap() -> None:
     side = arrange(area, (320, 240), "side")
     assert side.captured is not None
     assert side.captured.x1 <= side.rendered.x0
-    assert arrange(area, None, "side").rendered == area
+    assert arrange(area, None, "off").rendered == area
     assert fit(area, 500, 500).width == pytest.approx(500)
 
 

@@ -29,7 +29,8 @@ MOUSE_HELP: tuple[tuple[str, str], ...] = (
     ("Timeline drag", "Move through time"),
     ("Timeline wheel", "Move what is shown (also middle drag); with Ctrl closer or farther, double click for all"),
     ("Seam click", "Play around the boundary between two clips"),
-    ("White line drag", "Wipe between render and captured picture"),
+    ("White line drag", "Wipe between the two pictures that are compared"),
+    ("Hold B", "See the picture that the render is compared with, alone"),
     ("Folder drop", "Open it: a capture or a project"),
 )
 
