@@ -167,10 +167,6 @@ class FakeSession:
         held_out = tuple(index in self.holdout for index in range(n_cameras))
         return ResidualStatus(seams, cells, held_out, n_frames * (n_cameras - 2), n_frames * n_cameras, revision=1)
 
-    def cached_frames(self) -> list[tuple[int, int]]:
-        """Runs of frames in memory."""
-        return self.cached
-
     def anchor_heat(self, column: str) -> AnchorHeat | None:
         """Rises with the anchors' number; some were not seen."""
         positions = self._points[:1500]
@@ -180,6 +176,10 @@ class FakeSession:
         return AnchorHeat(
             positions, values, column, (column, frame_index), 0, frame_index, n_cameras=8, n_cameras_all=8
         )
+
+    def cached_frames(self) -> list[tuple[int, int]]:
+        """Runs of frames in memory."""
+        return self.cached
 
     def heat(self, kind: str) -> HeatMap | None:
         """Grows from left to right over the range of its kind, differs between frames, and frame 0 has no E."""
