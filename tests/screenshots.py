@@ -120,7 +120,9 @@ class Stage:
         path.parent.mkdir(parents=True, exist_ok=True)
         image.save(path, optimize=True)
         if path.stat().st_size > MOST_BYTES:
-            image.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.FLOYDSTEINBERG).save(path, optimize=True)
+            image.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.FLOYDSTEINBERG).save(
+                path, optimize=True
+            )
         return path.stat().st_size
 
     def close(self) -> None:

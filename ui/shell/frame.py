@@ -82,10 +82,6 @@ class FrameNeeds(
 ):
     """Everything that the window and its panels use of a session."""
 
-    def _is_panel_keyed(self) -> bool:
-        """Do arrow keys move from one item to the next? In the panel that F6 went to, and on the first screen."""
-        return self.ui.keyed_panel is not None or self.session.capture is None
-
     def dispatch(self, command: Command) -> None: ...
 
     def poll(self) -> bool: ...

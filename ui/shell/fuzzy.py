@@ -37,10 +37,10 @@ def match(typed: str, text: str) -> Match | None:
     plain = folded(text)
     total, positions = -LENGTH * len(text), set()
     words = folded(typed[:MAX_TYPED]).split()
+    if not all(_is_within(word, plain) for word in words):  # most texts end here
+        return None
     for word in words:
         found = _best(word, plain)
-        if found is None:
-            return None
         total += found.score
         positions.update(found.positions)
     if words and " ".join(words) == plain:
@@ -53,13 +53,18 @@ def folded(text: str) -> str:
     return "".join(lower if len(lower := sign.lower()) == 1 else sign for sign in text)
 
 
-def _best(word: str, text: str) -> Match | None:
-    """The best way to find the letters of a word in a text, in their order."""
+def _is_within(word: str, text: str) -> bool:
+    """Do the letters of a word come in a text in their order?"""
     at = -1
-    for letter in word:  # most texts end here
+    for letter in word:
         at = text.find(letter, at + 1)
         if at < 0:
-            return None
+            return False
+    return True
+
+
+def _best(word: str, text: str) -> Match:
+    """The best way to find the letters of a word in a text in which they come in their order."""
     n = len(text)
     bonus = [
         LETTER + (WORD_START if _starts_word(text, i) else 0.0) + (TEXT_START if i == 0 else 0.0) for i in range(n)
@@ -81,8 +86,6 @@ def _best(word: str, text: str) -> Match | None:
         scores = new
         came_from.append(origins)
     end = max(range(n), key=lambda i: scores[i])
-    if scores[end] == _NEVER:
-        return None
     score, positions = scores[end], [end]
     for origins in reversed(came_from):
         positions.append(origins[positions[-1]])

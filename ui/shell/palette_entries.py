@@ -44,6 +44,7 @@ class Entry:
         group: What it belongs to.
         keys: Its keys as text; empty where it has none.
         why_not: Why it cannot be run now; empty when it can.
+        is_numbered: One of many that differ by a number; where there are too many of them, one has to be typed.
     """
 
     id: str
@@ -52,6 +53,7 @@ class Entry:
     run: Run
     keys: str = ""
     why_not: str = ""
+    is_numbered: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +87,8 @@ def found(typed: str, offered: Sequence[Entry], used: Sequence[str]) -> list[Fou
     Args:
         used: Ids of entries used lately, newest first.
     """
+    if sum(entry.is_numbered for entry in offered) > MOST_SHOWN and not any(sign.isdigit() for sign in typed):
+        offered = [entry for entry in offered if not entry.is_numbered]
     rank = {entry_id: index for index, entry_id in enumerate(used)}
     if not typed.strip():
         order = sorted(offered, key=lambda entry: rank.get(entry.id, len(rank)))
@@ -140,7 +144,7 @@ def _clips(session: PaletteNeeds) -> list[Entry]:
         return lambda session, dispatch, ui: dispatch(SetFrame(frame_index))
 
     return [
-        Entry(f"clip:{clip.clip_index}", f"Go to clip {clip.clip_index}", "Clips", going(clip.start))
+        Entry(f"clip:{clip.clip_index}", f"Go to clip {clip.clip_index}", "Clips", going(clip.start), is_numbered=True)
         for clip in session.clips
     ]
 

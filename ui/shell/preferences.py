@@ -24,7 +24,7 @@ USUAL_CACHE_MB = 384
 
 
 class Page(Protocol):
-    """One page."""
+    """One page. is_asking: Whether a question of its own is up, to which Escape belongs."""
 
     def draw(self, ui: UiState) -> None: ...
 
@@ -38,7 +38,11 @@ class _Plain:
     is_asking = False
 
     def __init__(self, draw: Callable[[UiState], None]) -> None:
-        self.draw = draw
+        self._draw = draw
+
+    def draw(self, ui: UiState) -> None:
+        """Draw it."""
+        self._draw(ui)
 
 
 class PreferencesDialog:

@@ -31,7 +31,7 @@ def run(pilot: Pilot, typed: str) -> None:
 def test_layouts_of_the_program_are_shown(pilot: Pilot) -> None:
     usual = pilot.rects["timeline.track"]
     run(pilot, "layout tall timeline")
-    assert pilot.rects["timeline.track"].height > usual.height + 80
+    assert pilot.rects["timeline.track"].height > usual.height + 60
     run(pilot, "layout beginning")
     assert pilot.rects["timeline.track"].height == pytest.approx(usual.height, abs=2)
 

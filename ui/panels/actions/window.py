@@ -98,9 +98,10 @@ def _quit(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 _ALWAYS: dict[str, Any] = {"needs_capture": False}
 
-_FILE, _PANELS, _LAYOUTS, _THEMES = (
-    _ALWAYS | {"menu": menu} for menu in ("File", "Window/Panels", "Window/Layouts", "View/Theme")
-)
+_FILE: dict[str, Any] = _ALWAYS | {"menu": "File"}
+_PANELS: dict[str, Any] = _ALWAYS | {"menu": "Window/Panels"}
+_LAYOUTS: dict[str, Any] = _ALWAYS | {"menu": "Window/Layouts"}
+_THEMES: dict[str, Any] = _ALWAYS | {"menu": "View/Theme"}
 
 ACTIONS = (
     Action("window.open", "Open a capture or project folder", WINDOW, _open, keys=("Ctrl+O",), **_FILE),
