@@ -267,6 +267,8 @@ class FrameDecoder:
             key=request.key,
             near_plane=loaded.near_plane,
             source=source,
+            n_still=loaded.parts.part(content).n_constant_rows(),
+            still_key=(request.model_key, content),
             births=loaded.parts.births(content, clip_time),
             changes=loaded.parts.changes(content, clip_time, gaussians) if has_changes else None,
         )

@@ -123,7 +123,7 @@ def trail_lines(paths: np.ndarray, opacities: np.ndarray) -> tuple[np.ndarray, n
         colors: [2 L, 4] float32
     """
     steps = np.diff(paths, axis=0)  # [T - 1, N, 3]
-    is_step = np.isfinite(steps).all(axis=2)
+    is_step = np.all(np.isfinite(steps), axis=2)
     is_whole = np.cumprod(is_step[::-1], axis=0)[::-1].astype(bool)  # up to the frame itself without a gap
     lengths = (np.linalg.norm(np.nan_to_num(steps), axis=2) * is_whole).sum(axis=0)
     order = np.argsort(-lengths, kind="stable")

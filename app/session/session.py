@@ -24,9 +24,11 @@ from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.project import Project, check_settings
 from app.project.recents import project_name
+from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.residuals.residuals import Residuals
 from app.session import commands
+from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
 from app.session.notices import Notices
@@ -203,6 +205,9 @@ class Session:
             case commands.TrainClip(clip_index=clip_index, is_confirmed=is_confirmed):
                 self.question = None
                 self.question = live.train(clip_index, is_confirmed=is_confirmed)
+            case commands.TrainClips(clip_indices=clip_indices):
+                self.question = None
+                live.train_unfinished(clip_indices)
             case commands.PauseTraining():
                 live.pause()
             case commands.ResumeTraining():
@@ -213,6 +218,9 @@ class Session:
                 self.timeline.seek(frame_index)
             case commands.TogglePlay():
                 self.timeline.toggle_play()
+            case commands.FollowTraining(is_on=is_on):
+                self.timeline.hold()
+                self.timeline.is_following = is_on
             case commands.LookThrough(camera_index=camera_index):
                 self.view.look(camera_index)
             case commands.SetCompare(mode=mode):
@@ -272,12 +280,12 @@ class Session:
             return
         check_settings(changed, opened.capture)
         opened.project.update(changed)
-        frame_index = self.timeline.frame_index
+        before = self.timeline
         changed_project = opened_project(opened.capture, opened.project, opened.generation)
         self._show(changed_project)
         self.live_training.open(changed_project)
         self._open_residuals(changed_project)
-        self.timeline.seek(frame_index)
+        self.timeline.take_over(before)
 
     # ---------------------------------------------------------------- opening
 
@@ -378,6 +386,7 @@ class Session:
 
     def _refresh(self) -> None:
         """Remake the status values."""
+        follow_training(self.timeline, self.live_training)
         live, clip, opened = self.live_training, self.timeline.clip, self.opened
         live.note_anchors(self.playback.live_anchors(self.timeline))
         self.training = live.status(None if clip is None else clip.clip_index)
@@ -465,6 +474,10 @@ class Session:
     def compared_picture(self, camera_index: int, max_width: int) -> Picture | None:
         """What a camera took at the playhead, to be set beside the render; see Playback.compared_picture."""
         return self.playback.compared_picture(self.timeline, camera_index, max_width)
+
+    def anchor_heat(self, column: str) -> AnchorHeat | None:
+        """The residual of each anchor at the playhead; see Residuals.anchor_heat."""
+        return self.residuals.anchor_heat(self.timeline, column)
 
     def heat(self, kind: str) -> HeatMap | None:
         """The residual heat map of the playhead and the camera looked through; see Residuals.heat."""

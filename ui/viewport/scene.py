@@ -31,6 +31,7 @@ from ui.gl import (
     Target,
     is_software,
 )
+from ui.viewport.anchor_heat_layer import AnchorHeatLayer, AnchorHeatNeeds
 from ui.viewport.anchor_marks import nearest_under
 from ui.viewport.explaining_layer import ExplainingLayer, ExplainingNeeds
 from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
@@ -46,7 +47,7 @@ _CLOUD_KINDS = {"static": CLOUD, "moment": FIRST_CLOUD, "pictures": HINT}
 NO_REGIONS = ShownRegions()
 
 
-class SceneNeeds(MarkNeeds, ExplainingNeeds, Protocol):
+class SceneNeeds(MarkNeeds, AnchorHeatNeeds, ExplainingNeeds, Protocol):
     """What the picture is made from."""
 
     @property
@@ -136,6 +137,7 @@ class Scene:
         self._cloud = PointRenderer(ctx)
         self.marks = MarkLayer(ctx)
         self.regions = RegionLayer(ctx)
+        self._anchor_heat = AnchorHeatLayer(ctx)
         self.explaining = ExplainingLayer(ctx)
         self._drawn_key: Hashable = None
         self._asked_sizes: tuple[tuple[int, int], tuple[int, int]] | None = None
@@ -160,6 +162,7 @@ class Scene:
             self._cloud,
             self.marks,
             self.regions,
+            self._anchor_heat,
             self.explaining,
         )
         for thing in owned:
@@ -193,7 +196,7 @@ class Scene:
             other = session.request_other(*size, full_size=full_size)
             if other is not None and other.key != self._captured_key:
                 return True
-        return False
+        return self._splats.has_news
 
     # ---- the picture -----------------------------------------------------------------------------------------
 
@@ -222,7 +225,9 @@ class Scene:
         if base_key is None:
             shown = self._without_render(shown, points_key, captured)
         is_rendered = base_key is not None
-        marks_key = self.marks.take(session, view, session.shown_gaussians() if is_rendered else None)
+        gaussians = session.shown_gaussians() if is_rendered else None
+        marks_key = self.marks.take(session, view, gaussians)
+        heat_key = self._anchor_heat.take(session, view, gaussians)
         explaining_key = self.explaining.take(session, view)
         regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
         self.shown = shown
@@ -230,7 +235,8 @@ class Scene:
             # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
             self._drawn_key = None
             return Composed(self._picture.texture, shown)
-        key = (view.key, base_key, points_key, captured_key, marks_key, regions_key, explaining_key)
+        over_key = (marks_key, regions_key, explaining_key, heat_key, session.overlays.heat_opacity)
+        key = (view.key, base_key, points_key, captured_key, over_key)
         if key != self._drawn_key or self._splats.is_order_stale:
             self._drawn_key = key
             self._draw(view, base_key, points_key, captured_key, session)
@@ -240,7 +246,8 @@ class Scene:
 
     def _has_no_marks(self, session: SceneNeeds, regions: ShownRegions) -> bool:
         """Is nothing to be drawn over the picture?"""
-        return regions.is_empty and self.marks.is_empty(session) and self.explaining.is_empty
+        are_empty = regions.is_empty and self.explaining.is_empty and self._anchor_heat.is_empty
+        return are_empty and self.marks.is_empty(session)
 
     def captured(self, session: SceneNeeds, width_px: int) -> CapturedPicture | None:
         """What the camera looked through took at the playhead's frame, or at another one until that was decoded; None
@@ -329,7 +336,12 @@ class Scene:
         gaussians, wanted = session.shown_gaussians(), session.wanted_frame()
         if gaussians is None:
             return None, shown
-        self._splats.upload(gaussians)
+        before = self._splats.drawn
+        is_of_another_project = isinstance(before, GaussianArrays) and _project_of(before) != _project_of(gaussians)
+        self._splats.upload(gaussians, at_once=is_of_another_project)
+        self._splats.update()
+        assert isinstance(self._splats.drawn, GaussianArrays)
+        gaussians = self._splats.drawn  # the last ones, until those were sorted
         self._near = gaussians.near_plane
         shown = replace(
             shown,
@@ -417,6 +429,7 @@ class Scene:
             self._cloud.draw(target, *camera, near, shape="circle", size=size, unit=unit, is_depth_tested=True)
         elif captured_key is not None:
             target.draw_image(self._captured)
+        self._anchor_heat.draw(target, view, session.overlays.heat_opacity, self.marks.pixels_per_unit)
         self.explaining.draw(target, view, self.marks.pixels_per_unit)
         self.marks.draw(target, view, session)
         self.regions.draw(target, camera)
@@ -426,3 +439,11 @@ class Scene:
         """Fewer points are drawn larger, so that a thin cloud still reads as surfaces."""
         per_point_px2 = view.width * view.height / max(len(self._cloud), 1)
         return float(np.clip(0.45 * np.sqrt(per_point_px2), 2.0, 5.0))
+
+
+def _project_of(gaussians: GaussianArrays) -> Hashable:
+    """Frames of two projects differ in the first part of their keys; in a mode that lies in another key."""
+    key = gaussians.key
+    while isinstance(key, tuple):
+        key = key[0]
+    return key
