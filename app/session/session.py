@@ -12,6 +12,7 @@ from pathlib import Path
 
 from app.background.jobs import Jobs
 from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
+from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
@@ -55,7 +56,7 @@ class Session:
 
     Attributes:
         opened: What is open; None before.
-        timeline, views: What the user looks at; the window may change them directly.
+        timeline, views, bookmarks: What the user looks at; the window may change them directly.
         training, clip_states, plan, regions, project_status: Status values, remade by `poll` and `dispatch`. The plan
             is that of the next clip; None while something trains or nothing is left to train.
         question: What the user has to answer; None while there is nothing to ask.
@@ -83,6 +84,7 @@ class Session:
     ) -> None:
         self.opened: OpenedProject | None = None
         self.timeline, self.views = Timeline(), Views()
+        self.bookmarks = Bookmarks()
         self.notices = Notices()
         self.question: Question | None = None
         self.training = TrainingStatus()
@@ -257,6 +259,7 @@ class Session:
         self._show(opened)
         self.live_training.open(opened, found.catalog)
         self.views.look_at(opened.rig)
+        self.bookmarks = Bookmarks()
         self._keep_recent()
         for sentence in opened.capture.warnings:
             self.notices.add("warn", "The capture is odd but usable", sentence)
