@@ -21,6 +21,7 @@ class RenderRequest:
 
     Attributes:
         source: What the picture will be of.
+        near: Nothing nearer than this is drawn, scene units.
     """
 
     gaussians_key: object
@@ -31,6 +32,7 @@ class RenderRequest:
     gaussians: GaussianArrays = field(compare=False)
     world_to_camera: np.ndarray = field(compare=False)
     K: np.ndarray = field(compare=False)
+    near: float = 0.0
 
 
 class Renderer:
@@ -56,6 +58,7 @@ class Renderer:
             gaussians,
             world_to_camera,
             K,
+            view.near,
         )
         self._asked = request
         newest = self.worker.newest
@@ -87,9 +90,11 @@ def render(request: RenderRequest) -> Picture:
 
     started_s = time.perf_counter()
     arrays = request.gaussians
-    gaussians = Gaussians(
-        *(torch.from_numpy(a) for a in (arrays.means, arrays.quats, arrays.scales, arrays.opacities, arrays.colors))
-    )
+    order = slice(None)
+    if request.near > 0.0:  # seen from far away: float32 depths are too coarse to sort by, ties keep the order
+        order = np.argsort(arrays.means @ request.world_to_camera[2, :3].astype(np.float32), kind="stable")
+    columns = (arrays.means, arrays.quats, arrays.scales, arrays.opacities, arrays.colors)
+    gaussians = Gaussians(*(torch.from_numpy(column[order]) for column in columns))
     with torch.no_grad():
         rendering = rasterize(
             gaussians,
@@ -99,7 +104,7 @@ def render(request: RenderRequest) -> Picture:
             request.height,
             backend=backend_called(),
             background=torch.tensor(BACKGROUND),
-            near_plane=arrays.near_plane,
+            near_plane=max(arrays.near_plane, request.near),
         )
         image = (rendering.image[0].clamp(0.0, 1.0) * 255.0 + 0.5).to(torch.uint8).numpy()
     key = (arrays.key, request.view_bytes, request.width, request.height)

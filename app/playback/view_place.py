@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -55,14 +54,14 @@ class ViewPlace:
         """A place from what `values` has made; None where that makes no sense. What older versions did not know of
         may be missing."""
         pivot = values.get("pivot")
-        place = [_number(value, -1e6, 1e6) for value in pivot] if isinstance(pivot, list | tuple) else []
-        numbers = {name: _number(values.get(name, 0.0), *limits) for name, limits in _RANGES.items()}
-        if len(place) != 3 or None in place or None in numbers.values():
+        place = _numbers([(value, -1e6, 1e6) for value in pivot] if isinstance(pivot, list | tuple) else [])
+        angles = _numbers([(values.get(name, 0.0), *limits) for name, limits in _RANGES.items()])
+        if len(place) != 3 or not angles:
             return None
         up_axis, camera = values.get("up_axis", RIG_UP), values.get("camera")
         return cls(
             pivot=(place[0], place[1], place[2]),
-            **numbers,
+            **dict(zip(_RANGES, angles, strict=True)),
             is_orthographic=values.get("is_orthographic") is True,
             up_axis=up_axis if isinstance(up_axis, str) and up_axis in UP_AXES else RIG_UP,
             camera=camera if isinstance(camera, str) else None,
@@ -84,6 +83,11 @@ class ViewPlace:
             view.look_through = names.index(self.camera) if self.camera in names else None
 
 
-def _number(value: Any, low: float, high: float) -> float | None:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return float(value) if is_number and math.isfinite(value) and low <= value <= high else None
+def _numbers(found: list[tuple[Any, float, float]]) -> list[float]:
+    """Values that are numbers within their limits; none at all if one of them is not."""
+    numbers = [
+        float(value)
+        for value, low, high in found
+        if isinstance(value, int | float) and not isinstance(value, bool) and low <= value <= high  # NaN is not
+    ]
+    return numbers if len(numbers) == len(found) else []

@@ -162,11 +162,11 @@ class SplatRenderer:
         if not len(self._means):
             return np.zeros(0, dtype=np.uint32)
         # Only this row of the matrix decides the order: panning and rolling about the viewing axis need no sort.
-        key = (self._revision, np.asarray(view_row, dtype=np.float32).tobytes(), near)
+        key = (self._revision, np.asarray(view_row, dtype=np.float64).tobytes(), near)
         if key != self._wanted_order:
             self._wanted_order = key
             if self._order is not None and len(self._means) > self._sort_on_thread_above:
-                self._sorter.request(OrderRequest(key, self._means, np.array(view_row, np.float32), near))
+                self._sorter.request(OrderRequest(key, self._means, np.array(view_row, np.float64), near))
             else:  # few rows, or rows without any order yet
                 self._take_order(DepthOrder(key, depth_order(self._means, view_row, near)))
         if self.is_order_stale:

@@ -79,15 +79,15 @@ class Hud:
         self.text: HudText | None = None
         """What the newest frame says."""
 
-    def draw(self, session: HudNeeds, ui: UiState, area: Rect, scene: Scene) -> None:
-        """Everything that stands over the picture."""
+    def draw(self, session: HudNeeds, ui: UiState, area: Rect, scene: Scene, *, legend_x: float | None = None) -> None:
+        """Everything that stands over the picture. legend_x: Where the legend ends; near the border when None."""
         self.text = self._text(session, scene)
         if self.text is not None:
             self._draw_plates(self.text, ui, area)
             if self.text.pending or scene.shown.is_on_its_way:
                 ui.redraw_within(BUSY_REDRAW_S)
         if not ui.regions.is_active or area.width >= LEGEND_WIDTH:  # what is being chosen needs the room
-            self._draw_legend(session, ui, scene, area)
+            self._draw_legend(session, ui, scene, area, legend_x or area.x1 - MARGIN)
 
     def _text(self, session: HudNeeds, scene: Scene) -> HudText | None:
         wanted, timeline, shown = session.wanted_frame(), session.timeline, scene.shown
@@ -150,15 +150,15 @@ class Hud:
             x, row_height = plate.x1 + GAP, max(row_height, height)
         ui.mark_rect("viewport.free", Rect(area.x0, area.y0, area.x1, bottom - row_height))
 
-    def _draw_legend(self, session: HudNeeds, ui: UiState, scene: Scene, area: Rect) -> None:
+    def _draw_legend(self, session: HudNeeds, ui: UiState, scene: Scene, area: Rect, right: float) -> None:
         draw = imgui.get_window_draw_list()
         is_labelled = session.overlays.compare == "wipe" and session.view.look_through is not None
         y = (ui.rects["viewport.rendered"].y0 + 44) if is_labelled else area.y0 + 12
         for shape, color, text in legend_rows(session, scene):
             width = imgui.calc_text_size(text).x
-            x = area.x1 - width - 46
+            x = right - width - 34
             plate = theme.u32(theme.faded(theme.VOID, 0.78))
-            draw.add_rect_filled(ImVec2(x, y), ImVec2(area.x1 - 12, y + 24), plate, 4)
+            draw.add_rect_filled(ImVec2(x, y), ImVec2(right, y + 24), plate, 4)
             middle = ImVec2(x + 14, y + 12)
             if shape in REGION_WORDS:
                 draw_region_mark(draw, middle, shape)

@@ -11,6 +11,7 @@ from app.session.commands import LookThrough, ShowViews, ToggleOverlay
 from app.status import COMPARE_MODES
 from ui.panels.actions.action import ActionNeeds
 from ui.panels.actions.compare import cloud_overlay, set_compare, shown_compare
+from ui.panels.navigation import ViewPopup
 from ui.panels.regions import begin_choosing
 from ui.panels.state import Dispatch, UiState
 from ui.style import theme
@@ -27,7 +28,7 @@ class ToolbarNeeds(ActionNeeds, Protocol):
     """What the row reads."""
 
 
-def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, popup: ViewPopup) -> None:
     """The row of choices over the picture."""
     imgui.set_cursor_pos(ImVec2(imgui.get_cursor_pos_x() + 8, imgui.get_cursor_pos_y() + 6))
     shown = session.view.look_through
@@ -35,9 +36,6 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None
     room = imgui.get_content_region_avail().x
     is_roomy = room > TOOLBAR_WIDTH
     imgui.align_text_to_frame_padding()
-    if is_roomy:
-        imgui.text_disabled("View")
-        imgui.same_line()
     imgui.set_next_item_width(150 if is_roomy else min(120, max(room - 230, 40)))
     if imgui.begin_combo("##camera", "Free" if shown is None else names[shown]):
         if imgui.selectable("Free", shown is None)[0]:
@@ -70,6 +68,8 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None
         imgui.open_popup("overlays")
     ui.mark("viewport.overlays")
     _draw_overlay_menu(session, dispatch, ui)
+    imgui.same_line(0, 8)
+    popup.draw_button(session, dispatch, ui)
     imgui.same_line(0, 8)
     imgui.begin_disabled(not session.regions.can_mark)
     if _segment(f"{Icon.REGION}  Mark" if is_roomy else Icon.REGION, ui.regions.is_active):

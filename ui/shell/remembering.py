@@ -44,9 +44,12 @@ class Remembering:
             imgui.load_ini_settings_from_memory(self._memory.layout)
 
     def restore_marks(self, session: RememberNeeds) -> None:
-        """Size and opacity of anchor marks, which are the same in all projects."""
+        """What is the same in all projects: size and opacity of anchor marks, and how one moves about."""
         if self._memory is None:
             return
+        navigation = self._ui.navigation
+        navigation.preset_name = self._memory.navigation
+        navigation.is_motion_reduced = self._memory.is_motion_reduced
         if self._memory.mark_size is not None:
             session.overlays.mark_size = self._memory.mark_size
         if self._memory.mark_opacity is not None:
@@ -77,6 +80,8 @@ class Remembering:
             memory.keep_view(self._folder, view_of(session))
         memory.ui_scale = self._ui.scale.chosen
         memory.layout = LAYOUT_VERSION + imgui.save_ini_settings_to_memory()
+        navigation = self._ui.navigation
+        memory.navigation, memory.is_motion_reduced = navigation.preset.name, navigation.is_motion_reduced
         memory.mark_size, memory.mark_opacity = session.overlays.mark_size, session.overlays.mark_opacity
         memory.save()
 

@@ -4,28 +4,19 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from ui.panels.actions import compare, marking, time, training, view, window
+from ui.panels.actions import bookmarks, compare, marking, navigation, time, training, view, window
 from ui.panels.actions.action import Action, ActionNeeds
 from ui.panels.state import Dispatch, UiState
 
 ACTIONS: tuple[Action, ...] = (
     *time.ACTIONS,
     *view.ACTIONS,
+    *navigation.ACTIONS,
+    *bookmarks.ACTIONS,
     *compare.ACTIONS,
     *marking.ACTIONS,
     *training.ACTIONS,
     *window.ACTIONS,
-)
-
-MOUSE_HELP: tuple[tuple[str, str], ...] = (
-    ("Left drag", "Orbit around the pivot"),
-    ("Right drag", "Move the view sideways (also Shift + middle drag)"),
-    ("Wheel", "Move nearer or farther (also Ctrl + middle drag)"),
-    ("Click, wheel", "While a region is chosen: fix its place, change its size (Ctrl + wheel moves the view)"),
-    ("Camera click", "Look through the camera whose pyramid it is"),
-    ("Timeline drag", "Move through time"),
-    ("White line drag", "Wipe between render and captured picture"),
-    ("Folder drop", "Open it: a capture or a project"),
 )
 
 

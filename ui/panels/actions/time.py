@@ -83,7 +83,7 @@ ACTIONS = (
         "Play every frame, or skip frames to keep the speed",
         TIME,
         _toggle_every_frame,
-        keys=("E",),
+        keys=("Shift+Space",),
         is_on=lambda session: session.timeline.is_every_frame,
     ),
 )

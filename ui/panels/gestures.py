@@ -1,0 +1,152 @@
+"""Gestures: what the buttons and the wheel of the mouse do over the picture, as one table per preset.
+
+A preset is chosen, never guessed: a wheel and a touchpad cannot be told apart by what they send.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Gesture = Literal["orbit", "pan", "dolly", "look", "roll", "lens", "none"]
+Button = Literal["Left", "Middle", "Right"]
+
+GESTURE_WORDS: dict[str, str] = {
+    "orbit": "Orbit around what is under the pointer",
+    "pan": "Move the view sideways",
+    "dolly": "Move nearer or farther",
+    "look": "Look around",
+    "roll": "Lean the view to a side",
+    "lens": "Field of view",
+}
+DEFAULT_PRESET = "studio"
+FLY_KEYS: dict[str, tuple[float, float, float]] = {
+    "w": (0.0, 0.0, 1.0),
+    "s": (0.0, 0.0, -1.0),
+    "a": (-1.0, 0.0, 0.0),
+    "d": (1.0, 0.0, 0.0),
+    "e": (0.0, 1.0, 0.0),
+    "q": (0.0, -1.0, 0.0),
+}
+"""To the right, up and ahead, for keys that are held."""
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """What a mouse does.
+
+    Attributes:
+        name: In preferences.
+        label: As shown to the user.
+        drags: Gesture by button and modifiers, for example ("Left", "Ctrl+Alt"). With modifiers that are not in it a
+            button does what it does without any.
+        wheel: Gesture by modifiers, likewise.
+        look_button: The button that looks around while one flies.
+    """
+
+    name: str
+    label: str
+    drags: dict[tuple[Button, str], Gesture]
+    wheel: dict[str, Gesture]
+    look_button: Button = "Left"
+
+    def drag(self, button: Button, modifiers: str, *, is_flying: bool = False) -> Gesture:
+        """What dragging with a button does."""
+        if is_flying and button == self.look_button:
+            return "look"
+        return self.drags.get((button, modifiers), self.drags.get((button, ""), "none"))
+
+    def turn(self, modifiers: str) -> Gesture:
+        """What turning the wheel does."""
+        return self.wheel.get(modifiers, self.wheel[""])
+
+
+_MIDDLE: dict[tuple[Button, str], Gesture] = {
+    ("Middle", ""): "orbit",
+    ("Middle", "Shift"): "pan",
+    ("Middle", "Ctrl"): "dolly",
+}
+_BOTH: dict[tuple[Button, str], Gesture] = {
+    ("Left", ""): "orbit",
+    ("Right", ""): "pan",
+    **_MIDDLE,
+    ("Right", "Shift"): "look",
+    ("Left", "Ctrl+Alt"): "roll",
+}
+_WHEEL: dict[str, Gesture] = {"": "dolly", "Shift": "pan", "Ctrl": "lens"}
+
+PRESETS: dict[str, Preset] = {
+    preset.name: preset
+    for preset in (
+        Preset("studio", "Studio", _BOTH, _WHEEL),
+        Preset(
+            "blender",
+            "Blender: the middle button orbits",
+            {**_MIDDLE, ("Left", "Alt"): "orbit", ("Right", "Shift"): "look", ("Middle", "Ctrl+Alt"): "roll"},
+            _WHEEL,
+            look_button="Right",
+        ),
+        Preset("supersplat", "SuperSplat: the right button looks around while one flies", _BOTH, _WHEEL, "Right"),
+        Preset(
+            "touchpad",
+            "Touchpad: two fingers orbit, pinching moves nearer",
+            _BOTH,
+            {"": "orbit", "Shift": "pan", "Ctrl": "dolly", "Ctrl+Shift": "lens"},
+        ),
+    )
+}
+"""By name; the first one is what a new user gets."""
+
+
+@dataclass
+class Navigation:
+    """How the user wants to move about; the same in all projects.
+
+    Attributes:
+        preset_name: One of PRESETS; another one counts as the default.
+        is_motion_reduced: Whether the view jumps instead of moving.
+    """
+
+    preset_name: str = DEFAULT_PRESET
+    is_motion_reduced: bool = False
+
+    @property
+    def preset(self) -> Preset:
+        """The table in use."""
+        return PRESETS.get(self.preset_name, PRESETS[DEFAULT_PRESET])
+
+
+def modifier_words(*, is_ctrl: bool, is_shift: bool, is_alt: bool) -> str:
+    """Modifiers as the tables write them, for example "Ctrl+Shift"; empty without any."""
+    held = (("Ctrl", is_ctrl), ("Shift", is_shift), ("Alt", is_alt))
+    return "+".join(word for word, is_held in held if is_held)
+
+
+def mouse_help(preset: Preset) -> tuple[tuple[str, str], ...]:
+    """Rows of the help sheet: what is done, and what it does."""
+    rows: dict[str, list[str]] = {gesture: [] for gesture in GESTURE_WORDS}
+    for (button, modifiers), gesture in preset.drags.items():
+        rows[gesture].append(f"{modifiers}+{button} drag".removeprefix("+"))
+    wheel = "two fingers" if preset.name == "touchpad" else "wheel"
+    for modifiers, gesture in preset.wheel.items():
+        rows[gesture].append(f"{modifiers}+{wheel}".removeprefix("+"))
+    gestures = tuple((_sentence(done), GESTURE_WORDS[gesture]) for gesture, done in rows.items() if done)
+    return (
+        *gestures,
+        ("W A S D, Q E", "Fly, with Q down and E up; Shift is faster, Alt slower"),
+        (f"{preset.look_button} drag, flying", "Look around"),
+        ("Double click", "Bring what is under the pointer into the middle"),
+        ("Axes at the top right", "Click one to look along it; drag to orbit"),
+        ("Click, wheel", "While a region is chosen: fix its place, change its size (Ctrl + wheel moves the view)"),
+        ("Camera click", "Look through the camera whose pyramid it is"),
+        ("Timeline drag", "Move through time"),
+        ("White line drag", "Wipe between render and captured picture"),
+        ("Folder drop", "Open it: a capture or a project"),
+    )
+
+
+def _sentence(done: list[str]) -> str:
+    text = ", ".join(done).replace("+", " + ")
+    return text[0].upper() + text[1:].replace("Left drag", "left drag").replace("Middle drag", "middle drag").replace(
+        "Right drag", "right drag"
+    )
