@@ -31,8 +31,9 @@ FLAT_SHARE = 10_000.0
 """An orthographic view stands this many scene radii away. At the corner of a 1280 x 720 picture what lies one radius
 before or behind the pivot is then 0.08 px from where it belongs. Depths are float32 in the rasterizers and come in
 steps of a thousandth of a radius: enough to draw, not to sort, so renderers sort by depth within the scene."""
-FLAT_REACH = 100.0
-"""What lies up to so many scene radii before the pivot is seen in an orthographic view."""
+FLAT_REACH = 0.9
+"""An orthographic view is cut off before the pivot at least this many scene radii away, where the cameras stand, so that
+the wall behind them does not hide everything; farther away where one has moved away farther."""
 FRAME_SHARE = 1.15
 """What is framed leaves a little room at the border."""
 
@@ -119,7 +120,9 @@ class OrbitView:
         """Nothing nearer to the camera of `world_to_camera` than this is to be drawn, scene units; 0 where the scene
         alone decides. Only an orthographic view, whose camera stands far away, says something else."""
         pose = self.shown_pose
-        return max(pose.eye_distance - pose.distance - FLAT_REACH * self.radius, 0.0)
+        if pose.eye_distance <= pose.distance:
+            return 0.0
+        return max(pose.eye_distance - max(pose.distance, FLAT_REACH * self.radius), 0.0)
 
     @property
     def look_key(self) -> Hashable:

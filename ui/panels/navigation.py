@@ -39,6 +39,8 @@ class ViewPopup:
             imgui.open_popup(POPUP)
         ui.mark("viewport.look")
         imgui.set_item_tooltip("Lens, axes, what is up, and bookmarks (Ctrl+B)")
+        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        imgui.set_next_window_pos(ImVec2(low.x, high.y + 6), imgui.Cond_.appearing)  # not where the pointer is
         imgui.set_next_window_size(ImVec2(WIDTH, 0))
         if imgui.begin_popup(POPUP):
             self._draw_lens(session, dispatch, ui)
