@@ -134,7 +134,7 @@ def mouse_help(preset: Preset) -> tuple[tuple[str, str], ...]:
     return (
         *gestures,
         ("W A S D, Q E", "Fly, with Q down and E up; Shift is faster, Alt slower"),
-        (f"{preset.look_button} drag, flying", "Look around"),
+        (f"Flying, {preset.look_button.lower()} drag", "Look around while flying"),
         ("Double click", "Bring what is under the pointer into the middle"),
         ("Axes at the top right", "Click one to look along it; drag to orbit"),
         ("Click, wheel", "While a region is chosen: fix its place, change its size (Ctrl + wheel moves the view)"),
