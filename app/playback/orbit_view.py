@@ -32,8 +32,8 @@ FLAT_SHARE = 10_000.0
 before or behind the pivot is then 0.08 px from where it belongs. Depths are float32 in the rasterizers and come in
 steps of a thousandth of a radius: enough to draw, not to sort, so renderers sort by depth within the scene."""
 FLAT_REACH = 0.9
-"""An orthographic view is cut off before the pivot at least this many scene radii away, where the cameras stand, so that
-the wall behind them does not hide everything; farther away where one has moved away farther."""
+"""An orthographic view is cut off so many scene radii before the pivot, where the cameras stand: a wall behind them
+would hide everything. Farther away where one has moved away farther."""
 FRAME_SHARE = 1.15
 """What is framed leaves a little room at the border."""
 

@@ -50,6 +50,11 @@ class Preset:
     wheel: dict[str, Gesture]
     look_button: Button = "Left"
 
+    @property
+    def title(self) -> str:
+        """The label without what explains it."""
+        return self.label.partition(":")[0]
+
     def drag(self, button: Button, modifiers: str, *, is_flying: bool = False) -> Gesture:
         """What dragging with a button does."""
         if is_flying and button == self.look_button:
@@ -122,21 +127,26 @@ def modifier_words(*, is_ctrl: bool, is_shift: bool, is_alt: bool) -> str:
     return "+".join(word for word, is_held in held if is_held)
 
 
+def gesture_rows(preset: Preset) -> tuple[tuple[str, str], ...]:
+    """What is done and what it does, a row each; alike next to each other."""
+    wheel = "Two fingers" if preset.name == "touchpad" else "Wheel"
+    done = [(f"{button} drag", modifiers, gesture) for (button, modifiers), gesture in preset.drags.items()]
+    done += [(wheel, modifiers, gesture) for modifiers, gesture in preset.wheel.items()]
+    done.append((f"{preset.look_button} drag", "Flying", "look"))
+    order = list(GESTURE_WORDS)
+    return tuple(
+        (_chord(modifiers, what), GESTURE_WORDS[gesture])
+        for what, modifiers, gesture in sorted(done, key=lambda row: order.index(row[2]))
+    )
+
+
 def mouse_help(preset: Preset) -> tuple[tuple[str, str], ...]:
-    """Rows of the help sheet: what is done, and what it does."""
-    rows: dict[str, list[str]] = {gesture: [] for gesture in GESTURE_WORDS}
-    for (button, modifiers), gesture in preset.drags.items():
-        rows[gesture].append(f"{modifiers}+{button} drag".removeprefix("+"))
-    wheel = "two fingers" if preset.name == "touchpad" else "wheel"
-    for modifiers, gesture in preset.wheel.items():
-        rows[gesture].append(f"{modifiers}+{wheel}".removeprefix("+"))
-    gestures = tuple((_sentence(done), GESTURE_WORDS[gesture]) for gesture, done in rows.items() if done)
+    """Rows of the help sheet on everything that is done by mouse, or with keys that are held."""
     return (
-        *gestures,
+        *gesture_rows(preset),
         ("W A S D, Q E", "Fly, with Q down and E up; Shift is faster, Alt slower"),
-        (f"Flying, {preset.look_button.lower()} drag", "Look around while flying"),
         ("Double click", "Bring what is under the pointer into the middle"),
-        ("Axes at the top right", "Click one to look along it; drag to orbit"),
+        ("Axes, top right", "A click looks along an axis, a drag orbits"),
         ("Click, wheel", "While a region is chosen: fix its place, change its size (Ctrl + wheel moves the view)"),
         ("Camera click", "Look through the camera whose pyramid it is"),
         ("Timeline drag", "Move through time"),
@@ -145,8 +155,5 @@ def mouse_help(preset: Preset) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _sentence(done: list[str]) -> str:
-    text = ", ".join(done).replace("+", " + ")
-    return text[0].upper() + text[1:].replace("Left drag", "left drag").replace("Middle drag", "middle drag").replace(
-        "Right drag", "right drag"
-    )
+def _chord(modifiers: str, what: str) -> str:
+    return f"{modifiers} + {what[0].lower()}{what[1:]}".replace("+", " + ").replace("  ", " ") if modifiers else what

@@ -104,7 +104,7 @@ class Hud:
 
         def camera_name(index: int | None) -> str:
             if index is None:
-                return "free view"
+                return "orthographic view" if session.view.is_orthographic else "free view"
             return session.rig.names[index] + (" (held out)" if index in session.holdout else "")
 
         return hud_text(

@@ -65,7 +65,8 @@ class PicturePane:
         buttons = imgui.ButtonFlags_
         flags = buttons.mouse_button_left | buttons.mouse_button_right | buttons.mouse_button_middle
         imgui.invisible_button("canvas", ImVec2(area.width, area.height), flags)
-        is_used = imgui.is_item_activated() or (imgui.is_item_hovered() and imgui.get_io().mouse_wheel != 0.0)
+        wheel = (imgui.get_io().mouse_wheel, imgui.get_io().mouse_wheel_h)
+        is_used = imgui.is_item_activated() or (imgui.is_item_hovered() and any(wheel))
         if is_active:
             ui.mark_rect("viewport.canvas", area)
         shown = session.view.look_through

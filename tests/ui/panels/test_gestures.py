@@ -17,7 +17,7 @@ from app.session.window_memory import WindowMemory, read_window_memory
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from ui.panels.actions.table import ACTIONS
-from ui.panels.gestures import FLY_KEYS, GESTURE_WORDS, PRESETS, Navigation, mouse_help
+from ui.panels.gestures import FLY_KEYS, GESTURE_WORDS, PRESETS, Navigation, gesture_rows, mouse_help
 from ui.panels.gizmo import gizmo_tips, tip_under
 from ui.panels.pointer import PX_PER_STEP
 from ui.panels.state import Rect
@@ -422,11 +422,13 @@ def test_views_bookmarks_and_presets_come_back(open_pilot: Callable[..., Pilot],
 
 @pytest.mark.parametrize("preset", PRESETS.values(), ids=lambda preset: preset.name)
 def test_the_help_sheet_says_what_the_preset_does(preset) -> None:
-    rows = dict((words, done) for done, words in mouse_help(preset))
+    rows = mouse_help(preset)
+    assert len({done for done, _ in rows}) == len(rows)
     for (button, modifiers), gesture in preset.drags.items():
-        chord = f"{modifiers.replace('+', ' + ')} + {button} drag".removeprefix(" + ").lower()
-        assert chord in rows[GESTURE_WORDS[gesture]].lower()
-    assert all(done[0].isupper() or done[0].isdigit() for done in rows.values())
+        chord = f"{modifiers.replace('+', ' + ')} + {button.lower()} drag" if modifiers else f"{button} drag"
+        assert (chord, GESTURE_WORDS[gesture]) in rows
+    assert len(gesture_rows(preset)) == len(preset.drags) + len(preset.wheel) + 1
+    assert (f"Flying + {preset.look_button.lower()} drag", GESTURE_WORDS["look"]) in rows
 
 
 def test_a_preset_that_is_not_known_counts_as_the_first() -> None:

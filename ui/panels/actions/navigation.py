@@ -9,6 +9,7 @@ import numpy as np
 from app.playback.scene_axes import AXIS_VIEWS, UP_AXES
 from app.session.commands import LookThrough
 from ui.panels.actions.action import NAVIGATE, Action, ActionNeeds, Run
+from ui.panels.gestures import PRESETS
 from ui.panels.state import Dispatch, UiState
 
 LEAN_STEP = math.radians(5.0)
@@ -89,6 +90,17 @@ def _set_up(name: str) -> Run:
     return set_up
 
 
+def _choose_preset(name: str) -> Run:
+    def choose(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        ui.navigation.preset_name = name
+
+    return choose
+
+
+def _toggle_easing(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.navigation.is_motion_reduced = not ui.navigation.is_motion_reduced
+
+
 def up_words(name: str) -> str:
     """How the window calls one of UP_AXES."""
     return "as the cameras stand" if UP_AXES[name] is None else name.upper()
@@ -136,4 +148,9 @@ ACTIONS = (
         "view.narrower", "Narrower field of view", NAVIGATE, _scale_fov(1 / FOV_STEP), keys=("Alt++",), repeats=True
     ),
     *(_up(name) for name in UP_AXES),
+    *(
+        Action(f"navigation.{name}", f"Mouse as in {preset.title}", NAVIGATE, _choose_preset(name), needs_capture=False)
+        for name, preset in PRESETS.items()
+    ),
+    Action("navigation.eased", "Ease moves of the view, or jump", NAVIGATE, _toggle_easing, needs_capture=False),
 )
