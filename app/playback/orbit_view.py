@@ -116,6 +116,13 @@ class OrbitView:
         return self._shown_K(width, height)
 
     @property
+    def set_back(self) -> float:
+        """How much farther away the camera of `world_to_camera` stands than it seems to, scene units: 0 but for an
+        orthographic view."""
+        pose = self.shown_pose
+        return max(pose.eye_distance - pose.distance, 0.0)
+
+    @property
     def near(self) -> float:
         """Nothing nearer to the camera of `world_to_camera` than this is to be drawn, scene units; 0 where the scene
         alone decides. Only an orthographic view, whose camera stands far away, says something else."""

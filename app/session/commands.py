@@ -92,6 +92,13 @@ class ToggleOverlay:
 
 
 @dataclass(frozen=True, slots=True)
+class ShowHeat:
+    """Show a residual heat map over the picture, by its name; an empty one takes it away."""
+
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
 class SetHoldout:
     """Camera indices that training never sees. Only before the first clip is trained."""
 
@@ -155,6 +162,20 @@ class HomeView:
 
 
 @dataclass(frozen=True, slots=True)
+class SetMode:
+    """Let colours mean something else. mode: See app.playback.view_modes.MODES."""
+
+    mode: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetContent:
+    """Draw a part of the clips. content: See app.playback.view_modes.CONTENTS."""
+
+    content: str
+
+
+@dataclass(frozen=True, slots=True)
 class ShowViews:
     """Show one, two or four views side by side."""
 
@@ -206,9 +227,12 @@ Command = (
     | LookThrough
     | SetCompare
     | ToggleOverlay
+    | ShowHeat
     | SettingCommand
     | EditCommand
     | HomeView
+    | SetMode
+    | SetContent
     | ShowViews
     | ActivateView
     | CloseQuestion

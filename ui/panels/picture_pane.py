@@ -13,6 +13,7 @@ from imgui_bundle import ImVec2, imgui
 from app.playback.pointing import point_beside
 from ui.panels.actions.action import ActionNeeds
 from ui.panels.gizmo import draw_gizmo, gizmo_rect
+from ui.panels.heat_overlay import HeatNeeds, HeatOverlay
 from ui.panels.hud import Hud, HudNeeds
 from ui.panels.panes import Panes, arrange
 from ui.panels.pointer import MOVING_S, Pointer
@@ -27,15 +28,15 @@ from ui.viewport.scene import Scene, SceneNeeds, SceneView
 TOOLTIP_AWAY = 22.0
 
 
-class PictureNeeds(SceneNeeds, HudNeeds, ActionNeeds, Protocol):
+class PictureNeeds(SceneNeeds, HudNeeds, ActionNeeds, HeatNeeds, Protocol):
     """What the picture, and everything that lies over it, is made from."""
 
 
 class PicturePane:
     """Owns the GL objects of one view and the drag in progress there."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    def __init__(self, scene: Scene, heat: HeatOverlay) -> None:
+        self.scene, self.heat = scene, heat
         self.pointer = Pointer()
         self.hud = Hud()
         self._aimed_at = (0.0, 0.0)
@@ -44,6 +45,7 @@ class PicturePane:
     def release(self) -> None:
         """Free GL objects. GL thread only."""
         self.scene.release()
+        self.heat.release()
 
     def shows_playhead(self, session: PictureNeeds) -> bool:
         """Is the frame under the playhead on screen, in every picture that is compared?"""
@@ -92,7 +94,10 @@ class PicturePane:
             draw_gizmo(imgui.get_window_draw_list(), session.view, gizmo, (pointer.x, pointer.y))
             if is_active:
                 ui.mark_rect("viewport.gizmo", gizmo)
-        self.hud.draw(session, ui, area, self.scene, legend_x=None if gizmo is None else gizmo.x0 - 8)
+        value = self._value_under_pointer(panes.rendered)
+        free = self.heat.beside(area)
+        legend_x = free.x1 - 12 if gizmo is None else min(free.x1 - 12, gizmo.x0 - 8)
+        self.hud.draw(session, ui, free, self.scene, value=value, legend_x=legend_x)
         if ui.regions.is_active and is_active:
             top = panes.captured.y0 + 44 if panes.captured is not None else area.y0 + 12  # below what names the pane
             free = Rect(area.x0 + 12, top, area.x1, area.y1)
@@ -125,6 +130,7 @@ class PicturePane:
             shown = ShownRegions(session.regions.regions, tool.highlighted, tool.sphere)
         composed = self.scene.compose(session, view, shown)
         draw.add_image(imgui.ImTextureRef(composed.texture.glo), pane.low, pane.high)
+        self.heat.draw(session, ui, pane)
         if self.pointer.is_moving:
             ui.redraw_within(MOVING_S)
         elif imgui.is_item_hovered() and self.pointer.drag is None and not tool.is_active:
@@ -163,6 +169,12 @@ class PicturePane:
         density = imgui.get_io().display_framebuffer_scale.x
         view = self._scene_view(session, pane)
         return self.scene.point_under(session, view, (x - pane.x0) * density, (y - pane.y0) * density)
+
+    def _value_under_pointer(self, pane: Rect) -> float | None:
+        pointer = imgui.get_io().mouse_pos
+        if not imgui.is_item_hovered() or not pane.contains(pointer.x, pointer.y):
+            return None
+        return self.scene.value_at((pointer.x - pane.x0) / pane.width, (pointer.y - pane.y0) / pane.height)
 
     def _point_at_camera(self, session: PictureNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """The camera under the pointer stands out; one that was pressed is remembered for the click."""

@@ -19,7 +19,8 @@ from ui.style.ui_scale import UiScale
 from ui.viewport.region_tool import RegionTool
 
 VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
-PANELS = (CAPTURE, TRAINING, REGIONS, TIMELINE)
+RESIDUALS = "Residuals"
+PANELS = (CAPTURE, TRAINING, REGIONS, RESIDUALS, TIMELINE)
 """Titles of the panels around the picture."""
 Dispatch = Callable[[Command], None]
 """Takes one command of app.session.commands."""
@@ -65,6 +66,7 @@ class UiState:
         is_quality_seen: Was it scrolled to since then?
         pointed_anchor: Place of the anchor under the pointer, scene units; None without one. [3]
         is_view_popup_wanted: Open the popup of lens, axes and bookmarks.
+        last_heat: The heat map that was shown last, to be shown again; empty before the first.
         wanted_panel: Title of a panel that is to come to the front, or None.
         redraw_in_s: Shortest wait after which some panel wants to be drawn again, or None.
     """
@@ -76,6 +78,7 @@ class UiState:
     navigation: Navigation = field(default_factory=Navigation)
     pointed_anchor: np.ndarray | None = None
     is_view_popup_wanted: bool = False
+    last_heat: str = ""
     wanted_panel: str | None = None
     is_quality_open: bool = False
     is_quality_seen: bool = False

@@ -7,6 +7,7 @@ faster, so its picture is uploaded instead. Redrawn only when the key of what it
 
 from __future__ import annotations
 
+import time
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
@@ -18,6 +19,7 @@ from app.playback.arrays import BACKGROUND, GaussianArrays, Picture, PointArrays
 from app.playback.picture_source import PictureSource
 from app.playback.pointing import pixel_ray, seen_point
 from app.playback.timeline import Timeline
+from app.playback.view_modes import MODES
 from app.status import RegionsStatus, WantedFrame
 from engine.camera.projection import camera_center
 from ui.gl import (
@@ -28,10 +30,11 @@ from ui.gl import (
     Target,
     is_software,
 )
+from ui.viewport.anchor_heat_layer import AnchorHeatLayer, AnchorHeatNeeds
 from ui.viewport.anchor_marks import nearest_under
 from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
 from ui.viewport.mark_layer import AnchorCounts, MarkLayer, MarkNeeds
-from ui.viewport.picture_size import MAX_PICTURE_WIDTH, MOVING_SHARES, moving_share, picture_size
+from ui.viewport.picture_size import MAX_PICTURE_WIDTH, MovingSize, picture_size
 from ui.viewport.region_layer import RegionLayer, ShownRegions
 
 CLOUD_OVERLAP = 1.5
@@ -42,7 +45,7 @@ _CLOUD_KINDS = {"static": CLOUD, "moment": FIRST_CLOUD, "pictures": HINT}
 NO_REGIONS = ShownRegions()
 
 
-class SceneNeeds(MarkNeeds, Protocol):
+class SceneNeeds(MarkNeeds, AnchorHeatNeeds, Protocol):
     """What the picture is made from."""
 
     @property
@@ -57,7 +60,9 @@ class SceneNeeds(MarkNeeds, Protocol):
 
     def shown_points(self) -> PointArrays | None: ...
 
-    def request_render(self, width: int, height: int) -> Picture | None: ...
+    def request_render(
+        self, width: int, height: int, *, full_size: tuple[int, int] | None = None
+    ) -> Picture | None: ...
 
     def compared_picture(self, camera_index: int, max_width: int) -> Picture | None: ...
 
@@ -129,13 +134,16 @@ class Scene:
         self._cloud = PointRenderer(ctx)
         self.marks = MarkLayer(ctx)
         self.regions = RegionLayer(ctx)
+        self._anchor_heat = AnchorHeatLayer(ctx)
         self._drawn_key: Hashable = None
-        self._asked_size: tuple[int, int] | None = None
+        self._asked_sizes: tuple[tuple[int, int], tuple[int, int]] | None = None
         self._asked_capture: tuple[int, int] | None = None
         self._near = NEAR
-        self._moving_share = MOVING_SHARES[1]
+        self._moving_size = MovingSize()
         self._cloud_kind = CLOUD
         self._point_size = 0.0
+        self._is_picture = self.is_software
+        self._values: np.ndarray | None = None
         self._picture_key: Hashable = None
         self._captured_key: Hashable = None
 
@@ -149,6 +157,7 @@ class Scene:
             self._cloud,
             self.marks,
             self.regions,
+            self._anchor_heat,
         )
         for thing in owned:
             thing.release()
@@ -167,8 +176,9 @@ class Scene:
 
     def has_news(self, session: SceneNeeds) -> bool:
         """Did a picture arrive since the last compose? Asks again for what was asked last."""
-        if self._asked_size is not None:
-            picture = session.request_render(*self._asked_size)
+        if self._asked_sizes is not None:
+            size, full_size = self._asked_sizes
+            picture = session.request_render(*size, full_size=full_size)
             if picture is not None and picture.key != self._picture_key:
                 return True
         if self._asked_capture is not None:
@@ -185,7 +195,7 @@ class Scene:
         is_cloud_chosen = bool(session.overlays.show_cloud)
         points_key = self._take_points(session) if is_cloud_chosen else None
         is_cloud_chosen = points_key is not None
-        self._asked_size = None
+        self._asked_sizes = self._values = None
         shown = ShownPicture(
             source=PictureSource(camera_index=session.view.look_through, look=session.view.look_key),
             size=(view.width, view.height),
@@ -194,7 +204,8 @@ class Scene:
         )
         base_key = None
         if not is_cloud_chosen:
-            take = self._take_picture if self.is_software else self._take_gaussians
+            self._is_picture = self.is_software or MODES[session.overlays.mode].is_picture
+            take = self._take_picture if self._is_picture else self._take_gaussians
             base_key, shown = take(session, view, shown)
             points_key = self._take_points(session) if base_key is None and session.overlays.show_points else None
         needs_capture = base_key is None and points_key is None and session.view.look_through is not None
@@ -203,14 +214,26 @@ class Scene:
         if base_key is None:
             shown = self._without_render(shown, points_key, captured)
         is_rendered = base_key is not None
-        marks_key = self.marks.take(session, view, session.shown_gaussians() if is_rendered else None)
+        gaussians = session.shown_gaussians() if is_rendered else None
+        marks_key = self.marks.take(session, view, gaussians)
+        heat_key = self._anchor_heat.take(session, view, gaussians)
         regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
         self.shown = shown
-        if self.is_software and base_key is not None and regions.is_empty and self.marks.is_empty(session):
+        has_marks = not (regions.is_empty and self.marks.is_empty(session) and self._anchor_heat.is_empty)
+        if self.is_software and is_rendered and not has_marks:
             # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
             self._drawn_key = None
             return Composed(self._picture.texture, shown)
-        key = (view.key, base_key, points_key, captured_key, marks_key, regions_key)
+        key = (
+            view.key,
+            base_key,
+            points_key,
+            captured_key,
+            marks_key,
+            regions_key,
+            heat_key,
+            session.overlays.heat_opacity,
+        )
         if key != self._drawn_key or self._splats.is_order_stale:
             self._drawn_key = key
             self._draw(view, base_key, points_key, captured_key, session)
@@ -255,23 +278,27 @@ class Scene:
 
     def _take_picture(self, session: SceneNeeds, view: SceneView, shown: ShownPicture) -> tuple[Hashable, ShownPicture]:
         full = min(MAX_PICTURE_WIDTH / view.width, 1.0)
-        share = full * (self._moving_share if view.is_moving else 1.0)
-        self._asked_size = picture_size(view.width, view.height, share)
-        picture = session.request_render(*self._asked_size)
+        full_size = picture_size(view.width, view.height, full)
+        timeline, now_s = session.timeline, time.perf_counter()
+        is_hurried = self._moving_size.is_hurried(timeline.frame_index, now_s, is_playing=timeline.is_playing)
+        is_quick = is_hurried or view.is_moving
+        share = full * (self._moving_size.share if is_quick else 1.0)
+        self._asked_sizes = picture_size(view.width, view.height, share), full_size
+        picture = session.request_render(*self._asked_sizes[0], full_size=full_size)
         if picture is None:
             self._picture_key = None
             return None, shown
         if self._picture.set(picture.image, key=picture.key) and picture.duration_s > 0:
-            drawn_share = picture.image.shape[1] / (view.width * full)
-            self._moving_share = moving_share(drawn_share, picture.duration_s * 1e3)
-        self._picture_key = picture.key
+            self._moving_size.note_picture(picture.size[0] / full_size[0], picture.duration_s * 1e3)
+        self._picture_key, self._values = picture.key, picture.values
+        is_coarse = is_quick and picture.size[0] < full_size[0] and not timeline.is_playing
         return picture.key, replace(
             shown,
             kind=RENDERED,
             source=picture.source,
             size=picture.size,
-            full_size=picture_size(view.width, view.height, full),
-            is_on_its_way=picture.is_stale or (view.is_moving and share < full),
+            full_size=full_size,
+            is_on_its_way=picture.is_stale or is_coarse,
         )
 
     def _take_gaussians(
@@ -305,6 +332,19 @@ class Scene:
             self._point_size = CLOUD_OVERLAP * cloud.spacing
         return key
 
+    def value_at(self, x: float, y: float) -> float | None:
+        """The number that the picture's colour stands for at a place; None where nothing is, and where colours are no
+        numbers.
+
+        Args:
+            x, y: As shares of the picture's width and height, from its upper left corner.
+        """
+        if self._values is None or not (0.0 <= x < 1.0 and 0.0 <= y < 1.0):
+            return None
+        height, width = self._values.shape
+        value = float(self._values[int(y * height), int(x * width)])
+        return None if np.isnan(value) else value
+
     def anchor_text(self, session: SceneNeeds, view: SceneView, x: float, y: float) -> str:
         """What the anchor under a pixel of the view is and why; empty where none is shown or that is unknown. It stands
         out from the next frame on."""
@@ -337,7 +377,7 @@ class Scene:
         target = self._target
         target.clear(BACKGROUND)
         if base_key is not None:
-            if self.is_software:
+            if self._is_picture:
                 target.draw_image(self._picture)
             else:
                 self._splats.draw(target, *camera, max(self._near, view.near))
@@ -351,6 +391,7 @@ class Scene:
             )
         elif captured_key is not None:
             target.draw_image(self._captured)
+        self._anchor_heat.draw(target, view, session.overlays.heat_opacity, self.marks.pixels_per_unit)
         self.marks.draw(target, view, session)
         self.regions.draw(target, camera)
         target.resolve(BACKGROUND)

@@ -7,11 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.playback.arrays import AnchorArrays, GaussianArrays, Picture
+from app.playback.frame_decoder import ShownFrame
 from app.playback.orbit_view import FLAT_REACH, OrbitView
 from app.playback.pointing import pixel_ray, point_beside, seen_point
-from app.playback.render import RenderRequest, render
+from app.playback.render import Look, RenderRequest, render
 from app.playback.scene_axes import AXIS_VIEWS, UP_AXES, axis_rotation, rig_radius, scene_axes, view_from
 from app.playback.view_angles import angles_of, rotation_of
+from app.playback.view_modes import ShownAs
 from app.playback.view_motion import EASE_S, LONGEST_STEP_S
 from app.playback.view_place import ViewPlace
 from engine.camera.rig import CameraRig
@@ -346,6 +349,13 @@ def test_without_easing_there_is_nothing_to_wait_for():
 # ---- without perspective ---------------------------------------------------------------------------------------------
 
 
+def drawn(view: OrbitView, gaussians: GaussianArrays, mode: str = "color") -> Picture:
+    """The rasterizer's picture, 64 x 48."""
+    anchors = AnchorArrays(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), key="none")
+    look = Look.of(view, 64, 48, shown_as=ShownAs(mode))
+    return render(RenderRequest((0, "", 0, "", look.shown_as, 0), look, ShownFrame(gaussians, anchors)))
+
+
 def true_orthographic(view: OrbitView, points: np.ndarray, width: int, height: int) -> np.ndarray:
     """Where points are seen without any perspective. [N, 2]"""
     px_per_unit = height / (2.0 * view.distance * math.tan(view.fov_y / 2.0))
@@ -394,14 +404,28 @@ def test_pictures_without_perspective_are_sorted_by_depth():
         opacities=0.9,
     )
     gaussians.colors[:] = np.stack([np.arange(n)[order] / n, np.zeros(n), np.ones(n)], axis=1)
-    request = RenderRequest(
-        "sheets", b"", 64, 48, gaussians.source, gaussians, view.world_to_camera(), view.K(64, 48), view.near
-    )
-    image = render(request).image
+    image = drawn(view, gaussians).image
     red, _, blue = image[24, 32].astype(float) / 255.0
     left = 0.1 ** np.arange(n) * 0.9  # what each sheet adds, nearest first
     assert red == pytest.approx(float((left * np.arange(n) / n).sum()), abs=0.02)
     assert blue > 0.95
+
+
+def test_depths_and_normals_without_perspective_are_those_of_the_scene_and_not_of_how_it_is_drawn():
+    """A floor that rises by the slope of 0.2 across the picture."""
+    view = make_view(is_orthographic=True)
+    right, down, forward = view.rotation
+    across = view.distance * math.tan(view.fov_y / 2) * np.linspace(-1.5, 1.5, 90)
+    u, v = (axis.reshape(-1, 1) for axis in np.meshgrid(across, across))
+    floor = gaussians_at(view.pivot + u * right + v * down + 0.2 * u * forward, scales=0.03, opacities=0.99)
+    values = drawn(view, floor, "depth").values
+    assert values is not None
+    columns = (np.arange(64) + 0.5 - 32) * 2 * view.distance * math.tan(view.fov_y / 2) / 48
+    assert np.allclose(values[24], view.distance + 0.2 * columns, atol=0.02 * view.distance)
+    normal = (right * 0.2 - forward) / math.hypot(0.2, 1.0)
+    shown = drawn(view, floor, "normals").image[10:38, 16:48].reshape(-1, 3).mean(0) / 255.0
+    expected = 0.5 + 0.5 * (view.rotation @ normal) * [1.0, 1.0, -1.0]
+    assert np.allclose(shown, expected, atol=0.03)
 
 
 def test_what_lies_before_an_orthographic_view_is_cut_off_and_picking_agrees():

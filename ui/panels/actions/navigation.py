@@ -149,7 +149,9 @@ ACTIONS = (
     ),
     *(_up(name) for name in UP_AXES),
     *(
-        Action(f"navigation.{name}", f"Mouse preset: {preset.title}", NAVIGATE, _choose_preset(name), needs_capture=False)
+        Action(
+            f"navigation.{name}", f"Mouse preset: {preset.title}", NAVIGATE, _choose_preset(name), needs_capture=False
+        )
         for name, preset in PRESETS.items()
     ),
     Action("navigation.eased", "Ease moves of the view, or jump", NAVIGATE, _toggle_easing, needs_capture=False),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from ui.panels.actions import bookmarks, compare, marking, navigation, time, training, view, window
+from ui.panels.actions import bookmarks, compare, heat, marking, modes, navigation, time, training, view, window
 from ui.panels.actions.action import Action, ActionNeeds
 from ui.panels.state import Dispatch, UiState
 
@@ -14,6 +14,8 @@ ACTIONS: tuple[Action, ...] = (
     *navigation.ACTIONS,
     *bookmarks.ACTIONS,
     *compare.ACTIONS,
+    *modes.ACTIONS,
+    *heat.ACTIONS,
     *marking.ACTIONS,
     *training.ACTIONS,
     *window.ACTIONS,
