@@ -150,7 +150,10 @@ def mouse_help(preset: Preset) -> tuple[tuple[str, str], ...]:
         ("Click, wheel", "While a region is chosen: fix its place, change its size (Ctrl + wheel moves the view)"),
         ("Camera click", "Look through the camera whose pyramid it is"),
         ("Timeline drag", "Move through time"),
-        ("White line drag", "Wipe between render and captured picture"),
+        ("White line drag", "Wipe between the two pictures that are compared"),
+        ("Hold B", "See the picture that the render is compared with, alone"),
+        ("Timeline wheel", "Move what is shown (also middle drag); with Ctrl closer or farther, double click for all"),
+        ("Seam click", "Play around the boundary between two clips"),
         ("Folder drop", "Open it: a capture or a project"),
     )
 

@@ -44,9 +44,11 @@ class Remembering:
             imgui.load_ini_settings_from_memory(self._memory.layout)
 
     def restore_marks(self, session: RememberNeeds) -> None:
-        """What is the same in all projects: size and opacity of anchor marks, and how one moves about."""
+        """What is the same in all projects: size and opacity of anchor marks, unit and lanes of the timeline, and what
+        mouse and keys do."""
         if self._memory is None:
             return
+        self._ui.timeline.restore(self._memory.time_unit, self._memory.folded_lanes)
         navigation = self._ui.navigation
         navigation.preset_name = self._memory.navigation
         navigation.is_motion_reduced = self._memory.is_motion_reduced
@@ -83,6 +85,7 @@ class Remembering:
         navigation = self._ui.navigation
         memory.navigation, memory.is_motion_reduced = navigation.preset.name, navigation.is_motion_reduced
         memory.mark_size, memory.mark_opacity = session.overlays.mark_size, session.overlays.mark_opacity
+        memory.time_unit, memory.folded_lanes = self._ui.timeline.unit, tuple(sorted(self._ui.timeline.folded))
         memory.save()
 
 

@@ -4,12 +4,25 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from ui.panels.actions import bookmarks, compare, heat, marking, modes, navigation, time, training, view, window
+from ui.panels.actions import (
+    bookmarks,
+    compare,
+    heat,
+    marking,
+    modes,
+    navigation,
+    playing,
+    time,
+    training,
+    view,
+    window,
+)
 from ui.panels.actions.action import Action, ActionNeeds
 from ui.panels.state import Dispatch, UiState
 
 ACTIONS: tuple[Action, ...] = (
     *time.ACTIONS,
+    *playing.ACTIONS,
     *view.ACTIONS,
     *navigation.ACTIONS,
     *bookmarks.ACTIONS,
