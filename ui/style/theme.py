@@ -103,6 +103,7 @@ class Icon:
     ADD = "\u002b"
     CLOCK_BACK = "\uf1da"
     BROKEN = "\uf127"
+    COMPASS = "\uf14e"
 
 
 CLIP_ICONS: dict[str, str] = {
