@@ -29,6 +29,7 @@ from app.training.messages import (
     HeldOutMeasured,
     Pause,
     Resume,
+    SetSnapshots,
     SnapshotConsumed,
     SnapshotNow,
     StageReported,
@@ -57,6 +58,8 @@ logger = logging.getLogger(__name__)
 
 REPORT_EVERY_S = 0.1
 SNAPSHOT_EVERY_S = 2.0
+LOW_SNAPSHOT_EVERY_S = 10.0
+"""With a live view that is low."""
 SNAPSHOT_SHARE = 0.05
 """Share of the time that snapshots may cost."""
 HELD_OUT_EVERY_S = 5.0
@@ -71,6 +74,10 @@ METRICS_EVERY_S = 0.5
 Receive = Callable[[float], Command | None]
 """The next command, waiting at most this many seconds. Raises EOFError when nobody is left to send one."""
 Send = Callable[[Event], None]
+
+
+def _snapshot_cadence(live_view: str) -> Cadence:
+    return Cadence(LOW_SNAPSHOT_EVERY_S if live_view == "low" else SNAPSHOT_EVERY_S, SNAPSHOT_SHARE)
 
 
 class StopRequested(Exception):
@@ -118,7 +125,8 @@ class TrainingRun:
         self._watch = StageWatch(clock)
         self._paused_stage: str | None = None
         self._report_cadence = Cadence(REPORT_EVERY_S)
-        self._snapshot_cadence = Cadence(SNAPSHOT_EVERY_S, SNAPSHOT_SHARE)
+        self._live_view = job.live_view
+        self._snapshot_cadence = _snapshot_cadence(job.live_view)
         self._checkpoint_cadence = Cadence(CHECKPOINT_EVERY_S, CHECKPOINT_SHARE)
         self._held_out_cadence = Cadence(HELD_OUT_EVERY_S, HELD_OUT_SHARE)
         self._metrics_cadence = Cadence(METRICS_EVERY_S)
@@ -198,7 +206,8 @@ class TrainingRun:
             )
         )
         self._measure(training)  # renders, so that every kernel is compiled before a window does the same
-        self._write_snapshot(training)
+        if self._live_view != "off":
+            self._write_snapshot(training)
         self._rate.update(training.steps_done, self._clock())
         return training
 
@@ -233,7 +242,7 @@ class TrainingRun:
                 row = {"step": stats.step, "loss": loss, "train_psnr": stats.train_psnr}
                 self._note(row | {"gradient_norm": gradient_norm})
         is_wanted = self._is_snapshot_wanted or self._snapshot_cadence.is_due(now_s)
-        if is_wanted and self._snapshots.is_free and not is_last:
+        if is_wanted and self._live_view != "off" and self._snapshots.is_free and not is_last:
             self._write_snapshot(training)
         if self._held_out_cadence.is_due(now_s) and not is_last:
             self._measure(training)
@@ -344,6 +353,10 @@ class TrainingRun:
                     self._send(TrainingResumed(self._steps_done))
                 case SnapshotNow():
                     self._is_snapshot_wanted = True
+                case SetSnapshots(mode=mode) if mode != self._live_view:
+                    self._live_view = mode
+                    self._snapshot_cadence = _snapshot_cadence(mode)
+                    self._is_snapshot_wanted = mode == "live"
                 case SnapshotConsumed(revision=revision):
                     self._snapshots.consumed(revision)
             if command is None and not (self._is_paused and self._can_wait):
