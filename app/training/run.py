@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from app.background.memory import peak_bytes
+from app.project.clip_versions import forget_oldest, set_aside
 from app.project.project import Project, open_project
 from app.project.project_files import read_metrics
 from app.project.stage_seconds import stages_of
@@ -312,8 +313,11 @@ class TrainingRun:
             DiskError: The disk refused; everything is as it was.
         """
         assert self._project is not None
-        path = self._project.clip_path(self._job.clip_index)
-        keep_clip(clip, path, self._project.live_dir)
+        project, clip_index = self._project, self._job.clip_index
+        path = project.clip_path(clip_index)
+        fingerprint = clip.state.header.fingerprint
+        keep_clip(clip, path, project.live_dir, lambda: set_aside(project, clip_index, unless=fingerprint))
+        forget_oldest(project, clip_index)
         try:
             self._project.keep_curves(self._job.clip_index)
         except OSError as error:

@@ -454,6 +454,19 @@ class TrainingService:
             return "starting"
         return "preparing" if self._step is None else "running"
 
+    @property
+    def steps_of_run(self) -> tuple[int, int]:
+        """Steps done and all steps of the clip that trains; zeros before it has said so, and while none does."""
+        return (0, 0) if self.worker is None or self._run is None else (self._run.step, self._run.n_steps)
+
+    @property
+    def eta_s(self) -> float | None:
+        """Seconds until the clip that trains is finished; None when unknown."""
+        step = self._step
+        if step is None or step.steps_per_s <= 0 or self.state != "running":
+            return None
+        return (step.n_steps - step.step) / step.steps_per_s
+
     def status(self, viewed_clip: int | None = None) -> TrainingStatus:
         """Everything about the training as one value.
 
@@ -465,7 +478,6 @@ class TrainingService:
         curve_clip = clip_index if self.worker is not None or viewed_clip is None else viewed_clip
         curves = None if curve_clip is None else self._curves(curve_clip)
         rate = step.steps_per_s if step is not None else 0.0
-        left = 0 if step is None else step.n_steps - step.step
         upcoming = self.next_clip_index
         settings = self.project.settings
         is_reference = clip_index == settings.reference_clip or settings.config().independent
@@ -481,7 +493,7 @@ class TrainingService:
             n_stages=n_stages,
             message=self._message(state),
             steps_per_s=rate if state == "running" else 0.0,
-            eta_s=left / rate if rate > 0 and state == "running" else None,
+            eta_s=self.eta_s,
             curve_clip_index=curve_clip,
             gradient_norm=step.gradient_norm if step is not None and math.isfinite(step.gradient_norm) else None,
             loss_history=() if curves is None else curves.loss,
