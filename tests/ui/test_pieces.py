@@ -13,12 +13,13 @@ from hypothesis import strategies as st
 from app.cli.commands import COMMANDS
 from app.status import ClipStatus
 from ui.main import main
+from ui.panels.actions.key import parse_key
+from ui.panels.actions.table import ACTIONS
 from ui.panels.clip_quality import clip_quality
-from ui.panels.shortcuts import SHORTCUTS
+from ui.panels.panes import arrange, fit
 from ui.panels.state import Rect
 from ui.panels.timeline import MIN_TICK_SPACING_PX, cell_left, frame_at, tick_step
 from ui.panels.training import MAX_PLOT_POINTS, anchors_text, plot_arrays
-from ui.panels.viewport import arrange, fit
 
 
 @given(frames=st.integers(1, 20_000), width=st.floats(50, 4000))
@@ -85,17 +86,37 @@ def test_panes_keep_the_camera_s_aspect_and_do_not_overlap() -> None:
     assert fit(area, 500, 500).width == pytest.approx(500)
 
 
-def test_shortcut_table_is_complete_and_unambiguous() -> None:
-    chords = [(s.key_name, s.is_ctrl, s.is_shift) for s in SHORTCUTS]
+def test_the_table_of_actions_is_complete_and_unambiguous() -> None:
+    chords = [key.chord for action in ACTIONS for key in action.parsed_keys]
     assert len(set(chords)) == len(chords)
-    assert all(s.text and s.label and s.group for s in SHORTCUTS)
+    assert len({action.id for action in ACTIONS}) == len(ACTIONS)
+    assert all(action.text and action.group for action in ACTIONS)
     promised = {"Space", "Left", "Right", "Home", "End", "Up", "Down", "[", "]", "G", "Tab", "T", "F", "F1", "Ctrl+O"}
-    assert promised <= {s.label for s in SHORTCUTS}
-    assert all(s.needs_choosing for s in SHORTCUTS if s.key_name == "escape"), "at other times Escape ends nothing"
-    for shortcut in SHORTCUTS:
-        assert shortcut.key is not None
-        assert shortcut.is_ctrl == shortcut.label.startswith("Ctrl+")
-        assert shortcut.is_shift == ("Shift+" in shortcut.label)
+    assert promised <= {label for action in ACTIONS for label in action.keys}
+    leaving = [action for action in ACTIONS if "Escape" in action.keys]
+    assert all(action.needs_choosing for action in leaving), "at other times Escape ends nothing"
+
+
+@pytest.mark.parametrize(
+    ("label", "chord", "is_any_shift"),
+    [
+        ("Space", ("space", False, False, False), False),
+        ("Ctrl++", ("equal", True, False, False), True),
+        ("Ctrl+Shift+Z", ("z", True, True, False), False),
+        ("Page Up", ("page_up", False, False, False), False),
+        ("4", ("_4", False, False, False), False),
+        ("Alt+[", ("left_bracket", False, False, True), False),
+    ],
+)
+def test_keys_are_read_from_text(label: str, chord: tuple[str, bool, bool, bool], is_any_shift: bool) -> None:
+    key = parse_key(label)
+    assert (key.chord, key.is_any_shift, key.label) == (chord, is_any_shift, label)
+
+
+@pytest.mark.parametrize("label", ["", "Ctrl+", "Hyper+X", "Ctrl+Ctrl+X", "mod_ctrl+", "count", "__class__"])
+def test_text_that_names_no_key_is_refused(label: str) -> None:
+    with pytest.raises(ValueError, match="does not name a key"):
+        parse_key(label)
 
 
 @pytest.mark.parametrize("module", ["ui.main", "ui.__main__"])

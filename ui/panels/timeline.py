@@ -12,7 +12,7 @@ from app.playback.timeline import Timeline
 from app.session.commands import SetFrame, TogglePlay, TrainClip
 from app.status import ClipStatus, TrainingStatus
 from engine.capture.clip import Clip
-from ui.panels.shortcuts import go_to_frame
+from ui.panels.actions.time import go_to_frame
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import text_right
 from ui.style import theme

@@ -15,7 +15,8 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import portable_file_dialogs as native
 
 from app.session.commands import OpenCapture
-from ui.panels.shortcuts import MOUSE_HELP, SHORTCUTS, TIME, VIEW, WINDOW
+from ui.panels.actions.action import TIME, VIEW, WINDOW
+from ui.panels.actions.table import ACTIONS, MOUSE_HELP
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import text_wrapped_dim
 from ui.style import theme
@@ -151,7 +152,7 @@ class OpenFolderDialog:
 
 
 def draw_help(ui: UiState) -> None:
-    """The F1 sheet: every row of the shortcut table, and what the mouse does."""
+    """The F1 sheet: every row of the table of actions, and what the mouse does."""
     if not ui.is_help_open:
         return
     center = imgui.get_main_viewport().get_center()
@@ -165,19 +166,23 @@ def draw_help(ui: UiState) -> None:
     if imgui.is_window_appearing():
         ui.redraw_within(0.0)  # only then does what lies below know that it is covered
     if is_shown:
-        groups = dict.fromkeys(shortcut.group for shortcut in SHORTCUTS)
+        groups = dict.fromkeys(action.group for action in ACTIONS)
         left = (TIME, VIEW, WINDOW)
         if imgui.begin_table("sheet", 2, imgui.TableFlags_.sizing_stretch_same):
             imgui.table_next_column()
             for group in left:
-                _draw_group(group, [(s.label, s.text) for s in SHORTCUTS if s.group == group])
+                _draw_group(group, _rows(group))
             _draw_group("Mouse", list(MOUSE_HELP))
             imgui.table_next_column()
             for group in (group for group in groups if group not in left):
-                _draw_group(group, [(s.label, s.text) for s in SHORTCUTS if s.group == group])
+                _draw_group(group, _rows(group))
             imgui.end_table()
     imgui.end()
     ui.is_help_open = bool(is_kept)
+
+
+def _rows(group: str) -> list[tuple[str, str]]:
+    return [(", ".join(action.keys), action.text) for action in ACTIONS if action.group == group and action.keys]
 
 
 def _draw_group(title: str, rows: list[tuple[str, str]]) -> None:

@@ -18,10 +18,10 @@ from pyglet.window import BaseWindow
 from app.session.commands import Command
 from app.session.window_memory import WindowMemory
 from ui.gl import ImageTexture, free_dropped, n_changes
+from ui.panels.actions.table import handle_keys
 from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.notices import NoticesNeeds, NoticesPanel
 from ui.panels.regions import draw_regions
-from ui.panels.shortcuts import handle_shortcuts
 from ui.panels.state import CAPTURE, REGIONS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
 from ui.panels.timeline import TimelineNeeds, draw_timeline
 from ui.panels.training import draw_training
@@ -222,7 +222,7 @@ class Frame:
 
     def _compose(self) -> None:
         session, ui, dispatch = self.session, self.ui, self.dispatch
-        self._guard("Keys", lambda: handle_shortcuts(session, dispatch, ui))
+        self._guard("Keys", lambda: handle_keys(session, dispatch, ui))
         self._guard("Menu", lambda: draw_menu_bar(session, dispatch, ui))
         is_software = self.viewport.scene.is_software
         self._guard("Status bar", lambda: draw_status_bar(session, ui, is_software=is_software))

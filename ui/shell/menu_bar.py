@@ -1,4 +1,4 @@
-"""The menu bar. Entries that have a key come from the table of shortcuts, so that both say the same."""
+"""The menu bar. Entries that have a key come from the table of actions, so that both say the same."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from imgui_bundle import imgui
 
 from app.session.commands import ForgetRecent, OpenCapture
 from app.status import ProjectStatus
-from ui.panels.shortcuts import COMPARE, MARK, SHORTCUTS, TIME, VIEW, ShortcutNeeds, choose_scale, train_or_pause
+from ui.panels.actions.action import COMPARE, MARK, TIME, VIEW, ActionNeeds
+from ui.panels.actions.table import ACTIONS
+from ui.panels.actions.training import train_or_pause
+from ui.panels.actions.window import choose_scale
 from ui.panels.state import PANELS, Dispatch, UiState
 from ui.panels.training import TrainingNeeds, next_label
 from ui.panels.welcome import SAMPLE_PATH, WelcomeNeeds, open_recent
@@ -21,7 +24,7 @@ MIN_PATH_WIDTH = 60.0
 """Less of a path says nothing."""
 
 
-class MenuNeeds(ShortcutNeeds, TrainingNeeds, WelcomeNeeds, Protocol):
+class MenuNeeds(ActionNeeds, TrainingNeeds, WelcomeNeeds, Protocol):
     """What the menus read."""
 
     @property
@@ -94,16 +97,15 @@ def _item(ui: UiState, label: str, key_label: str = "", *, is_on: bool = False) 
 def _draw_rows(
     groups: tuple[str, ...], session: MenuNeeds, dispatch: Dispatch, ui: UiState, *, is_on_only: bool = False
 ) -> None:
-    """Rows of the table of keys. is_on_only: Those only that can be on or off."""
-    for shortcut in SHORTCUTS:
-        if is_on_only and shortcut.is_on is None:
+    """Rows of the table of actions. is_on_only: Those only that can be on or off."""
+    for action in ACTIONS:
+        if action.group not in groups or (is_on_only and action.is_on is None):
             continue
-        is_offered = shortcut.is_listed and (ui.regions.is_active or not shortcut.needs_choosing)
-        if shortcut.group not in groups or not is_offered:
+        if action.needs_choosing and not ui.regions.is_active:
             continue
-        is_on = shortcut.is_on is not None and session.capture is not None and shortcut.is_on(session)
-        if _item(ui, shortcut.text, shortcut.label, is_on=is_on):
-            shortcut.action(session, dispatch, ui)
+        is_on = action.is_on is not None and session.capture is not None and action.is_on(session)
+        if _item(ui, action.text, action.key_label, is_on=is_on):
+            action.run(session, dispatch, ui)
 
 
 def _draw_scale_menu(ui: UiState) -> None:

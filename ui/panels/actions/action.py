@@ -1,0 +1,86 @@
+"""Action: one thing a user can do, with its words, its keys and what it runs. Help sheet, menus and keys read the same
+rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+from app.playback.orbit_view import OrbitView
+from app.playback.timeline import Timeline
+from app.status import Overlays, TrainingStatus, WantedFrame
+from engine.camera.rig import CameraRig
+from ui.panels.actions.key import Key, parse_key
+from ui.panels.regions import RegionsNeeds
+from ui.panels.state import Dispatch, UiState
+
+TIME, VIEW, COMPARE, MARK, TRAIN, WINDOW = "Time", "View", "Show and compare", "Mark regions", "Train", "Window"
+
+
+class ActionNeeds(RegionsNeeds, Protocol):
+    """What actions act on."""
+
+    @property
+    def timeline(self) -> Timeline: ...
+
+    @property
+    def view(self) -> OrbitView: ...
+
+    @property
+    def overlays(self) -> Overlays: ...
+
+    @property
+    def rig(self) -> CameraRig: ...
+
+    @property
+    def training(self) -> TrainingStatus: ...
+
+    def wanted_frame(self) -> WantedFrame | None: ...
+
+
+Run = Callable[[ActionNeeds, Dispatch, UiState], None]
+
+
+@dataclass(frozen=True)
+class Action:
+    """One row.
+
+    Attributes:
+        id: Its name in preferences; never changes.
+        text: What it does, for the help sheet, menus and the palette.
+        group: Heading of the help sheet.
+        keys: As text, see ui.panels.actions.key; the first one is shown in menus. Empty where it has none.
+        needs_capture: Ignored until a capture is open.
+        needs_choosing: Ignored unless a region is being chosen.
+        repeats: Holding the key repeats the action.
+        is_on: Of what can be on or off, whether it is; menus show a tick.
+    """
+
+    id: str
+    text: str
+    group: str
+    run: Run
+    keys: tuple[str, ...] = ()
+    needs_capture: bool = True
+    needs_choosing: bool = False
+    repeats: bool = False
+    is_on: Callable[[ActionNeeds], bool] | None = None
+
+    @cached_property
+    def parsed_keys(self) -> tuple[Key, ...]:
+        """Its keys, parsed."""
+        return tuple(parse_key(label) for label in self.keys)
+
+    @property
+    def key_label(self) -> str:
+        """The key that menus show; empty without one."""
+        return self.keys[0] if self.keys else ""
+
+    def is_offered(self, session: ActionNeeds, ui: UiState) -> bool:
+        """Whether it can be run now."""
+        if self.needs_capture and session.capture is None:
+            return False
+        return ui.regions.is_active or not self.needs_choosing

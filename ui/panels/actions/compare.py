@@ -1,0 +1,103 @@
+"""Actions on what is shown beside or over the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from app.session.commands import LookThrough, SetCompare, ToggleOverlay
+from app.status import COMPARE_MODES
+from ui.panels.actions.action import COMPARE, Action, ActionNeeds, Run
+from ui.panels.actions.view import nearest_camera
+from ui.panels.state import Dispatch, UiState
+
+MARK_NAMES = ("show_frusta", "show_inherited", "show_residual")
+"""The overlays that Tab shows or hides together."""
+
+
+def set_compare(session: ActionNeeds, dispatch: Dispatch, mode: str) -> None:
+    """Compare with the captured picture; needs a capture camera, so the nearest one is taken from a free view."""
+    if mode != "off" and session.view.look_through is None:
+        dispatch(LookThrough(nearest_camera(session)))
+    dispatch(SetCompare(mode))
+
+
+def shown_compare(session: ActionNeeds) -> str:
+    """The comparison on screen: none from a free view, where no camera took a picture."""
+    return "off" if session.view.look_through is None else session.overlays.compare
+
+
+def _cycle_compare(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    shown = COMPARE_MODES.index(shown_compare(session))
+    set_compare(session, dispatch, COMPARE_MODES[(shown + 1) % len(COMPARE_MODES)])
+
+
+def _is_shown(name: str) -> Callable[[Any], bool]:
+    return lambda session: bool(getattr(session.overlays, name))
+
+
+def _are_marks_shown(session: ActionNeeds) -> bool:
+    return all(getattr(session.overlays, name) for name in MARK_NAMES)
+
+
+def _toggle_overlays(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    is_all_shown = _are_marks_shown(session)
+    for name in MARK_NAMES:
+        if getattr(session.overlays, name) == is_all_shown:
+            dispatch(ToggleOverlay(name))
+
+
+def _toggle_overlay(name: str) -> Run:
+    def toggle(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        dispatch(ToggleOverlay(name))
+
+    return toggle
+
+
+def cloud_overlay(session: ActionNeeds) -> str:
+    """The overlay that shows or hides the point cloud: in place of a trained picture, or where there is none."""
+    wanted = session.wanted_frame()
+    return "show_points" if wanted is None or not wanted.revision else "show_cloud"
+
+
+def _is_cloud_shown(session: ActionNeeds) -> bool:
+    return bool(getattr(session.overlays, cloud_overlay(session)))
+
+
+def _toggle_cloud(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(ToggleOverlay(cloud_overlay(session)))
+
+
+def _overlay(name: str, text: str, key: str) -> Action:
+    return Action(f"show.{name}", text, COMPARE, _toggle_overlay(name), keys=(key,), is_on=_is_shown(name))
+
+
+ACTIONS = (
+    Action(
+        "compare.next",
+        "Compare with the captured picture: wipe, side by side, off",
+        COMPARE,
+        _cycle_compare,
+        keys=("G",),
+    ),
+    Action(
+        "show.marks",
+        "Show or hide cameras and anchors",
+        COMPARE,
+        _toggle_overlays,
+        keys=("Tab",),
+        is_on=_are_marks_shown,
+    ),
+    _overlay("show_frusta", "Show or hide cameras", "1"),
+    _overlay("show_inherited", "Show or hide inherited anchors", "2"),
+    _overlay("show_residual", "Show or hide residual anchors", "3"),
+    Action(
+        "show.cloud",
+        "Point cloud, also in place of a trained picture",
+        COMPARE,
+        _toggle_cloud,
+        keys=("4",),
+        is_on=_is_cloud_shown,
+    ),
+    _overlay("show_regions", "Show or hide marked regions", "5"),
+)

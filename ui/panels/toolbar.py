@@ -1,0 +1,138 @@
+"""The row over the picture: which camera, what it is compared with, what is shown over it, and marking."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from app.session.commands import LookThrough, ToggleOverlay
+from app.status import COMPARE_MODES
+from ui.panels.actions.action import ActionNeeds
+from ui.panels.actions.compare import cloud_overlay, set_compare, shown_compare
+from ui.panels.regions import begin_choosing
+from ui.panels.state import Dispatch, UiState
+from ui.style import theme
+from ui.style.theme import Icon
+
+TOOLBAR_HEIGHT = 38.0
+TOOLBAR_WIDTH = 610.0
+"""With less room, words give way to symbols."""
+MARK_SLIDER = imgui.SliderFlags_.always_clamp
+COMPARE_WORDS = {"off": "Off", "wipe": "Wipe", "side": "Side by side"}
+
+
+class ToolbarNeeds(ActionNeeds, Protocol):
+    """What the row reads."""
+
+
+def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """The row of choices over the picture."""
+    imgui.set_cursor_pos(ImVec2(imgui.get_cursor_pos_x() + 8, imgui.get_cursor_pos_y() + 6))
+    shown = session.view.look_through
+    names = session.rig.names
+    room = imgui.get_content_region_avail().x
+    is_roomy = room > TOOLBAR_WIDTH
+    imgui.align_text_to_frame_padding()
+    if is_roomy:
+        imgui.text_disabled("View")
+        imgui.same_line()
+    imgui.set_next_item_width(150 if is_roomy else min(120, max(room - 230, 40)))
+    if imgui.begin_combo("##camera", "Free" if shown is None else names[shown]):
+        if imgui.selectable("Free", shown is None)[0]:
+            dispatch(LookThrough(None))
+        for index, name in enumerate(names):
+            imgui.push_id(index)  # names may be equal before a "##", which is all that ImGui would tell apart
+            is_chosen = imgui.selectable("##camera", shown == index)[0]
+            ui.mark(f"viewport.camera{index}")
+            imgui.same_line(0, 0)
+            imgui.text(name)
+            imgui.pop_id()
+            if is_chosen:
+                dispatch(LookThrough(index))
+        imgui.end_combo()
+    ui.mark("viewport.camera")
+    imgui.set_item_tooltip("Look through a capture camera ([ and ])")
+    imgui.same_line(0, 18 if is_roomy else 8)
+    if is_roomy:
+        imgui.text_disabled("Compare")
+        for mode in COMPARE_MODES:
+            imgui.same_line(0, 8 if mode == "off" else 2)
+            if _segment(COMPARE_WORDS[mode], shown_compare(session) == mode):
+                set_compare(session, dispatch, mode)
+            ui.mark(f"viewport.compare.{mode}")
+            imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")
+    else:
+        _draw_compare_box(session, dispatch, ui)
+    imgui.same_line(0, 18 if is_roomy else 8)
+    if imgui.button(f"{Icon.EYE}  Show" if is_roomy else f"{Icon.EYE}##show"):
+        imgui.open_popup("overlays")
+    ui.mark("viewport.overlays")
+    _draw_overlay_menu(session, dispatch, ui)
+    imgui.same_line(0, 8)
+    imgui.begin_disabled(not session.regions.can_mark)
+    if _segment(f"{Icon.REGION}  Mark" if is_roomy else Icon.REGION, ui.regions.is_active):
+        if ui.regions.is_active:
+            ui.regions.leave()
+        else:
+            begin_choosing(session, ui)
+    ui.mark("viewport.mark")
+    imgui.end_disabled()
+    words = session.regions.why_not or "Say of a part of the scene that it is static, or that it moves (M)"
+    if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+        imgui.set_tooltip(words)
+
+
+def _draw_compare_box(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """All ways to compare in one place, where there is no room for buttons."""
+    shown = shown_compare(session)
+    imgui.set_next_item_width(118)
+    if imgui.begin_combo("##compare", "Compare" if shown == "off" else COMPARE_WORDS[shown]):
+        for mode in COMPARE_MODES:
+            if imgui.selectable(COMPARE_WORDS[mode], shown == mode)[0]:
+                set_compare(session, dispatch, mode)
+            ui.mark(f"viewport.compare.{mode}")
+        imgui.end_combo()
+    ui.mark("viewport.compare")
+    imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")
+
+
+def _draw_overlay_menu(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    if not imgui.begin_popup("overlays"):
+        return
+    rows = (
+        ("show_frusta", "Cameras", "1"),
+        ("show_inherited", "Inherited anchors (circles)", "2"),
+        ("show_residual", "Residual anchors (diamonds)", "3"),
+        (cloud_overlay(session), "Point cloud", "4"),
+        ("show_regions", "Marked regions", "5"),
+    )
+    for name, label, key_label in rows:
+        if imgui.menu_item(label, key_label, bool(getattr(session.overlays, name)), True)[0]:
+            dispatch(ToggleOverlay(name))
+        ui.mark(f"show.{name}")
+    imgui.separator()
+    overlays = session.overlays
+    imgui.text_disabled("Anchor marks")
+    imgui.set_next_item_width(150)
+    size = imgui.slider_float("Size", overlays.mark_size * 100.0, 50.0, 300.0, "%.0f %%", MARK_SLIDER)
+    overlays.mark_size = size[1] / 100.0
+    ui.mark("show.mark_size")
+    imgui.set_next_item_width(150)
+    opacity = imgui.slider_float("Opacity", overlays.mark_opacity * 100.0, 10.0, 100.0, "%.0f %%", MARK_SLIDER)
+    overlays.mark_opacity = opacity[1] / 100.0
+    ui.mark("show.mark_opacity")
+    imgui.separator()
+    imgui.text_disabled("Tab hides or shows cameras and anchors")
+    imgui.end_popup()
+
+
+def _segment(label: str, is_on: bool) -> bool:
+    if is_on:
+        imgui.push_style_color(imgui.Col_.button, ImVec4(*theme.faded(theme.SKY, 0.9)))
+        imgui.push_style_color(imgui.Col_.button_hovered, ImVec4(*theme.SKY))
+        imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_ON_ACCENT))
+    is_clicked = imgui.button(f"{label}##compare")
+    if is_on:
+        imgui.pop_style_color(3)
+    return is_clicked
