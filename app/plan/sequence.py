@@ -161,9 +161,10 @@ class SequencePlan:
         parts_of = (id(service), service.catalog.revision, id(kinds.plans) if kinds.plans else 0, own)
         if parts_of != self._parts_of:
             self._parts_of = parts_of
+            settings, config = project.settings, project.settings.config()
             self._parts = [
                 clip_forecast(
-                    kinds.plans.get((is_source(project, clip.clip_index), clip.n_frames)),
+                    kinds.plans.get((is_source(settings, config, clip.clip_index), clip.n_frames)),
                     service.catalog[clip.clip_index],
                     begins_afresh=clip.clip_index in own,
                 )
@@ -215,7 +216,7 @@ def _plans(request: SequenceRequest, timed: StepTime) -> dict[Kind, TrainingPlan
     reference: ClipHeader | None = None if found is None else found.header
     plans: dict[Kind, TrainingPlan] = {}
     for clip in request.clips:
-        begins_with_other = is_source(project, clip.clip_index)
+        begins_with_other = is_source(project.settings, config, clip.clip_index)
         kind = (begins_with_other, clip.n_frames)
         if kind in plans:
             continue

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from app.project.project import Project
+from app.project.project_files import ProjectSettings
 from engine.clip_files.clip_header import SettingValue
 from engine.errors import ProjectError
 from engine.training.config import LENGTH, LOSS, RATES, SETTINGS, TrainConfig, config_of
@@ -22,19 +23,19 @@ _OF_SOURCE = ("source_steps", "max_moving_points", "residual")
 _OF_BOTH = ("ssim_weight", "volume_weight")
 
 
-def is_source(project: Project, clip_index: int) -> bool:
-    """Whether a clip begins with what another one has learned."""
-    config = project.settings.config()
-    if clip_index == project.settings.reference_clip:
+def is_source(settings: ProjectSettings, config: TrainConfig, clip_index: int) -> bool:
+    """Whether a clip begins with what another one has learned. config: That of the settings."""
+    if clip_index == settings.reference_clip:
         return False
     return not config.independent or config.start == "previous"
 
 
 def offered(project: Project, clip_index: int) -> tuple[str, ...]:
     """The main ones of a clip: those that a dialog shows."""
-    if not is_source(project, clip_index):
+    config = project.settings.config()
+    if not is_source(project.settings, config, clip_index):
         return (*_OF_REFERENCE, *_OF_BOTH)
-    shared = ("residual",) if project.settings.config().independent else ()
+    shared = ("residual",) if config.independent else ()
     return tuple(name for name in (*_OF_SOURCE, *_OF_BOTH) if name not in shared)
 
 

@@ -82,11 +82,13 @@ class ShownState:
     Attributes:
         revision: Names the state.
         is_live: Whether it is a snapshot, which its worker replaces and removes as it goes on.
+        reference_file: The clip it is shown with, where that is not the project's reference as it is now.
     """
 
     file: Path
     revision: str
     is_live: bool = False
+    reference_file: Path | None = None
 
 
 class TrainingService:
@@ -249,24 +251,22 @@ class TrainingService:
             ProjectError: The project is read-only.
         """
         self.project.check_writable()
-        due, left_out = set(self.unfinished), []
-        wanted = {index for index in clip_indices if 0 <= index < len(self.clips)}
-        for index in self.catalog.order:  # a clip comes after all that it needs
-            if index not in wanted or self.catalog[index].state == "trained":
-                continue
-            chain, open_ends = [], [index]
+        due, left_out, config = set(self.unfinished), [], self.project.settings.config()
+        rank = {index: place for place, index in enumerate(self.catalog.order)}  # a clip comes after all that it needs
+        coming: set[int | None] = {*self.queue, self.running_clip}
+        for index in sorted({index for index in clip_indices if index in rank}, key=rank.__getitem__):
+            chain, open_ends = set[int](), [index]
             while open_ends:
                 one = open_ends.pop()
-                if self.catalog[one].state == "trained" or one in chain:
-                    continue
-                chain.append(one)
-                open_ends += needed_clips(self.project, one)
+                if self.catalog[one].state != "trained" and one not in chain and one not in coming:
+                    chain.add(one)
+                    open_ends += needed_clips(self.project, one, config)
             if not due.issuperset(chain):
                 left_out.append(index)
                 continue
-            for one in reversed(chain):
-                if one != self.running_clip and one not in self.queue:
-                    self._add(one)
+            for one in sorted(chain, key=rank.__getitem__):
+                self._add(one)
+            coming |= chain
         self._start_next()
         return left_out
 
@@ -286,6 +286,10 @@ class TrainingService:
         self.live_view = mode
         if self.worker is not None:
             self.worker.send(SetSnapshots(mode))
+
+    def drop_hopeless(self) -> list[int]:
+        """Take out of the queue what cannot be trained any more. Returns it."""
+        return drop_hopeless(self.queue, self.running_clip, self.project, self.catalog)
 
     def take_dropped(self) -> list[int]:
         """Clips that left the queue because what they need cannot come, once."""
@@ -436,7 +440,7 @@ class TrainingService:
         if self.is_ending_after and self.queue:
             self.queue.is_held = True
         self.is_ending_after = False
-        self._dropped += drop_hopeless(self.queue, self.project, self.catalog)
+        self._dropped += self.drop_hopeless()
         self._start_next()
 
     # ---------------------------------------------------------------- status
@@ -476,7 +480,7 @@ class TrainingService:
         run, state, step = self._run, self.state, self._step
         clip_index = None if run is None else run.clip_index
         curve_clip = clip_index if self.worker is not None or viewed_clip is None else viewed_clip
-        curves = None if curve_clip is None else self._curves(curve_clip)
+        curves = None if curve_clip is None else self.curves_of(curve_clip)
         rate = step.steps_per_s if step is not None else 0.0
         upcoming = self.next_clip_index
         settings = self.project.settings
@@ -511,7 +515,7 @@ class TrainingService:
             )
         return self._stage.message if self.worker is not None else ""
 
-    def _curves(self, clip_index: int) -> Curves | None:
+    def curves_of(self, clip_index: int) -> Curves | None:
         """Of the training at hand once it has any; otherwise those on disk, None until they are read."""
         run = self._run
         if run is not None and clip_index == run.clip_index:

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from app.project.clip_catalog import ClipCatalog
 from app.project.project import Project
 from engine.clip_files.clip_header import SettingValue
+from engine.training.config import TrainConfig
 
 OwnSettings = Mapping[str, SettingValue]
 """Training settings of one clip that differ from those of its project."""
@@ -85,26 +86,37 @@ class TrainQueue:
         self.n_done = self.steps_done = 0
 
 
-def needed_clips(project: Project, clip_index: int) -> tuple[int, ...]:
-    """Clips that have to be finished before this one can be trained."""
+def needed_clips(project: Project, clip_index: int, config: TrainConfig | None = None) -> tuple[int, ...]:
+    """Clips that have to be finished before this one can be trained.
+
+    Args:
+        config: Settings of the project, for callers that ask for many clips; taken from it when None.
+    """
     settings = project.settings
     if clip_index == settings.reference_clip:
         return ()
-    inherited, config = project.inherited_index(clip_index), settings.config()
+    config = settings.config() if config is None else config
+    inherited = () if config.independent else (settings.reference_clip,)
     goes_on = config.field == "continue" or config.start == "previous"
     before = (project.previous_index(clip_index),) if goes_on else ()
-    return tuple(dict.fromkeys((*(() if inherited is None else (inherited,)), *before)))
+    return tuple(dict.fromkeys((*inherited, *before)))
 
 
-def drop_hopeless(queue: TrainQueue, project: Project, catalog: ClipCatalog) -> list[int]:
-    """Take out the clips that need one which is neither finished nor waits itself. Returns them."""
+def drop_hopeless(queue: TrainQueue, running: int | None, project: Project, catalog: ClipCatalog) -> list[int]:
+    """Take out the clips that need one which is neither finished nor comes before them. Returns them.
+
+    Args:
+        running: The clip that trains.
+    """
     dropped: list[int] = []
-    coming: set[int] = set(queue)
+    come: set[int | None] = {running}
+    config = project.settings.config()
     for clip_index in queue:
-        needed = needed_clips(project, clip_index)
-        if any(other not in coming and catalog[other].state not in ("trained", "stale") for other in needed):
+        needed = needed_clips(project, clip_index, config)
+        if any(other not in come and catalog[other].state not in ("trained", "stale") for other in needed):
             dropped.append(clip_index)
-            coming.discard(clip_index)
+        else:
+            come.add(clip_index)
     for clip_index in dropped:
         queue.remove(clip_index)
     return dropped
