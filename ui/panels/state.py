@@ -12,12 +12,14 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import Command
 from ui.gl.image import Rect as PixelRect
+from ui.panels.curve_view import CurveView
 from ui.style.theme import Fonts
 from ui.style.ui_scale import UiScale
 from ui.viewport.region_tool import RegionTool
 
 VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
-PANELS = (CAPTURE, TRAINING, REGIONS, TIMELINE)
+LOG = "Log"
+PANELS = (CAPTURE, TRAINING, REGIONS, TIMELINE, LOG)
 """Titles of the panels around the picture."""
 Dispatch = Callable[[Command], None]
 """Takes one command of app.session.commands."""
@@ -56,6 +58,8 @@ class UiState:
         scale: How large everything is drawn.
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
         regions: The region that is being chosen, and the one that stands out.
+        curves: What the plots of the training panel show.
+        queue_chosen: The waiting clip that keys move; None without one.
         is_popup_open: Is a menu or another popup open, so that keys belong to it?
         is_menu_wanted: Open the first menu, for the keyboard.
         is_quality_open: Is the plot of quality over the clips folded out?
@@ -68,6 +72,8 @@ class UiState:
     scale: UiScale = field(default_factory=UiScale)
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
+    curves: CurveView = field(default_factory=CurveView)
+    queue_chosen: int | None = None
     wanted_panel: str | None = None
     is_quality_open: bool = False
     is_quality_seen: bool = False

@@ -9,10 +9,11 @@ from typing import Protocol
 from imgui_bundle import ImVec2, imgui
 
 from app.playback.timeline import Timeline
-from app.session.commands import SetFrame, TogglePlay, TrainClip
+from app.session.commands import SetFrame, TogglePlay
 from app.status import ClipStatus, TrainingStatus
 from engine.capture.clip import Clip
 from ui.panels.actions.time import go_to_frame
+from ui.panels.clip_training_menu import ClipMenuNeeds, draw_clip_training
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import text_right
 from ui.style import theme
@@ -41,7 +42,7 @@ STATE_WORDS: dict[str, str] = {
 }
 
 
-class TimelineNeeds(Protocol):
+class TimelineNeeds(ClipMenuNeeds, Protocol):
     """What this panel reads."""
 
     @property
@@ -253,16 +254,7 @@ def _draw_menu(session: TimelineNeeds, dispatch: Dispatch, ui: UiState, track: R
         state = session.clip_states[clip_index].state
         imgui.text_disabled(f"{_clip_title(clip_index, session)}: {STATE_WORDS.get(state, state)}")
         imgui.separator()
-        is_free = session.training.state in ("idle", "failed")
-        reference = session.reference_index
-        has_reference = clip_index == reference or session.clip_states[reference].state == "trained"
-        status = session.clip_states[clip_index]
-        verb = "Train again" if state in ("trained", "damaged") else "Train" if status.resume_step is None else "Resume"
-        if imgui.menu_item(f"{Icon.TRAIN}  {verb} this clip", "", False, is_free and has_reference)[0]:
-            dispatch(TrainClip(clip_index))
-        ui.mark("clip menu.train")
-        if not has_reference:
-            imgui.text_disabled(f"Clip {reference}, the reference, has to be trained first")
+        draw_clip_training(session, dispatch, ui, clip_index)
         if imgui.menu_item(f"{Icon.PLAY}  Go to its first frame", "", False, True)[0]:
             dispatch(SetFrame(session.clips[clip_index].start))
     imgui.end_popup()

@@ -20,9 +20,10 @@ from app.session.window_memory import WindowMemory
 from ui.gl import ImageTexture, free_dropped, n_changes
 from ui.panels.actions.table import handle_keys
 from ui.panels.capture import CaptureNeeds, CapturePanel
+from ui.panels.log import LogNeeds, LogPanel
 from ui.panels.notices import NoticesNeeds, NoticesPanel
 from ui.panels.regions import draw_regions
-from ui.panels.state import CAPTURE, REGIONS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
+from ui.panels.state import CAPTURE, LOG, REGIONS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
 from ui.panels.timeline import TimelineNeeds, draw_timeline
 from ui.panels.training import draw_training
 from ui.panels.viewport import ViewportNeeds, ViewportPanel
@@ -62,6 +63,7 @@ class FrameNeeds(
     QuestionNeeds,
     RememberNeeds,
     NoticesNeeds,
+    LogNeeds,
     Protocol,
 ):
     """Everything that the window and its panels use of a session."""
@@ -117,6 +119,7 @@ class Frame:
         self.viewport = ViewportPanel(Scene(ctx))
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
         self.notices = NoticesPanel()
+        self.log = LogPanel()
         self.dialog = OpenFolderDialog()
         self.questions = QuestionDialogs()
         self._redraw = RedrawPlan()
@@ -130,6 +133,7 @@ class Frame:
         self.remembering.restore_marks(session)
         self._failed_panels: set[str] = set()
         self._floating_panels: set[str] = set()
+        self._in_front: set[str] = set()
         self._dock_ids: dict[str, int] = {}
         self._panels: tuple[tuple[str, Callable[[FrameNeeds, Dispatch, UiState], None], bool], ...] = (
             (VIEWPORT, self.viewport.draw, False),
@@ -137,6 +141,7 @@ class Frame:
             (TRAINING, draw_training, True),
             (REGIONS, draw_regions, True),
             (TIMELINE, draw_timeline, True),
+            (LOG, self.log.draw, True),
         )
 
     # ---- the redraw plan -------------------------------------------------------------------------------------
@@ -231,7 +236,7 @@ class Frame:
         imgui.pop_style_color()
         if ui.is_layout_reset_requested or not is_laid_out(dock_id):
             ui.is_layout_reset_requested = False
-            ui.wanted_panel = TRAINING  # of the two that lie over each other
+            self._in_front = {TRAINING, TIMELINE}  # of those that lie over each other
             lay_out(dock_id)
             self._redraw.request(FIRST_FRAMES)
         self._dock_ids.clear()
@@ -261,8 +266,9 @@ class Frame:
         self.dispatch(OpenCapture(path if path.is_dir() or not path.exists() else path.parent))
 
     def _draw_panel(self, title: str, draw_panel: Callable[..., None], has_padding: bool) -> None:
-        if title == self.ui.wanted_panel:
-            self.ui.wanted_panel = None
+        if title == self.ui.wanted_panel or title in self._in_front:
+            self.ui.wanted_panel = None if title == self.ui.wanted_panel else self.ui.wanted_panel
+            self._in_front.discard(title)
             imgui.set_next_window_focus()
         if not has_padding:
             imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from imgui_bundle import ImVec2, imgui
 
-from ui.panels.state import CAPTURE, REGIONS, TIMELINE, TRAINING, VIEWPORT
+from ui.panels.state import CAPTURE, LOG, REGIONS, TIMELINE, TRAINING, VIEWPORT
 
 SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: (236.0, 0.0), REGIONS: (236.0, 0.0), TIMELINE: (0.0, 140.0)}
 """Width and height of docked panels, units. The timeline has its buttons, ruler and bands at this height."""
@@ -19,7 +19,7 @@ WIDE_UNITS = 1240.0
 
 
 def lay_out(dock_id: int) -> None:
-    """Capture left, training and regions right, timeline below, the picture in the rest."""
+    """Capture left, training and regions right, timeline and log below, the picture in the rest."""
     internal = imgui.internal
     size = imgui.get_main_viewport().work_size
     is_wide = size.x >= WIDE_UNITS
@@ -38,6 +38,7 @@ def lay_out(dock_id: int) -> None:
         (TRAINING, right),
         (REGIONS, right),
         (TIMELINE, bottom),
+        (LOG, bottom),
     ):
         internal.dock_builder_dock_window(title, node_id)
     node = internal.dock_builder_get_node(middle)  # it stays the central node: the one that gives way

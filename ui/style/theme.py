@@ -99,6 +99,9 @@ class Icon:
     ADD = "\u002b"
     CLOCK_BACK = "\uf1da"
     BROKEN = "\uf127"
+    UP = "\uf062"
+    DOWN = "\uf063"
+    LOG = "\uf15c"
 
 
 CLIP_ICONS: dict[str, str] = {

@@ -11,7 +11,7 @@ from typing import Protocol
 
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
-from app.status import Overlays, TrainingStatus, WantedFrame
+from app.status import Overlays, QueueStatus, TrainingStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from ui.panels.actions.key import Key, parse_key
 from ui.panels.regions import RegionsNeeds
@@ -37,6 +37,9 @@ class ActionNeeds(RegionsNeeds, Protocol):
 
     @property
     def training(self) -> TrainingStatus: ...
+
+    @property
+    def queue(self) -> QueueStatus: ...
 
     def wanted_frame(self) -> WantedFrame | None: ...
 
