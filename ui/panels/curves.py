@@ -227,7 +227,7 @@ def _set_axes(limits: tuple[float, float], found: tuple[float, float] | None, he
     width = max(imgui.get_content_region_avail().x - TICK_ROOM, 40.0)
     steps = round_ticks(*limits, max(int(width / TICK_DISTANCE), 2), least=1.0)
     implot.setup_axis_ticks(implot.ImAxis_.x1, *_fitting(steps, limits, width))
-    n_rows = max(int((height - ROW_DISTANCE) / ROW_DISTANCE), 2)
+    n_rows = max(int((height - 0.5 * ROW_DISTANCE) / ROW_DISTANCE), 2)
     if is_log:
         implot.setup_axis_scale(implot.ImAxis_.y1, implot.Scale_.log10)
         values = log_ticks(low, high, n_rows)

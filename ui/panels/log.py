@@ -13,8 +13,8 @@ from ui.panels.state import Dispatch, UiState
 from ui.style import theme
 from ui.style.theme import Icon
 
-LEVEL_CHOICES = (("all", ""), ("warnings", "WARNING"), ("errors", "ERROR"))
-SOURCES = ("all", "program", "training")
+LEVEL_CHOICES = (("every level", ""), ("warnings", "WARNING"), ("errors", "ERROR"))
+SOURCE_CHOICES = (("every source", "all"), ("program", "program"), ("training", "training"))
 _RANK = {"DEBUG": 0, "INFO": 1, "WARNING": 2, "ERROR": 3, "CRITICAL": 4}
 _COLORS = {"WARNING": theme.ORANGE, "ERROR": theme.VERMILLION, "CRITICAL": theme.VERMILLION, "DEBUG": theme.TEXT_DIM}
 _MARKS = {"WARNING": Icon.WARNING, "ERROR": Icon.ERROR, "CRITICAL": Icon.ERROR}
@@ -116,7 +116,7 @@ class LogPanel:
         imgui.same_line()
         self.filter.level = _combo("level", LEVEL_CHOICES, self.filter.level, ui)
         imgui.same_line()
-        self.filter.source = _combo("source", tuple((name, name) for name in SOURCES), self.filter.source, ui)
+        self.filter.source = _combo("source", SOURCE_CHOICES, self.filter.source, ui)
         imgui.same_line()
         if imgui.button(f"{Icon.COPY}##copy"):
             imgui.set_clipboard_text("\n".join(line_text(line) for line in shown))
@@ -131,7 +131,9 @@ class LogPanel:
 
     def _draw_lines(self, shown: Sequence[LogLine]) -> None:
         if not shown:
-            imgui.text_disabled("Nothing was said that fits.")
+            imgui.text_disabled(
+                "Nothing was said that fits." if self.filter != LogFilter() else "Nothing was said yet."
+            )
             return
         clipper = imgui.ListClipper()
         clipper.begin(len(shown))
@@ -150,7 +152,7 @@ class LogPanel:
 
 def _combo(name: str, choices: Sequence[tuple[str, str]], chosen: str, ui: UiState) -> str:
     words = next(word for word, value in choices if value == chosen)
-    imgui.set_next_item_width(104.0)
+    imgui.set_next_item_width(124.0)
     if imgui.begin_combo(f"##{name}", words):
         for word, value in choices:
             if imgui.selectable(word, value == chosen)[0]:

@@ -199,7 +199,6 @@ def _draw_clip_row(session: TrainingNeeds, clip: Clip, status: ClipStatus, dispa
     flags = imgui.SelectableFlags_.span_all_columns | imgui.SelectableFlags_.allow_overlap
     if imgui.selectable("##row", False, flags)[0]:
         dispatch(SetFrame(clip.start))
-    ui.mark(f"training.clip{clip.clip_index}")
     imgui.open_popup_on_item_click("row menu", imgui.PopupFlags_.mouse_button_right)
     if imgui.begin_popup("row menu"):
         imgui.text_disabled(f"Clip {clip.clip_index}")
@@ -211,6 +210,7 @@ def _draw_clip_row(session: TrainingNeeds, clip: Clip, status: ClipStatus, dispa
     icon = theme.CLIP_ICONS.get(status.state, "")
     words: str = STATE_WORDS.get(status.state, str(status.state))
     imgui.text(f"{clip.clip_index}")
+    ui.mark(f"training.clip{clip.clip_index}")
     imgui.same_line(26 + 8 * (clip.clip_index > 99))
     imgui.text_colored(ImVec4(*theme.status_color(status.state)), f"{icon}  {words}" if icon else words)
     note = state_note(status)

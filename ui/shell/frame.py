@@ -133,7 +133,7 @@ class Frame:
         self.remembering.restore_marks(session)
         self._failed_panels: set[str] = set()
         self._floating_panels: set[str] = set()
-        self._in_front: set[str] = set()
+        self._in_front = [TIMELINE]  # a log in front of it would be a surprise
         self._dock_ids: dict[str, int] = {}
         self._panels: tuple[tuple[str, Callable[[FrameNeeds, Dispatch, UiState], None], bool], ...] = (
             (VIEWPORT, self.viewport.draw, False),
@@ -236,9 +236,11 @@ class Frame:
         imgui.pop_style_color()
         if ui.is_layout_reset_requested or not is_laid_out(dock_id):
             ui.is_layout_reset_requested = False
-            self._in_front = {TRAINING, TIMELINE}  # of those that lie over each other
+            self._in_front = [TRAINING, TIMELINE]  # of those that lie over each other; one in each frame
             lay_out(dock_id)
             self._redraw.request(FIRST_FRAMES)
+        elif self._in_front and ui.wanted_panel is None:
+            ui.wanted_panel = self._in_front.pop()
         self._dock_ids.clear()
         for title, draw_panel, has_padding in self._panels:
             self._draw_panel(title, draw_panel, has_padding)
@@ -266,9 +268,8 @@ class Frame:
         self.dispatch(OpenCapture(path if path.is_dir() or not path.exists() else path.parent))
 
     def _draw_panel(self, title: str, draw_panel: Callable[..., None], has_padding: bool) -> None:
-        if title == self.ui.wanted_panel or title in self._in_front:
-            self.ui.wanted_panel = None if title == self.ui.wanted_panel else self.ui.wanted_panel
-            self._in_front.discard(title)
+        if title == self.ui.wanted_panel:
+            self.ui.wanted_panel = None
             imgui.set_next_window_focus()
         if not has_padding:
             imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))

@@ -43,11 +43,14 @@ def round_ticks(low: float, high: float, most: int, *, least: float = 0.0) -> li
     span = high - low
     if not math.isfinite(span) or span <= 0:
         return [low]
-    smallest = max(span / max(most, 1), least)
-    power = 10.0 ** math.floor(math.log10(smallest))
-    step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= smallest * (1 - 1e-9))
-    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    return [number * step for number in range(first, last + 1)]
+    power = math.floor(math.log10(max(span / max(most, 1), least))) - 1
+    while True:  # ends: with a step of more than the span there is one value at most
+        for factor in (1, 2, 5):
+            step = factor * 10.0**power
+            first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+            if step >= least * (1 - 1e-9) and last - first < max(most, 1):
+                return [number * step for number in range(first, last + 1)]
+        power += 1
 
 
 def log_ticks(low: float, high: float, most: int) -> list[float]:
