@@ -221,6 +221,20 @@ class HomeView:
 
 
 @dataclass(frozen=True, slots=True)
+class ShowViews:
+    """Show one, two or four views side by side."""
+
+    n: int
+
+
+@dataclass(frozen=True, slots=True)
+class ActivateView:
+    """Let keys, menus and the toolbar act on another view."""
+
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
 class CloseQuestion:
     """Do nothing of what was asked."""
 
@@ -275,6 +289,8 @@ Command = (
     | SettingCommand
     | EditCommand
     | HomeView
+    | ShowViews
+    | ActivateView
     | CloseQuestion
     | ForgetRecent
     | DismissNotice

@@ -17,6 +17,7 @@ from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArra
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
+from app.playback.views import Views
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.project import Project, check_settings
@@ -61,7 +62,7 @@ class Session:
 
     Attributes:
         opened: What is open; None before.
-        timeline, view, overlays: What the user looks at; the window may change them directly.
+        timeline, views: What the user looks at; the window may change them directly.
         training, queue, clip_states, plan, regions, usage, project_status: Status values, remade by `poll` and
             `dispatch`. The plan is that of the next clip; None while something trains or nothing is left to train.
         versions: What clips were before they were trained again.
@@ -90,7 +91,7 @@ class Session:
         is_preloading: bool = True,
     ) -> None:
         self.opened: OpenedProject | None = None
-        self.timeline, self.view, self.overlays = Timeline(), OrbitView(), Overlays()
+        self.timeline, self.views = Timeline(), Views()
         self.notices = Notices()
         self.question: Question | None = None
         self.training = TrainingStatus()
@@ -158,6 +159,16 @@ class Session:
         return 0 if self.opened is None else self.opened.reference_index
 
     @property
+    def view(self) -> OrbitView:
+        """From where the current view looks."""
+        return self.views.current.view
+
+    @property
+    def overlays(self) -> Overlays:
+        """What the current view shows."""
+        return self.views.current.overlays
+
+    @property
     def jobs(self) -> list[JobStatus]:
         """Short jobs that run."""
         return self._jobs.statuses
@@ -217,6 +228,10 @@ class Session:
                 self._change_settings(command)
             case commands.HomeView():
                 self.view.home()
+            case commands.ShowViews(n=n):
+                self.views.show(n)
+            case commands.ActivateView(index=index):
+                self.views.activate(index)
             case commands.DismissNotice(index=index):
                 self.notices.dismiss(index)
             case _ if isinstance(command, commands.EditCommand):
@@ -262,7 +277,7 @@ class Session:
         self._show(opened)
         self.live_training.open(opened, found.catalog)
         self.versions.open(opened)
-        self.view = OrbitView(opened.rig)
+        self.views.look_at(opened.rig)
         self._keep_recent()
         for sentence in opened.capture.warnings:
             self.notices.add("warn", "The capture is odd but usable", sentence)

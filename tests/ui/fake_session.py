@@ -16,6 +16,7 @@ from app.playback.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
+from app.playback.views import Views
 from app.project.recents import RecentProject
 from app.session import commands
 from app.session.marking import after_marking
@@ -87,7 +88,6 @@ class FakeSession:
         self.commands: list[commands.Command] = []
         self.notices = Notices()
         self.jobs: list[JobStatus] = []
-        self.overlays = Overlays()
         self.recent = FakeRecent(
             entries=[
                 RecentProject("/projects/kitchen-toy", "/captures/kitchen", "kitchen-toy", 2, 3),
@@ -136,10 +136,17 @@ class FakeSession:
         self.clips: list[Clip] = []
         self.clip_states: list[ClipStatus] = []
         self.project = None
-        self.timeline = Timeline()
-        self.view = OrbitView()
+        self.timeline, self.views = Timeline(), Views()
         if has_capture:
             self._open(FakeCapture(make_rig()))
+
+    @property
+    def view(self) -> OrbitView:
+        return self.views.current.view
+
+    @property
+    def overlays(self) -> Overlays:
+        return self.views.current.overlays
 
     def _open(self, capture: FakeCapture) -> None:
         self.capture, self.rig = capture, capture.rig
@@ -147,7 +154,7 @@ class FakeSession:
         self.clip_states = [ClipStatus() for _ in self.clips]
         self.project_status = ProjectStatus("juggling", Path("/projects/juggling"), 1, len(self.clips))
         self.timeline = Timeline(self.clips, fps=capture.fps)
-        self.view = OrbitView(capture.rig)
+        self.views.look_at(capture.rig)
         self.regions = RegionsStatus(can_mark=True, effect="Marks apply to clips whose training starts from now on.")
 
     def dispatch(self, command: commands.Command) -> None:
@@ -169,6 +176,10 @@ class FakeSession:
                 setattr(self.overlays, name, not getattr(self.overlays, name))
             case commands.HomeView():
                 self.view.home()
+            case commands.ShowViews(n=n):
+                self.views.show(n)
+            case commands.ActivateView(index=index):
+                self.views.activate(index)
             case commands.MarkRegion():
                 sphere = sphere_region(command.treat, command.center, command.radius)
                 self._set_regions(after_marking(self.regions.regions, [sphere]))

@@ -174,7 +174,7 @@ def test_compared_pictures_of_different_frames_say_so(
         labels.append(text)
         return x
 
-    monkeypatch.setattr("ui.panels.viewport.chip", note)
+    monkeypatch.setattr("ui.panels.picture_pane.chip", note)
     show_frame(window, 0)
     window.session.dispatch(c.LookThrough(1))
     window.session.dispatch(c.SetCompare(mode))

@@ -75,6 +75,11 @@ class ImageTexture:
         return self._texture
 
     @property
+    def key(self) -> Hashable:
+        """Key of the last picture; None when not known."""
+        return self._key
+
+    @property
     def is_empty(self) -> bool:
         """Was nothing set yet?"""
         return self._texture is None

@@ -8,19 +8,18 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
-from app.playback.arrays import Picture
 from app.playback.orbit_view import OrbitView
 from app.session.commands import LookThrough
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
 from ui.gl.image import ImageTexture
 from ui.panels.state import Dispatch, Rect, UiState
+from ui.panels.thumbnails import ThumbnailNeeds, Thumbnails
 from ui.panels.widgets import elided, pop_bold, push_bold, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.theme import Icon
 
-THUMBNAIL_WIDTH_PX = 160
 ROW_HEIGHT = 50.0
 PICTURE_SIZE = (64.0, 40.0)
 HELD_OUT_WORDS = ("held out", "test")
@@ -46,7 +45,7 @@ class CaptureFacts(Protocol):
     def fps(self) -> float: ...
 
 
-class CaptureNeeds(Protocol):
+class CaptureNeeds(ThumbnailNeeds, Protocol):
     """What this panel reads."""
 
     @property
@@ -61,8 +60,6 @@ class CaptureNeeds(Protocol):
     @property
     def holdout(self) -> tuple[int, ...]: ...
 
-    def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None: ...
-
 
 class CapturePanel:
     """Draws the list; owns the thumbnail textures and nothing else.
@@ -72,19 +69,19 @@ class CapturePanel:
     """
 
     def __init__(self, make_texture: Callable[[], ImageTexture]) -> None:
-        self._make_texture = make_texture
-        self._thumbnails: dict[int, ImageTexture] = {}
+        self._thumbnails = Thumbnails(make_texture)
         self._capture_path: Path | None = None
         self._filter = ""
         self._shown_camera: int | None = None
-        self.is_waiting = False
+
+    @property
+    def is_waiting(self) -> bool:
         """Is a thumbnail of a visible row still to come?"""
+        return self._thumbnails.is_waiting
 
     def release(self) -> None:
         """Free the thumbnails. GL thread only."""
-        for texture in self._thumbnails.values():
-            texture.release()
-        self._thumbnails.clear()
+        self._thumbnails.release()
 
     def draw(self, session: CaptureNeeds, dispatch: Dispatch, ui: UiState) -> None:
         """Summary, then one row per camera."""
@@ -121,8 +118,7 @@ class CapturePanel:
     def _draw_cameras(self, rig: CameraRig, session: CaptureNeeds, dispatch: Dispatch, ui: UiState) -> None:
         held_out = frozenset(session.holdout)
         shown = session.view.look_through
-        has_asked = False
-        self.is_waiting = False
+        self._thumbnails.begin()
         for index, name in enumerate(rig.names):
             imgui.push_id(index)
             top_left = imgui.get_cursor_screen_pos()
@@ -137,50 +133,24 @@ class CapturePanel:
                 imgui.set_scroll_here_y(0.5)
                 self._shown_camera = shown
             if is_visible:
-                has_asked = self._ask_thumbnail(session, index, has_asked, ui)
                 row = Rect(top_left.x, low.y, high.x, high.y)
-                if self._draw_row(ui, row, index, rig, index in held_out, is_shown=shown == index):
+                if self._draw_row(session, ui, row, index, index in held_out, is_shown=shown == index):
                     imgui.set_item_tooltip(name)
             imgui.pop_id()
         if shown is None:
             self._shown_camera = None
 
-    def _ask_thumbnail(self, session: CaptureNeeds, index: int, has_asked: bool, ui: UiState) -> bool:
-        """One missing thumbnail is asked for per frame, so that decoding never crowds out the viewport."""
-        if index in self._thumbnails or has_asked:
-            return has_asked
-        picture = session.ground_truth(index, 0, THUMBNAIL_WIDTH_PX)
-        self.is_waiting = True
-        if picture is not None:
-            texture = self._make_texture()
-            texture.set(picture.image)
-            self._thumbnails[index] = texture
-        ui.redraw_within(0.1)
-        return True
-
     def _draw_row(
-        self, ui: UiState, row: Rect, index: int, rig: CameraRig, is_held_out: bool, *, is_shown: bool
+        self, session: CaptureNeeds, ui: UiState, row: Rect, index: int, is_held_out: bool, *, is_shown: bool
     ) -> bool:
         """Picture, name and size of a camera. Whether its name had to be cut."""
+        assert session.capture is not None
+        rig = session.capture.rig
         draw = imgui.get_window_draw_list()
         if is_shown:
             draw.add_rect_filled(row.low, ImVec2(row.x0 + 3, row.y1), theme.u32(theme.SKY))
         box = Rect(row.x0 + 4, row.y0 + 5, row.x0 + 4 + PICTURE_SIZE[0], row.y0 + 5 + PICTURE_SIZE[1])
-        texture = self._thumbnails.get(index)
-        if texture is None:
-            draw.add_rect_filled(box.low, box.high, theme.u32(theme.BACKDROP), 3)
-            draw.add_text(ImVec2(box.x0 + 24, box.y0 + 12), theme.u32(theme.OUTLINE), Icon.CAMERA)
-        else:
-            low, high = crop_to(texture.size[0] / max(texture.size[1], 1), box.width / box.height)
-            draw.add_image_rounded(
-                imgui.ImTextureRef(texture.texture.glo),
-                box.low,
-                box.high,
-                low,
-                high,
-                theme.u32(theme.rgb(255, 255, 255)),
-                3,
-            )
+        self._thumbnails.draw(session, index, 0, box, ui)
         x, room = box.x1 + 10, row.x1 - box.x1 - 14
         if is_shown:
             push_bold(ui, ui.fonts.body_size)
@@ -201,10 +171,3 @@ class CapturePanel:
             draw.add_rect(tag.low, tag.high, theme.u32(theme.HELD_OUT), 4)
             draw.add_text(ImVec2(tag.x0 + 7, tag.y0 + 1), theme.u32(theme.HELD_OUT), label)
         return name != rig.names[index]
-
-
-def crop_to(image_aspect: float, box_aspect: float) -> tuple[ImVec2, ImVec2]:
-    """Texture corners of the largest centred part of an image that fills a box without stretching."""
-    share_x = min(box_aspect / image_aspect, 1.0)
-    share_y = min(image_aspect / box_aspect, 1.0)
-    return ImVec2(0.5 - share_x / 2, 0.5 - share_y / 2), ImVec2(0.5 + share_x / 2, 0.5 + share_y / 2)

@@ -1,4 +1,4 @@
-"""Where pictures lie in the viewport."""
+"""Where views, and the pictures in each of them, lie in the viewport."""
 
 from __future__ import annotations
 
@@ -33,3 +33,18 @@ def arrange(area: Rect, image_size: tuple[int, int] | None, compare: str) -> Pan
         return Panes(rendered=right, captured=left)
     pane = fit(area, *image_size)
     return Panes(pane, pane if compare == "wipe" else None)
+
+
+VIEW_GAP = 3.0
+"""Between views side by side."""
+
+
+def view_areas(area: Rect, n: int) -> list[Rect]:
+    """One, two or four parts of an area: side by side, or in two rows."""
+    if n == 1:
+        return [area]
+    x, y = area.center
+    half = VIEW_GAP / 2
+    columns = ((area.x0, x - half), (x + half, area.x1))
+    rows = ((area.y0, area.y1),) if n == 2 else ((area.y0, y - half), (y + half, area.y1))
+    return [Rect(x0, y0, x1, y1) for y0, y1 in rows for x0, x1 in columns]

@@ -6,7 +6,8 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.session.commands import LookThrough, ToggleOverlay
+from app.playback.views import COUNTS
+from app.session.commands import LookThrough, ShowViews, ToggleOverlay
 from app.status import COMPARE_MODES
 from ui.panels.actions.action import ActionNeeds
 from ui.panels.actions.compare import cloud_overlay, set_compare, shown_compare
@@ -81,6 +82,24 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None
     words = session.regions.why_not or "Say of a part of the scene that it is static, or that it moves (M)"
     if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
         imgui.set_tooltip(words)
+    _draw_layouts(session, dispatch, ui)
+
+
+def _draw_layouts(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """How many views, at the right end where there is room."""
+    width = imgui.get_frame_height()
+    imgui.same_line()
+    left = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - len(COUNTS) * (width + 2) - 8
+    if left < imgui.get_cursor_pos_x():
+        return
+    imgui.set_cursor_pos_x(left)
+    for n in COUNTS:
+        if _segment(f"{n}##views", session.views.n_shown == n, width):
+            dispatch(ShowViews(n))
+        ui.mark(f"viewport.views{n}")
+        imgui.set_item_tooltip(f"{n} view{'s' if n > 1 else ''} (V)")
+        imgui.same_line(0, 2)
+    imgui.new_line()
 
 
 def _draw_compare_box(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None:
@@ -127,12 +146,12 @@ def _draw_overlay_menu(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -
     imgui.end_popup()
 
 
-def _segment(label: str, is_on: bool) -> bool:
+def _segment(label: str, is_on: bool, width: float = 0.0) -> bool:
     if is_on:
         imgui.push_style_color(imgui.Col_.button, ImVec4(*theme.faded(theme.SKY, 0.9)))
         imgui.push_style_color(imgui.Col_.button_hovered, ImVec4(*theme.SKY))
         imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_ON_ACCENT))
-    is_clicked = imgui.button(f"{label}##compare")
+    is_clicked = imgui.button(f"{label}##segment", ImVec2(width, 0))
     if is_on:
         imgui.pop_style_color(3)
     return is_clicked

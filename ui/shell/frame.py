@@ -116,7 +116,7 @@ class Frame:
         self._on_input = on_input
         self.ui = UiState(fonts=theme.load_fonts(), scale=self.scale)
         theme.apply_style()
-        self.viewport = ViewportPanel(Scene(ctx))
+        self.viewport = ViewportPanel(lambda: Scene(ctx))
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
         self.notices = NoticesPanel()
         self.log = LogPanel()

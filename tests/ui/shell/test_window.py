@@ -280,7 +280,7 @@ def listen_to_tooltips(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         said.append(text)
         show(text)
 
-    monkeypatch.setattr("ui.panels.viewport.imgui.set_tooltip", listen)
+    monkeypatch.setattr("ui.panels.picture_pane.imgui.set_tooltip", listen)
     return said
 
 

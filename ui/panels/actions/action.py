@@ -11,6 +11,7 @@ from typing import Protocol
 
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
+from app.playback.views import Views
 from app.status import Overlays, QueueStatus, TrainingStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from ui.panels.actions.key import Key, parse_key
@@ -28,6 +29,9 @@ class ActionNeeds(RegionsNeeds, Protocol):
 
     @property
     def view(self) -> OrbitView: ...
+
+    @property
+    def views(self) -> Views: ...
 
     @property
     def overlays(self) -> Overlays: ...

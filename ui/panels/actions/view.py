@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from app.session.commands import HomeView, LookThrough
+from app.playback.views import COUNTS
+from app.session.commands import ActivateView, HomeView, LookThrough, ShowViews
 from engine.camera.projection import camera_center
 from ui.panels.actions.action import VIEW, Action, ActionNeeds, Run
 from ui.panels.state import Dispatch, UiState
@@ -36,8 +39,33 @@ def nearest_camera(session: ActionNeeds) -> int:
     return int(np.argmin(distances / spread + turns))
 
 
+def _show_views(n: int) -> Run:
+    def show(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        dispatch(ShowViews(n))
+
+    return show
+
+
+def _shows(n: int) -> Callable[[ActionNeeds], bool]:
+    return lambda session: session.views.n_shown == n
+
+
+def next_layout(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """From one view to two, to four, and back to one."""
+    dispatch(ShowViews(COUNTS[(COUNTS.index(session.views.n_shown) + 1) % len(COUNTS)]))
+
+
+def _next_view(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(ActivateView((session.views.active_index + 1) % session.views.n_shown))
+
+
 ACTIONS = (
     Action("view.home", "Frame the whole scene", VIEW, _home, keys=("F",)),
     Action("view.previous_camera", "Look through the previous camera", VIEW, _camera_by(-1), keys=("[",), repeats=True),
     Action("view.next_camera", "Look through the next camera", VIEW, _camera_by(1), keys=("]",), repeats=True),
+    Action("view.one", "One view", VIEW, _show_views(1), is_on=_shows(1)),
+    Action("view.two", "Two views side by side", VIEW, _show_views(2), is_on=_shows(2)),
+    Action("view.four", "Four views", VIEW, _show_views(4), is_on=_shows(4)),
+    Action("view.next_layout", "One, two or four views", VIEW, next_layout, keys=("V",)),
+    Action("view.next_view", "Let keys act on the next view", VIEW, _next_view, keys=("Shift+V",)),
 )

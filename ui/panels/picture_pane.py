@@ -1,0 +1,224 @@
+"""One picture of the scene, from the place of one view: render, captured picture, marks, pointer and HUD.
+
+What is drawn off screen, and when, is ui.viewport.scene's business.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from imgui_bundle import ImVec2, imgui
+
+from ui.panels.actions.action import ActionNeeds
+from ui.panels.hud import Hud, HudNeeds
+from ui.panels.panes import Panes, arrange
+from ui.panels.pointer import MOVING_S, Pointer
+from ui.panels.regions import draw_chosen_sphere
+from ui.panels.state import Dispatch, Rect, UiState
+from ui.panels.widgets import chip
+from ui.style import theme
+from ui.viewport.hud_text import captured_words, pane_text
+from ui.viewport.region_layer import ShownRegions
+from ui.viewport.scene import Scene, SceneNeeds, SceneView
+
+TOOLTIP_AWAY = 22.0
+
+
+class PictureNeeds(SceneNeeds, HudNeeds, ActionNeeds, Protocol):
+    """What the picture, and everything that lies over it, is made from."""
+
+
+class PicturePane:
+    """Owns the GL objects of one view and the drag in progress there."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.pointer = Pointer()
+        self.hud = Hud()
+        self._aimed_at = (0.0, 0.0)
+        self._captured_frame: int | None = None
+
+    def release(self) -> None:
+        """Free GL objects. GL thread only."""
+        self.scene.release()
+
+    def shows_playhead(self, session: PictureNeeds) -> bool:
+        """Is the frame under the playhead on screen, in every picture that is compared?"""
+        wanted = session.wanted_frame()
+        return wanted is None or (self.scene.shown.is_of(wanted) and self._captured_frame in (None, wanted.frame_index))
+
+    def draw(
+        self, session: PictureNeeds, dispatch: Dispatch, ui: UiState, area: Rect, *, is_active: bool = True
+    ) -> bool:
+        """Draw into an area of the window, and take up what the pointer did there.
+
+        Args:
+            session: Its current view is the one to draw.
+            is_active: Whether keys act on this view; what is being chosen is chosen here.
+        Returns:
+            Whether it was pressed, or the wheel turned over it.
+        """
+        imgui.set_cursor_screen_pos(area.low)
+        buttons = imgui.ButtonFlags_
+        flags = buttons.mouse_button_left | buttons.mouse_button_right | buttons.mouse_button_middle
+        imgui.invisible_button("canvas", ImVec2(area.width, area.height), flags)
+        is_used = imgui.is_item_activated() or (imgui.is_item_hovered() and imgui.get_io().mouse_wheel != 0.0)
+        if is_active:
+            ui.mark_rect("viewport.canvas", area)
+        shown = session.view.look_through
+        image_size = None
+        if shown is not None:
+            width, height = session.rig.image_sizes[shown]
+            image_size = (int(width), int(height))
+        panes = arrange(area, image_size, session.overlays.compare)
+        self.pointer.navigate(session, dispatch, ui, panes)
+        # Looking through a camera may just have ended; the picture then fills the area from the next frame on.
+        self._draw_picture(session, dispatch, ui, area, panes, is_active=is_active)
+        self.hud.draw(session, ui, area, self.scene)
+        if ui.regions.is_active and is_active:
+            top = panes.captured.y0 + 44 if panes.captured is not None else area.y0 + 12  # below what names the pane
+            free = Rect(area.x0 + 12, top, area.x1, area.y1)
+            draw_chosen_sphere(ui, imgui.get_window_draw_list(), free, self.scene.regions.counts)
+        return is_used
+
+    # ---- picture ---------------------------------------------------------------------------------------------
+
+    def _draw_picture(
+        self, session: PictureNeeds, dispatch: Dispatch, ui: UiState, area: Rect, panes: Panes, *, is_active: bool
+    ) -> None:
+        draw = imgui.get_window_draw_list()
+        draw.push_clip_rect(area.low, area.high, True)
+        pane = panes.rendered
+        if pane != area:  # the backdrop shows; where the picture covers everything it would only cost time
+            draw.add_rect_filled(area.low, area.high, theme.u32(theme.VOID))
+        if is_active:
+            ui.mark_rect("viewport.rendered", pane)
+        density = imgui.get_io().display_framebuffer_scale.x
+        size = (max(round(pane.width * density), 16), max(round(pane.height * density), 16))
+        view = SceneView(
+            world_to_camera=session.view.world_to_camera(),
+            K=session.view.K(*size),
+            width=size[0],
+            height=size[1],
+            is_moving=self.pointer.is_moving,
+        )
+        self.scene.marks.pixels_per_unit = density
+        self._point_at_camera(session, ui, view, pane, density)
+        if is_active:
+            self._aim(session, ui, view, pane, density)
+            command = ui.regions.take_accepted()
+            if command is not None:
+                dispatch(command)
+        tool, shown = ui.regions, ShownRegions(sphere=ui.regions.sphere)
+        if session.overlays.show_regions:
+            shown = ShownRegions(session.regions.regions, tool.highlighted, tool.sphere)
+        composed = self.scene.compose(session, view, shown)
+        draw.add_image(imgui.ImTextureRef(composed.texture.glo), pane.low, pane.high)
+        if self.pointer.is_moving:
+            ui.redraw_within(MOVING_S)
+        elif imgui.is_item_hovered() and self.pointer.drag is None and not tool.is_active:
+            camera = self.scene.marks.pointed_camera
+            if camera is not None:
+                is_held_out = " (held out)" if camera in session.holdout else ""
+                _tooltip_beside(f"Camera {session.rig.names[camera]}{is_held_out}\nClick to look through it", area)
+            else:
+                text = self.scene.anchor_text(session, view, *_pixels(pane, density))
+                if text:
+                    _tooltip_beside(text, area)
+        else:
+            self.scene.marks.pointed_anchor = None
+        self._captured_frame = None
+        if panes.captured is not None:
+            self._draw_captured(session, draw, panes)
+        draw.pop_clip_rect()
+
+    def _point_at_camera(self, session: PictureNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
+        """The camera under the pointer stands out; one that was pressed is remembered for the click."""
+        is_free = imgui.is_item_hovered() and not ui.regions.is_active
+        is_pressing = imgui.is_item_activated() and self.pointer.button == imgui.MouseButton_.left
+        marks = self.scene.marks
+        if is_free and (is_pressing or (self.pointer.drag is None and not self.pointer.is_moving)):
+            marks.pointed_camera = marks.camera_under(session, view, *_pixels(pane, density))
+        elif self.pointer.pressed_camera is None:
+            marks.pointed_camera = None
+        if imgui.is_item_activated():
+            self.pointer.pressed_camera = marks.pointed_camera if is_pressing and self.pointer.drag == "view" else None
+        if marks.pointed_camera is not None:
+            marks.pointed_anchor = None
+            imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
+
+    def _aim(self, session: PictureNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
+        """Lead the sphere that is being chosen: to the middle at first, then by the pointer, until a click fixes it."""
+        tool, pointer = ui.regions, imgui.get_io().mouse_pos
+        is_click = self.pointer.take_click()
+        if not tool.is_active:
+            return
+        at = (pointer.x, pointer.y)
+        is_over = imgui.is_item_hovered() and pane.contains(*at)
+        is_led = is_over and not tool.is_placed and self.pointer.drag is None and at != self._aimed_at
+        if tool.center is not None and not is_led and not (is_over and is_click):
+            return
+        self._aimed_at = at
+        x, y = at if is_over else pane.center
+        away = session.view.pivot if tool.center is None else tool.center
+        depth = max(float(np.linalg.norm(away - view.eye)), 1e-6)
+        pixels = ((x - pane.x0) * density, (y - pane.y0) * density)
+        tool.place(self.scene.point_under(session, view, *pixels, depth), eye=view.eye)
+        tool.is_placed |= is_click
+
+    def _draw_captured(self, session: PictureNeeds, draw: imgui.ImDrawList, panes: Panes) -> None:
+        area = panes.captured
+        assert area is not None
+        captured = self.scene.captured(session, round(area.width))
+        shown = self.scene.shown
+        self._captured_frame = None if captured is None else captured.frame_index
+        frames = (None if captured is None else captured.frame_index, shown.source.frame_index)
+        words = (
+            "Captured picture is being read"
+            if captured is None
+            else pane_text(captured_words(captured.has_scene_colors), *frames)
+        )
+        rendered_words = pane_text(shown.kind, *frames[::-1])
+        color = theme.YELLOW if None not in frames and frames[0] != frames[1] else theme.TEXT
+        if session.overlays.compare == "side":
+            if captured is not None:
+                draw.add_image(imgui.ImTextureRef(captured.texture.glo), area.low, area.high)
+            chip(draw, area.x0 + 10, area.y0 + 10, words, color=color)
+            chip(draw, panes.rendered.x0 + 10, panes.rendered.y0 + 10, rendered_words, color=color)
+            return
+        share = session.overlays.wipe_position
+        x = area.x0 + area.width * share
+        if captured is not None:
+            draw.add_image(
+                imgui.ImTextureRef(captured.texture.glo), area.low, ImVec2(x, area.y1), ImVec2(0, 0), ImVec2(share, 1)
+            )
+        white = theme.u32(theme.PLAYHEAD)
+        draw.add_line_v(x, area.y0, area.y1, white, 2)
+        middle = area.center[1]
+        draw.add_circle_filled(ImVec2(x, middle), 9, white)
+        dark = theme.u32(theme.VOID)
+        draw.add_triangle_filled(ImVec2(x - 6, middle), ImVec2(x - 2, middle - 4), ImVec2(x - 2, middle + 4), dark)
+        draw.add_triangle_filled(ImVec2(x + 6, middle), ImVec2(x + 2, middle + 4), ImVec2(x + 2, middle - 4), dark)
+        if share > 0.15:
+            chip(draw, area.x0 + 10, area.y0 + 10, words, color=color)
+        if share < 0.85:
+            chip(draw, area.x1 - 10, area.y0 + 10, rendered_words, color=color, is_right=True)
+
+
+def _pixels(pane: Rect, density: float) -> tuple[float, float]:
+    """Where the pointer is, in pixels of the picture in a pane."""
+    pointer = imgui.get_io().mouse_pos
+    return (pointer.x - pane.x0) * density, (pointer.y - pane.y0) * density
+
+
+def _tooltip_beside(text: str, area: Rect) -> None:
+    """A tooltip that does not cover what is pointed at: away from the pointer, on the side where there is room."""
+    pointer = imgui.get_io().mouse_pos
+    is_left, is_above = pointer.x > area.center[0], pointer.y > area.center[1]
+    x = pointer.x + (-TOOLTIP_AWAY if is_left else TOOLTIP_AWAY)
+    y = pointer.y + (-TOOLTIP_AWAY if is_above else TOOLTIP_AWAY)
+    imgui.set_next_window_pos(
+        ImVec2(x, y), imgui.Cond_.always, ImVec2(1.0 if is_left else 0.0, 1.0 if is_above else 0.0)
+    )
+    imgui.set_tooltip(text)
