@@ -44,6 +44,8 @@ logger = logging.getLogger(__name__)
 
 FIRST_FRAMES = 6
 """A new layout: docked panels get their tabs, then their sizes, then they lose scrollbars that are not needed."""
+FRAMES_TO_DOCK = 2
+"""Until all panels of a kept layout have their tabs; the one that got its tab last is in front."""
 TRAINING_REFRESH_S = 0.2
 """Often enough for numbers that nobody waits for; each frame is taken from the training where the CPU draws."""
 ATTENDED_S = 0.5
@@ -239,7 +241,7 @@ class Frame:
             self._in_front = [TRAINING, TIMELINE]  # of those that lie over each other; one in each frame
             lay_out(dock_id)
             self._redraw.request(FIRST_FRAMES)
-        elif self._in_front and ui.wanted_panel is None:
+        elif self._in_front and ui.wanted_panel is None and imgui.get_frame_count() > FRAMES_TO_DOCK:
             ui.wanted_panel = self._in_front.pop()
         self._dock_ids.clear()
         for title, draw_panel, has_padding in self._panels:
