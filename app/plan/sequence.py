@@ -215,7 +215,8 @@ def _plans(request: SequenceRequest, timed: StepTime) -> dict[Kind, TrainingPlan
     found = project.headers.read(project.reference_path)
     reference: ClipHeader | None = None if found is None else found.header
     plans: dict[Kind, TrainingPlan] = {}
-    for clip in request.clips:
+    # a clip says nothing of itself: one that is not finished can stand for those that are
+    for clip in sorted(request.clips, key=lambda clip: request.catalog[clip.clip_index].state == "trained"):
         begins_with_other = is_source(project.settings, config, clip.clip_index)
         kind = (begins_with_other, clip.n_frames)
         if kind in plans:

@@ -97,8 +97,11 @@ def draw_curves(session: CurveNeeds, ui: UiState) -> None:
     height = min(max((imgui.get_content_region_avail().y - ROOM_BELOW) / 2, LOWEST), HIGHEST)
     pointer_step, view.pointer_step = view.pointer_step, None
     of_clip = f" of clip {shown[0]}" if len(shown) == 1 else ""
+    is_aligned = implot.begin_aligned_plots("curves")  # the same step stands over itself
     _draw_plot(f"Held-out PSNR{of_clip}, dB", "psnr", psnr, last, pointer_step, height, ui, is_log=False, digits=2)
     _draw_plot(f"Loss{of_clip}", "loss", loss, last, pointer_step, height, ui, is_log=view.is_log, digits=4)
+    if is_aligned:
+        implot.end_aligned_plots()
     if view.pointer_step != pointer_step:
         ui.redraw_within(0.0)  # the other plot shows it, too
 
