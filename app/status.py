@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+
+import numpy as np
 
 from engine.gate.regions import GateRegion
 
@@ -21,6 +23,10 @@ class Overlays:
         show_cloud: The point cloud in place of the picture of a trained clip.
         compare: "off", "wipe" or "side": the captured picture over or beside the rendered one.
         wipe_position: Share of the width that shows the captured picture, 0..1.
+        mode, content: What colours mean and which part of a clip is drawn, by name; see app.playback.view_modes.
+        heat: Name of the residual heat map over the picture, see app.residuals.heat_map.HEAT_KINDS; empty for none.
+            Where no camera is looked through, the residual of each anchor is shown in its place.
+        heat_opacity: Of the heat map, 0..1.
         mark_size: Of anchor marks, 1 as designed.
         mark_opacity: Of anchor marks that nothing hides, 0..1.
     """
@@ -33,6 +39,10 @@ class Overlays:
     show_regions: bool = True
     compare: str = "off"
     wipe_position: float = 0.5
+    mode: str = "color"
+    content: str = "all"
+    heat: str = ""
+    heat_opacity: float = 0.75
     mark_size: float = 1.0
     mark_opacity: float = 0.9
 
@@ -46,6 +56,7 @@ class WantedFrame:
         revision: The state of the clip that is to be shown; empty where none can be: it is not trained.
         camera_index: The capture camera looked through; None for a free view.
         look: From where and through which lens; see OrbitView.look_key.
+        shown_as: What colours mean and which part of the clip is drawn, in words; empty for the scene as it is.
         is_loaded: Whether the clip is in memory, so that only its frame has to be made.
         has_failed: Whether the frame or its picture could not be made, so that it is not on its way.
     """
@@ -55,6 +66,7 @@ class WantedFrame:
     revision: str = ""
     camera_index: int | None = None
     look: Hashable = None
+    shown_as: str = ""
     is_loaded: bool = False
     has_failed: bool = False
 
@@ -331,3 +343,96 @@ class JobStatus:
     name: str
     done: float = 0.0
     message: str = ""
+
+
+CELL_COLUMNS = ("psnr", "flip", "E")
+"""Figures of single pictures: PSNR in dB, mean FLIP, and mean excess flicker against the frame before in 1/255."""
+CELL_RANGES = {"psnr": (20.0, 40.0), "flip": (0.0, 0.3), "E": (0.0, 2.0)}
+"""What the colours of cells span, one range for all projects. PSNR: below 20 dB a picture is plainly wrong, above 40 dB
+nobody sees a difference. FLIP: trained clips lie around 0.1, and 0.3 is bad everywhere. E: trained clips lie around 0.3
+levels of a display, mostly where something moves; two on average are plain flicker."""
+LOW_IS_BAD = frozenset({"psnr"})
+"""Columns in which higher figures are better."""
+SEAM_RANGE = (0.0, 1.0)
+"""What the colours of seam scores span, 1/255, one range for all projects. Where everything is inherited scores are
+0.01 to 0.1; with heads of their own clips are 0.4 to 0.8 apart, and independent ones 1.4 and more."""
+SEAM_FLAGGED = 0.3
+"""Scores above it are pointed out."""
+SEAM_RATIO_RANGE = (1.0, 3.0)
+"""What the colours of seam ratios span: 1 is no seam; inheriting clips have 1.0 to 1.4, others 10 and more."""
+SEAM_RATIO_FLAGGED = 2.0
+"""Ratios above it are pointed out."""
+
+
+@dataclass(frozen=True, slots=True)
+class SeamStatus:
+    """The boundary between two clips.
+
+    Attributes:
+        clip_index: The later clip.
+        frame_index: Its first frame.
+        score: Excess flicker of static pixels there, less what is normal inside the two clips, in 1/255, a mean over
+            cameras: see engine.metrics.clips.seams. None where no camera was measured in both clips.
+        ratio: Change of static pixels there / inside the two clips, over all cameras; 1 is no seam. None where nothing
+            changes inside, or nothing was measured.
+        n_cameras: Cameras behind the score.
+        worst_camera: The camera with the highest score; None without one.
+    """
+
+    clip_index: int
+    frame_index: int
+    score: float | None = None
+    ratio: float | None = None
+    n_cameras: int = 0
+    worst_camera: int | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResidualStatus:
+    """What is measured of every picture of the project.
+
+    Attributes:
+        seams: One per boundary between clips, in order.
+        cells: By column of CELL_COLUMNS: figures by frame and camera, NaN where not measured. [F, C] float32, not to be
+            changed
+        is_held_out: Of each camera.
+        n_done, n_all: Pictures that are measured, and all of trained clips.
+        is_measuring: Whether more are being measured now.
+        is_held_back: Whether that goes on slowly only, because a clip trains.
+        rate: Pictures per second; 0 when unknown.
+        eta_s: Seconds until all are measured; None when unknown.
+        message: What went wrong, in sentences; empty when nothing did.
+        revision: Grows with every change of the figures.
+    """
+
+    seams: tuple[SeamStatus, ...] = ()
+    cells: Mapping[str, np.ndarray] = field(default_factory=dict)
+    is_held_out: tuple[bool, ...] = ()
+    n_done: int = 0
+    n_all: int = 0
+    is_measuring: bool = False
+    is_held_back: bool = False
+    rate: float = 0.0
+    eta_s: float | None = None
+    message: str = ""
+    revision: int = 0
+
+    def worst(self, column: str, n_worst: int) -> list[tuple[float, int, int]]:
+        """The worst figures of a column: (value, frame_index, camera_index), worst first; only what is measured.
+
+        Raises:
+            ValueError: There is no such column.
+        """
+        if column not in CELL_COLUMNS:
+            raise ValueError(f"columns are {', '.join(CELL_COLUMNS)}, not {column!r}")
+        values = self.cells.get(column)
+        if values is None or n_worst <= 0:
+            return []
+        known = np.flatnonzero(np.isfinite(values))
+        ranked = values.ravel()[known] * (1.0 if column in LOW_IS_BAD else -1.0)
+        if len(known) > n_worst:
+            known = known[np.argpartition(ranked, n_worst - 1)[:n_worst]]
+            ranked = values.ravel()[known] * (1.0 if column in LOW_IS_BAD else -1.0)
+        found = known[np.lexsort((known, ranked))]
+        frames, cameras = np.divmod(found, values.shape[1])
+        return [(float(values[f, c]), int(f), int(c)) for f, c in zip(frames, cameras, strict=True)]

@@ -1,10 +1,14 @@
-"""LatestWorker: one thread that always works on the newest request. Older requests that did not start are dropped."""
+"""LatestWorker: one thread that always works on the newest request. Older requests that did not start are dropped.
+
+Requests come in lanes, one for each place where a result is shown: the newest of every lane is worked on, lanes in
+turn, the active one first. When nothing is asked, the thread works on what will probably be asked next.
+"""
 
 from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from typing import Generic, TypeVar
 
 from app.background.priority import lower_thread
@@ -12,16 +16,20 @@ from app.background.priority import lower_thread
 Request = TypeVar("Request", bound=Hashable)
 Result = TypeVar("Result")
 logger = logging.getLogger(__name__)
+MAX_FAILED = 64
 
 
 class LatestWorker(Generic[Request, Result]):
     """Computes results off the calling thread; the newest request wins. The thread starts with the first request.
 
+    Attributes:
+        active_lane: Its requests come first; others get every second turn.
+
     Args:
         name: Of the thread, for logs.
         compute: Called on the thread. What it raises is kept and handed to `take_error`.
         prepare: Called once on the thread before the first request.
-        on_done: Called on the thread after each result, to wake somebody up. Must not block.
+        on_done: Called on the thread after each result that was asked for, to wake somebody up. Must not block.
     """
 
     def __init__(
@@ -34,31 +42,52 @@ class LatestWorker(Generic[Request, Result]):
     ) -> None:
         self._name, self._compute, self._prepare, self._on_done = name, compute, prepare, on_done
         self._condition = threading.Condition()
-        self._pending: list[Request] = []  # zero or one
+        self._pending: dict[Hashable, Request] = {}  # at most one a lane, those asked first in front
+        self._planned: list[Request] = []
         self._running: list[Request] = []  # zero or one
+        self._lane: Hashable = None  # of what runs; None where that was planned
         self._finished: tuple[Request, Result] | None = None
+        self._finished_in: dict[Hashable, tuple[Request, Result]] = {}
         self._error: tuple[Request, Exception] | None = None
-        self._failed: list[Request] = []  # zero or one
+        self._failed: dict[Hashable, Request] = {}  # at most one a lane
+        self._failed_ahead: list[Request] = []
         self._generation = 0
         self._running_generation = 0
+        self._n_ahead = 0
+        self._last_lane: Hashable = None
         self._is_closed = False
         self._thread: threading.Thread | None = None
+        self.active_lane: Hashable = 0
 
-    def request(self, request: Request) -> None:
+    def request(self, request: Request, *, lane: Hashable = 0) -> None:
         """Ask for a result. Never blocks for long.
 
         The same request again changes nothing while it waits or runs, nor after it failed: asking at every frame
         must not try in vain at every frame.
         """
         with self._condition:
-            if self._is_closed or request in self._pending or request in self._failed:
+            if self._is_closed or self._pending.get(lane) == request or self._failed.get(lane) == request:
                 return
-            is_running = request in self._running and self._running_generation == self._generation
-            if not self._pending and is_running:
+            if request in self._running and self._running_generation == self._generation:
+                self._pending.pop(lane, None)
+                if self._lane is None:  # it was planned; now somebody waits for it
+                    self._lane = lane
                 return
-            self._pending = [request]
+            self._pending[lane] = request  # in its lane's place, so that no lane waits for ever
             self._start_thread()
             self._condition.notify_all()
+
+    def plan(self, requests: Sequence[Request]) -> None:
+        """What to work on, in this order, while nothing is asked; takes the place of what was planned before.
+
+        Results are what `compute` keeps of them: they are not `newest`, and nobody is woken up. What fails is not tried
+        again before it is asked for.
+        """
+        with self._condition:
+            self._planned = [] if self._is_closed else [one for one in requests if one not in self._failed_ahead]
+            if self._planned:
+                self._start_thread()
+                self._condition.notify_all()
 
     def start(self) -> None:
         """Start the thread and prepare it now, rather than with the first request."""
@@ -73,8 +102,18 @@ class LatestWorker(Generic[Request, Result]):
 
     @property
     def newest(self) -> tuple[Request, Result] | None:
-        """The result finished last, with its request; None before the first."""
+        """The result finished last of those asked for, with its request; None before the first."""
         return self._finished
+
+    def newest_in(self, lane: Hashable) -> tuple[Request, Result] | None:
+        """The same for one lane."""
+        with self._condition:
+            return self._finished_in.get(lane)
+
+    @property
+    def n_ahead(self) -> int:
+        """How many planned results were finished so far."""
+        return self._n_ahead
 
     @property
     def is_still_wanted(self) -> bool:
@@ -82,43 +121,51 @@ class LatestWorker(Generic[Request, Result]):
         return self._running_generation == self._generation
 
     def forget(self) -> None:
-        """Drop the last result, what waits, and what comes of the request that runs."""
+        """Drop the last result, what waits or is planned, and what comes of the request that runs."""
         with self._condition:
             self._generation += 1
-            self._pending, self._failed = [], []
-            self._finished = None
+            self._pending, self._failed, self._planned, self._failed_ahead = {}, {}, [], []
+            self._finished, self._finished_in = None, {}
             self._error = None
 
     def has_failed(self, request: Request) -> bool:
         """Whether this request failed, so that nothing will come of it."""
         with self._condition:
-            return request in self._failed
+            return request in self._failed.values()
 
     def take_error(self) -> tuple[Request, Exception] | None:
-        """The last failure, once."""
+        """The last failure of something asked for, once."""
         with self._condition:
             error, self._error = self._error, None
             return error
 
     @property
     def is_busy(self) -> bool:
-        """Whether a request waits or runs."""
+        """Whether something that was asked for waits or runs."""
         with self._condition:
-            return bool(self._pending or self._running)
+            return bool(self._pending or (self._running and self._lane is not None))
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing waits, runs or is planned."""
+        with self._condition:
+            return not (self._pending or self._running or self._planned)
 
     def wait_idle(self, timeout_s: float) -> bool:
-        """Block until nothing waits or runs; for tests and headless use. False when the time is up."""
+        """Block until nothing waits, runs or is planned; for tests and headless use. False when the time is up."""
         with self._condition:
-            return self._condition.wait_for(lambda: not (self._pending or self._running), timeout_s)
+            return self._condition.wait_for(lambda: not (self._pending or self._running or self._planned), timeout_s)
 
     def close(self, timeout_s: float = 2.0) -> None:
         """Stop after the running request; later requests are ignored."""
         with self._condition:
             self._is_closed = True
-            self._pending = []
+            self._pending, self._planned = {}, []
             self._condition.notify_all()
         if self._thread is not None and self._thread is not threading.current_thread():
             self._thread.join(timeout_s)
+
+    # ---------------------------------------------------------------- on the thread
 
     def _prepare_thread(self) -> None:
         if self._prepare is None:
@@ -128,31 +175,48 @@ class LatestWorker(Generic[Request, Result]):
         except Exception:  # the edge of a job: requests will fail by themselves and say why
             logger.warning("%s could not be prepared", self._name, exc_info=True)
 
+    def _take(self) -> tuple[Hashable, Request]:
+        """What to work on now and its lane, None where it was planned. There is something."""
+        if not self._pending:
+            return None, self._planned.pop(0)
+        lanes = [lane for lane in self._pending if lane != self.active_lane]
+        is_turn = self.active_lane in self._pending and (self._last_lane != self.active_lane or not lanes)
+        lane = self._last_lane = self.active_lane if is_turn else lanes[0]
+        return lane, self._pending.pop(lane)
+
     def _run(self) -> None:
         lower_thread()
         self._prepare_thread()
         while True:
             with self._condition:
-                self._condition.wait_for(lambda: self._pending or self._is_closed)
+                self._condition.wait_for(lambda: self._pending or self._planned or self._is_closed)
                 if self._is_closed:
                     return
-                self._running, self._pending = self._pending, []
+                self._lane, request = self._take()
+                self._running = [request]
                 self._running_generation = self._generation
-            request = self._running[0]
             try:
                 outcome = (request, self._compute(request))
                 error = None
             except Exception as raised:
                 outcome, error = None, raised
                 logger.debug("%s failed", self._name, exc_info=True)
-            with self._condition:
-                self._running = []
-                is_wanted = self._running_generation == self._generation
-                if outcome is not None and is_wanted:
-                    self._finished = outcome
-                if error is not None and is_wanted:
-                    self._error = (request, error)
-                    self._failed = [request]
-                self._condition.notify_all()
-            if self._on_done is not None:
+            if self._take_up(request, outcome, error) and self._on_done is not None:
                 self._on_done()
+
+    def _take_up(self, request: Request, outcome: tuple[Request, Result] | None, error: Exception | None) -> bool:
+        """Whether somebody asked for it."""
+        with self._condition:
+            lane, self._running = self._lane, []
+            is_wanted = self._running_generation == self._generation
+            if is_wanted and lane is None:
+                self._n_ahead += 1
+                if error is not None:
+                    self._failed_ahead = [*self._failed_ahead, request][-MAX_FAILED:]
+            elif is_wanted and outcome is not None:
+                self._finished = self._finished_in[lane] = outcome
+            elif is_wanted and error is not None:
+                self._failed[lane] = request
+                self._error = (request, error)
+            self._condition.notify_all()
+            return lane is not None

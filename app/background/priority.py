@@ -16,6 +16,10 @@ WORKER_NICENESS = 10
 """Of processes that compute in the background."""
 
 
+IDLE_NICENESS = 19
+"""Of processes whose work can wait for as long as anything else wants to compute."""
+
+
 def lower_thread(niceness: int = THREAD_NICENESS) -> None:
     """Make the calling thread nicer than the rest of its process. Only Linux can; elsewhere nothing happens."""
     if sys.platform.startswith("linux"):
@@ -31,3 +35,13 @@ def lower_process(niceness: int = WORKER_NICENESS) -> None:
     if hasattr(os, "SCHED_BATCH"):  # it never interrupts the window in the middle of a frame when it wakes up
         with suppress(OSError):
             os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+
+
+def idle_process() -> None:
+    """Give the calling process, with all threads it starts from now on, only what nobody else computes with."""
+    if hasattr(os, "nice"):
+        with suppress(OSError):
+            os.nice(IDLE_NICENESS)
+    if hasattr(os, "SCHED_IDLE"):
+        with suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))

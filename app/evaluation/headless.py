@@ -217,15 +217,17 @@ class TrainedProject:
         return TrainedClip(self.clips[clip_index], model, base, state.drift)
 
 
-def open_trained(project: Project) -> TrainedProject:
+def open_trained(project: Project, capture: Capture | None = None) -> TrainedProject:
     """Open what a project was trained on.
 
+    Args:
+        capture: Its capture where that is open already.
     Raises:
         CaptureError: The capture is gone or damaged.
         ProjectError: It is another one, or nothing is trained yet.
     """
     settings = project.settings
-    capture = open_capture_of(settings, project.folder)
+    capture = open_capture_of(settings, project.folder) if capture is None else capture
     clips = project.clips(capture.n_frames)
     has_reference = project.is_trained(settings.reference_clip)
     can_do_without = settings.config().independent and any(project.is_trained(clip.clip_index) for clip in clips)

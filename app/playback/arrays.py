@@ -27,6 +27,9 @@ class GaussianArrays:
         key: Changes when the content does.
         near_plane: Nearest depth that should be drawn, scene units.
         source: The frame, and the state of the clip it was decoded from.
+        births: Where each comes from, see app.playback.contents; None where unknown. [N] uint8
+        changes: How far each is from the reference clip, NaN where that has none; None where nobody asked.
+            [N] float32
     """
 
     means: np.ndarray
@@ -37,6 +40,8 @@ class GaussianArrays:
     key: Hashable
     near_plane: float = 0.01
     source: PictureSource = UNKNOWN
+    births: np.ndarray | None = None
+    changes: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.means)
@@ -59,6 +64,7 @@ class AnchorArrays:
             [A0], [A] uint8
         inherited_reasons, own_reasons: Why the gate decided so, codes of engine.gate.reasons. [A0], [A] uint8
         source: The frame they are of; unknown for all anchors of the clip.
+        spacing: Distance between neighbours, scene units; 0 where unknown.
     """
 
     inherited_positions: np.ndarray
@@ -69,6 +75,7 @@ class AnchorArrays:
     inherited_reasons: np.ndarray | None = None
     own_reasons: np.ndarray | None = None
     source: PictureSource = UNKNOWN
+    spacing: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,6 +113,8 @@ class Picture:
         is_stale: It is not what was asked for now, but the newest there is.
         duration_s: How long it took to make; 0 when unknown.
         source: What it shows.
+        values: The numbers that its colours stand for, NaN where nothing is; None where they stand for none. [H, W]
+            float32
     """
 
     image: np.ndarray
@@ -113,6 +122,7 @@ class Picture:
     is_stale: bool = False
     duration_s: float = 0.0
     source: PictureSource = UNKNOWN
+    values: np.ndarray | None = None
 
     @property
     def size(self) -> tuple[int, int]:

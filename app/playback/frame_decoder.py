@@ -1,14 +1,15 @@
 """FrameDecoder: a frame of a trained clip as arrays to draw. Loads states and decodes on one thread; keeps results by
 key.
 
-A key is (generation, path, clip_index, revision, frame_index). The generation goes up when another project is opened:
-what the thread finishes for the one before is dropped. A new revision of a live clip makes its older frames worthless.
+A key is (generation, path, clip_index, revision, shown_as, frame_index). The generation goes up when another project
+is opened: what the thread finishes for the one before is dropped. A new revision of a live clip makes its older frames
+worthless.
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,14 +19,16 @@ import numpy as np
 from app.background.kernels import prepare_decoding
 from app.background.latest import LatestWorker
 from app.playback.arrays import AnchorArrays, GaussianArrays
+from app.playback.contents import ClipParts
 from app.playback.picture_source import UNKNOWN, PictureSource
+from app.playback.view_modes import PLAIN, ShownAs
 from engine.backends.table import backend_called
 from engine.byte_cache import ByteCache
 from engine.capture.clip import Clip
-from engine.clip_files.array_names import GAINS
 from engine.clip_files.clip_state import ClipState, read_clip_state
 
 if TYPE_CHECKING:
+    from engine.metrics.clips.trained_clip import TrainedClip
     from engine.model.camera_colors import CameraColors
     from engine.model.clip_model import AnchorView, ClipModel  # brings torch, which only the thread needs
 
@@ -37,8 +40,8 @@ MAX_MODELS = 3
 
 ModelKey = tuple[int, str, int, str]
 """generation, path, clip_index, revision"""
-FrameKey = tuple[int, str, int, str, int]
-"""the same, and frame_index"""
+FrameKey = tuple[int, str, int, str, ShownAs, int]
+"""the same, what is decoded of the frame, and frame_index"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +55,7 @@ class FrameRequest:
         is_live: Whether the file is a snapshot of a running training: it may be gone before it is read, and another
             one follows soon.
         generation: Of the open project.
+        shown_as: What is decoded; see app.playback.view_modes.decoded_as.
     """
 
     clip_index: int
@@ -62,6 +66,7 @@ class FrameRequest:
     reference_path: Path | None = field(compare=False)
     clip: Clip = field(compare=False)
     is_live: bool = field(default=False, compare=False)
+    shown_as: ShownAs = PLAIN
 
     @property
     def model_key(self) -> ModelKey:
@@ -71,7 +76,7 @@ class FrameRequest:
     @property
     def key(self) -> FrameKey:
         """Identity of the result."""
-        return *self.model_key, self.frame_index
+        return *self.model_key, self.shown_as, self.frame_index
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,13 +85,17 @@ class LoadedClip:
 
     Attributes:
         colors: What the cameras make of the scene's colours; None where the files do not say.
+        trained: The clip as cameras see it; None in the same case.
+        parts: What else can be decoded of it.
     """
 
     model: ClipModel
+    parts: ClipParts
     anchors: AnchorArrays
     near_plane: float
     step: int | None = None
     colors: CameraColors | None = None
+    trained: TrainedClip | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,14 +106,49 @@ class ShownFrame:
     anchors: AnchorArrays
 
 
+class ClipFiles:
+    """Reads states of clips. For one thread; the reference clip, which all of them need, is read once."""
+
+    def __init__(self) -> None:
+        self._reference: tuple[tuple[str, int], ClipState] | None = None
+
+    def read(self, request: FrameRequest) -> LoadedClip:
+        """The clip of a request.
+
+        Raises:
+            ProjectError: The file is missing or damaged, or does not fit its reference.
+        """
+        from engine.metrics.clips.trained_clip import TrainedClip
+        from engine.model.clip_model import load_clip_model
+
+        state = read_clip_state(request.path)
+        reference = None if state.is_reference else self._read_reference(request.reference_path)
+        model = load_clip_model(state, reference, backend=backend_called())
+        header = state.header
+        spacing = min(header.spacing, header.moving_spacing or header.spacing)
+        anchors = _anchor_arrays(model.anchors(), request.model_key, spacing)
+        trained = TrainedClip.of_state(request.clip, model, state, reference)
+        colors, parts = None if trained is None else trained.colors, ClipParts(model, state, reference)
+        return LoadedClip(model, parts, anchors, header.near_plane, header.step, colors, trained)
+
+    def _read_reference(self, path: Path | None) -> ClipState | None:
+        if path is None or not path.is_file():
+            return None
+        identity = (str(path), path.stat().st_mtime_ns)
+        if self._reference is None or self._reference[0] != identity:
+            self._reference = (identity, read_clip_state(path))
+        return self._reference[1]
+
+
 class FrameDecoder:
     """Frames to arrays on one thread; the newest request wins. Methods are for one other thread."""
 
     def __init__(self, *, cache_bytes: int = CACHE_BYTES) -> None:
         self._cache: ByteCache[FrameKey, ShownFrame] = ByteCache(cache_bytes)
         self._models: OrderedDict[ModelKey, LoadedClip] = OrderedDict()
-        self._reference: tuple[tuple[str, int], ClipState] | None = None
+        self._files = ClipFiles()
         self._last: ShownFrame | None = None
+        self._frame_bytes = 0  # of the newest one
         self.worker: LatestWorker[FrameRequest, ShownFrame] = LatestWorker(
             "playback", self._compute, prepare=prepare_decoding
         )
@@ -124,6 +168,37 @@ class FrameDecoder:
             self._last = newest[1]
         return self._last
 
+    def known(self, key: FrameKey) -> ShownFrame | None:
+        """A frame that is ready; nothing is asked for."""
+        return self._cache.get(key)
+
+    def is_ready(self, key: FrameKey) -> bool:
+        """Whether a frame can be shown at once."""
+        return key in self._cache
+
+    def ready_keys(self) -> list[FrameKey]:
+        """All frames that can be shown at once."""
+        return self._cache.keys()
+
+    @property
+    def revision(self) -> int:
+        """Another number whenever other frames are ready."""
+        return self._cache.revision
+
+    @property
+    def n_that_fit(self) -> int:
+        """How many frames like the newest one can be kept."""
+        return max(self._cache.max_bytes // max(self._frame_bytes, 1), 1)
+
+    def plan(self, requests: Sequence[FrameRequest], distance: Callable[[FrameKey], float]) -> None:
+        """Decode these, in this order, while nothing is asked for.
+
+        Args:
+            distance: How far off it is that a frame is shown; the farthest go when memory is needed.
+        """
+        self._cache.distance = distance
+        self.worker.plan([request for request in requests if request.key not in self._cache])
+
     def anchors(self, request: FrameRequest) -> AnchorArrays | None:
         """All anchors of a state; None until it was loaded."""
         loaded = self._models.get(request.model_key)
@@ -133,6 +208,10 @@ class FrameDecoder:
         """What the cameras make of the scene's colours in a state; None until it was loaded, or where unknown."""
         loaded = self._models.get(request.model_key)
         return None if loaded is None else loaded.colors
+
+    def loaded(self, request: FrameRequest) -> LoadedClip | None:
+        """The clip of a request if it is in memory. May be asked on any thread."""
+        return self._models.get(request.model_key)
 
     def is_loaded(self, request: FrameRequest) -> bool:
         """Whether the file of this state is not needed any more."""
@@ -147,7 +226,8 @@ class FrameDecoder:
         self.worker.forget()  # first: from here on the thread keeps nothing of what it is working on
         self._cache.clear()
         self._models = OrderedDict()
-        self._reference = self._last = None
+        self._files = ClipFiles()
+        self._last = None
 
     def close(self) -> None:
         """End the thread."""
@@ -156,23 +236,38 @@ class FrameDecoder:
     # ---------------------------------------------------------------- on the thread
 
     def _compute(self, request: FrameRequest) -> ShownFrame:
-        import torch
-
         from engine.model.host_array import host_array
 
+        known = self._cache.get(request.key)
+        if known is not None:  # it was asked for and planned
+            return known
         loaded = self._load(request)
         clip_time = request.clip.clip_time(request.frame_index)
-        with torch.no_grad():
-            gaussians = loaded.model.decode(clip_time)
+        content = request.shown_as.content
+        gaussians = loaded.parts.decode(content, clip_time)
         source = PictureSource(
-            request.clip_index, request.frame_index, request.revision, loaded.step, loaded.model.field is None
+            request.clip_index,
+            request.frame_index,
+            request.revision,
+            loaded.step,
+            loaded.model.field is None,
+            shown_as=ShownAs(content=content),
         )
-        anchors = _anchor_arrays(loaded.model.anchors(clip_time), request.key, source)
+        anchors = _anchor_arrays(loaded.model.anchors(clip_time), request.key, loaded.anchors.spacing, source)
         values = [np.ascontiguousarray(host_array(tensor)) for tensor in gaussians.tensors()]
-        arrays = GaussianArrays(*values, key=request.key, near_plane=loaded.near_plane, source=source)
+        has_changes = request.shown_as.mode == "changed"
+        arrays = GaussianArrays(
+            *values,
+            key=request.key,
+            near_plane=loaded.near_plane,
+            source=source,
+            births=loaded.parts.births(content, clip_time),
+            changes=loaded.parts.changes(content, clip_time, gaussians) if has_changes else None,
+        )
         shown = ShownFrame(arrays, anchors)
         if self.worker.is_still_wanted:
             n_bytes = arrays.n_bytes + anchors.inherited_positions.nbytes + anchors.own_positions.nbytes
+            self._frame_bytes = n_bytes
             self._cache.put(request.key, shown, n_bytes)
         return shown
 
@@ -182,14 +277,7 @@ class FrameDecoder:
         if identity in models:
             models.move_to_end(identity)
             return models[identity]
-        from engine.model.clip_model import load_clip_model
-
-        state = read_clip_state(request.path)
-        reference = None if state.is_reference else self._read_reference(request.reference_path)
-        model = load_clip_model(state, reference, backend=backend_called())
-        anchors = _anchor_arrays(model.anchors(), identity)
-        colors = _camera_colors(state, reference)
-        loaded = LoadedClip(model, anchors, state.header.near_plane, state.header.step, colors)
+        loaded = self._files.read(request)
         if not self.worker.is_still_wanted:
             return loaded
         self._cache.drop(lambda key: key[2] == request.clip_index and key[3] != request.revision)
@@ -198,26 +286,8 @@ class FrameDecoder:
         self._models = OrderedDict([*kept[-(MAX_MODELS - 1) :], (identity, loaded)])
         return loaded
 
-    def _read_reference(self, path: Path | None) -> ClipState | None:
-        if path is None or not path.is_file():
-            return None
-        identity = (str(path), path.stat().st_mtime_ns)
-        if self._reference is None or self._reference[0] != identity:
-            self._reference = (identity, read_clip_state(path))
-        return self._reference[1]
 
-
-def _camera_colors(state: ClipState, reference: ClipState | None) -> CameraColors | None:
-    from engine.model.camera_colors import CameraColors
-
-    base = state if reference is None else reference
-    gains, names = base.arrays.get(GAINS), tuple(base.header.camera_names)
-    if gains is None or len(gains) != len(names):
-        return None
-    return CameraColors(names, gains, state.drift, state.header.clip_length)
-
-
-def _anchor_arrays(view: AnchorView, key: Hashable, source: PictureSource = UNKNOWN) -> AnchorArrays:
+def _anchor_arrays(view: AnchorView, key: Hashable, spacing: float, source: PictureSource = UNKNOWN) -> AnchorArrays:
     return AnchorArrays(
         np.ascontiguousarray(view.inherited_positions, np.float32),
         np.ascontiguousarray(view.own_positions, np.float32),
@@ -227,4 +297,5 @@ def _anchor_arrays(view: AnchorView, key: Hashable, source: PictureSource = UNKN
         inherited_reasons=view.inherited_reasons,
         own_reasons=view.own_reasons,
         source=source,
+        spacing=spacing,
     )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass
 
+from app.playback.view_modes import PLAIN, ShownAs
+
 
 @dataclass(frozen=True, slots=True)
 class PictureSource:
@@ -20,6 +22,7 @@ class PictureSource:
         camera_index: The capture camera that took it, or that it is looked at through; None for a free view.
         look: From where and through which lens, whatever the size; see OrbitView.look_key.
         has_scene_colors: Whether a captured picture was brought into the scene's colours.
+        shown_as: What its colours mean, and which part of the clip it shows.
     """
 
     clip_index: int | None = None
@@ -30,6 +33,7 @@ class PictureSource:
     camera_index: int | None = None
     look: Hashable = None
     has_scene_colors: bool = False
+    shown_as: ShownAs = PLAIN
 
 
 UNKNOWN = PictureSource()

@@ -4,22 +4,27 @@ is trained, captured pictures, and pictures drawn on the processor.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from typing import Any
 
 from app.background.jobs import Jobs
 from app.background.latest import LatestWorker
+from app.playback.ahead import Ahead, AskedLook
 from app.playback.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.capture_pictures import CapturedPictures, Gain
 from app.playback.clouds import CloudRequest, Clouds
-from app.playback.frame_decoder import FrameDecoder, FrameRequest, ShownFrame
+from app.playback.course import Course
+from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest, ShownFrame
+from app.playback.mode_arrays import ModeArrays
 from app.playback.orbit_view import OrbitView
-from app.playback.render import Renderer
+from app.playback.render import Look, Renderer
 from app.playback.timeline import Timeline
+from app.playback.view_modes import PLAIN, ShownAs, decoded_as
 from app.project.opened_project import OpenedProject
 from app.status import WantedFrame
 from app.training.service import ShownState
+from engine.capture.clip import Clip
 
 StateOf = Callable[[int], ShownState | None]
 """The state of a clip to look at; None where it has none."""
@@ -53,8 +58,11 @@ class Playback:
     def __init__(self, state_of: StateOf) -> None:
         self.decoder, self.renderer = FrameDecoder(), Renderer()
         self.captured, self.clouds = CapturedPictures(), Clouds()
+        self.ahead = Ahead(self.decoder, self.renderer)
+        self._modes = ModeArrays()
         self._opened: OpenedProject | None = None
         self._state_of = state_of
+        self._n_ahead_seen = 0
 
     def start(self) -> None:
         """Start the threads now rather than with the first request, and load what they need."""
@@ -64,7 +72,7 @@ class Playback:
     def show(self, opened: OpenedProject) -> None:
         """Take up what is open. What was made of another project is forgotten."""
         if self._opened is not None and self._opened.generation != opened.generation:
-            for store in (self.decoder, self.renderer, self.captured, self.clouds):
+            for store in (self.decoder, self.renderer, self.captured, self.clouds, self.ahead, self._modes):
                 store.clear()
         self._opened = opened
 
@@ -75,11 +83,12 @@ class Playback:
 
     # ---------------------------------------------------------------- frames of clips
 
-    def frame(self, timeline: Timeline) -> ShownFrame | None:
+    def frame(self, timeline: Timeline, shown_as: ShownAs = PLAIN) -> ShownFrame | None:
         """What is drawn of the frame under the playhead, or the newest there is until that was decoded; None where
         nothing is trained. It says itself what it is of."""
-        request = self._request(timeline)
-        return None if request is None else self.decoder.frame(request)
+        request = self._request(timeline, shown_as)
+        shown = None if request is None else self.decoder.frame(request)
+        return None if shown is None else replace(shown, gaussians=self._modes.of(shown, shown_as.mode))
 
     def live_anchors(self, timeline: Timeline) -> AnchorArrays | None:
         """All anchors of the clip under the playhead while it trains; None before a state of it was loaded."""
@@ -94,56 +103,127 @@ class Playback:
         self.decoder.frame(request)
         return self.decoder.is_loaded(request)
 
-    def wanted(self, timeline: Timeline, view: OrbitView) -> WantedFrame | None:
-        """What ought to be on screen; None without a project."""
-        clip, request = timeline.clip, self._request(timeline)
+    def wanted(
+        self, timeline: Timeline, view: OrbitView, shown_as: ShownAs = PLAIN, *, view_id: Hashable = 0
+    ) -> WantedFrame | None:
+        """What ought to be on screen in a place; None without a project."""
+        clip, request = timeline.clip, self._request(timeline, shown_as)
         if clip is None:
             return None
-        wanted = WantedFrame(clip.clip_index, timeline.frame_index, camera_index=view.look_through, look=view.look_key)
+        wanted = WantedFrame(
+            clip.clip_index,
+            timeline.frame_index,
+            camera_index=view.look_through,
+            look=view.look_key,
+            shown_as=shown_as.label,
+        )
         if request is None:
             return wanted
         return replace(
             wanted,
             revision=request.revision,
             is_loaded=self.decoder.is_loaded(request),
-            has_failed=self.decoder.has_failed(request) or self.renderer.has_failed,
+            has_failed=self.decoder.has_failed(request) or self.renderer.has_failed(view_id),
         )
 
-    def render(self, timeline: Timeline, view: OrbitView, width: int, height: int) -> Picture | None:
+    def render(
+        self,
+        timeline: Timeline,
+        view: OrbitView,
+        width: int,
+        height: int,
+        *,
+        full_size: tuple[int, int] | None = None,
+        shown_as: ShownAs = PLAIN,
+        view_id: Hashable = 0,
+    ) -> Picture | None:
         """The rasterizer's picture of the frame and view; None where nothing is trained or ready.
 
         Stale where it is of another frame, view, size or state of the clip; it says of which.
-        """
-        request = self._request(timeline)
-        shown = None if request is None else self.decoder.frame(request)
-        if request is None or shown is None:
-            return None
-        picture = self.renderer.picture(shown.gaussians, view, width, height)
-        if picture is None or picture.is_stale:
-            return picture
-        source = picture.source
-        is_of_now = (source.clip_index, source.frame_index, source.revision) == (
-            request.clip_index,
-            request.frame_index,
-            request.revision,
-        )
-        return picture if is_of_now else replace(picture, is_stale=True)
 
-    def _request(self, timeline: Timeline) -> FrameRequest | None:
+        Args:
+            width, height: Its size, px.
+            full_size: If it is there already in this size, that is given instead.
+            shown_as: What its colours mean, and of which part of the clip.
+            view_id: Of the place where it is shown.
+        """
+        request = self._request(timeline, shown_as)
+        if request is None:
+            return None
+        look = Look.of(view, width, height, shown_as=shown_as)
+        full = look if full_size in (None, (width, height)) else Look.of(view, *full_size, shown_as=shown_as)
+        self.ahead.note(view_id, AskedLook(look, full))
+        shown: ShownFrame | None = None
+        picture = self._known_picture(request.key, (full, look), view_id)
+        if picture is None:
+            shown = self.decoder.frame(request)
+        if shown is None:
+            return picture
+        key = shown.gaussians.key
+        if key == request.key:
+            return self.renderer.picture(request.key, shown, look, view_id=view_id)
+        # Until the frame was decoded, the newest one there is, drawn from the view as it is now.
+        assert isinstance(key, tuple)
+        picture = self._known_picture(key, (full, look), view_id)
+        if picture is None:
+            picture = self.renderer.picture(key, shown, look, view_id=view_id)
+        return None if picture is None else replace(picture, is_stale=True)
+
+    def _known_picture(self, key: FrameKey, looks: tuple[Look, ...], view_id: Hashable) -> Picture | None:
+        """The first of these that is there."""
+        for look in looks:
+            picture = self.renderer.known(key, look, view_id=view_id)
+            if picture is not None:
+                return picture
+        return None
+
+    def favour(self, view_id: Hashable) -> None:
+        """Draw what is asked for this place first."""
+        self.renderer.worker.active_lane = view_id
+
+    def work_ahead(self, timeline: Timeline, *, is_busy: bool = False) -> None:
+        """Make ready what comes next while nothing is asked for. Called in every turn of the loop.
+
+        Args:
+            is_busy: Whether a training needs the cores while nothing plays.
+        """
+        course = Course.of(timeline)
+        self.ahead.plan(course, lambda frame, shown_as: self._request_at(timeline, frame, shown_as), is_busy=is_busy)
+
+    def cached_frames(self) -> list[tuple[int, int]]:
+        """Frames that can be shown at once, as they are looked at now: first and stop of each run, in order."""
+        return self.ahead.runs(self._state_of, self._is_current)
+
+    def _is_current(self, key: FrameKey) -> bool:
+        generation, path, clip_index, revision, _, _ = key
+        state = self._state_of(clip_index)
+        is_open = self._opened is not None and self._opened.generation == generation
+        return is_open and state is not None and (str(state.file), state.revision) == (path, revision)
+
+    def _request(self, timeline: Timeline, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
         """What is to be decoded for the playhead; None where nothing is trained."""
-        opened, clip = self._opened, timeline.clip
-        state = None if opened is None or clip is None else self._state_of(clip.clip_index)
-        if opened is None or clip is None or state is None:
+        return self._request_at(timeline, timeline.frame_index, shown_as)
+
+    def _request_at(self, timeline: Timeline, frame_index: int, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
+        clip = timeline.clip_of(frame_index)
+        return None if clip is None else self.request(clip, frame_index, shown_as)
+
+    def request(self, clip: Clip, frame_index: int, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
+        """What is to be loaded and decoded for a frame of a clip; None where the clip has no state."""
+        opened = self._opened
+        state = None if opened is None else self._state_of(clip.clip_index)
+        if opened is None or state is None:
             return None
         return FrameRequest(
             clip_index=clip.clip_index,
             revision=state.revision,
-            frame_index=timeline.frame_index,
+            frame_index=frame_index,
             path=state.file,
             generation=opened.generation,
             reference_path=opened.inherited_path(clip.clip_index),
             clip=clip,
             is_live=state.is_live,
+            shown_as=decoded_as(shown_as),
         )
 
     # ---------------------------------------------------------------- beside them
@@ -201,7 +281,15 @@ class Playback:
     @property
     def finished(self) -> tuple[object, ...]:
         """Identities of the newest results. Another value means that there is something new to see."""
-        return tuple(None if worker.newest is None else worker.newest[0] for worker in self.workers)
+        results = tuple(None if worker.newest is None else worker.newest[0] for worker in self.workers)
+        return *results, self._n_ahead()
+
+    def _n_ahead(self) -> int:
+        """How much was made ahead up to the last pause: each of it alone is not worth drawing the window anew."""
+        workers = (self.decoder.worker, self.renderer.worker)
+        if all(worker.is_idle for worker in workers):
+            self._n_ahead_seen = sum(worker.n_ahead for worker in workers)
+        return self._n_ahead_seen
 
     def take_failures(self) -> list[Failure]:
         """What could not be made since the last call."""

@@ -158,6 +158,13 @@ class ToggleOverlay:
 
 
 @dataclass(frozen=True, slots=True)
+class ShowHeat:
+    """Show a residual heat map over the picture, by its name; an empty one takes it away."""
+
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
 class SetHoldout:
     """Camera indices that training never sees. Only before the first clip is trained."""
 
@@ -218,6 +225,20 @@ class RedoMark:
 @dataclass(frozen=True, slots=True)
 class HomeView:
     """Frame the point that the cameras look at."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetMode:
+    """Let colours mean something else. mode: See app.playback.view_modes.MODES."""
+
+    mode: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetContent:
+    """Draw a part of the clips. content: See app.playback.view_modes.CONTENTS."""
+
+    content: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,9 +307,12 @@ Command = (
     | LookThrough
     | SetCompare
     | ToggleOverlay
+    | ShowHeat
     | SettingCommand
     | EditCommand
     | HomeView
+    | SetMode
+    | SetContent
     | ShowViews
     | ActivateView
     | CloseQuestion

@@ -1,8 +1,9 @@
 """Session: the one owner of live state, and the one thing a window talks to. `dispatch` takes commands, `poll` lets
 finished work in. Belongs to one thread; nothing here blocks. Draws nothing.
 
-It composes: `playback` prepares what is shown, `live_training` trains, `marking` holds the edits, `recent` what was
-opened before. What is open is one immutable value that each of them is handed.
+It composes: `playback` prepares what is shown, `live_training` trains, `residuals` compares with what the cameras took,
+`marking` holds the edits, `recent` what was opened before. What is open is one immutable value that each of them is
+handed.
 """
 
 from __future__ import annotations
@@ -17,11 +18,14 @@ from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArra
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
+from app.playback.view_modes import CONTENTS, MODES, ShownAs
 from app.playback.views import Views
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.project import Project, check_settings
 from app.project.recents import project_name
+from app.residuals.heat_map import HEAT_KINDS, HeatMap
+from app.residuals.residuals import Residuals
 from app.session import commands
 from app.session.clip_versions import Versions
 from app.session.live_training import LiveTraining
@@ -43,6 +47,7 @@ from app.status import (
     ProjectStatus,
     QueueStatus,
     RegionsStatus,
+    ResidualStatus,
     TrainingStatus,
     UsageStatus,
     VersionStatus,
@@ -114,6 +119,7 @@ class Session:
         self._queue_commands = QueueCommands(self.live_training, self.versions, self.notices, settings)
         self._usage, self.log = UsageMeter(), LogView()
         self.playback = Playback(self.live_training.state_of)
+        self.residuals = Residuals(self.playback)
         self.marking = Marking()
         self.regions: RegionsStatus = self.marking.status([])
         self.recent = RecentProjects(settings)
@@ -167,6 +173,15 @@ class Session:
     def overlays(self) -> Overlays:
         """What the current view shows."""
         return self.views.current.overlays
+
+    @property
+    def _shown_as(self) -> ShownAs:
+        return ShownAs(self.overlays.mode, self.overlays.content)
+
+    @property
+    def residual_status(self) -> ResidualStatus:
+        """What is measured of every picture."""
+        return self.residuals.status
 
     @property
     def jobs(self) -> list[JobStatus]:
@@ -224,14 +239,28 @@ class Session:
                 if name not in OVERLAY_NAMES:
                     raise ValueError(f"overlays are {', '.join(OVERLAY_NAMES)}, not {name!r}")
                 setattr(self.overlays, name, not getattr(self.overlays, name))
+            case commands.ShowHeat(kind=kind):
+                if kind and kind not in HEAT_KINDS:
+                    raise ValueError(f"heat maps are {', '.join(HEAT_KINDS)}, not {kind!r}")
+                self.overlays.heat = kind
             case commands.SetHoldout() | commands.SetClipLength() | commands.SetTrainSetting() | commands.SetPreset():
                 self._change_settings(command)
+            case commands.SetMode(mode=mode):
+                if mode not in MODES:
+                    raise ValueError(f"modes are {', '.join(MODES)}, not {mode!r}")
+                self.overlays.mode = mode
+            case commands.SetContent(content=content):
+                if content not in CONTENTS:
+                    raise ValueError(f"parts of a clip are {', '.join(CONTENTS)}, not {content!r}")
+                self.overlays.content = content
             case commands.HomeView():
                 self.view.home()
             case commands.ShowViews(n=n):
                 self.views.show(n)
+                self.playback.favour(self.views.active_index)
             case commands.ActivateView(index=index):
                 self.views.activate(index)
+                self.playback.favour(self.views.active_index)
             case commands.DismissNotice(index=index):
                 self.notices.dismiss(index)
             case _ if isinstance(command, commands.EditCommand):
@@ -260,6 +289,7 @@ class Session:
         self._show(changed_project)
         self.live_training.open(changed_project)
         self.versions.open(changed_project)
+        self._open_residuals(changed_project)
         self.timeline.seek(frame_index)
 
     # ---------------------------------------------------------------- opening
@@ -277,6 +307,7 @@ class Session:
         self._show(opened)
         self.live_training.open(opened, found.catalog)
         self.versions.open(opened)
+        self._open_residuals(opened)
         self.views.look_at(opened.rig)
         self._keep_recent()
         for sentence in opened.capture.warnings:
@@ -290,6 +321,10 @@ class Session:
         self.opened = opened
         self.timeline = Timeline(opened.clips, fps=opened.capture.fps)
         self.playback.show(opened)
+
+    def _open_residuals(self, opened: OpenedProject) -> None:
+        if self.live_training.service is not None:
+            self.residuals.open(opened, self.live_training.service.catalog)
 
     def _keep_recent(self) -> None:
         if self.opened is not None and self.live_training.service is not None:
@@ -313,7 +348,12 @@ class Session:
             self._keep_recent()
         self._release_snapshot()
         has_changed |= bool(events) | self.marking.poll()
+        is_training = self.live_training.is_busy and self.training.state != "paused"
+        if self._is_preloading:
+            self.residuals.look_at(self.timeline, self.view.look_through)
+        has_changed |= self.residuals.poll(is_training=is_training)
         self._tell_failures()
+        self.playback.work_ahead(self.timeline, is_busy=self.live_training.is_busy)
         seen = self._news_key()
         has_changed |= seen != self._seen
         self._seen = seen
@@ -339,7 +379,7 @@ class Session:
 
     def _tell_failures(self) -> None:
         told = []
-        for failure in self.playback.take_failures():
+        for failure in [*self.playback.take_failures(), *self.residuals.take_failures()]:
             if failure.is_live:
                 self.live_training.replace_snapshot(failure.error)
                 continue
@@ -380,6 +420,7 @@ class Session:
         if self.project is not None:
             self.project.close()
         self.recent.close()
+        self.residuals.close()
         self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)
         self.playback.close()
         self.versions.close()
@@ -415,26 +456,33 @@ class Session:
 
     def wanted_frame(self) -> WantedFrame | None:
         """What ought to be on screen; None without a capture. What is there says itself what it is."""
-        return self.playback.wanted(self.timeline, self.view)
+        return self.playback.wanted(self.timeline, self.view, self._shown_as, view_id=self.views.current_index)
 
     def shown_gaussians(self) -> GaussianArrays | None:
         """Gaussians of the shown frame; the newest ones there are until those are decoded; None where nothing is
         trained."""
-        shown = self.playback.frame(self.timeline)
+        shown = self.playback.frame(self.timeline, self._shown_as)
         return None if shown is None else shown.gaussians
 
     def shown_anchors(self) -> AnchorArrays | None:
         """Anchors that exist at the shown frame; those of the newest frame there is until it was decoded."""
-        shown = self.playback.frame(self.timeline)
+        shown = self.playback.frame(self.timeline, self._shown_as)
         return None if shown is None else shown.anchors
 
     def shown_points(self) -> PointArrays | None:
         """A cloud for frames that are not trained; see Playback.cloud."""
         return self.playback.cloud(self.view)
 
-    def request_render(self, width: int, height: int) -> Picture | None:
+    def request_render(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
         """The rasterizer's picture of the frame and view; see Playback.render."""
-        return self.playback.render(self.timeline, self.view, width, height)
+        view_id = self.views.current_index
+        return self.playback.render(
+            self.timeline, self.view, width, height, full_size=full_size, shown_as=self._shown_as, view_id=view_id
+        )
+
+    def cached_frames(self) -> list[tuple[int, int]]:
+        """Frames that can be shown at once: first and stop of each run, in order."""
+        return self.playback.cached_frames()
 
     def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None:
         """The captured picture, at most `max_width` pixels wide; None until it was decoded."""
@@ -443,6 +491,11 @@ class Session:
     def compared_picture(self, camera_index: int, max_width: int) -> Picture | None:
         """What a camera took at the playhead, to be set beside the render; see Playback.compared_picture."""
         return self.playback.compared_picture(self.timeline, camera_index, max_width)
+
+    def heat(self, kind: str) -> HeatMap | None:
+        """The residual heat map of the playhead and the camera looked through; see Residuals.heat."""
+        camera_index = self.view.look_through
+        return None if camera_index is None else self.residuals.heat(self.timeline, camera_index, kind)
 
 
 _TITLES: dict[type, str] = {

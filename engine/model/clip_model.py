@@ -221,11 +221,12 @@ class ClipModel(nn.Module):
         if role != STATIC or self.light is None:
             return gaussians
         weight = self.light_weights(clip_time)[1]
-        if weight not in self._lit:
+        lit = self._lit.get(weight)
+        if lit is None:  # may be asked for on several threads
             if len(self._lit) > self.n_frames:  # times between frames, as playback asks for
                 self._lit.clear()
-            self._lit[weight] = self.in_light(gaussians, clip_time)
-        return self._lit[weight]
+            self._lit[weight] = lit = self.in_light(gaussians, clip_time)
+        return lit
 
     def in_light(self, gaussians: Gaussians, clip_time: float) -> Gaussians:
         """Gaussians of all static anchors, K per anchor, in the light of a time of the clip."""

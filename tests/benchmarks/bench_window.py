@@ -101,6 +101,15 @@ def report(title: str, answers: dict[str, list[float]], log: list[dict[str, Any]
     print(f"{'all':10}{len(every):6}{statistics.median(every):12.1f}{'':10}{max(every):10.1f}")
     print(f"over {BUDGET_MS:.0f} ms: {late} of {len(every)};  frames drawn {len(frames)}, ", end="")
     print(f"median {statistics.median(frames):.1f} ms, max {max(frames):.1f} ms")
+    for line in log:
+        if "slow" in line and line["at_s"] >= since_s:
+            print(
+                f"  {line['slow']}: {line['wall_ms']} ms, of it computing {line['computed_ms']}, waiting for a core ",
+                end="",
+            )
+            print(f"{line['waited_for_a_core_ms']}; other threads computed {line['other_threads_computed_ms']}")
+            for text in (*line["stacks"], *line["others"]):
+                print(f"      {text}")
     return max(every)
 
 
@@ -137,9 +146,10 @@ def measure(desk: Desk, options: argparse.Namespace) -> float:
     phases = [("nothing trains", "")]
     if not options.no_training:
         phases += [("while a clip is prepared", "preparing"), ("while a clip trains", "running")]
+    phases = [phase for phase in phases if phase[1] in os.environ.get("PHASES", ",preparing,running").split(",")]
     worst = 0.0
     for title, state_name in phases:
-        if state_name == "preparing":
+        if state_name and desk.state["training"]["state"] == "idle":
             desk.click("training.next")
         if state_name:
             wanted = (state_name, "running")

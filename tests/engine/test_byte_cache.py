@@ -40,3 +40,28 @@ def test_values_are_forgotten_by_key() -> None:
     assert cache.n_bytes == 20
     cache.clear()
     assert (len(cache), cache.n_bytes) == (0, 0)
+
+
+def test_where_it_is_known_what_is_wanted_last_that_goes_first() -> None:
+    cache: ByteCache[int, str] = ByteCache(3)
+    cache.distance = lambda frame: abs(frame - 10)
+    for frame in (10, 14, 9, 11):
+        cache.put(frame, str(frame), 1)
+    assert sorted(cache.keys()) == [9, 10, 11]
+    cache.put(30, "30", 1)
+    assert 30 in cache, "the newest stays, wherever it is"
+    cache.put(12, "12", 1)
+    assert sorted(cache.keys()) == [10, 11, 12]
+
+
+def test_the_revision_tells_whether_other_keys_are_held() -> None:
+    cache: ByteCache[int, str] = ByteCache(100)
+    cache.put(1, "1", 10)
+    before = cache.revision
+    cache.get(1)
+    assert cache.keys() == [1]
+    assert cache.revision == before
+    cache.drop(lambda key: key == 2)
+    assert cache.revision == before
+    cache.drop(lambda key: key == 1)
+    assert cache.revision != before

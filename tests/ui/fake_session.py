@@ -18,11 +18,13 @@ from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
 from app.playback.views import Views
 from app.project.recents import RecentProject
+from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands
 from app.session.marking import after_marking
 from app.session.notices import Notices
 from app.session.questions import Question, RetrainQuestion
 from app.status import (
+    CELL_RANGES,
     ClipStatus,
     JobStatus,
     Overlays,
@@ -30,6 +32,8 @@ from app.status import (
     ProjectStatus,
     QueueStatus,
     RegionsStatus,
+    ResidualStatus,
+    SeamStatus,
     SettingStatus,
     TrainingStatus,
     UsageStatus,
@@ -148,6 +152,39 @@ class FakeSession:
     def overlays(self) -> Overlays:
         return self.views.current.overlays
 
+    @property
+    def residual_status(self) -> ResidualStatus:
+        """Two cameras are not measured; frame 12 of camera 5 and the seam at frame 20 are bad."""
+        n_frames, n_cameras = self.timeline.n_frames, len(self.rig)
+        cells = {}
+        for column, (low, high) in CELL_RANGES.items():
+            values = np.full(
+                (n_frames, n_cameras), 0.3 * low + 0.7 * high if column == "psnr" else 0.3 * high, np.float32
+            )
+            values[:, 6:] = np.nan
+            values[12, 5] = low if column == "psnr" else high
+            cells[column] = values
+        seams = tuple(
+            SeamStatus(clip.clip_index, clip.start, score, n_cameras - 2, 5)
+            for clip, score in zip(self.clips[1:], (0.4, 2.6), strict=True)
+        )
+        held_out = tuple(index in self.holdout for index in range(n_cameras))
+        return ResidualStatus(seams, cells, held_out, n_frames * (n_cameras - 2), n_frames * n_cameras, revision=1)
+
+    def heat(self, kind: str) -> HeatMap | None:
+        """Grows from left to right over the range of its kind, differs between frames, and frame 0 has no E."""
+        frame_index, camera_index = self.timeline.frame_index, self.view.look_through
+        assert camera_index is not None
+        clip_index = 0 if self.timeline.clip is None else self.timeline.clip.clip_index
+        if kind in ("R", "G", "E", "clips") and frame_index == 0:
+            return HeatMap(None, kind, None, 0, 0, camera_index, note="Frame 0 has no frame before it.")
+        width, height = (int(side) for side in self.rig.image_sizes[camera_index])
+        low, high = HEAT_KINDS[kind].value_range
+        values = np.tile(np.linspace(low, high, width, dtype=np.float32), (height, 1))
+        values[: frame_index % height] = low
+        key = (kind, frame_index, camera_index)
+        return HeatMap(values, kind, key, clip_index, frame_index, camera_index, mean=float(values.mean()))
+
     def _open(self, capture: FakeCapture) -> None:
         self.capture, self.rig = capture, capture.rig
         self.clips = split_clips(capture.n_frames, 10)
@@ -174,6 +211,12 @@ class FakeSession:
                 self.overlays.compare = mode
             case commands.ToggleOverlay(name=name):
                 setattr(self.overlays, name, not getattr(self.overlays, name))
+            case commands.SetMode(mode=mode):
+                self.overlays.mode = mode
+            case commands.SetContent(content=content):
+                self.overlays.content = content
+            case commands.ShowHeat(kind=kind):
+                self.overlays.heat = kind
             case commands.HomeView():
                 self.view.home()
             case commands.ShowViews(n=n):
@@ -241,7 +284,7 @@ class FakeSession:
             is_loaded=is_trained,
         )
 
-    def request_render(self, width: int, height: int) -> Picture | None:
+    def request_render(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
         """A gradient that depends on the frame, for trained clips."""
         if not self._is_trained():
             return None

@@ -3,8 +3,8 @@
     python observed_app.py STATE_FILE ARGUMENTS...
 
 STATE_FILE is replaced about ten times a second with JSON: rectangles, time, view, training, notices. STATE_FILE.log
-gets one JSON line per forwarded input event and per finished frame, with CLOCK_MONOTONIC seconds. Nothing is changed
-in how the program behaves.
+gets one JSON line per forwarded input event, per finished frame and per slow part of a turn of the loop (see
+tests.ui.watchdog), with CLOCK_MONOTONIC seconds. Nothing is changed in how the program behaves.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+
+from tests.ui.watchdog import Watchdog
 
 STATE_PERIOD_S = 0.1
 
@@ -63,20 +65,42 @@ def watch(state_path: Path) -> None:
             super().__init__(*arguments, **options)
             self._written_s = 0.0
             self._log = Path(f"{state_path}.log").open("w", buffering=1)  # noqa: SIM115 - open as long as the window
+            self._watchdog = Watchdog(self._write)
+            self._watch_updates()
             for name in ("on_mouse_motion", "on_mouse_drag", "on_mouse_press", "on_key_press", "on_mouse_scroll"):
                 self.window.push_handlers(**{name: self._reporter(name)})
 
+        def _write(self, line: dict[str, Any]) -> None:
+            self._log.write(json.dumps(line) + "\n")
+
+        def _watch_updates(self) -> None:
+            update = self.frame.update
+
+            def watched(dt_s: float) -> bool:
+                with self._watchdog.phase("update"):
+                    return update(dt_s)
+
+            self.frame.update = watched
+
         def _reporter(self, name: str) -> Any:
             def report(*values: float) -> None:
-                self._log.write(json.dumps({"event": name, "values": values[:2], "at_s": time.monotonic()}) + "\n")
+                self._write({"event": name, "values": values[:2], "at_s": time.monotonic()})
 
             return report
 
         def draw(self) -> None:
             started_s = time.monotonic()
-            super().draw()
-            self.ctx.finish()  # so that the time is that of the finished picture
-            self._log.write(json.dumps({"frame_s": started_s, "at_s": time.monotonic()}) + "\n")
+            with self._watchdog.phase("draw"):
+                super().draw()
+                self.ctx.finish()  # so that the time is that of the finished picture
+            shown = self.frame.viewport.scene.shown
+            self._write(
+                {
+                    "frame_s": started_s,
+                    "at_s": time.monotonic(),
+                    "shows": [shown.kind, shown.source.frame_index, shown.size[0], hash(shown.source.look)],
+                }
+            )
 
         def tick(self, dt_s: float) -> None:
             super().tick(dt_s)

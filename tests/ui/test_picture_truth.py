@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from pyglet.window import key
 
+import app.playback.ahead
 import app.playback.frame_decoder
 from app.session import commands as c
 from app.session.session import Session
@@ -75,6 +76,7 @@ class Reader:
             return state
 
         monkeypatch.setattr(app.playback.frame_decoder, "read_clip_state", read_and_wait)
+        monkeypatch.setattr(app.playback.ahead, "STANDING", 0)  # else the next clip is read before it is asked for
 
 
 @pytest.fixture
@@ -155,6 +157,7 @@ def test_a_cloud_stands_in_for_a_clip_that_loads_and_says_what_is_missing(window
     show_frame(window, 0)
     reader.may_go_on.clear()
     window.session.playback.decoder.clear()  # as when the project was just opened
+    window.session.playback.renderer.clear()
     window.draw(3)
     assert scene.shows == CLOUD
     assert hud(window).pending == "loading clip 0"

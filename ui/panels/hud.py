@@ -11,15 +11,17 @@ from imgui_bundle import ImVec2, imgui
 
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
+from app.playback.view_modes import MODES, range_of
 from app.status import ClipStatus, Overlays, RegionsStatus, WantedFrame
 from engine.camera.rig import CameraRig
+from ui.panels.color_bar import COLOR_BAR_SIZE, draw_color_bar
 from ui.panels.regions import draw_region_mark
 from ui.panels.state import Rect, UiState
 from ui.panels.timeline import STATE_WORDS
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.theme import Icon
-from ui.viewport.hud_text import HudText, count_text, hud_text
+from ui.viewport.hud_text import RENDERED, HudText, count_text, hud_text
 from ui.viewport.picture_rate import PictureRate
 from ui.viewport.region_tool import REGION_WORDS
 from ui.viewport.scene import Scene
@@ -79,13 +81,15 @@ class Hud:
         self.text: HudText | None = None
         """What the newest frame says."""
 
-    def draw(self, session: HudNeeds, ui: UiState, area: Rect, scene: Scene) -> None:
-        """Everything that stands over the picture."""
+    def draw(self, session: HudNeeds, ui: UiState, area: Rect, scene: Scene, *, value: float | None = None) -> None:
+        """Everything that stands over the picture. value: Under the pointer, where colours stand for numbers."""
         self.text = self._text(session, scene)
         if self.text is not None:
             self._draw_plates(self.text, ui, area)
             if self.text.pending or scene.shown.is_on_its_way:
                 ui.redraw_within(BUSY_REDRAW_S)
+        if scene.shows == RENDERED:
+            self._draw_color_bar(session, ui, scene, value)
         if not ui.regions.is_active or area.width >= LEGEND_WIDTH:  # what is being chosen needs the room
             self._draw_legend(session, ui, scene, area)
 
@@ -150,6 +154,21 @@ class Hud:
             x, row_height = plate.x1 + GAP, max(row_height, height)
         ui.mark_rect("viewport.free", Rect(area.x0, area.y0, area.x1, bottom - row_height))
 
+    def _draw_color_bar(self, session: HudNeeds, ui: UiState, scene: Scene, value: float | None) -> None:
+        """What the colours of the picture on screen mean, at its lower right, above the plates."""
+        mode = MODES[scene.shown.source.shown_as.mode]
+        if not mode.map_name:
+            return
+        free = ui.rects["viewport.free"]
+        width, height = COLOR_BAR_SIZE
+        if free.width < width + 2 * MARGIN or free.height < height + 2 * MARGIN:
+            return
+        x, y = free.x1 - MARGIN, free.y1 - 6
+        plate = Rect(x - width, y - height, x, y)
+        low, high = range_of(mode.name, session.rig)
+        draw_color_bar(imgui.get_window_draw_list(), plate, mode.map_name, low, high, mode.unit, value)
+        ui.mark_rect("viewport.color_bar", plate)
+
     def _draw_legend(self, session: HudNeeds, ui: UiState, scene: Scene, area: Rect) -> None:
         draw = imgui.get_window_draw_list()
         is_labelled = session.overlays.compare == "wipe" and session.view.look_through is not None
@@ -162,6 +181,8 @@ class Hud:
             middle = ImVec2(x + 14, y + 12)
             if shape in REGION_WORDS:
                 draw_region_mark(draw, middle, shape)
+            elif shape == "disc":
+                draw.add_circle_filled(middle, 6, theme.u32(color))
             elif shape == "circle":
                 draw.add_circle(middle, 5, theme.u32(color), 0, 2)
             else:
@@ -179,7 +200,8 @@ def _draw_busy(draw: imgui.ImDrawList, middle: ImVec2, color: theme.Color) -> No
 
 def legend_rows(session: HudNeeds, scene: Scene) -> list[tuple[str, theme.Color, str]]:
     """Shape, colour and words of what is marked."""
-    counts, rows = scene.counts, []
+    counts = scene.counts
+    rows = [("disc", (*hue, 1.0), words) for hue, words in MODES[scene.shown.source.shown_as.mode].legend]
     clip_index, frame_index = counts.source.clip_index, counts.source.frame_index
     status = None if clip_index is None else session.clip_states[clip_index]
     n_inherited, n_own = (0, 0) if status is None else (status.n_inherited, status.n_own)

@@ -11,6 +11,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from ui.panels.actions.action import ActionNeeds
+from ui.panels.heat_overlay import HeatNeeds, HeatOverlay
 from ui.panels.hud import Hud, HudNeeds
 from ui.panels.panes import Panes, arrange
 from ui.panels.pointer import MOVING_S, Pointer
@@ -25,15 +26,15 @@ from ui.viewport.scene import Scene, SceneNeeds, SceneView
 TOOLTIP_AWAY = 22.0
 
 
-class PictureNeeds(SceneNeeds, HudNeeds, ActionNeeds, Protocol):
+class PictureNeeds(SceneNeeds, HudNeeds, ActionNeeds, HeatNeeds, Protocol):
     """What the picture, and everything that lies over it, is made from."""
 
 
 class PicturePane:
     """Owns the GL objects of one view and the drag in progress there."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    def __init__(self, scene: Scene, heat: HeatOverlay) -> None:
+        self.scene, self.heat = scene, heat
         self.pointer = Pointer()
         self.hud = Hud()
         self._aimed_at = (0.0, 0.0)
@@ -42,6 +43,7 @@ class PicturePane:
     def release(self) -> None:
         """Free GL objects. GL thread only."""
         self.scene.release()
+        self.heat.release()
 
     def shows_playhead(self, session: PictureNeeds) -> bool:
         """Is the frame under the playhead on screen, in every picture that is compared?"""
@@ -75,7 +77,8 @@ class PicturePane:
         self.pointer.navigate(session, dispatch, ui, panes)
         # Looking through a camera may just have ended; the picture then fills the area from the next frame on.
         self._draw_picture(session, dispatch, ui, area, panes, is_active=is_active)
-        self.hud.draw(session, ui, area, self.scene)
+        value = self._value_under_pointer(panes.rendered)
+        self.hud.draw(session, ui, self.heat.beside(area), self.scene, value=value)
         if ui.regions.is_active and is_active:
             top = panes.captured.y0 + 44 if panes.captured is not None else area.y0 + 12  # below what names the pane
             free = Rect(area.x0 + 12, top, area.x1, area.y1)
@@ -115,6 +118,7 @@ class PicturePane:
             shown = ShownRegions(session.regions.regions, tool.highlighted, tool.sphere)
         composed = self.scene.compose(session, view, shown)
         draw.add_image(imgui.ImTextureRef(composed.texture.glo), pane.low, pane.high)
+        self.heat.draw(session, ui, pane)
         if self.pointer.is_moving:
             ui.redraw_within(MOVING_S)
         elif imgui.is_item_hovered() and self.pointer.drag is None and not tool.is_active:
@@ -132,6 +136,12 @@ class PicturePane:
         if panes.captured is not None:
             self._draw_captured(session, draw, panes)
         draw.pop_clip_rect()
+
+    def _value_under_pointer(self, pane: Rect) -> float | None:
+        pointer = imgui.get_io().mouse_pos
+        if not imgui.is_item_hovered() or not pane.contains(pointer.x, pointer.y):
+            return None
+        return self.scene.value_at((pointer.x - pane.x0) / pane.width, (pointer.y - pane.y0) / pane.height)
 
     def _point_at_camera(self, session: PictureNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """The camera under the pointer stands out; one that was pressed is remembered for the click."""

@@ -18,8 +18,8 @@ from ui.style.ui_scale import UiScale
 from ui.viewport.region_tool import RegionTool
 
 VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
-LOG = "Log"
-PANELS = (CAPTURE, TRAINING, REGIONS, TIMELINE, LOG)
+RESIDUALS, LOG = "Residuals", "Log"
+PANELS = (CAPTURE, TRAINING, REGIONS, RESIDUALS, TIMELINE, LOG)
 """Titles of the panels around the picture."""
 Dispatch = Callable[[Command], None]
 """Takes one command of app.session.commands."""
@@ -64,6 +64,7 @@ class UiState:
         is_menu_wanted: Open the first menu, for the keyboard.
         is_quality_open: Is the plot of quality over the clips folded out?
         is_quality_seen: Was it scrolled to since then?
+        last_heat: The heat map that was shown last, to be shown again; empty before the first.
         wanted_panel: Title of a panel that is to come to the front, or None.
         redraw_in_s: Shortest wait after which some panel wants to be drawn again, or None.
     """
@@ -74,6 +75,7 @@ class UiState:
     regions: RegionTool = field(default_factory=RegionTool)
     curves: CurveView = field(default_factory=CurveView)
     queue_chosen: int | None = None
+    last_heat: str = ""
     wanted_panel: str | None = None
     is_quality_open: bool = False
     is_quality_seen: bool = False

@@ -7,18 +7,22 @@ from typing import Protocol
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.playback.views import COUNTS
-from app.session.commands import LookThrough, ShowViews, ToggleOverlay
+from app.residuals.heat_map import HEAT_KINDS
+from app.session.commands import LookThrough, ShowHeat, ShowViews, ToggleOverlay
 from app.status import COMPARE_MODES
 from ui.panels.actions.action import ActionNeeds
 from ui.panels.actions.compare import cloud_overlay, set_compare, shown_compare
+from ui.panels.mode_box import draw_mode_box
 from ui.panels.regions import begin_choosing
 from ui.panels.state import Dispatch, UiState
 from ui.style import theme
 from ui.style.theme import Icon
 
 TOOLBAR_HEIGHT = 38.0
-TOOLBAR_WIDTH = 610.0
+TOOLBAR_WIDTH = 736.0
 """With less room, words give way to symbols."""
+MODE_WIDTHS = (124.0, 108.0)
+"""Of the box of modes, where there is room and where there is little, units."""
 MARK_SLIDER = imgui.SliderFlags_.always_clamp
 COMPARE_WORDS = {"off": "Off", "wipe": "Wipe", "side": "Side by side"}
 
@@ -38,7 +42,7 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None
     if is_roomy:
         imgui.text_disabled("View")
         imgui.same_line()
-    imgui.set_next_item_width(150 if is_roomy else min(120, max(room - 230, 40)))
+    imgui.set_next_item_width(150 if is_roomy else min(120, max(room - 238 - MODE_WIDTHS[1], 40)))
     if imgui.begin_combo("##camera", "Free" if shown is None else names[shown]):
         if imgui.selectable("Free", shown is None)[0]:
             dispatch(LookThrough(None))
@@ -54,6 +58,8 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None
         imgui.end_combo()
     ui.mark("viewport.camera")
     imgui.set_item_tooltip("Look through a capture camera ([ and ])")
+    imgui.same_line(0, 8)
+    draw_mode_box(session, dispatch, ui, MODE_WIDTHS[0] if is_roomy else MODE_WIDTHS[1])
     imgui.same_line(0, 18 if is_roomy else 8)
     if is_roomy:
         imgui.text_disabled("Compare")
@@ -66,6 +72,8 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None
     else:
         _draw_compare_box(session, dispatch, ui)
     imgui.same_line(0, 18 if is_roomy else 8)
+    _draw_heat_box(session, dispatch, ui, is_roomy=is_roomy)
+    imgui.same_line(0, 8)
     if imgui.button(f"{Icon.EYE}  Show" if is_roomy else f"{Icon.EYE}##show"):
         imgui.open_popup("overlays")
     ui.mark("viewport.overlays")
@@ -114,6 +122,30 @@ def _draw_compare_box(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) ->
         imgui.end_combo()
     ui.mark("viewport.compare")
     imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")
+
+
+def _draw_heat_box(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, *, is_roomy: bool) -> None:
+    """Which residual is shown over the picture, and how strongly."""
+    overlays = session.overlays
+    imgui.set_next_item_width(132 if is_roomy else 64)
+    shown = HEAT_KINDS[overlays.heat].label if overlays.heat else "Heat map"
+    if imgui.begin_combo("##heat", shown, imgui.ComboFlags_.height_large):
+        if imgui.selectable("None", not overlays.heat)[0]:
+            dispatch(ShowHeat(""))
+        ui.mark("viewport.heat.none")
+        for kind in HEAT_KINDS.values():
+            if imgui.selectable(kind.label, overlays.heat == kind.name)[0]:
+                dispatch(ShowHeat(kind.name))
+            ui.mark(f"viewport.heat.{kind.name}")
+            imgui.set_item_tooltip(kind.meaning)
+        imgui.separator()
+        imgui.set_next_item_width(150)
+        percent = imgui.slider_float("Opacity", overlays.heat_opacity * 100.0, 10.0, 100.0, "%.0f %%", MARK_SLIDER)[1]
+        overlays.heat_opacity = percent / 100.0
+        ui.mark("viewport.heat.opacity")
+        imgui.end_combo()
+    ui.mark("viewport.heat")
+    imgui.set_item_tooltip("Where the render differs, from the frame before or from what the camera took (7)")
 
 
 def _draw_overlay_menu(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None:

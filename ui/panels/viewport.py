@@ -33,12 +33,12 @@ class ViewportPanel:
     """Owns the pictures. Those of views that are not shown keep what they hold until the window closes.
 
     Args:
-        make_scene: Makes what one picture is drawn with. GL thread only.
+        make_pane: Makes what one view is drawn with. GL thread only.
     """
 
-    def __init__(self, make_scene: Callable[[], Scene]) -> None:
-        self._make_scene = make_scene
-        self._panes = [PicturePane(make_scene())]
+    def __init__(self, make_pane: Callable[[], PicturePane]) -> None:
+        self._make_pane = make_pane
+        self._panes = [make_pane()]
         self._active = 0
 
     def release(self) -> None:
@@ -104,7 +104,7 @@ class ViewportPanel:
             draw.add_rect_filled(area.low, area.high, theme.u32(theme.PANEL))  # shows as lines between the pictures
         for index, part in enumerate(view_areas(area, views.n_shown)):
             while len(self._panes) <= index:
-                self._panes.append(PicturePane(self._make_scene()))
+                self._panes.append(self._make_pane())
             is_active = index == views.active_index
             ui.mark_rect(f"viewport.view{index}", part)
             imgui.push_id(index)

@@ -20,10 +20,13 @@ from app.session.window_memory import WindowMemory
 from ui.gl import ImageTexture, free_dropped, n_changes
 from ui.panels.actions.table import handle_keys
 from ui.panels.capture import CaptureNeeds, CapturePanel
+from ui.panels.heat_overlay import HeatOverlay
 from ui.panels.log import LogNeeds, LogPanel
 from ui.panels.notices import NoticesNeeds, NoticesPanel
+from ui.panels.picture_pane import PicturePane
 from ui.panels.regions import draw_regions
-from ui.panels.state import CAPTURE, LOG, REGIONS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
+from ui.panels.residuals.panel import ResidualsNeeds, ResidualsPanel
+from ui.panels.state import CAPTURE, LOG, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
 from ui.panels.timeline import TimelineNeeds, draw_timeline
 from ui.panels.training import draw_training
 from ui.panels.viewport import ViewportNeeds, ViewportPanel
@@ -66,6 +69,7 @@ class FrameNeeds(
     RememberNeeds,
     NoticesNeeds,
     LogNeeds,
+    ResidualsNeeds,
     Protocol,
 ):
     """Everything that the window and its panels use of a session."""
@@ -118,8 +122,9 @@ class Frame:
         self._on_input = on_input
         self.ui = UiState(fonts=theme.load_fonts(), scale=self.scale)
         theme.apply_style()
-        self.viewport = ViewportPanel(lambda: Scene(ctx))
+        self.viewport = ViewportPanel(lambda: PicturePane(Scene(ctx), HeatOverlay(ctx)))
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
+        self.residuals = ResidualsPanel(lambda: ImageTexture(ctx))
         self.notices = NoticesPanel()
         self.log = LogPanel()
         self.dialog = OpenFolderDialog()
@@ -142,6 +147,7 @@ class Frame:
             (CAPTURE, self.capture.draw, True),
             (TRAINING, draw_training, True),
             (REGIONS, draw_regions, True),
+            (RESIDUALS, self.residuals.draw, True),
             (TIMELINE, draw_timeline, True),
             (LOG, self.log.draw, True),
         )
@@ -321,4 +327,5 @@ class Frame:
         """Release GL objects and ImGui. The GL context must still be current."""
         self.viewport.release()
         self.capture.release()
+        self.residuals.release()
         self.backend.close()

@@ -9,9 +9,10 @@ from collections.abc import Mapping
 
 from imgui_bundle import ImVec2, imgui
 
-from ui.panels.state import CAPTURE, LOG, REGIONS, TIMELINE, TRAINING, VIEWPORT
+from ui.panels.state import CAPTURE, LOG, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT
 
-SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: (236.0, 0.0), REGIONS: (236.0, 0.0), TIMELINE: (0.0, 140.0)}
+SIDE = (236.0, 0.0)
+SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: SIDE, REGIONS: SIDE, RESIDUALS: SIDE, TIMELINE: (0.0, 140.0)}
 """Width and height of docked panels, units. The timeline has its buttons, ruler and bands at this height."""
 SMALLEST_PICTURE = (300.0, 150.0)
 WIDE_UNITS = 1240.0
@@ -19,7 +20,7 @@ WIDE_UNITS = 1240.0
 
 
 def lay_out(dock_id: int) -> None:
-    """Capture left, training and regions right, timeline and log below, the picture in the rest."""
+    """Capture left, training, regions and residuals right, timeline and log below, the picture in the rest."""
     internal = imgui.internal
     size = imgui.get_main_viewport().work_size
     is_wide = size.x >= WIDE_UNITS
@@ -37,6 +38,7 @@ def lay_out(dock_id: int) -> None:
         (CAPTURE, left),
         (TRAINING, right),
         (REGIONS, right),
+        (RESIDUALS, right),
         (TIMELINE, bottom),
         (LOG, bottom),
     ):

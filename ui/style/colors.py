@@ -1,10 +1,12 @@
 """Hues that carry meaning, once for the widgets and the GL drawing alike. Plain numbers; imports no library.
 
-They come from the Okabe-Ito set, which stays apart for the common kinds of colour blindness; every one of them is also
-told apart by a shape, an icon or a word where it is used.
+They are those of app.playback.hues; every one of them is also told apart by a shape, an icon or a word where it is
+used.
 """
 
 from __future__ import annotations
+
+from app.playback import hues
 
 Color = tuple[float, float, float, float]
 """Red, green, blue and opacity in 0..1."""
@@ -15,27 +17,19 @@ def rgb(r: int, g: int, b: int, alpha: float = 1.0) -> Color:
     return (r / 255.0, g / 255.0, b / 255.0, alpha)
 
 
-SKY = rgb(86, 180, 233)
-ORANGE = rgb(230, 159, 0)
-GREEN = rgb(0, 158, 115)
-YELLOW = rgb(240, 228, 66)
-VERMILLION = rgb(213, 94, 0)
-PURPLE = rgb(204, 121, 167)
+SKY: Color = (*hues.SKY, 1.0)
+ORANGE: Color = (*hues.ORANGE, 1.0)
+GREEN: Color = (*hues.GREEN, 1.0)
+YELLOW: Color = (*hues.YELLOW, 1.0)
+VERMILLION: Color = (*hues.VERMILLION, 1.0)
+PURPLE: Color = (*hues.PURPLE, 1.0)
 
 INHERITED = SKY
 """Inherited anchors; drawn as circles."""
 RESIDUAL = ORANGE
 """Residual anchors; drawn as diamonds."""
-ROLE_COLORS = {
-    "static": SKY,
-    "moving": GREEN,
-    "promoted": VERMILLION,
-    "residual": ORANGE,
-    "adapted": GREEN,
-    "replacing": VERMILLION,
-}
-"""Anchors by what they are (engine.clip_files.roles). Adapted and replacing ones are moving and promoted ones of one
-clip, drawn as diamonds."""
+ROLE_COLORS: dict[str, Color] = {role: (*hue, 1.0) for role, hue in hues.ROLE_HUES.items()}
+"""Anchors by what they are; those that one clip alone has are drawn as diamonds."""
 REGION_COLORS = {"static": SKY, "dynamic": VERMILLION}
 """Regions that the user marks, like the anchors they make; drawn with whole lines and with dashes."""
 HELD_OUT = PURPLE

@@ -16,7 +16,7 @@ class HeatImage:
     """Owns one texture. GL thread only."""
 
     def __init__(self, ctx: moderngl.Context) -> None:
-        self._image = ImageTexture(ctx, is_smooth=False)  # a pixel of it is a pixel that was measured
+        self._image = ImageTexture(ctx)
 
     @property
     def texture(self) -> moderngl.Texture:

@@ -166,7 +166,8 @@ def _label(
     if width < shown.full_size[0]:
         size += f" of {shown.full_size[0]} x {shown.full_size[1]}"
     camera = camera_name(source.camera_index)
-    return "   ".join((f"clip {clip_index}", frame, f"{frame_index / max(fps, 1e-6):.2f} s", camera, size))
+    words = [f"clip {clip_index}", frame, f"{frame_index / max(fps, 1e-6):.2f} s", camera, size]
+    return "   ".join(words + ([source.shown_as.label] if source.shown_as.label else []))
 
 
 def _pending_text(
@@ -183,6 +184,8 @@ def _pending_text(
         return (
             f"showing frame {source.frame_index} of clip {source.clip_index}, clip {wanted.clip_index} is being loaded"
         )
+    if source.shown_as.label != wanted.shown_as:
+        return f"{wanted.shown_as or 'the scene in its own colours'} is being drawn"
     if source.frame_index != wanted.frame_index:
         if is_playing:
             return ""  # the label names both, and changes with every picture

@@ -7,6 +7,7 @@ faster, so its picture is uploaded instead. Redrawn only when the key of what it
 
 from __future__ import annotations
 
+import time
 from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
@@ -18,6 +19,7 @@ from app.playback.arrays import BACKGROUND, GaussianArrays, Picture, PointArrays
 from app.playback.picture_source import PictureSource
 from app.playback.pointing import pixel_ray, seen_point
 from app.playback.timeline import Timeline
+from app.playback.view_modes import MODES
 from app.status import RegionsStatus, WantedFrame
 from engine.camera.projection import camera_center
 from ui.gl import (
@@ -31,7 +33,7 @@ from ui.gl import (
 from ui.viewport.anchor_marks import nearest_under
 from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
 from ui.viewport.mark_layer import AnchorCounts, MarkLayer, MarkNeeds
-from ui.viewport.picture_size import MAX_PICTURE_WIDTH, MOVING_SHARES, moving_share, picture_size
+from ui.viewport.picture_size import MAX_PICTURE_WIDTH, MovingSize, picture_size
 from ui.viewport.region_layer import RegionLayer, ShownRegions
 
 CLOUD_OVERLAP = 1.5
@@ -57,7 +59,9 @@ class SceneNeeds(MarkNeeds, Protocol):
 
     def shown_points(self) -> PointArrays | None: ...
 
-    def request_render(self, width: int, height: int) -> Picture | None: ...
+    def request_render(
+        self, width: int, height: int, *, full_size: tuple[int, int] | None = None
+    ) -> Picture | None: ...
 
     def compared_picture(self, camera_index: int, max_width: int) -> Picture | None: ...
 
@@ -127,12 +131,14 @@ class Scene:
         self.marks = MarkLayer(ctx)
         self.regions = RegionLayer(ctx)
         self._drawn_key: Hashable = None
-        self._asked_size: tuple[int, int] | None = None
+        self._asked_sizes: tuple[tuple[int, int], tuple[int, int]] | None = None
         self._asked_capture: tuple[int, int] | None = None
         self._near = NEAR
-        self._moving_share = MOVING_SHARES[1]
+        self._moving_size = MovingSize()
         self._cloud_kind = CLOUD
         self._point_size = 0.0
+        self._is_picture = self.is_software
+        self._values: np.ndarray | None = None
         self._picture_key: Hashable = None
         self._captured_key: Hashable = None
 
@@ -164,8 +170,9 @@ class Scene:
 
     def has_news(self, session: SceneNeeds) -> bool:
         """Did a picture arrive since the last compose? Asks again for what was asked last."""
-        if self._asked_size is not None:
-            picture = session.request_render(*self._asked_size)
+        if self._asked_sizes is not None:
+            size, full_size = self._asked_sizes
+            picture = session.request_render(*size, full_size=full_size)
             if picture is not None and picture.key != self._picture_key:
                 return True
         if self._asked_capture is not None:
@@ -182,7 +189,7 @@ class Scene:
         is_cloud_chosen = bool(session.overlays.show_cloud)
         points_key = self._take_points(session) if is_cloud_chosen else None
         is_cloud_chosen = points_key is not None
-        self._asked_size = None
+        self._asked_sizes = self._values = None
         shown = ShownPicture(
             source=PictureSource(camera_index=session.view.look_through, look=session.view.look_key),
             size=(view.width, view.height),
@@ -191,7 +198,8 @@ class Scene:
         )
         base_key = None
         if not is_cloud_chosen:
-            take = self._take_picture if self.is_software else self._take_gaussians
+            self._is_picture = self.is_software or MODES[session.overlays.mode].is_picture
+            take = self._take_picture if self._is_picture else self._take_gaussians
             base_key, shown = take(session, view, shown)
             points_key = self._take_points(session) if base_key is None and session.overlays.show_points else None
         needs_capture = base_key is None and points_key is None and session.view.look_through is not None
@@ -203,7 +211,7 @@ class Scene:
         marks_key = self.marks.take(session, view, session.shown_gaussians() if is_rendered else None)
         regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
         self.shown = shown
-        if self.is_software and base_key is not None and regions.is_empty and self.marks.is_empty(session):
+        if self.is_software and is_rendered and regions.is_empty and self.marks.is_empty(session):
             # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
             self._drawn_key = None
             return Composed(self._picture.texture, shown)
@@ -252,23 +260,27 @@ class Scene:
 
     def _take_picture(self, session: SceneNeeds, view: SceneView, shown: ShownPicture) -> tuple[Hashable, ShownPicture]:
         full = min(MAX_PICTURE_WIDTH / view.width, 1.0)
-        share = full * (self._moving_share if view.is_moving else 1.0)
-        self._asked_size = picture_size(view.width, view.height, share)
-        picture = session.request_render(*self._asked_size)
+        full_size = picture_size(view.width, view.height, full)
+        timeline, now_s = session.timeline, time.perf_counter()
+        is_hurried = self._moving_size.is_hurried(timeline.frame_index, now_s, is_playing=timeline.is_playing)
+        is_quick = is_hurried or view.is_moving
+        share = full * (self._moving_size.share if is_quick else 1.0)
+        self._asked_sizes = picture_size(view.width, view.height, share), full_size
+        picture = session.request_render(*self._asked_sizes[0], full_size=full_size)
         if picture is None:
             self._picture_key = None
             return None, shown
         if self._picture.set(picture.image, key=picture.key) and picture.duration_s > 0:
-            drawn_share = picture.image.shape[1] / (view.width * full)
-            self._moving_share = moving_share(drawn_share, picture.duration_s * 1e3)
-        self._picture_key = picture.key
+            self._moving_size.note_picture(picture.size[0] / full_size[0], picture.duration_s * 1e3)
+        self._picture_key, self._values = picture.key, picture.values
+        is_coarse = is_quick and picture.size[0] < full_size[0] and not timeline.is_playing
         return picture.key, replace(
             shown,
             kind=RENDERED,
             source=picture.source,
             size=picture.size,
-            full_size=picture_size(view.width, view.height, full),
-            is_on_its_way=picture.is_stale or (view.is_moving and share < full),
+            full_size=full_size,
+            is_on_its_way=picture.is_stale or is_coarse,
         )
 
     def _take_gaussians(
@@ -301,6 +313,19 @@ class Scene:
         else:
             self._point_size = CLOUD_OVERLAP * cloud.spacing
         return key
+
+    def value_at(self, x: float, y: float) -> float | None:
+        """The number that the picture's colour stands for at a place; None where nothing is, and where colours are no
+        numbers.
+
+        Args:
+            x, y: As shares of the picture's width and height, from its upper left corner.
+        """
+        if self._values is None or not (0.0 <= x < 1.0 and 0.0 <= y < 1.0):
+            return None
+        height, width = self._values.shape
+        value = float(self._values[int(y * height), int(x * width)])
+        return None if np.isnan(value) else value
 
     def anchor_text(self, session: SceneNeeds, view: SceneView, x: float, y: float) -> str:
         """What the anchor under a pixel of the view is and why; empty where none is shown or that is unknown. It stands
@@ -340,7 +365,7 @@ class Scene:
         target = self._target
         target.clear(BACKGROUND)
         if base_key is not None:
-            if self.is_software:
+            if self._is_picture:
                 target.draw_image(self._picture)
             else:
                 self._splats.draw(target, *camera, self._near)

@@ -150,13 +150,11 @@ class Evaluation:
         return self._boundary(clip, self._shot(after, camera, clip.start), before, camera)[1]
 
     def _boundary(self, clip: Clip, shot: _Shot, before: TrainedClip, camera: int) -> tuple[PairRow, SeamMaps]:
-        clip_before = before.clip
         last = self._shot(before, camera, clip.start - 1)
         maps = self._maps(shot, last)
         # the same instant by the clip before: its field may end with its last frame, and the picture with it
-        beyond = clip_before.n_frames / clip_before.clip_length
-        is_held = before.model.knots(beyond) == before.model.knots(clip_before.clip_time(clip.start - 1))
-        image = last.image if is_held else self._render(before, camera, beyond)
+        is_held = before.is_held_beyond
+        image = last.image if is_held else self._render(before, camera, before.beyond)
         two_clips = part_means(change_of(shot.image, image), maps.is_static)
         row = _pair_row(
             maps,

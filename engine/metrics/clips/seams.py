@@ -89,6 +89,11 @@ def change_of(image: np.ndarray, previous: np.ndarray) -> np.ndarray:
     return np.einsum("hwc->hw", np.abs(difference, out=difference)) / np.float32(3)
 
 
+def excess_of(change: np.ndarray, truth_change: np.ndarray) -> np.ndarray:
+    """E of R and G: what changes in the render beyond what changes in the truth. [H, W] float32"""
+    return np.maximum(change - truth_change, np.float32(0))
+
+
 def seam_maps(
     image: np.ndarray,
     previous_image: np.ndarray,
@@ -107,7 +112,7 @@ def seam_maps(
     sigma_px = BLUR_PX_PER_640 * max(truth.shape[1] / 640.0, 0.5)
     blurred = ndimage.gaussian_filter(truth_change, sigma_px, mode="nearest", truncate=3.0)
     is_static = (blurred < STATIC_THRESHOLD) & ~is_moving
-    return SeamMaps(change, truth_change, np.maximum(change - truth_change, np.float32(0)), is_static)
+    return SeamMaps(change, truth_change, excess_of(change, truth_change), is_static)
 
 
 def part_means(values: np.ndarray, is_static: np.ndarray) -> tuple[float | None, float | None]:
@@ -202,14 +207,29 @@ def _measures(rows: Sequence[PairRow]) -> dict[str, float | None]:
 def _score(row: PairRow, normal: dict[tuple[str, int], list[float]]) -> float | None:
     """Excess of a boundary pair over the median of its camera's interior pairs in the two clips, 1/255."""
     around = [e for clip in (row.clip_index - 1, row.clip_index) for e in normal.get((row.camera, clip), [])]
-    if row.excess_static is None or not around:
+    return score_of(row.excess_static, around)
+
+
+def score_of(excess_static: float | None, around: Sequence[float]) -> float | None:
+    """Seam score of one camera at one boundary, 1/255; None where one side of the comparison is missing.
+
+    Args:
+        excess_static: Mean E on static pixels at the boundary.
+        around: The same of the interior pairs of the two clips.
+    """
+    if excess_static is None or not len(around):
         return None
-    return 255.0 * (row.excess_static - float(np.median(around)))
+    return 255.0 * (excess_static - float(np.median(around)))
 
 
 def ratio(boundary: Sequence[PairRow], interior: Sequence[PairRow], name: str) -> float | None:
     """Mean of a field of PairRow over the first pairs / its mean over the others; None where there is no such value."""
-    above, below = (mean_of([getattr(row, name) for row in rows]) for rows in (boundary, interior))
+    return ratio_of(*([getattr(row, name) for row in rows] for rows in (boundary, interior)))
+
+
+def ratio_of(boundary: Sequence[float | None], interior: Sequence[float | None]) -> float | None:
+    """Mean of the first values / mean of the others; None where there is none, or the latter is 0."""
+    above, below = mean_of(boundary), mean_of(interior)
     return None if above is None or not below else above / below
 
 

@@ -34,18 +34,61 @@ class TrainedClip:
     base: ClipState
     drift: np.ndarray | None = None
 
+    @classmethod
+    def of_state(
+        cls, clip: Clip, model: ClipModel, state: ClipState, reference: ClipState | None
+    ) -> TrainedClip | None:
+        """A loaded state of a clip; None where its files do not say what the cameras make of the scene's colours.
+
+        Args:
+            reference: What the clip inherits from; None for one that inherits nothing.
+        """
+        base = state if state.is_reference or reference is None else reference
+        gains = base.arrays.get(GAINS)
+        if gains is None or len(gains) != len(base.header.camera_names):
+            return None
+        return cls(clip, model, ClipState({GAINS: gains}, base.header), state.drift)  # the rest of it is not needed
+
     @property
     def colors(self) -> CameraColors:
         """What the cameras make of the scene's colours in this clip."""
         header = self.base.header
         return CameraColors(tuple(header.camera_names), self.base.arrays[GAINS], self.drift, self.clip.clip_length)
 
+    @property
+    def beyond(self) -> float:
+        """Clip time of the frame after the last one: that of the next clip's first frame."""
+        return self.clip.n_frames / self.clip.clip_length
+
+    @property
+    def is_held_beyond(self) -> bool:
+        """Whether the clip answers with its last frame when it is asked beyond it, because its field ends there."""
+        return self.model.knots(self.beyond) == self.model.knots(self.clip.clip_time(self.clip.stop - 1))
+
+    @property
+    def ahead(self) -> float:
+        """Clip time of the frame before the first one."""
+        return -1.0 / self.clip.clip_length
+
+    @property
+    def is_held_ahead(self) -> bool:
+        """Whether the clip answers with its first frame when it is asked for the one before it."""
+        return self.model.knots(self.ahead) == self.model.knots(0.0)
+
+    @property
+    def reach(self) -> float:
+        """How far Gaussians are expected from their anchors, scene units."""
+        return REACH_SPACINGS * self.base.header.spacing
+
+    def view(self, rig: CameraRig, camera: int) -> View:
+        """What a camera of the rig looks at."""
+        width, height = (int(v) for v in rig.image_sizes[camera])
+        near_plane = self.base.header.near_plane
+        return View.from_arrays(
+            rig.world_to_camera[camera], rig.Ks[camera], width=width, height=height, near_plane=near_plane
+        )
+
     def picture(self, rig: CameraRig, camera: int, clip_time: float) -> np.ndarray:
         """What a camera of the rig sees, in its own colours where they are known. Not clamped. [H, W, 3] float32"""
-        header = self.base.header
-        width, height = (int(v) for v in rig.image_sizes[camera])
-        view = View.from_arrays(
-            rig.world_to_camera[camera], rig.Ks[camera], width=width, height=height, near_plane=header.near_plane
-        )
-        image = render_model(self.model, view, clip_time, reach=REACH_SPACINGS * header.spacing)
+        image = render_model(self.model, self.view(rig, camera), clip_time, reach=self.reach)
         return self.colors.in_camera(host_array(image), rig, camera, clip_time)

@@ -130,11 +130,11 @@ def test_the_next_project_shows_nothing_of_the_one_before(shown: Shown, make_ope
     assert shown.playback.captured_picture(1, 0, 640) is not None
     shown.open(second)
     shown.train(second, 0)  # the same revision of the same clip
+    assert not shown.playback.is_loaded(shown.timeline)
     assert shown.playback.frame(shown.timeline) is None
     assert shown.playback.render(shown.timeline, shown.view, *SIZE) is None
     assert shown.playback.captured_picture(1, 0, 640) is None
     assert shown.playback.cloud(shown.view) is None
-    assert not shown.playback.is_loaded(shown.timeline)
 
 
 def test_other_settings_of_the_same_project_keep_what_was_made(shown: Shown, make_opened):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ui.viewport.picture_size import MOVING_MS, MOVING_SHARES, moving_share, picture_size
+from ui.viewport.picture_size import HURRY_S, MOVING_MS, MOVING_SHARES, MovingSize, moving_share, picture_size
 
 
 @pytest.mark.parametrize(
@@ -25,3 +25,28 @@ def test_a_moving_picture_is_as_large_as_time_allows(drawn_share: float, took_ms
 def test_a_picture_is_never_too_small_to_be_drawn() -> None:
     assert picture_size(900, 600, 0.5) == (450, 300)
     assert picture_size(20, 20, 0.25) == (16, 16)
+
+
+def test_the_size_changes_only_when_pictures_take_clearly_too_long_or_short() -> None:
+    size = MovingSize()
+    size.note_picture(1.0, 4 * MOVING_MS)
+    assert size.share == 0.5
+    for took in (1.3, 0.6, 1.1):
+        size.note_picture(0.5, took * MOVING_MS)
+        assert size.share == 0.5
+    size.note_picture(1.0, 4.5 * MOVING_MS)
+    assert size.share == 0.5, "a picture in full says the same of this size"
+    size.note_picture(0.5, 1.5 * MOVING_MS)
+    assert size.share == 0.375
+    size.note_picture(0.375, 0.2 * MOVING_MS)
+    assert size.share == 0.75
+
+
+def test_a_frame_that_changed_a_moment_ago_is_wanted_quickly() -> None:
+    size = MovingSize()
+    assert not size.is_hurried(3, 10.0, is_playing=False), "the first one may take its time"
+    assert not size.is_hurried(3, 10.1, is_playing=False)
+    assert size.is_hurried(4, 10.2, is_playing=False)
+    assert size.is_hurried(4, 10.2 + 0.9 * HURRY_S, is_playing=False)
+    assert not size.is_hurried(4, 10.2 + 1.1 * HURRY_S, is_playing=False)
+    assert size.is_hurried(4, 99.0, is_playing=True)

@@ -19,6 +19,7 @@ from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
 
 TIME, VIEW, COMPARE, MARK, TRAIN, WINDOW = "Time", "View", "Show and compare", "Mark regions", "Train", "Window"
+MODE = "View mode"
 
 
 class ActionNeeds(RegionsNeeds, Protocol):

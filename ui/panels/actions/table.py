@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from ui.panels.actions import compare, marking, time, training, view, window
+from ui.panels.actions import compare, heat, marking, modes, time, training, view, window
 from ui.panels.actions.action import Action, ActionNeeds
 from ui.panels.state import Dispatch, UiState
 
@@ -12,6 +12,8 @@ ACTIONS: tuple[Action, ...] = (
     *time.ACTIONS,
     *view.ACTIONS,
     *compare.ACTIONS,
+    *modes.ACTIONS,
+    *heat.ACTIONS,
     *marking.ACTIONS,
     *training.ACTIONS,
     *window.ACTIONS,

@@ -7,9 +7,14 @@ import warnings
 import numpy as np
 
 
-def columns_per_pixel(n_frames: int, width_px: float) -> int:
+def pixel_cells(n_cells: int, n_pixels: int) -> np.ndarray:
+    """Which cell each pixel of a side shows, where there are at least as many pixels as cells. [n_pixels] int64"""
+    return np.arange(n_pixels, dtype=np.int64) * n_cells // max(n_pixels, 1)
+
+
+def frames_per_column(n_frames: int, n_pixels: int) -> int:
     """Frames that share a column of pixels; 1 where there is room for all."""
-    return max(1, -(-n_frames // max(int(width_px), 1)))
+    return max(1, -(-n_frames // max(n_pixels, 1)))
 
 
 def worst_of(cells: np.ndarray, n: int, *, is_higher_better: bool) -> np.ndarray:

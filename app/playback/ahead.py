@@ -1,0 +1,160 @@
+"""Ahead: what is decoded and drawn before it is asked for, and which frames are ready to be shown at once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Hashable, Iterator
+from dataclasses import dataclass
+
+from app.playback.course import Course
+from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest
+from app.playback.render import Look, PictureKey, Renderer, RenderRequest
+from app.playback.view_modes import PLAIN, ShownAs, decoded_as
+
+PLAYING_S = 1.5
+"""This much of what comes is made ready while it plays."""
+MAX_PLAYING, STANDING = 64, 8
+"""At most so many frames while it plays; so many once the playhead stands."""
+SETTLED_S = 0.3
+"""The view, and the playhead unless it plays, have to stand still so long: until then cores are for what is shown."""
+SPARE = 2
+"""Frames that memory holds beside those that come: the one shown, and the newest."""
+
+RequestOf = Callable[[int, ShownAs], FrameRequest | None]
+"""What is to be decoded for a frame and how it is shown; None where nothing is trained."""
+StateOf = Callable[[int], Hashable]
+"""What tells states of a clip apart."""
+
+
+@dataclass(frozen=True, slots=True)
+class AskedLook:
+    """How a place on screen shows frames.
+
+    Attributes:
+        look: What was asked for.
+        full: The same at full size.
+    """
+
+    look: Look
+    full: Look
+
+    @property
+    def sizes(self) -> tuple[Look, ...]:
+        """Each size once, the one that was asked for first."""
+        return (self.look,) if self.look == self.full else (self.look, self.full)
+
+
+class Ahead:
+    """Plans the work of a decoder and a renderer. For one thread; costs next to nothing while nothing changes.
+
+    Args:
+        settled_s: See SETTLED_S.
+    """
+
+    def __init__(self, decoder: FrameDecoder, renderer: Renderer, *, settled_s: float = SETTLED_S) -> None:
+        self._decoder, self._renderer, self._settled_s = decoder, renderer, settled_s
+        self._looks: dict[Hashable, AskedLook] = {}
+        self._asked: dict[Hashable, AskedLook] = {}
+        self._still: object = None
+        self._still_since_s = 0.0
+        self._planned_of: object = None
+        self._runs_of: object = None
+        self._runs: list[tuple[int, int]] = []
+
+    def note(self, view_id: Hashable, asked: AskedLook) -> None:
+        """A place on screen shows rasterized pictures in this way. It says so again for as long as it does."""
+        self._asked[view_id] = asked
+
+    def clear(self) -> None:
+        """Another project was opened."""
+        self._looks, self._asked, self._planned_of, self._runs_of, self._runs = {}, {}, None, None, []
+
+    # ---------------------------------------------------------------- planning
+
+    def plan(self, course: Course, request_of: RequestOf, *, is_busy: bool = False) -> None:
+        """Look at where the playhead is, and plan anew if something is other than before.
+
+        Args:
+            is_busy: Whether something else, such as a training, needs the cores while the playhead stands.
+        """
+        self._looks, self._asked = self._asked or self._looks, {}
+        n = STANDING
+        if not self._is_settled(course) or (is_busy and not course.is_playing):
+            n = 0
+        elif course.is_playing:
+            n = min(round(PLAYING_S * course.frames_per_s), MAX_PLAYING)
+        parts = dict.fromkeys(decoded_as(asked.look.shown_as) for asked in self._looks.values()) or (PLAIN,)
+        requests = [request_of(frame, part) for frame in course.ahead(n) for part in parts]
+        # A snapshot of a running training is replaced before long: not worth the cores while nothing plays.
+        coming = [one for one in requests if one is not None and (course.is_playing or not one.is_live)]
+        identity = (course, coming, tuple(self._looks.items()), self._decoder.revision)
+        if identity == self._planned_of:
+            return
+        self._planned_of = identity
+        missing = [request for request in coming if not self._is_ready(request.key)]
+        look_keys = {asked.full.key for asked in self._looks.values()}
+        self._decoder.plan(missing[: max(self._decoder.n_that_fit - SPARE, 0)], lambda key: course.distance(key[-1]))
+        self._renderer.plan(list(self._drawable(coming)), lambda key: _picture_distance(key, course, look_keys))
+
+    def _is_settled(self, course: Course) -> bool:
+        views = tuple((view_id, asked.full) for view_id, asked in self._looks.items())
+        still = (views, None if course.is_playing else course.frame_index)
+        now_s = time.perf_counter()
+        if still != self._still:
+            self._still, self._still_since_s = still, now_s
+        return now_s - self._still_since_s >= self._settled_s
+
+    def _drawable(self, coming: list[FrameRequest]) -> Iterator[RenderRequest]:
+        """Pictures of frames that are decoded: as they are asked for, and after those in full size."""
+        for place in range(2):
+            for asked in self._looks.values():
+                if place >= len(asked.sizes):
+                    continue
+                of_look = [one for one in coming if one.shown_as == decoded_as(asked.look.shown_as)]
+                n_that_fit = self._renderer.n_that_fit(asked.full) // len(self._looks) - SPARE
+                for request in of_look[: max(n_that_fit, 0)]:
+                    shown = self._decoder.known(request.key)
+                    if shown is not None and not (place == 0 and self._renderer.is_ready(request.key, asked.full)):
+                        yield RenderRequest(request.key, asked.sizes[place], shown)
+
+    # ---------------------------------------------------------------- what is ready
+
+    def _is_ready(self, key: FrameKey) -> bool:
+        """Whether a frame can be shown at once, as it is looked at now."""
+        if not self._looks:
+            return self._decoder.is_ready(key)
+        return all(
+            any(self._renderer.is_ready((*key[:-2], decoded_as(look.shown_as), key[-1]), look) for look in asked.sizes)
+            for asked in self._looks.values()
+        )
+
+    def runs(self, state_of: StateOf, is_current: Callable[[FrameKey], bool]) -> list[tuple[int, int]]:
+        """Frames that can be shown at once as they are looked at now: first and stop of each run, in order.
+
+        Args:
+            is_current: Whether a key is of the state of its clip that is shown.
+        """
+        keys = self._renderer.ready_keys() if self._looks else self._decoder.ready_keys()
+        states = tuple((clip_index, state_of(clip_index)) for clip_index in sorted({key[2] for key in keys}))
+        identity = (states, self._decoder.revision, self._renderer.revision, tuple(self._looks.items()))
+        if identity != self._runs_of:
+            frames = sorted({key[-1] for key in keys if is_current(key) and self._is_ready(key)})
+            self._runs_of, self._runs = identity, _runs(frames)
+        return self._runs
+
+
+def _picture_distance(key: PictureKey, course: Course, look_keys: set[Hashable]) -> float:
+    """Of other looks than those that are shown nothing is wanted soon."""
+    gaussians_key, look = key
+    return course.distance(gaussians_key[-1]) if look.key in look_keys else float("inf")
+
+
+def _runs(frames: list[int]) -> list[tuple[int, int]]:
+    """Ascending frames as runs: first and stop of each."""
+    runs: list[tuple[int, int]] = []
+    for frame in frames:
+        if runs and runs[-1][1] == frame:
+            runs[-1] = (runs[-1][0], frame + 1)
+        else:
+            runs.append((frame, frame + 1))
+    return runs

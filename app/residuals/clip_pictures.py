@@ -1,0 +1,112 @@
+"""ClipPictures: renders and captured pictures of cameras as an evaluation compares them. Kept up to a number of bytes.
+
+For threads, which share one: what is loaded for playback is used, other clips are loaded here, a few at a time.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.playback.frame_decoder import ClipFiles, FrameDecoder, FrameRequest, ModelKey
+from engine.byte_cache import ByteCache
+from engine.capture.capture import Capture
+from engine.errors import ProjectError
+
+if TYPE_CHECKING:
+    from engine.metrics.clips.trained_clip import TrainedClip  # brings torch, which only the threads need
+
+MAX_CLIPS = 3
+"""Loaded here: two neighbours and one more. Clips that playback has loaded come on top, and cost nothing."""
+CACHE_BYTES = 64 << 20
+"""Renders as floats: the frame before, and the same frame for another kind of map, are mostly there."""
+DECODER_WAIT_S = 1.0
+"""Playback may be loading the very clip; loading it twice at the same time takes longer than waiting."""
+
+_PictureKey = tuple[ModelKey, int, float]
+
+
+class ClipPictures:
+    """Pictures of the open project.
+
+    Args:
+        decoder: Of the playback; its loaded clips are used.
+    """
+
+    def __init__(self, decoder: FrameDecoder) -> None:
+        self._decoder = decoder
+        self._lock = threading.Lock()
+        self._files = ClipFiles()
+        self._clips: OrderedDict[ModelKey, TrainedClip] = OrderedDict()
+        self._renders: ByteCache[_PictureKey, np.ndarray] = ByteCache(CACHE_BYTES)
+
+    def clear(self) -> None:
+        """Forget everything, as when another project is opened."""
+        with self._lock:
+            self._clips.clear()
+            self._files = ClipFiles()
+        self._renders.clear()
+
+    def trained(self, request: FrameRequest) -> TrainedClip:
+        """The clip of a request as cameras see it.
+
+        Raises:
+            ProjectError: Its file is missing or damaged, or does not say what cameras make of its colours.
+        """
+        loaded = self._decoder.loaded(request)
+        if loaded is not None and loaded.trained is not None:
+            return loaded.trained
+        with self._lock:
+            known = self._clips.get(request.model_key)
+            if known is None and self._decoder.worker.wait_idle(DECODER_WAIT_S):
+                loaded = self._decoder.loaded(request)
+                known = None if loaded is None else loaded.trained
+            if known is None:
+                known = self._files.read(request).trained
+                if known is None:
+                    raise ProjectError(
+                        f"Clip {request.clip_index} does not say what the cameras make of its colours.",
+                        hint="Train this clip again.",
+                        path=request.path,
+                    )
+                self._keep(request, known)
+            return known
+
+    def _keep(self, request: FrameRequest, trained: TrainedClip) -> None:
+        for key in [key for key in self._clips if key[2] == request.clip_index]:  # an earlier state of it
+            del self._clips[key]
+        while len(self._clips) >= MAX_CLIPS:
+            self._clips.popitem(last=False)
+        self._clips[request.model_key] = trained
+
+    def render(self, capture: Capture, request: FrameRequest, camera_index: int, clip_time: float) -> np.ndarray:
+        """A camera's picture of a clip in its own colours, as it is compared. [H, W, 3] float32 in 0..1
+
+        Raises:
+            ProjectError: See `trained`.
+        """
+        from engine.metrics.pictures.colors import as_shown
+
+        key = (request.model_key, camera_index, clip_time)
+        known = self._renders.get(key)
+        if known is None:
+            trained = self.trained(request)
+            known = as_shown(trained.picture(capture.rig, camera_index, clip_time), "float")
+            self._renders.put(key, known, known.nbytes)
+        return known
+
+    def frame(self, capture: Capture, request: FrameRequest, camera_index: int) -> np.ndarray:
+        """`render` of the frame that a request names."""
+        return self.render(capture, request, camera_index, request.clip.clip_time(request.frame_index))
+
+
+def captured(capture: Capture, camera_index: int, frame_index: int) -> np.ndarray:
+    """What a camera took. [H, W, 3] float32 in 0..1
+
+    Raises:
+        CaptureError: The file is missing or damaged.
+    """
+    return capture.frame(camera_index, frame_index).astype(np.float32) / np.float32(255.0)

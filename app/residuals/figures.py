@@ -1,0 +1,225 @@
+"""Figures: what is known of every picture of a project, as arrays over frames and cameras, and the score of each seam.
+
+Numbers are those of the rows of an evaluation. A reading of kept figures or a measuring hands them over clip by clip;
+what was trained again is forgotten.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from app.residuals.heat_map import LEVELS
+from app.status import CELL_COLUMNS, SeamStatus
+from engine.capture.clip import Clip
+from engine.metrics.clips.seams import PairRow, ratio_of, score_of
+from engine.metrics.clips.summary import EvalRow, mean_of
+
+N_SEAMS_PER_CALL = 20
+"""Scores that are made at a time: about half a millisecond each with thirty cameras."""
+
+
+@dataclass(frozen=True, slots=True)
+class RowFigures:
+    """Of one picture. None where a figure does not exist.
+
+    Attributes:
+        psnr: dB
+        flip: Mean FLIP, 0..1
+        has_flip: Whether that was measured.
+    """
+
+    frame_index: int
+    camera_index: int
+    psnr: float | None
+    flip: float | None
+    has_flip: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class PairFigures:
+    """Of two neighbouring frames of one camera, by the later one. None where a figure does not exist.
+
+    Attributes:
+        excess: Mean E over all pixels, 0..1
+        excess_static, change_static: Mean E and mean R over static pixels, 0..1
+    """
+
+    frame_index: int
+    camera_index: int
+    excess: float | None
+    excess_static: float | None
+    change_static: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class ClipFigures:
+    """What was found of one clip."""
+
+    clip_index: int
+    rows: Sequence[RowFigures] = ()
+    pairs: Sequence[PairFigures] = ()
+
+
+def mean_excess(pair: PairRow) -> float | None:
+    """Mean E over all pixels, that of the map of E, from the means over both parts; None where there is none."""
+    parts = ((pair.static_share, pair.excess_static), (1.0 - pair.static_share, pair.excess_moving))
+    known = [share * value for share, value in parts if value is not None]
+    return sum(known) if known else None
+
+
+def row_figures(row: EvalRow, camera_index: int, *, has_flip: bool = True) -> RowFigures:
+    """What the window shows of a row. has_flip: Whether FLIP was among the figures that were measured."""
+    return RowFigures(row.frame_index, camera_index, row.figures["psnr"], row.figures["flip"], has_flip)
+
+
+def pair_figures(pair: PairRow, camera_index: int) -> PairFigures:
+    """What the window shows of a pair."""
+    return PairFigures(pair.frame_index, camera_index, mean_excess(pair), pair.excess_static, pair.change_static)
+
+
+def _known(values: np.ndarray) -> list[float]:
+    return values[np.isfinite(values)].tolist()
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else value
+
+
+@dataclass(slots=True)
+class Figures:
+    """Arrays over all frames and cameras. For one thread.
+
+    Attributes:
+        clips: Of the project.
+        n_cameras: Of the capture.
+        cells: By column of CELL_COLUMNS, NaN where not known. [F, C] float64
+        has_row, has_pair: What was measured, whether or not there is a figure. [F, C] bool
+        is_wanted: Frames of trained clips. [F] bool
+        is_wanted_pair: Frames whose pair with the frame before can be measured. [F] bool
+        seams: One per boundary between clips.
+        revision: Grows with every change.
+    """
+
+    clips: Sequence[Clip]
+    n_cameras: int
+    cells: dict[str, np.ndarray] = field(init=False)
+    has_row: np.ndarray = field(init=False)
+    has_pair: np.ndarray = field(init=False)
+    is_wanted: np.ndarray = field(init=False)
+    is_wanted_pair: np.ndarray = field(init=False)
+    seams: list[SeamStatus] = field(init=False)
+    revision: int = 0
+    _excess_static: np.ndarray = field(init=False)
+    _change_static: np.ndarray = field(init=False)
+    _stale_seams: set[int] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        shape = (self.clips[-1].stop if self.clips else 0, self.n_cameras)
+        self.cells = {column: np.full(shape, np.nan) for column in CELL_COLUMNS}
+        self.has_row, self.has_pair = (np.zeros(shape, bool) for _ in range(2))
+        self.is_wanted, self.is_wanted_pair = (np.zeros(shape[0], bool) for _ in range(2))
+        self._excess_static, self._change_static = (np.full(shape, np.nan) for _ in range(2))
+        self.seams = [SeamStatus(clip.clip_index, clip.start) for clip in self.clips[1:]]
+
+    def set_trained(self, trained: Iterable[int]) -> None:
+        """Say which clips are trained, and so can be measured."""
+        known = set(trained)
+        self.is_wanted[:] = self.is_wanted_pair[:] = False
+        for clip in self.clips:
+            if clip.clip_index in known:
+                self.is_wanted[clip.start : clip.stop] = True
+                self.is_wanted_pair[clip.start + 1 : clip.stop] = True
+                self.is_wanted_pair[clip.start] = clip.clip_index - 1 in known
+        self.revision += 1
+
+    def forget(self, clip_index: int) -> None:
+        """A clip was trained again, or is gone: nothing of it holds any more, nor the boundary behind it."""
+        clip = self.clips[clip_index]
+        frames = slice(clip.start, clip.stop)
+        for column in CELL_COLUMNS:
+            self.cells[column][frames] = np.nan
+        self._excess_static[frames] = self._change_static[frames] = np.nan
+        self.has_row[frames] = self.has_pair[frames] = False
+        if clip.stop < len(self.has_pair):
+            for values in (self.cells["E"], self._excess_static, self._change_static):
+                values[clip.stop] = np.nan
+            self.has_pair[clip.stop] = False
+        for later in (clip_index, clip_index + 1):
+            if 0 < later < len(self.clips):
+                self.seams[later - 1] = SeamStatus(later, self.clips[later].start)
+        self._stale_seams |= self._seams_of(clip_index)
+        self.revision += 1
+
+    def take(self, found: ClipFigures) -> None:
+        """Take up what was measured of a clip. What is known already is overwritten."""
+        for row in found.rows:
+            at = row.frame_index, row.camera_index
+            self.cells["psnr"][at] = _number(row.psnr)
+            if row.has_flip:
+                self.cells["flip"][at] = _number(row.flip)
+                self.has_row[at] = True
+        for pair in found.pairs:
+            at = pair.frame_index, pair.camera_index
+            self.cells["E"][at] = LEVELS * _number(pair.excess)
+            self._excess_static[at] = _number(pair.excess_static)
+            self._change_static[at] = _number(pair.change_static)
+            self.has_pair[at] = True
+        if found.pairs:
+            self._stale_seams |= self._seams_of(found.clip_index)
+        self.revision += 1
+
+    def _seams_of(self, clip_index: int) -> set[int]:
+        """Boundaries, by the later clip, whose score depends on pairs of a clip."""
+        return {later for later in (clip_index, clip_index + 1) if 0 < later < len(self.clips)}
+
+    def score_seams(self) -> None:
+        """Make some of the scores anew that have changed; call it again while `has_stale_seams`."""
+        for later in sorted(self._stale_seams)[:N_SEAMS_PER_CALL]:
+            self._stale_seams.discard(later)
+            self.seams[later - 1] = self._seam(later)
+            self.revision += 1
+
+    @property
+    def has_stale_seams(self) -> bool:
+        """Whether there are scores to be made anew."""
+        return bool(self._stale_seams)
+
+    def _seam(self, later: int) -> SeamStatus:
+        before, after = self.clips[later - 1], self.clips[later]
+        inside = np.r_[before.start + 1 : before.stop, after.start + 1 : after.stop]
+        interior = self._excess_static[inside]
+        scores: dict[int, float] = {}
+        for camera in np.flatnonzero(np.isfinite(self._excess_static[after.start])):
+            score = score_of(float(self._excess_static[after.start, camera]), _known(interior[:, camera]))
+            if score is not None:
+                scores[int(camera)] = score
+        ratio = ratio_of(_known(self._change_static[after.start]), _known(self._change_static[inside]))
+        if not scores:
+            return SeamStatus(later, after.start, ratio=ratio)
+        worst = max(scores, key=lambda camera: scores[camera])
+        return SeamStatus(later, after.start, mean_of(list(scores.values())), ratio, len(scores), worst)
+
+    # ---------------------------------------------------------------- what is left
+
+    @property
+    def n_all(self) -> int:
+        """Pictures of trained clips."""
+        return int(self.is_wanted.sum()) * self.n_cameras
+
+    @property
+    def n_done(self) -> int:
+        """Those that are measured, with their pair."""
+        return self.n_all - int((self.unknown_rows | self.unknown_pairs).sum())
+
+    @property
+    def unknown_rows(self) -> np.ndarray:
+        """Pictures that are not measured. [F, C] bool"""
+        return ~self.has_row & self.is_wanted[:, None]
+
+    @property
+    def unknown_pairs(self) -> np.ndarray:
+        """Pairs that are not measured, by the later frame. [F, C] bool"""
+        return ~self.has_pair & self.is_wanted_pair[:, None]

@@ -1,0 +1,75 @@
+"""KeptReader: reads kept figures on a thread of its own, clip by clip, for whoever polls."""
+
+from __future__ import annotations
+
+import logging
+import queue
+import threading
+import time
+from collections.abc import Sequence
+
+from app.background.priority import lower_thread
+from app.project.opened_project import OpenedProject
+from app.residuals.figures import ClipFigures
+from engine.errors import EngineError
+
+logger = logging.getLogger(__name__)
+
+PAUSE_S = 0.002
+"""Between clips: parsing holds the interpreter lock, which the window needs too."""
+
+
+class KeptReader:
+    """One reading. For one thread, besides the one it owns.
+
+    Args:
+        opened: The project.
+        trained: Clips that can be measured.
+        clip_indices: Those that are read.
+    """
+
+    def __init__(self, opened: OpenedProject, trained: Sequence[int], clip_indices: Sequence[int]) -> None:
+        self._opened, self._trained, self._clip_indices = opened, list(trained), list(clip_indices)
+        self._found: queue.SimpleQueue[ClipFigures | str] = queue.SimpleQueue()
+        self._is_cancelled = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="kept figures", daemon=True)
+        self._thread.start()
+
+    def poll(self, n_at_most: int = 20) -> list[ClipFigures | str]:
+        """What was read since the last call: figures, and sentences that the user should know."""
+        found: list[ClipFigures | str] = []
+        while len(found) < n_at_most:
+            try:
+                found.append(self._found.get_nowait())
+            except queue.Empty:
+                break
+        return found
+
+    @property
+    def is_done(self) -> bool:
+        """Whether everything was read and polled."""
+        return not self._thread.is_alive() and self._found.empty()
+
+    def cancel(self) -> None:
+        """End soon."""
+        self._is_cancelled.set()
+
+    def _run(self) -> None:
+        lower_thread()
+        try:
+            self._read()
+        except EngineError as error:
+            self._found.put(str(error))
+        except Exception:  # the edge of a thread: figures are measured again
+            logger.exception("kept figures could not be read")
+
+    def _read(self) -> None:
+        from app.evaluation.headless import open_trained
+        from app.residuals.kept_reading import read_kept
+
+        opened = open_trained(self._opened.project, self._opened.capture)
+        for found in read_kept(opened, self._trained, self._clip_indices, self._found.put):
+            if self._is_cancelled.is_set():
+                return
+            self._found.put(found)
+            time.sleep(PAUSE_S)

@@ -1,0 +1,51 @@
+"""Figures that were measured before, by the window or by `clipgstream eval`: read clip by clip from what evaluations
+keep in the project.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from app.evaluation.evaluation import Scope, kept_figures
+from app.evaluation.headless import TrainedProject
+from app.residuals.figures import ClipFigures, PairFigures, RowFigures, pair_figures, row_figures
+from engine.errors import EngineError
+
+if TYPE_CHECKING:
+    from engine.metrics.pictures.picture import Choice  # brings torch, which only the thread needs
+
+WINDOW_METRICS: Choice = "all"
+"""What the window measures: what `clipgstream eval` measures unless it is told otherwise, so that neither measures what
+the other has. It takes half as long again as PSNR and FLIP alone would, rendering included."""
+READ_METRICS: tuple[Choice, ...] = ("quick", WINDOW_METRICS)
+"""What is read: quick figures have PSNR and pairs too."""
+
+
+def read_kept(
+    opened: TrainedProject, trained: Sequence[int], clip_indices: Sequence[int], say: Callable[[str], None]
+) -> Iterator[ClipFigures]:
+    """What is known of some clips, one after another. A clip that is damaged is left out.
+
+    Args:
+        trained: All clips that can be measured.
+        clip_indices: Those that are read.
+        say: Told of what cannot be read, in sentences.
+    """
+    cameras = {name: index for index, name in enumerate(opened.capture.rig.names)}
+    for clip_index in clip_indices:
+        rows: list[RowFigures] = []
+        pairs: list[PairFigures] = []
+        for metrics in READ_METRICS:
+            scope = Scope(trained, range(len(cameras)), metrics, "float")
+            try:
+                kept = kept_figures(opened, scope, clip_index, say)
+            except EngineError as error:
+                say(str(error))
+                break
+            has_flip = metrics != "quick"
+            for (name, _), row in kept.rows.items():
+                if name in cameras:
+                    rows.append(row_figures(row, cameras[name], has_flip=has_flip))
+            pairs += [pair_figures(pair, cameras[name]) for (name, _), pair in kept.pairs.items() if name in cameras]
+        yield ClipFigures(clip_index, rows, pairs)

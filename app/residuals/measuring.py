@@ -1,0 +1,253 @@
+"""Measuring: figures of every picture of the open project, read where they were measured before and measured in the
+background where not; forgotten and measured anew when a clip was trained again.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from app.evaluation.kept_figures import EVALUATIONS
+from app.playback.timeline import Timeline
+from app.project.clip_catalog import ClipCatalog
+from app.project.opened_project import OpenedProject
+from app.residuals.figures import ClipFigures, Figures
+from app.residuals.kept_reader import KeptReader
+from app.residuals.measuring_messages import LookAt, Measured, MeasureJob, MeasuringEnded, SetShare, Trouble
+from app.residuals.measuring_order import Look
+from app.residuals.measuring_process import LaunchMeasuring, Measurer, MeasuringProcess
+from app.status import CELL_COLUMNS, ResidualStatus
+from app.training.rate import Rate
+from engine.parallel import n_cores
+
+SHARE_WHILE_TRAINING = 0.05
+"""Of one core's time, while a clip trains on every core: training takes at most that much longer, whatever
+the scheduler makes of it, and the order in which things are measured shows seams long before everything is."""
+N_CORES_ENOUGH = 3
+"""From here on a training leaves one core to the window, most of which the window leaves alone."""
+START_AFTER_S = 2.0
+"""Quiet before the process is started: not while a project opens, nor between two clips of a queue."""
+STATUS_EVERY_S = 0.25
+"""Figures come more often than anybody looks."""
+RATE_TIME_CONSTANT_S = 30.0
+"""Items begin slowly, with the background of a camera."""
+
+
+class Measuring:
+    """Figures of the open project. For one thread, and nothing here waits.
+
+    Args:
+        launch: Starts a process; tests bring their own.
+        clock: Seconds.
+    """
+
+    def __init__(
+        self, *, launch: LaunchMeasuring = MeasuringProcess, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._launch, self._clock = launch, clock
+        self._opened: OpenedProject | None = None
+        self._catalog: ClipCatalog | None = None
+        self._seen: tuple[int, int] | None = None
+        self._revisions: tuple[str, ...] = ()
+        self._figures = Figures((), 0)
+        self._reader: KeptReader | None = None
+        self._process: Measurer | None = None
+        self._look: Look | None = None
+        self._told: tuple[Look, float] | None = None
+        self._is_training = False
+        self._is_given_up = False
+        self._changed_s = self._status_s = 0.0
+        self._rate = Rate(RATE_TIME_CONSTANT_S)
+        self._messages: list[str] = []
+        self._status_key: tuple[object, ...] = ()
+        self.status = ResidualStatus()
+
+    def open(self, opened: OpenedProject, catalog: ClipCatalog) -> None:
+        """Take up a project, or the same one with other settings."""
+        self._end()
+        self._opened, self._catalog = opened, catalog
+        self._seen, self._revisions = None, ("",) * len(opened.clips)
+        self._figures = Figures(opened.clips, len(opened.rig))
+        self._look, self._messages = None, []
+        self._take_catalog()
+        self._remake()
+
+    def look_at(self, timeline: Timeline, camera_index: int | None) -> None:
+        """Say what the user looks at: measured first. Nothing is measured before the first call."""
+        clip = timeline.clip
+        if clip is not None:
+            self._look = Look(clip.clip_index, camera_index)
+
+    def poll(self, *, is_training: bool) -> bool:
+        """Take in what was read and measured, and start what is missing. Whether the status has changed.
+
+        Args:
+            is_training: Whether a clip trains now.
+        """
+        if self._opened is None:
+            return False
+        self._is_training = is_training
+        self._take_catalog()
+        self._take_kept()
+        self._take_measured()
+        if self._figures.has_stale_seams:
+            self._figures.score_seams()
+        self._start()
+        self._tell()
+        now_s = self._clock()
+        key = (self._figures.revision, self._process is None, len(self._messages), self._is_held_back)
+        is_reading = self._reader is not None
+        if key == self._status_key or (now_s < self._status_s + STATUS_EVERY_S and not is_reading):
+            return False
+        self._status_key, self._status_s = key, now_s
+        self._remake()
+        return True
+
+    def close(self) -> None:
+        """End thread and process at once; what was measured is kept."""
+        self._end()
+        self._opened = None
+
+    def _end(self) -> None:
+        if self._reader is not None:
+            self._reader.cancel()
+        if self._process is not None:
+            self._process.end()
+        self._reader = self._process = self._told = None
+        self._rate = Rate(RATE_TIME_CONSTANT_S)
+
+    # ---------------------------------------------------------------- what comes in
+
+    def _take_catalog(self) -> None:
+        """See which clips are trained, and were trained again."""
+        catalog, opened = self._catalog, self._opened
+        assert catalog is not None
+        assert opened is not None
+        seen = (id(catalog), catalog.revision)
+        if seen == self._seen:
+            return
+        self._seen = seen
+        records = [catalog[index] for index in range(len(opened.clips))]
+        revisions = tuple(record.revision if record.state == "trained" else "" for record in records)
+        if revisions == self._revisions:
+            return
+        changed = [index for index, known in enumerate(self._revisions) if known != revisions[index]]
+        self._revisions = revisions
+        for clip_index in changed:
+            self._figures.forget(clip_index)
+        trained = [index for index, revision in enumerate(revisions) if revision]
+        self._figures.set_trained(trained)
+        self._end()
+        self._is_given_up, self._changed_s = False, self._clock()
+        behind = [index + 1 for index in changed if index + 1 < len(revisions)]
+        to_read = sorted({*changed, *behind} & {*trained})  # the pair at a boundary belongs to the clip behind it
+        if to_read and (opened.project.folder / EVALUATIONS).is_dir():
+            self._reader = KeptReader(opened, trained, to_read)
+
+    def _take_kept(self) -> None:
+        if self._reader is None:
+            return
+        for found in self._reader.poll():
+            if isinstance(found, str):
+                self._say(found)
+            else:
+                self._figures.take(found)
+        if self._reader.is_done:
+            self._reader = None
+
+    def _take_measured(self) -> None:
+        process = self._process
+        if process is None:
+            return
+        n_new = 0
+        for event in process.poll():
+            match event:
+                case Measured(clip_index=clip_index, row=row, pair=pair):
+                    n_new += row is not None
+                    rows, pairs = () if row is None else (row,), () if pair is None else (pair,)
+                    self._figures.take(ClipFigures(clip_index, rows, pairs))
+                case Trouble(message=message):
+                    self._say(message)
+                case MeasuringEnded():
+                    process.end()
+                    self._process, self._is_given_up = None, True
+        if n_new:
+            self._rate.update(self._figures.n_done, self._clock())
+
+    def _say(self, message: str) -> None:
+        if message not in self._messages:
+            self._messages.append(message)
+
+    # ---------------------------------------------------------------- what goes out
+
+    def _start(self) -> None:
+        """Start measuring where something is missing and nothing stands in the way."""
+        opened, look = self._opened, self._look
+        if opened is None or look is None or self._process is not None or self._reader is not None:
+            return
+        if self._is_given_up or self._clock() < self._changed_s + START_AFTER_S:
+            return
+        rows, pairs = self._figures.unknown_rows, self._figures.unknown_pairs
+        self._is_given_up = True
+        if not (rows | pairs).any():
+            return
+        self._is_given_up = False
+        capture = opened.capture
+        job = MeasureJob(
+            project=str(opened.project.folder),
+            capture=str(capture.path),
+            scale=capture.scale,
+            follow_links=capture.follow_links,
+            trained=tuple(index for index, revision in enumerate(self._revisions) if revision),
+            rows=rows,
+            pairs=pairs,
+            is_kept=opened.project.is_writable,
+            look=look,
+            share=self._share,
+        )
+        self._told = (look, self._share)
+        self._rate.update(self._figures.n_done, self._clock())
+        self._process = self._launch(job)
+
+    def _tell(self) -> None:
+        """Tell the process what has changed since it was told last."""
+        if self._process is None or self._told is None or self._look is None:
+            return
+        look, share = self._told
+        if look != self._look:
+            self._process.send(LookAt(self._look))
+        if share != self._share:
+            self._process.send(SetShare(self._share))
+        self._told = (self._look, self._share)
+
+    @property
+    def _share(self) -> float:
+        return SHARE_WHILE_TRAINING if self._is_training and n_cores() < N_CORES_ENOUGH else 1.0
+
+    @property
+    def _is_held_back(self) -> bool:
+        return self._process is not None and self._share < 1.0
+
+    def _remake(self) -> None:
+        figures, opened = self._figures, self._opened
+        holdout: Sequence[int] = () if opened is None else opened.holdout
+        cells = {column: figures.cells[column].astype(np.float32) for column in CELL_COLUMNS}
+        for values in cells.values():
+            values.flags.writeable = False
+        n_done, n_all = figures.n_done, figures.n_all
+        is_measuring = self._process is not None
+        self.status = ResidualStatus(
+            seams=tuple(figures.seams),
+            cells=cells,
+            is_held_out=tuple(camera in holdout for camera in range(figures.n_cameras)),
+            n_done=n_done,
+            n_all=n_all,
+            is_measuring=is_measuring,
+            is_held_back=self._is_held_back,
+            rate=self._rate.per_s if is_measuring else 0.0,
+            eta_s=self._rate.eta_s(n_all - n_done) if is_measuring else None,
+            message=" ".join(self._messages),
+            revision=figures.revision,
+        )

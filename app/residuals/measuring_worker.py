@@ -1,0 +1,226 @@
+"""The process that measures: one camera of one clip after another, in the order of measuring_order, with one thread and
+only what nobody else computes with. Nothing imported here may draw anything.
+
+While a clip trains it keeps to a share of one core's time as well, by resting after each picture: so even where its
+memory traffic or its turns were in the training's way, they would be for that share of the time only.
+"""
+
+from __future__ import annotations
+
+import logging
+import signal
+import time
+from collections import OrderedDict
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from app.background.kernels import use_threads
+from app.background.logs import start_logging
+from app.background.priority import idle_process
+from app.evaluation.evaluation import Scope, kept_figures
+from app.evaluation.headless import TrainedProject, open_trained
+from app.evaluation.kept_figures import KeptFigures
+from app.project.project import open_project
+from app.residuals.figures import pair_figures, row_figures
+from app.residuals.kept_reading import WINDOW_METRICS
+from app.residuals.measuring_messages import (
+    Event,
+    LookAt,
+    Measured,
+    MeasureJob,
+    MeasuringEnded,
+    SetShare,
+    Trouble,
+    decode_command,
+    encode,
+)
+from app.residuals.measuring_order import Item, first_item
+from engine.capture.capture import open_capture
+from engine.errors import EngineError
+from engine.kernels.cache import use_kernel_cache
+from engine.metrics.clips.summary import EvalRow
+
+if TYPE_CHECKING:
+    from engine.metrics.clips.evaluate import Evaluation
+    from engine.metrics.clips.seams import PairRow
+    from engine.metrics.clips.trained_clip import TrainedClip
+
+logger = logging.getLogger(__name__)
+
+MAX_CLIPS = 3
+"""Clips and their kept figures in memory."""
+
+
+class ParentGone(Exception):
+    """Nobody listens any more."""
+
+
+def main(job: MeasureJob, commands: Connection, events: Connection) -> None:
+    """Runs in the child until everything is measured."""
+    idle_process()  # before any thread is started, since threads take over the priority
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C reaches the whole group; the parent decides what it means
+    start_logging()
+    use_kernel_cache()  # before kernels are imported
+    use_threads(1)
+    with suppress(ParentGone):
+        talk = Talk(job, commands, events)
+        try:
+            measure(job, talk)
+        except EngineError as error:
+            talk.say(str(error))
+        except Exception as error:  # the edge of the process
+            logger.exception("measuring has failed")
+            talk.say(f"Measuring has failed ({type(error).__name__}: {error}); the log has more.")
+        talk.send(MeasuringEnded())
+
+
+class Talk:
+    """What the process hears and says, and when it rests."""
+
+    def __init__(self, job: MeasureJob, commands: Connection, events: Connection) -> None:
+        self._commands, self._events = commands, events
+        self.look, self._share = job.look, job.share
+        self._said: set[str] = set()
+        self._cpu_s = time.process_time()
+
+    def send(self, event: Event) -> None:
+        """Tell the window's process. Raises ParentGone."""
+        try:
+            self._events.send_bytes(encode(event))
+        except OSError as error:
+            raise ParentGone from error
+
+    def say(self, message: str) -> None:
+        """Tell the user, once."""
+        if message not in self._said:
+            self._said.add(message)
+            self.send(Trouble(message))
+
+    def rest(self) -> None:
+        """Take in commands, and wait for as long as the share demands for what was computed since the last call. Raises
+        ParentGone."""
+        spent_s = time.process_time() - self._cpu_s
+        began_s = time.monotonic()
+        while True:  # the share may change while it waits
+            left_s = began_s + spent_s * (1.0 / self._share - 1.0) - time.monotonic()
+            if not self._receive(max(left_s, 0.0)) and left_s <= 0:
+                break
+        self._cpu_s = time.process_time()
+
+    def _receive(self, wait_s: float) -> bool:
+        try:
+            if not self._commands.poll(wait_s):
+                return False
+            command = decode_command(self._commands.recv_bytes())
+        except (OSError, EOFError) as error:
+            raise ParentGone from error
+        if isinstance(command, LookAt):
+            self.look = command.look
+        elif isinstance(command, SetShare):
+            self._share = command.share
+        return True
+
+
+class _Clips:
+    """Clips and their kept figures, those used last."""
+
+    def __init__(self, opened: TrainedProject, job: MeasureJob, talk: Talk) -> None:
+        self._opened, self._talk = opened, talk
+        self._scope = Scope(job.trained, range(len(opened.capture.rig)), WINDOW_METRICS, "float")
+        self._is_kept = job.is_kept
+        self._loaded: OrderedDict[int, TrainedClip] = OrderedDict()
+        self._figures: OrderedDict[int, KeptFigures] = OrderedDict()
+
+    def load(self, clip_index: int) -> TrainedClip:
+        if clip_index not in self._loaded:
+            while len(self._loaded) >= MAX_CLIPS:
+                self._loaded.popitem(last=False)
+            self._loaded[clip_index] = self._opened.load(clip_index)
+        self._loaded.move_to_end(clip_index)
+        return self._loaded[clip_index]
+
+    def figures(self, clip_index: int) -> KeptFigures | None:
+        """Where the figures of a clip are kept; None where they are not."""
+        if not self._is_kept:
+            return None
+        if clip_index not in self._figures:
+            while len(self._figures) >= MAX_CLIPS:
+                self._figures.popitem(last=False)
+            self._figures[clip_index] = kept_figures(self._opened, self._scope, clip_index, self._talk.say)
+        return self._figures[clip_index]
+
+
+def measure(job: MeasureJob, talk: Talk) -> None:
+    """Measure what the job wants, most wanted first. What cannot be read is told and left out.
+
+    Raises:
+        CaptureError, ProjectError: The capture or the project cannot be opened.
+        ParentGone: Nobody listens any more.
+    """
+    project = open_project(Path(job.project), is_writable=False)
+    capture = open_capture(job.capture, scale=job.scale, follow_links=job.follow_links)
+    opened = open_trained(project, capture)
+    from engine.metrics.clips.evaluate import Evaluation
+
+    holdout = capture.camera_indices(project.settings.holdout)
+    cameras = range(len(capture.rig))
+    evaluation = Evaluation(capture, cameras=cameras, holdout=holdout, metrics=WINDOW_METRICS)
+    clips = _Clips(opened, job, talk)
+    rows, pairs = job.rows.copy(), job.pairs.copy()
+    left = _items(opened, job.trained, rows | pairs)
+    while (item := first_item(left, talk.look, holdout)) is not None:
+        try:
+            is_done = _measure_item(item, evaluation, clips, rows, pairs, talk)
+        except EngineError as error:
+            talk.say(str(error))
+            is_done = True  # as far as it can be
+        if is_done:
+            left.discard(item)
+
+
+def _items(opened: TrainedProject, trained: tuple[int, ...], wanted: np.ndarray) -> set[Item]:
+    found = set()
+    for clip_index in trained:
+        clip = opened.clips[clip_index]
+        cameras = np.flatnonzero(wanted[clip.start : clip.stop].any(0))
+        found |= {(clip_index, int(camera)) for camera in cameras}
+    return found
+
+
+def _measure_item(
+    item: Item, evaluation: Evaluation, clips: _Clips, rows: np.ndarray, pairs: np.ndarray, talk: Talk
+) -> bool:
+    """Measure one camera of one clip; what is done is taken out of rows and pairs. False where the user looked at
+    something else before it was done."""
+    clip_index, camera = item
+    trained = clips.load(clip_index)
+    clip, look = trained.clip, talk.look
+    frames = [frame for frame in clip.frame_indices() if rows[frame, camera]]
+    later = [frame for frame in clip.frame_indices() if pairs[frame, camera]]
+    before = clips.load(clip_index - 1) if clip.start in later else None
+    figures = clips.figures(clip_index)
+    talk.rest()
+    for found in evaluation.of_camera(trained, camera, before=before, frames=frames, pairs=later):
+        _take(found, clip_index, camera, rows, pairs, talk)
+        if figures is not None:
+            with figures.writing():
+                figures.add(found)
+        talk.rest()
+        if talk.look != look:
+            return False
+    return True
+
+
+def _take(
+    found: EvalRow | PairRow, clip_index: int, camera: int, rows: np.ndarray, pairs: np.ndarray, talk: Talk
+) -> None:
+    if isinstance(found, EvalRow):
+        rows[found.frame_index, camera] = False
+        talk.send(Measured(clip_index, row=row_figures(found, camera)))
+    else:
+        pairs[found.frame_index, camera] = False
+        talk.send(Measured(clip_index, pair=pair_figures(found, camera)))

@@ -1,0 +1,135 @@
+"""Ahead: what is decoded and drawn before it is asked for, and which frames are said to be ready."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from app.playback.ahead import Ahead
+from app.playback.orbit_view import OrbitView
+from app.playback.playback import Playback
+from app.playback.timeline import Timeline
+from app.project.opened_project import OpenedProject
+from app.training.service import ShownState
+from tests.app.fakes import write_trained
+
+WAIT_S = 300.0
+"""Only a hang takes longer, or the first start, which compiles the kernels."""
+SIZE, FULL = (32, 24), (64, 48)
+
+
+class Screen:
+    """A playback that is looked at: `turn` is one turn of the loop of a window without a graphics card."""
+
+    def __init__(self, opened: OpenedProject) -> None:
+        self.states: dict[int, ShownState] = {}
+        self.playback = Playback(self.states.get)
+        self.playback.ahead = Ahead(self.playback.decoder, self.playback.renderer, settled_s=0.0)
+        self.playback.show(opened)
+        self.timeline, self.view = Timeline(opened.clips), OrbitView(opened.rig)
+        for index in range(len(opened.clips)):
+            self.states[index] = ShownState(write_trained(opened, index), f"state of {index}")
+
+    def turn(self, *, is_busy: bool = False, draws: bool = True, size: tuple[int, int] = SIZE):
+        picture = None
+        if draws:
+            picture = self.playback.render(self.timeline, self.view, *size, full_size=FULL)
+        self.playback.work_ahead(self.timeline, is_busy=is_busy)
+        for worker in (self.playback.decoder.worker, self.playback.renderer.worker):
+            assert worker.wait_idle(WAIT_S)
+        return picture
+
+    def turns(self, n: int = 6, **options: object) -> list[tuple[int, int]]:
+        """Some turns; gives what is ready then."""
+        for _ in range(n):
+            self.turn(**options)  # pyright: ignore[reportArgumentType]
+        return self.playback.cached_frames()
+
+
+@pytest.fixture
+def screen(make_opened: Callable[..., OpenedProject]) -> Iterator[Screen]:
+    """Two trained clips of three frames."""
+    made = Screen(make_opened())
+    yield made
+    made.playback.close()
+
+
+def test_while_it_stands_the_next_frames_become_ready_into_the_next_clip(screen: Screen):
+    assert screen.playback.cached_frames() == []
+    n = screen.timeline.n_frames
+    assert n == 6
+    assert screen.turns() == [(0, n)]
+    for frame in range(n):
+        screen.timeline.seek(frame)
+        picture = screen.playback.render(screen.timeline, screen.view, *SIZE, full_size=FULL)
+        assert picture is not None
+        assert (picture.is_stale, picture.source.frame_index) == (False, frame), "what is said to be ready is"
+        assert picture.size == (FULL if frame else SIZE), "sharp ones follow; the window itself asks for that of now"
+
+
+def test_without_pictures_frames_are_ready_when_they_are_decoded(screen: Screen):
+    screen.playback.frame(screen.timeline)
+    assert screen.turns(draws=False) == [(0, 6)]
+    assert screen.playback.renderer.worker.newest is None
+
+
+def test_beside_a_training_nothing_is_made_ahead_until_it_plays(screen: Screen):
+    assert screen.turns(is_busy=True) == [(0, 1)]
+    screen.timeline.toggle_play()
+    assert screen.turns(is_busy=True) == [(0, 6)]
+
+
+def test_another_view_or_state_has_nothing_ready(screen: Screen):
+    screen.turns()
+    screen.view.orbit(40.0, 0.0)
+    screen.turn(is_busy=True)
+    assert screen.turns(1, is_busy=True) == [(0, 1)], "only what was drawn from here"
+    screen.view.orbit(-40.0, 0.0)
+    screen.turns(1)
+    state = screen.states[1]
+    screen.states[1] = ShownState(state.file, "another state")
+    assert screen.playback.cached_frames() == [(0, 3)]
+
+
+def test_a_snapshot_is_not_decoded_ahead_while_it_stands(screen: Screen):
+    screen.states[1] = ShownState(screen.states[1].file, "live", is_live=True)
+    assert screen.turns() == [(0, 3)]
+
+
+def test_what_is_asked_is_not_held_up_by_what_fails_ahead(screen: Screen):
+    screen.states[1].file.write_bytes(b"not a clip")
+    assert screen.turns() == [(0, 3)]
+    assert screen.playback.take_failures() == [], "nobody has looked at it yet"
+    screen.timeline.seek(3)
+    screen.turn()
+    (failure,) = screen.playback.take_failures()
+    assert failure.title == "The clip cannot be shown"
+
+
+def test_no_more_is_made_ahead_than_memory_holds(make_opened: Callable[..., OpenedProject]):
+    screen = Screen(make_opened())
+    decoder = screen.playback.decoder
+    screen.playback.frame(screen.timeline)
+    assert decoder.worker.wait_idle(WAIT_S)
+    n_bytes = decoder._cache.n_bytes
+    decoder._cache.max_bytes = int(4.5 * n_bytes)
+    screen.timeline.toggle_play()
+    began = decoder.worker.n_ahead
+    assert screen.turns(10, draws=False) == [(0, 3)]
+    assert decoder.worker.n_ahead - began == 2, "what was made is not thrown away for what comes later"
+    screen.playback.close()
+
+
+def test_a_moving_view_is_not_held_up(screen: Screen):
+    screen.playback.ahead = Ahead(screen.playback.decoder, screen.playback.renderer, settled_s=1e6)
+    assert screen.turns() == [(0, 1)]
+
+
+def test_only_a_pause_after_work_ahead_is_news(screen: Screen):
+    screen.turns()
+    before = screen.playback.finished
+    screen.view.orbit(30.0, 0.0)
+    screen.turns(2)
+    assert screen.playback.finished != before
+    assert screen.playback.finished == screen.playback.finished

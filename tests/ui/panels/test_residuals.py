@@ -1,0 +1,165 @@
+"""The residuals panel and heat maps over the picture, in the real window."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pyglet.window import key
+
+from app.residuals.heat_map import HEAT_KINDS, HeatMap
+from app.session import commands
+from app.status import CELL_RANGES, SeamStatus
+from tests.ui.pilot import Pilot
+from ui.panels.heat_overlay import heat_words
+from ui.panels.residuals.cells import cell_at, frames_per_column, pixel_cells, worst_of
+from ui.panels.residuals.matrix import cell_colors, matrix_picture
+from ui.panels.residuals.panel import worst_seams
+from ui.panels.state import RESIDUALS
+from ui.viewport.heat_image import value_at
+
+
+def test_the_worst_of_frames_that_share_a_column_is_kept() -> None:
+    cells = np.array([[30.0, 1.0], [20.0, np.nan], [25.0, np.nan]], np.float32)
+    assert np.array_equal(worst_of(cells, 2, is_higher_better=True), [[20.0, 1.0], [25.0, np.nan]], equal_nan=True)
+    assert np.array_equal(worst_of(cells, 2, is_higher_better=False), [[30.0, 1.0], [25.0, np.nan]], equal_nan=True)
+    assert worst_of(cells, 1, is_higher_better=True) is cells
+
+
+@pytest.mark.parametrize(("n_frames", "width"), [(1, 1), (30, 200), (10_000, 195), (7, 7), (201, 200)])
+def test_one_bad_frame_is_seen_at_its_place_however_many_there_are(n_frames: int, width: int) -> None:
+    low, high = CELL_RANGES["psnr"]
+    cells = np.full((n_frames, 3), high, np.float32)
+    bad = n_frames // 2
+    cells[bad, 1] = low
+    picture = matrix_picture(cells, "psnr", width, 9)
+    assert picture.shape == (9, width, 3)
+    is_bad = (picture == cell_colors(np.array(low), "psnr")).all(axis=2)
+    rows, columns = np.nonzero(is_bad)
+    assert set(rows) == {3, 4, 5}
+    n = frames_per_column(n_frames, width)
+    assert abs((columns.mean() + 0.5) / width - (bad + 0.5) / n_frames) <= max(n / n_frames, 1.0 / width)
+
+
+def test_cells_of_pixels_cover_all_cells_in_order() -> None:
+    found = pixel_cells(3, 8)
+    assert list(found) == sorted(found)
+    assert set(found) == {0, 1, 2}
+
+
+def test_a_place_outside_of_the_matrix_is_no_cell() -> None:
+    assert cell_at(0.999, 0.0, 30, 8) == (29, 0)
+    assert cell_at(1.0, 0.5, 30, 8) is None
+    assert cell_at(-0.01, 0.5, 30, 8) is None
+    assert cell_at(0.5, 0.5, 0, 8) is None
+
+
+def test_bad_is_bright_in_every_column() -> None:
+    for column, (low, high) in CELL_RANGES.items():
+        good, bad = (high, low) if column == "psnr" else (low, high)
+        assert cell_colors(np.array(bad), column).sum() > cell_colors(np.array(good), column).sum()
+
+
+def test_seams_without_a_score_are_left_out() -> None:
+    seams = (SeamStatus(1, 10, 0.5), SeamStatus(2, 20), SeamStatus(3, 30, 2.5))
+    assert [seam.clip_index for seam in worst_seams(seams, 5)] == [3, 1]
+
+
+def test_a_value_outside_of_the_map_is_none() -> None:
+    values = np.array([[1.0, np.nan]], np.float32)
+    assert value_at(values, 0.2, 0.5) == 1.0
+    assert value_at(values, 0.7, 0.5) is None
+    assert value_at(values, 1.0, 0.5) is None
+
+
+def test_words_say_what_is_shown_and_why_not() -> None:
+    kind = HEAT_KINDS["E"]
+    shown = HeatMap(np.zeros((2, 2), np.float32), "E", 1, 0, 5, 0, mean=1.25)
+    assert heat_words(kind, shown) == "E: excess flicker, frame 5, mean 1.2 x 1/255"
+    nothing = HeatMap(None, "E", None, 0, 0, 0, note="Frame 0 has no frame before it.")
+    assert "no frame before" in heat_words(kind, nothing)
+    assert "being measured" in heat_words(kind, None)
+
+
+# ---- in the window ---------------------------------------------------------------------------------------------
+
+
+def _show(pilot: Pilot) -> None:
+    pilot.studio.frame.ui.wanted_panel = RESIDUALS
+    pilot.draw(6)
+
+
+def test_a_click_on_a_cell_goes_to_its_frame_and_camera(pilot: Pilot) -> None:
+    _show(pilot)
+    area = pilot.rects["residuals.matrix"]
+    pilot.tap(area.x0 + area.width * 12.5 / 30, area.y0 + area.height * 5.5 / 8)
+    assert pilot.session.timeline.frame_index == 12
+    assert pilot.session.view.look_through == 5
+
+
+def test_the_worst_picture_comes_first_and_a_click_goes_there(pilot: Pilot) -> None:
+    _show(pilot)
+    pilot.click("residuals.worst12.5")
+    assert (pilot.session.timeline.frame_index, pilot.session.view.look_through) == (12, 5)
+    pilot.click("residuals.column.E")
+    pilot.draw(2)
+    assert "residuals.worst12.5" in pilot.rects
+
+
+def test_a_seam_leads_to_its_frame_and_its_worst_camera(pilot: Pilot) -> None:
+    _show(pilot)
+    pilot.click("residuals.seam2")
+    assert (pilot.session.timeline.frame_index, pilot.session.view.look_through) == (20, 5)
+
+
+def test_a_heat_map_lies_over_the_picture_with_its_bar_and_the_value_under_the_pointer(pilot: Pilot) -> None:
+    pilot.session.dispatch(commands.LookThrough(2))
+    pilot.key(key.RIGHT)
+    pilot.draw(3)
+    before = pilot.picture()
+    pilot.key(key._7)
+    pilot.draw(3)
+    assert pilot.sent(commands.ShowHeat) == [commands.ShowHeat("E")]
+    pane, bar = pilot.rects["viewport.rendered"], pilot.rects["viewport.heat_bar"]
+    assert pane.contains(bar.x0, bar.y0)
+    assert np.abs(pilot.picture().astype(int) - before).mean() > 5.0
+    heat = pilot.studio.frame.viewport.active.heat
+    assert heat.shown is not None
+    assert heat.shown.kind == "E"
+    pilot.key(key._7)
+    pilot.draw(3)
+    assert heat.shown is None
+    assert "viewport.heat_bar" not in pilot.rects
+
+
+def test_colours_keep_their_range_from_frame_to_frame(pilot: Pilot) -> None:
+    pilot.session.dispatch(commands.LookThrough(2))
+    pilot.session.dispatch(commands.ShowHeat("error"))
+    strips = []
+    for frame_index in (3, 17):
+        pilot.session.dispatch(commands.SetFrame(frame_index))
+        pilot.draw(4)
+        pane = pilot.rects["viewport.rendered"]
+        y = int(pane.y0 + pane.height * 0.8)
+        strips.append(pilot.picture()[y, int(pane.x0) + 4 : int(pane.x0) + 40].astype(int))
+    assert np.abs(strips[0] - strips[1]).max() <= 2
+
+
+def test_where_there_is_no_map_the_reason_is_said_and_nothing_breaks(pilot: Pilot) -> None:
+    pilot.session.dispatch(commands.LookThrough(2))
+    pilot.session.dispatch(commands.ShowHeat("E"))
+    pilot.draw(4)
+    assert pilot.studio.frame.viewport.active.heat.shown is None
+    assert len(pilot.session.notices) == 0
+    assert "viewport.heat_bar" in pilot.rects
+
+
+def test_every_kind_can_be_chosen_by_key(pilot: Pilot) -> None:
+    pilot.session.dispatch(commands.LookThrough(2))
+    pilot.session.dispatch(commands.SetFrame(4))
+    seen = []
+    for _ in HEAT_KINDS:
+        pilot.key(key._8)
+        pilot.draw(2)
+        seen.append(pilot.session.overlays.heat)
+    assert sorted(seen) == sorted(HEAT_KINDS)
+    assert len(pilot.session.notices) == 0

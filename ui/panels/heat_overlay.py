@@ -1,0 +1,116 @@
+"""A residual heat map over the picture of a capture camera: colours, colour bar, the value under the pointer, and why
+there is none where there is none.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import moderngl
+from imgui_bundle import ImVec2, imgui
+
+from app.playback.color_maps import SIGNED
+from app.playback.orbit_view import OrbitView
+from app.residuals.heat_map import HEAT_KINDS, HeatKind, HeatMap
+from app.status import Overlays
+from ui.panels.color_bar import COLOR_BAR_SIZE, bar_number, draw_color_bar
+from ui.panels.state import Rect, UiState
+from ui.panels.widgets import chip
+from ui.style import theme
+from ui.viewport.heat_image import HeatImage, value_at
+
+COLOR_MAP_OF = {"sequential": "inferno", "signed": SIGNED}
+"""Black reads as fine on a dark window, white as no difference."""
+MARGIN = 12.0
+LEAST_BESIDE = 300.0
+"""Plates of the HUD need at least this width."""
+BUSY_REDRAW_S = 0.1
+
+
+class HeatNeeds(Protocol):
+    """What a heat map is drawn from."""
+
+    @property
+    def overlays(self) -> Overlays: ...
+
+    @property
+    def view(self) -> OrbitView: ...
+
+    def heat(self, kind: str) -> HeatMap | None: ...
+
+
+class HeatOverlay:
+    """Owns the texture of one view's heat map. GL thread only.
+
+    Attributes:
+        shown: What was drawn last; None without a heat map.
+    """
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._image = HeatImage(ctx)
+        self._bar: Rect | None = None
+        self.shown: HeatMap | None = None
+
+    def release(self) -> None:
+        """Free the texture."""
+        self._image.release()
+
+    def beside(self, area: Rect) -> Rect:
+        """As much of an area as is left of the colour bar; all of it where there is none, or too little is left."""
+        if self._bar is None or self._bar.x0 - area.x0 < LEAST_BESIDE:
+            return area
+        return Rect(area.x0, area.y0, self._bar.x0, area.y1)
+
+    def draw(self, session: HeatNeeds, ui: UiState, pane: Rect) -> None:
+        """Draw over a picture that fills the pane; nothing where no heat map is chosen or no camera is looked through.
+
+        Asks for what is missing.
+        """
+        self.shown = self._bar = None
+        overlays = session.overlays
+        if not overlays.heat or session.view.look_through is None:
+            return
+        kind, draw = HEAT_KINDS[overlays.heat], imgui.get_window_draw_list()
+        map_name, (low, high) = COLOR_MAP_OF[kind.color_map], kind.value_range
+        heat = session.heat(overlays.heat)
+        if heat is None or heat.is_stale:
+            ui.redraw_within(BUSY_REDRAW_S)
+        pointed = None
+        if heat is not None and heat.values is not None:
+            self._image.set(heat.values, map_name, low, high, key=heat.key)
+            tint = theme.u32((1.0, 1.0, 1.0, overlays.heat_opacity))
+            texture = imgui.ImTextureRef(self._image.texture.glo)
+            draw.add_image(texture, pane.low, pane.high, ImVec2(0, 0), ImVec2(1, 1), tint)
+            self.shown = heat
+            pointer = imgui.get_io().mouse_pos
+            if imgui.is_item_hovered():
+                across, down = (pointer.x - pane.x0) / pane.width, (pointer.y - pane.y0) / pane.height
+                pointed = value_at(heat.values, across, down)
+        bar = Rect(
+            pane.x1 - MARGIN - COLOR_BAR_SIZE[0],
+            pane.y1 - MARGIN - COLOR_BAR_SIZE[1],
+            pane.x1 - MARGIN,
+            pane.y1 - MARGIN,
+        )
+        draw_color_bar(draw, bar, map_name, low, high, unit_of(kind), pointed)
+        self._bar = bar
+        ui.mark_rect("viewport.heat_bar", bar)
+        chip(draw, bar.x1, bar.y0 - 28, heat_words(kind, heat), is_right=True)
+
+
+def heat_words(kind: HeatKind, heat: HeatMap | None) -> str:
+    """What is shown, of which frame, and its mean; or why it is not."""
+    if heat is None:
+        return f"{kind.label}: being measured"
+    if heat.note and heat.values is None:
+        return f"{kind.label}: {heat.note}"
+    words = f"{kind.label}, frame {heat.frame_index}"
+    if heat.is_stale:
+        return f"{words}; the playhead's is being measured"
+    mean = "" if heat.mean is None else f", mean {bar_number(heat.mean, *kind.value_range)} {unit_of(kind)}".rstrip()
+    return f"{words}{mean}{f' ({heat.note})' if heat.note else ''}"
+
+
+def unit_of(kind: HeatKind) -> str:
+    """The unit as written after numbers; nothing where there is none."""
+    return "" if kind.unit == "1" else f"x {kind.unit}"

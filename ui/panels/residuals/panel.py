@@ -1,0 +1,227 @@
+"""The residuals panel: seams worst first, the matrix of frames and cameras, and the worst pictures with what was taken
+there. Everything in it is a way to go there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from app.playback.orbit_view import OrbitView
+from app.playback.timeline import Timeline
+from app.session.commands import LookThrough, SetFrame
+from app.status import CELL_COLUMNS, CELL_RANGES, LOW_IS_BAD, SEAM_FLAGGED, ResidualStatus, SeamStatus
+from engine.camera.rig import CameraRig
+from engine.capture.clip import Clip
+from engine.text import duration_text
+from ui.gl import ImageTexture
+from ui.panels.color_bar import COLOR_BAR_SIZE, draw_color_bar
+from ui.panels.residuals.matrix import Matrix
+from ui.panels.state import Dispatch, Rect, UiState
+from ui.panels.thumbnails import ThumbnailNeeds, Thumbnails
+from ui.panels.widgets import elided, text_wrapped_dim
+from ui.style import theme
+from ui.style.numbers import format_count
+from ui.style.theme import Icon
+
+COLUMN_WORDS = {"psnr": "PSNR", "flip": "FLIP", "E": "Flicker"}
+COLUMN_MEANINGS = {
+    "psnr": "Likeness to the captured picture, dB; higher is better",
+    "flip": "Difference that a viewer notices, mean FLIP; lower is better",
+    "E": "Change against the frame before beyond that of the capture, mean E in 1/255; lower is better",
+}
+UNITS = {"psnr": "dB", "flip": "", "E": "x 1/255"}
+N_WORST = 24
+N_SEAMS = 8
+ROW_HEIGHT = 46.0
+PICTURE_SIZE = (58.0, 36.0)
+
+
+class ResidualsNeeds(ThumbnailNeeds, Protocol):
+    """What this panel reads."""
+
+    @property
+    def capture(self) -> object | None: ...
+
+    @property
+    def timeline(self) -> Timeline: ...
+
+    @property
+    def view(self) -> OrbitView: ...
+
+    @property
+    def rig(self) -> CameraRig: ...
+
+    @property
+    def clips(self) -> Sequence[Clip]: ...
+
+    @property
+    def residual_status(self) -> ResidualStatus: ...
+
+
+def figure_text(value: float, column: str) -> str:
+    """A figure with its unit."""
+    digits = {"psnr": 1, "flip": 3, "E": 2}[column]
+    return f"{value:.{digits}f} {UNITS[column]}".rstrip()
+
+
+def worst_seams(seams: Sequence[SeamStatus], n: int) -> list[SeamStatus]:
+    """The highest scores first."""
+    known = [seam for seam in seams if seam.score is not None]
+    return sorted(known, key=lambda seam: -(seam.score or 0.0))[:n]
+
+
+def progress_text(status: ResidualStatus) -> str:
+    """How much is measured, in words."""
+    if status.n_all == 0:
+        return "Pictures are measured once a clip is trained."
+    done = f"{format_count(status.n_done)} of {format_count(status.n_all)} pictures measured"
+    if status.n_done >= status.n_all:
+        return f"All {format_count(status.n_all)} pictures of trained clips are measured."
+    if status.is_held_back:
+        return f"{done}; the rest follows slowly while a clip trains."
+    if status.is_measuring and status.eta_s is not None:
+        return f"{done}, {duration_text(status.eta_s)} left."
+    return f"{done}."
+
+
+class ResidualsPanel:
+    """Owns the matrix's and the small pictures' textures.
+
+    Args:
+        make_texture: Makes an empty texture.
+    """
+
+    def __init__(self, make_texture: Callable[[], ImageTexture]) -> None:
+        self._thumbnails = Thumbnails(make_texture)
+        self._matrix = Matrix(make_texture)
+        self._capture: object | None = None
+        self._worst_key: object = None
+        self._worst: Sequence[tuple[float, int, int]] = ()
+        self.column = "psnr"
+        """What the matrix and the list show; one of CELL_COLUMNS."""
+
+    def release(self) -> None:
+        """Free GL objects. GL thread only."""
+        self._thumbnails.release()
+        self._matrix.release()
+
+    def draw(self, session: ResidualsNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        """Progress, seams, matrix, worst pictures."""
+        if session.capture is None:
+            text_wrapped_dim("How far renders are from what was captured is shown here when a capture is open.")
+            return
+        if session.capture is not self._capture:
+            self._thumbnails.release()
+            self._capture = session.capture
+        status = session.residual_status
+        self._thumbnails.begin()
+        text_wrapped_dim(progress_text(status))
+        ui.mark("residuals.progress")
+        if status.message:
+            imgui.text_colored(ImVec4(*theme.VERMILLION), Icon.WARNING)
+            imgui.same_line()
+            text_wrapped_dim(status.message)
+        if not status.cells:
+            return
+        self._draw_seams(status, session, dispatch, ui)
+        self._draw_columns(ui)
+        self._draw_matrix(status, session, dispatch, ui)
+        self._draw_worst(status, session, dispatch, ui)
+
+    def _draw_seams(self, status: ResidualStatus, session: ResidualsNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        if not status.seams:
+            return
+        imgui.separator_text("Seams between clips, worst first")
+        found = worst_seams(status.seams, N_SEAMS)
+        if not found:
+            text_wrapped_dim("No boundary between two trained clips is measured yet.")
+        for seam in found:
+            assert seam.score is not None
+            imgui.push_id(seam.clip_index)
+            is_flagged = seam.score > SEAM_FLAGGED
+            is_clicked = imgui.selectable("##seam", session.timeline.frame_index == seam.frame_index)[0]
+            ui.mark(f"residuals.seam{seam.clip_index}")
+            worst = "" if seam.worst_camera is None else f"; most in {session.rig.names[seam.worst_camera]}"
+            imgui.set_item_tooltip(f"Mean of {seam.n_cameras} cameras, in 1/255{worst}. Click to go there.")
+            imgui.same_line(0, 0)
+            if is_flagged:
+                imgui.text_colored(ImVec4(*theme.ORANGE), f"{Icon.WARNING} ")
+                imgui.same_line(0, 4)
+            imgui.text(f"{seam.score:.2f}   clip {seam.clip_index - 1} to {seam.clip_index}, frame {seam.frame_index}")
+            imgui.pop_id()
+            if is_clicked:
+                dispatch(SetFrame(seam.frame_index))
+                if seam.worst_camera is not None:
+                    dispatch(LookThrough(seam.worst_camera))
+
+    def _draw_columns(self, ui: UiState) -> None:
+        imgui.separator_text("Frames and cameras")
+        for index, column in enumerate(CELL_COLUMNS):
+            if index:
+                imgui.same_line(0, 2)
+            is_on = column == self.column
+            if is_on:
+                imgui.push_style_color(imgui.Col_.button, ImVec4(*theme.faded(theme.SKY, 0.9)))
+                imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_ON_ACCENT))
+            if imgui.button(COLUMN_WORDS[column]):
+                self.column = column
+            if is_on:
+                imgui.pop_style_color(2)
+            ui.mark(f"residuals.column.{column}")
+            imgui.set_item_tooltip(COLUMN_MEANINGS[column])
+
+    def _draw_matrix(self, status: ResidualStatus, session: ResidualsNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        at = (session.timeline.frame_index, session.view.look_through)
+        hovered, pressed = self._matrix.draw(status, self.column, session.rig, session.clips, at, ui)
+        if pressed is not None and pressed != at:
+            dispatch(SetFrame(pressed[0]))
+            dispatch(LookThrough(pressed[1]))
+        value = None
+        if hovered is not None:
+            frame_index, camera_index = hovered
+            found = float(status.cells[self.column][frame_index, camera_index])
+            is_known = found == found  # not a NaN
+            value = found if is_known else None
+            words = figure_text(found, self.column) if is_known else "not measured"
+            held_out = " (held out)" if status.is_held_out[camera_index] else ""
+            name = session.rig.names[camera_index]
+            imgui.set_tooltip(f"{name}{held_out}, frame {frame_index}: {words}".replace("%", "%%"))
+        origin = imgui.get_cursor_screen_pos()
+        width = min(imgui.get_content_region_avail().x, COLOR_BAR_SIZE[0])
+        bar = Rect(origin.x, origin.y, origin.x + width, origin.y + COLOR_BAR_SIZE[1])
+        best, worst = CELL_RANGES[self.column]
+        if self.column in LOW_IS_BAD:
+            best, worst = worst, best
+        draw_color_bar(imgui.get_window_draw_list(), bar, "inferno", best, worst, UNITS[self.column], value)
+        imgui.dummy(ImVec2(width, COLOR_BAR_SIZE[1]))
+
+    def _draw_worst(self, status: ResidualStatus, session: ResidualsNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        imgui.separator_text("Worst pictures")
+        key = (status.revision, self.column, id(session.capture))
+        if key != self._worst_key:
+            self._worst, self._worst_key = status.worst(self.column, N_WORST), key
+        if not self._worst:
+            text_wrapped_dim("Nothing is measured yet.")
+        for value, frame_index, camera_index in self._worst:
+            imgui.push_id(f"{frame_index}/{camera_index}")
+            is_here = (frame_index, camera_index) == (session.timeline.frame_index, session.view.look_through)
+            is_clicked = imgui.selectable("##worst", is_here, 0, ImVec2(0, ROW_HEIGHT))[0]
+            low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+            if imgui.is_item_visible():
+                ui.mark(f"residuals.worst{frame_index}.{camera_index}")
+                row = Rect(low.x, low.y, high.x, high.y)
+                box = Rect(row.x0 + 4, row.y0 + 5, row.x0 + 4 + PICTURE_SIZE[0], row.y0 + 5 + PICTURE_SIZE[1])
+                self._thumbnails.draw(session, camera_index, frame_index, box, ui)
+                draw, x = imgui.get_window_draw_list(), box.x1 + 10
+                draw.add_text(ImVec2(x, row.y0 + 5), theme.u32(theme.TEXT), figure_text(value, self.column))
+                is_held_out = status.is_held_out[camera_index]
+                name = elided(f"{session.rig.names[camera_index]}, frame {frame_index}", row.x1 - x - 4)
+                color = theme.HELD_OUT if is_held_out else theme.TEXT_DIM
+                draw.add_text(ImVec2(x, row.y0 + 24), theme.u32(color), name)
+            imgui.pop_id()
+            if is_clicked:
+                dispatch(SetFrame(frame_index))
+                dispatch(LookThrough(camera_index))
