@@ -15,6 +15,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui, implot
 from app.status import ClipStatus, TrainingStatus
 from ui.panels.curve_view import MAX_CHOSEN, CurveView, value_at, value_range
 from ui.panels.state import UiState
+from ui.panels.timeline import STATE_WORDS
 from ui.panels.widgets import text_right
 from ui.style import theme
 from ui.style.axis import log_ticks, round_ticks, tick_text
@@ -33,7 +34,7 @@ ROW_DISTANCE = 24.0
 TICK_ROOM = 52.0
 """What the numbers on the left and the margins take of a plot, units."""
 CLIP_HUES = (SKY, ORANGE, GREEN, PURPLE, VERMILLION, YELLOW)
-MENU_HEIGHT = 220.0
+MENU_HEIGHT = 260.0
 HELP = "Wheel: zoom. Drag: move. Double click: everything."
 
 Points = Sequence[tuple[int, float]]
@@ -139,27 +140,25 @@ def _draw_choice(session: CurveNeeds, shown: Sequence[int], ui: UiState) -> None
         if imgui.small_button("all steps"):
             view.show_all()
         ui.mark("curves.all")
+    imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(1e4, MENU_HEIGHT))
     if not imgui.begin_popup("curve clips"):
         return
     imgui.text_disabled(f"Up to {MAX_CHOSEN}; none: the one that trains or is looked at")
-    if imgui.begin_child("list", ImVec2(0, min(len(session.clip_states) * 26.0 + 8.0, MENU_HEIGHT))):
-        clipper = imgui.ListClipper()
-        clipper.begin(len(session.clip_states))
-        while clipper.step():
-            for index in range(clipper.display_start, clipper.display_end):
-                state = session.clip_states[index].state
-                is_toggled, _ = imgui.checkbox(f"Clip {index}##{index}", index in view.chosen)
-                ui.mark(f"curves.clip{index}")
-                if is_toggled:
-                    view.toggle(index)
-                if state != "trained":
-                    imgui.same_line()
-                    imgui.text_disabled(state)
-        clipper.end()
-    imgui.end_child()
-    if imgui.button("Only the one looked at"):
+    if view.chosen and imgui.small_button("None"):
         view.chosen = []
-        imgui.close_current_popup()
+    clipper = imgui.ListClipper()
+    clipper.begin(len(session.clip_states))
+    while clipper.step():
+        for index in range(clipper.display_start, clipper.display_end):
+            state = session.clip_states[index].state
+            is_toggled, _ = imgui.checkbox(f"Clip {index}##{index}", index in view.chosen)
+            ui.mark(f"curves.clip{index}")
+            if is_toggled:
+                view.toggle(index)
+            if state != "trained":
+                imgui.same_line()
+                imgui.text_disabled(STATE_WORDS.get(state, state))
+    clipper.end()
     imgui.end_popup()
 
 
