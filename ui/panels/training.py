@@ -199,9 +199,7 @@ def _draw_clip_row(session: TrainingNeeds, clip: Clip, status: ClipStatus, dispa
     flags = imgui.SelectableFlags_.span_all_columns | imgui.SelectableFlags_.allow_overlap
     if imgui.selectable("##row", False, flags)[0]:
         dispatch(SetFrame(clip.start))
-    is_inside = imgui.is_mouse_hovering_rect(imgui.get_item_rect_min(), imgui.get_item_rect_max())
-    if is_inside and imgui.is_window_hovered() and imgui.is_mouse_released(imgui.MouseButton_.right):
-        imgui.open_popup("row menu")  # asked so, because what lies over the row is hovered a frame later
+    imgui.open_popup_on_item_click("row menu", imgui.PopupFlags_.mouse_button_right)
     if imgui.begin_popup("row menu"):
         imgui.text_disabled(f"Clip {clip.clip_index}")
         imgui.separator()

@@ -1,4 +1,4 @@
-"""The training panel through a real window: the queue by pointer, drag and keys, curves, versions, settings, the log."""
+"""The training panel through a real window: queue by pointer, drag and keys, curves, versions, settings, the log."""
 
 from __future__ import annotations
 
@@ -200,7 +200,7 @@ def test_the_menu_of_a_clip_trains_from_here_and_brings_versions_back(busy: Pilo
             VersionStatus(1, "2026-11-21 10:11", why_not="It is damaged."),
         )
     }
-    busy.rest()
+    busy.draw(2)
     busy.tap(*busy.rects["timeline.clip1"].center, mouse.RIGHT)
     busy.click("clip menu.from_here")
     assert busy.sent(TrainClips) == [TrainClips((1, 2))]
@@ -224,7 +224,7 @@ def test_the_menu_of_a_clip_trains_from_here_and_brings_versions_back(busy: Pilo
 def test_the_clip_list_has_the_same_menu(busy: Pilot) -> None:
     busy.session.training = TrainingStatus(can_train_next=True, next_clip_index=2)
     busy.session.queue = QueueStatus()
-    busy.rest()
+    busy.draw(2)
     busy.tap(*busy.rects["training.clip0"].center, mouse.RIGHT)
     busy.click("clip menu.settings")
     assert busy.sent(AskTrainSettings) == [AskTrainSettings(0)]
