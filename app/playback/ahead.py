@@ -17,6 +17,8 @@ MAX_PLAYING, STANDING = 64, 8
 """At most so many frames while it plays; so many once the playhead stands."""
 SETTLED_S = 0.3
 """The view, and the playhead unless it plays, have to stand still so long: until then cores are for what is shown."""
+MOST_UNASKED = 30
+"""After so many turns of the loop in which nobody asked for a picture, none are drawn ahead."""
 SPARE = 2
 """Frames that memory holds beside those that come: the one shown, and the newest."""
 
@@ -55,6 +57,7 @@ class Ahead:
         self._decoder, self._renderer, self._settled_s = decoder, renderer, settled_s
         self._looks: dict[Hashable, AskedLook] = {}
         self._asked: dict[Hashable, AskedLook] = {}
+        self._unasked: dict[Hashable, int] = {}
         self._still: object = None
         self._still_since_s = 0.0
         self._planned_of: object = None
@@ -67,7 +70,8 @@ class Ahead:
 
     def clear(self) -> None:
         """Another project was opened."""
-        self._looks, self._asked, self._planned_of, self._runs_of, self._runs = {}, {}, None, None, []
+        self._looks, self._asked, self._unasked = {}, {}, {}
+        self._planned_of, self._runs_of, self._runs = None, None, []
 
     # ---------------------------------------------------------------- planning
 
@@ -77,7 +81,7 @@ class Ahead:
         Args:
             is_busy: Whether something else, such as a training, needs the cores while the playhead stands.
         """
-        self._looks, self._asked = self._asked or self._looks, {}
+        self._take_looks()
         n = STANDING
         if not self._is_settled(course) or (is_busy and not course.is_playing):
             n = 0
@@ -91,10 +95,20 @@ class Ahead:
         if identity == self._planned_of:
             return
         self._planned_of = identity
-        missing = [request for request in coming if not self._is_ready(request.key)]
+        kept = coming[: max(self._decoder.n_that_fit - SPARE, 0)]
+        missing = [request for request in kept if not self._is_ready(request.key)]
         look_keys = {asked.full.key for asked in self._looks.values()}
-        self._decoder.plan(missing[: max(self._decoder.n_that_fit - SPARE, 0)], lambda key: course.distance(key[-1]))
+        self._decoder.plan(missing, lambda key: course.distance(key[-1]))
         self._renderer.plan(list(self._drawable(coming)), lambda key: _picture_distance(key, course, look_keys))
+
+    def _take_looks(self) -> None:
+        """What is shown now; a place that has not said so for some turns of the loop is gone."""
+        self._unasked = {view_id: 0 if view_id in self._asked else n + 1 for view_id, n in self._unasked.items()}
+        self._unasked |= dict.fromkeys(self._asked, 0)
+        looks = self._looks | self._asked
+        self._looks = {view_id: look for view_id, look in looks.items() if self._unasked[view_id] <= MOST_UNASKED}
+        self._unasked = {view_id: self._unasked[view_id] for view_id in self._looks}
+        self._asked = {}
 
     def _is_settled(self, course: Course) -> bool:
         views = tuple((view_id, asked.full) for view_id, asked in self._looks.items())

@@ -27,6 +27,8 @@ class GaussianArrays:
         key: Changes when the content does.
         near_plane: Nearest depth that should be drawn, scene units.
         source: The frame, and the state of the clip it was decoded from.
+        n_still: So many rows come first and differ in nothing but their colours between arrays of one `still_key`.
+        still_key: None where no rows are known to be so.
         births: Where each comes from, see app.playback.contents; None where unknown. [N] uint8
         changes: How far each is from the reference clip, NaN where that has none; None where nobody asked.
             [N] float32
@@ -40,6 +42,8 @@ class GaussianArrays:
     key: Hashable
     near_plane: float = 0.01
     source: PictureSource = UNKNOWN
+    n_still: int = 0
+    still_key: Hashable = None
     births: np.ndarray | None = None
     changes: np.ndarray | None = None
 

@@ -204,6 +204,12 @@ class FrameDecoder:
         loaded = self._models.get(request.model_key)
         return None if loaded is None else loaded.anchors
 
+    def model(self, request: FrameRequest) -> ClipModel | None:
+        """The model of a state, not to be decoded on another thread but in parts (app.playback.contents.part_of); None
+        until it was loaded."""
+        loaded = self._models.get(request.model_key)
+        return None if loaded is None else loaded.model
+
     def colors(self, request: FrameRequest) -> CameraColors | None:
         """What the cameras make of the scene's colours in a state; None until it was loaded, or where unknown."""
         loaded = self._models.get(request.model_key)
@@ -261,6 +267,8 @@ class FrameDecoder:
             key=request.key,
             near_plane=loaded.near_plane,
             source=source,
+            n_still=loaded.parts.part(content).n_constant_rows(),
+            still_key=(request.model_key, content),
             births=loaded.parts.births(content, clip_time),
             changes=loaded.parts.changes(content, clip_time, gaussians) if has_changes else None,
         )
@@ -280,8 +288,9 @@ class FrameDecoder:
         loaded = self._files.read(request)
         if not self.worker.is_still_wanted:
             return loaded
-        self._cache.drop(lambda key: key[2] == request.clip_index and key[3] != request.revision)
-        kept = [(key, value) for key, value in models.items() if key[2] != request.clip_index]
+        # another revision of the same file is worthless now; another file may be a version that it is compared with
+        self._cache.drop(lambda key: key[:3] == identity[:3] and key[3] != request.revision)
+        kept = [(key, value) for key, value in models.items() if key[:3] != identity[:3]]
         # replaced as a whole, so that the other thread never sees it half changed
         self._models = OrderedDict([*kept[-(MAX_MODELS - 1) :], (identity, loaded)])
         return loaded

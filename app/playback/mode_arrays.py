@@ -84,6 +84,8 @@ def _anchors_alone(shown: ShownFrame) -> GaussianArrays:
         colors=colors,
         births=None,
         changes=None,
+        n_still=0,
+        still_key=None,
     )
 
 

@@ -137,6 +137,13 @@ class TogglePlay:
 
 
 @dataclass(frozen=True, slots=True)
+class FollowTraining:
+    """Go along with the training: the playhead stands in the clip with the newest state, until the user moves it."""
+
+    is_on: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class LookThrough:
     """Look through a capture camera, or freely again with None."""
 
@@ -145,7 +152,7 @@ class LookThrough:
 
 @dataclass(frozen=True, slots=True)
 class SetCompare:
-    """Compare with the captured picture: "off", "wipe" or "side"."""
+    """Compare with another picture: "off", "wipe", "side" or "blink"."""
 
     mode: str
 
@@ -228,6 +235,13 @@ class HomeView:
 
 
 @dataclass(frozen=True, slots=True)
+class SetCompareWith:
+    """What to compare with. other: See Overlays.compare_with."""
+
+    other: str
+
+
+@dataclass(frozen=True, slots=True)
 class SetMode:
     """Let colours mean something else. mode: See app.playback.view_modes.MODES."""
 
@@ -304,6 +318,7 @@ Command = (
     | StopTraining
     | SetFrame
     | TogglePlay
+    | FollowTraining
     | LookThrough
     | SetCompare
     | ToggleOverlay
@@ -311,6 +326,7 @@ Command = (
     | SettingCommand
     | EditCommand
     | HomeView
+    | SetCompareWith
     | SetMode
     | SetContent
     | ShowViews

@@ -52,6 +52,7 @@ class LiveTraining:
         self._unread: SnapshotWritten | None = None
         self._live_counts: tuple[int, int] | None = None
         self._n_ending = 0
+        self._ended_clip: int | None = None
 
     def start(self) -> None:
         """Start the thread of the curves now rather than with the first request."""
@@ -70,6 +71,8 @@ class LiveTraining:
                 service.close()
             else:
                 self._retire(service, before)
+        if before is None or before.generation != opened.generation:
+            self._ended_clip = None
         self._opened = opened
         self.service = TrainingService(
             opened.project,
@@ -204,6 +207,7 @@ class LiveTraining:
 
     def poll(self) -> Sequence[Event]:
         """Take in what the worker said, and tell the user what is news. Returns all of it, oldest first."""
+        running = None if self.service is None else self.service.running_clip
         events = [] if self.service is None else self.service.poll()
         for event in events:
             tell(event, self._notices)
@@ -211,9 +215,26 @@ class LiveTraining:
                 self._unread = event
             elif isinstance(event, ENDINGS):
                 self._unread = self._live_counts = None
+                if running is not None and self.state_of(running) is not None:
+                    self._ended_clip = running
         if events and self.service is not None:
             self.tell_dropped(self.service.take_dropped())
         return events
+
+    @property
+    def newest_clip(self) -> int | None:
+        """The clip with the newest state to look at: the one that trains once it has one, else the one whose training
+        has ended last, else the last one that is trained; None where there is none."""
+        service = self.service
+        if service is None:
+            return None
+        running = service.running_clip
+        state = None if running is None else service.shown_state(running)
+        if state is not None and state.is_live:
+            return running
+        if self._ended_clip is not None:
+            return self._ended_clip
+        return next((index for index in reversed(service.catalog.order) if service.is_finished(index)), None)
 
     @property
     def unread_clip(self) -> int | None:

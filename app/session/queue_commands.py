@@ -78,4 +78,4 @@ class QueueCommands:
                 "Restore the damaged file from a copy, or train that clip again: right-click it in the timeline.",
             )
         elif service.worker is None and not service.queue:
-            self._notices.add("info", "Every one of these clips is trained")
+            self._notices.add("info", "All of these clips are trained")

@@ -2,11 +2,12 @@
 // One Gaussian per instance: EWA projection (Zwicker et al. 2001) to an ellipse, drawn as the rectangle around it.
 // ALPHA_MIN, EPS2D_PX2 and FRUSTUM_MARGIN come from engine.conventions.
 
-const int SPLATS_PER_ROW = 1024; // as in ui/gl/splat_renderer.py
+const int SPLATS_PER_ROW = 1024; // as in ui/gl/splat_rows.py
 const float SNAP_PX = 1.0 / 16.0; // drivers may round corners that much, and must not round a pixel away
 const vec4 OUTSIDE = vec4(2.0, 2.0, 2.0, 1.0);
 
-uniform sampler2D splats; // four texels each: mean, opacity | quat wxyz | scale | color
+uniform sampler2D geometry; // three texels each: mean, opacity | quat wxyz | scale
+uniform sampler2D colors; // one each
 uniform mat4 world_to_camera;
 uniform vec2 focal_px;
 uniform vec2 center_px;
@@ -33,8 +34,9 @@ void main() {
     gl_Position = OUTSIDE;
 
     int id = int(splat_id);
-    ivec2 texel = ivec2(4 * (id % SPLATS_PER_ROW), id / SPLATS_PER_ROW);
-    vec4 mean_opacity = texelFetch(splats, texel, 0);
+    ivec2 place = ivec2(id % SPLATS_PER_ROW, id / SPLATS_PER_ROW);
+    ivec2 texel = ivec2(3 * place.x, place.y);
+    vec4 mean_opacity = texelFetch(geometry, texel, 0);
     float opacity = mean_opacity.w;
     vec3 p = (world_to_camera * vec4(mean_opacity.xyz, 1.0)).xyz;
     if (!(p.z > near) || !(opacity > ALPHA_MIN)) {
@@ -48,8 +50,8 @@ void main() {
     vec2 held = clamp(slope, -(center_px + margin) / focal_px, (size_px - center_px + margin) / focal_px);
 
     // Rows of (Jacobian * camera rotation * splat rotation * scale): the screen covariance is rows . rows^T + low-pass.
-    vec4 quat = texelFetch(splats, texel + ivec2(1, 0), 0);
-    vec3 scale = texelFetch(splats, texel + ivec2(2, 0), 0).xyz;
+    vec4 quat = texelFetch(geometry, texel + ivec2(1, 0), 0);
+    vec3 scale = texelFetch(geometry, texel + ivec2(2, 0), 0).xyz;
     mat3 axes = mat3(world_to_camera) * rotation_of(quat); // columns: the splat's axes in camera space
     vec3 axes_x = vec3(axes[0].x, axes[1].x, axes[2].x);
     vec3 axes_y = vec3(axes[0].y, axes[1].y, axes[2].y);
@@ -84,6 +86,6 @@ void main() {
     offset_sigma = corner * (reach_sigma + SNAP_PX / sigma_px);
     vec2 offset_px = offset_sigma * sigma_px;
     offset_px = offset_px.x * axis + offset_px.y * vec2(-axis.y, axis.x);
-    color_opacity = vec4(texelFetch(splats, texel + ivec2(3, 0), 0).rgb, opacity);
+    color_opacity = vec4(texelFetch(colors, place, 0).rgb, opacity);
     gl_Position = vec4(2.0 * (mean_px + offset_px) / size_px - 1.0, 0.0, 1.0);
 }

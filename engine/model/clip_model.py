@@ -148,6 +148,15 @@ class ClipModel(nn.Module):
         is_learning = anchors.features.requires_grad or any(p.requires_grad for p in self.decoder.parameters())
         return not anchors.is_dynamic and not is_learning
 
+    def n_constant_rows(self) -> int:
+        """How many Gaussians of `decode` come first and are the same at all times, but for the light on them."""
+        n = 0
+        for role in self.roles():
+            if not self.is_constant(role) or self.anchor_set(role).presence is not None:
+                break
+            n += self.decoder.gaussians_per_anchor * len(self.anchor_set(role))
+        return n
+
     def knots(self, clip_time: float) -> list[tuple[int, float]]:
         """Frames of the clip around this time and their weights."""
         if self.field is not None:

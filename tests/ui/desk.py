@@ -25,16 +25,22 @@ def missing_programs() -> list[str]:
 
 
 class Desk:
-    """One Xvfb, one program, one xdotool. Everything started here is ended by `close`."""
+    """One Xvfb, one program, one xdotool. Everything started here is ended by `close`.
 
-    def __init__(self, folder: Path, arguments: list[str]) -> None:
-        self._folder = folder
+    Args:
+        folder: For reports and output of the program.
+        arguments: Of the program.
+        size: Of its window, px.
+    """
+
+    def __init__(self, folder: Path, arguments: list[str], *, size: tuple[int, int] = WINDOW) -> None:
+        self._folder, self._size = folder, size
         self._state_path = folder / "state.json"
         self._children: list[subprocess.Popen[Any]] = []
         display = self._start_screen()
         self._environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
         command = [sys.executable, str(ROOT / "tests" / "ui" / "observed_app.py"), str(self._state_path)]
-        command += ["--size", f"{WINDOW[0]}x{WINDOW[1]}", *arguments]
+        command += ["--size", f"{size[0]}x{size[1]}", *arguments]
         self._output = (folder / "program.txt").open("w")
         self.program = subprocess.Popen(
             command, env=self._environment, stdout=self._output, stderr=subprocess.STDOUT, cwd=ROOT
@@ -149,7 +155,7 @@ class Desk:
             ["xwd", "-root", "-silent"], env=self._environment, capture_output=True, check=True, timeout=20
         )
         image = read_xwd(dump.stdout)
-        return write_png(image[: WINDOW[1], : WINDOW[0]], path)
+        return write_png(image[: self._size[1], : self._size[0]], path)
 
     def close(self) -> int | None:
         """Ask the program to end, then end the rest. Returns the program's exit code."""

@@ -54,6 +54,19 @@ def describe(studio: Any) -> dict[str, Any]:
     }
 
 
+def shown_picture(studio: Any) -> dict[str, Any]:
+    """What the newest frame of the window shows, and what it ought to show. Looks are told apart by numbers."""
+    session, shown = studio.session, studio.frame.viewport.scene.shown
+    return {
+        "kind": shown.kind,
+        "frame": shown.source.frame_index,
+        "look": hash(shown.source.look),
+        "width": shown.size[0],
+        "playhead": session.timeline.frame_index,
+        "view": hash(session.view.look_key),
+    }
+
+
 def watch(state_path: Path) -> None:
     """Hook the window class so that each window reports into the file."""
     import ui.shell.window as window_module
@@ -93,14 +106,7 @@ def watch(state_path: Path) -> None:
             with self._watchdog.phase("draw"):
                 super().draw()
                 self.ctx.finish()  # so that the time is that of the finished picture
-            shown = self.frame.viewport.scene.shown
-            self._write(
-                {
-                    "frame_s": started_s,
-                    "at_s": time.monotonic(),
-                    "shows": [shown.kind, shown.source.frame_index, shown.size[0], hash(shown.source.look)],
-                }
-            )
+            self._write({"frame_s": started_s, "at_s": time.monotonic()} | shown_picture(self))
 
         def tick(self, dt_s: float) -> None:
             super().tick(dt_s)

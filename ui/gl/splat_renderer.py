@@ -2,84 +2,86 @@
 
 Equal to engine.raster up to float32 and three things: blending runs back to front, so the rasterizer's early stop at
 TRANSMITTANCE_MIN does not exist here (it hides less than that share of a colour); the target's precision (16-bit floats
-about 65 dB); and, during fast camera moves with very many rows, an order that is a frame or two old.
+about 65 dB); and, while the camera moves with many rows, an order that is a frame or two old.
+
+Many rows are packed and sorted on a thread. Other Gaussians are drawn once they are sorted, the last ones until then:
+rows and order always belong together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Hashable
-from typing import Protocol
+from dataclasses import dataclass, field
 
 import moderngl
 import numpy as np
 
 from app.background.latest import LatestWorker
-from engine.conventions import ALPHA_MIN
 from ui.gl.camera import NEAR, resized_K, uniform_matrix
 from ui.gl.depth_order import DepthOrder, OrderKey, OrderRequest, depth_order
 from ui.gl.shaders import load_program
+from ui.gl.splat_rows import PackedSplats, SplatArrays, pack_splats
+from ui.gl.splat_textures import COLORS, GEOMETRY, SplatTextures
 from ui.gl.targets import Target
 
-TEXELS_PER_SPLAT = 4
-SPLATS_PER_ROW = 1024
-"""64 bytes per splat in rows of 4096 texels: below every driver's texture limit up to 16 million splats."""
-SORT_ON_THREAD_ABOVE = 100_000
-"""Up to this many rows a sort takes about a millisecond, less than a stale order is worth."""
+ON_THREAD_ABOVE = 20_000
+"""Up to this many rows are packed and sorted in about a millisecond, less than a late picture is worth."""
+NEW_ROWS, NEW_ORDER = "rows", "order"
+"""Lanes of the sorter."""
 
 
-class SplatArrays(Protocol):
-    """What can be drawn: the fields of engine.raster.Gaussians as numpy arrays, and a name for the contents.
+@dataclass(frozen=True, slots=True)
+class RowsRequest:
+    """Other Gaussians, to be packed and put in order.
 
     Attributes:
-        means: Centres, world space, scene units. [N, 3]
-        quats: Rotations wxyz, any non-zero length. [N, 4]
-        scales: Standard deviations, scene units. [N, 3]
-        opacities: In 0..1. [N]
-        colors: Display-encoded RGB in 0..1. [N, 3]
-        key: Differs whenever the arrays do; None when not known.
+        key: Of the Gaussians.
+        before: See ui.gl.splat_rows.pack_splats.
+        view_row, near: Of the last draw; see ui.gl.depth_order.
     """
 
-    @property
-    def means(self) -> np.ndarray: ...
-    @property
-    def quats(self) -> np.ndarray: ...
-    @property
-    def scales(self) -> np.ndarray: ...
-    @property
-    def opacities(self) -> np.ndarray: ...
-    @property
-    def colors(self) -> np.ndarray: ...
-    @property
-    def key(self) -> Hashable: ...
+    key: Hashable
+    arrays: SplatArrays = field(compare=False)
+    before: PackedSplats = field(compare=False)
+    view_row: np.ndarray = field(compare=False)
+    near: float = field(compare=False)
+
+    def answer(self) -> tuple[PackedSplats, np.ndarray]:
+        """Rows, and their order."""
+        packed = pack_splats(self.arrays, self.before)
+        return packed, depth_order(packed.means, self.view_row, self.near)
 
 
 class SplatRenderer:
-    """Draws one uploaded set of Gaussians. Owns its buffers, its program and the sorter.
+    """Draws one set of Gaussians. Owns its buffers, its program and the sorter.
 
     Args:
         ctx: Current context. All methods belong to its thread.
-        sort_on_thread_above: With more rows than this, a moved camera is drawn in the last order until the new one is
-            ready. Tests that compare pictures keep below it.
+        on_thread_above: With more rows than this, other Gaussians and a moved camera wait for the thread, and the last
+            ones are drawn meanwhile. Tests that compare pictures keep below it.
     """
 
-    def __init__(self, ctx: moderngl.Context, *, sort_on_thread_above: int = SORT_ON_THREAD_ABOVE) -> None:
+    def __init__(self, ctx: moderngl.Context, *, on_thread_above: int = ON_THREAD_ABOVE) -> None:
         self._ctx = ctx
         self._program = load_program(ctx, "splat")
-        self._sorter: LatestWorker[OrderRequest, DepthOrder] = LatestWorker("splat-sorter", OrderRequest.answer)
-        self._sort_on_thread_above = sort_on_thread_above
-        self._texture: moderngl.Texture | None = None
+        self._sorter: LatestWorker[RowsRequest | OrderRequest, object] = LatestWorker(
+            "splat-sorter", lambda request: request.answer()
+        )
+        self._on_thread_above = on_thread_above
+        self._textures = SplatTextures(ctx)
         self._ids: moderngl.Buffer | None = None
         self._quads: moderngl.VertexArray | None = None
-        self._means = np.zeros((0, 3), dtype=np.float32)
+        self._packed: PackedSplats | None = None
+        self._coming: RowsRequest | None = None
         self._key: Hashable = None
         self._revision = 0
         self._order: DepthOrder | None = None
         self._wanted_order: OrderKey | None = None
-        self._n_dropped = 0
+        self._view: tuple[np.ndarray, float] | None = None
 
     def __len__(self) -> int:
         """Rows that can be seen."""
-        return len(self._means)
+        return 0 if self._packed is None else len(self._packed)
 
     @property
     def key(self) -> Hashable:
@@ -87,36 +89,70 @@ class SplatRenderer:
         return self._key
 
     @property
+    def drawn(self) -> SplatArrays | None:
+        """The Gaussians that are drawn: those of the last upload, or the ones before until those are ready."""
+        return None if self._packed is None else self._packed.arrays
+
+    @property
+    def textures(self) -> SplatTextures:
+        """Where the rows are."""
+        return self._textures
+
+    @property
     def n_dropped(self) -> int:
-        """Rows of the last upload that were left out: not finite, no rotation, or too faint to pass ALPHA_MIN."""
-        return self._n_dropped
+        """Rows of what is drawn that were left out: not finite, no rotation, or too faint to pass ALPHA_MIN."""
+        return 0 if self._packed is None else self._packed.n_dropped
 
     @property
     def is_order_stale(self) -> bool:
-        """Was the last draw made in an order of another view? Then draw again soon."""
-        return self._order is not None and self._order.key != self._wanted_order
+        """Was the last draw made in an order of another view, or of other Gaussians than uploaded? Draw again soon."""
+        return self._coming is not None or (self._order is not None and self._order.key != self._wanted_order)
 
-    def upload(self, gaussians: SplatArrays) -> bool:
+    @property
+    def has_news(self) -> bool:
+        """Is there something that the last draw waited for?"""
+        lane = NEW_ROWS if self._coming is not None else NEW_ORDER
+        wanted = self._coming if self._coming is not None else self._wanted_order
+        newest = self._sorter.newest_in(lane)
+        return self.is_order_stale and newest is not None and wanted in (newest[0], newest[0].key)
+
+    def upload(self, gaussians: SplatArrays, *, at_once: bool = False) -> bool:
         """Take another set of Gaussians. Rows that are not finite are dropped and counted.
 
         Args:
-            gaussians: Arrays, copied. The same key as last time uploads nothing; a key of None always uploads.
+            gaussians: Arrays, which must not change afterwards. The same key as last time uploads nothing; a key of
+                None always uploads.
+            at_once: Do not wait for the thread: what is drawn must not be seen any more.
         Returns:
-            Whether anything was uploaded.
+            Whether it was another one.
         Raises:
             ValueError: Shapes do not belong together.
         """
         if gaussians.key is not None and gaussians.key == self._key:
             return False
-        packed = pack_splats(gaussians)
-        self._n_dropped = len(gaussians.means) - len(packed)
-        self._means = np.ascontiguousarray(packed[:, 0:3])
         self._key = gaussians.key
-        self._revision += 1  # the order of other rows means nothing for these
-        self._order = None
-        if len(packed):
-            self._write_texture(packed)
+        is_many = len(gaussians.means) > self._on_thread_above
+        if not is_many or at_once or self._packed is None or self._view is None or gaussians.key is None:
+            self._coming = None
+            self._take_rows(pack_splats(gaussians, self._packed))
+        else:
+            self._coming = RowsRequest(gaussians.key, gaussians, self._packed, *self._view)
+            self._sorter.request(self._coming, lane=NEW_ROWS)
         return True
+
+    def update(self) -> None:
+        """Take up what was packed and sorted on the thread. `draw` does that too."""
+        failure = self._sorter.take_error()
+        if failure is not None:
+            raise failure[1]
+        coming = self._coming
+        newest = None if coming is None else self._sorter.newest_in(NEW_ROWS)
+        if coming is None or newest is None or newest[0] != coming:
+            return
+        packed, ids = newest[1]  # pyright: ignore[reportGeneralTypeIssues] - of a RowsRequest
+        self._coming = None
+        self._take_rows(packed)
+        self._take_order(DepthOrder(self._order_key(coming.view_row, coming.near), ids))
 
     def draw(
         self, target: Target, world_to_camera: np.ndarray, K: np.ndarray, width: int, height: int, near: float = NEAR
@@ -133,13 +169,16 @@ class SplatRenderer:
             near: Centres whose camera z is not above this are not drawn, scene units.
         """
         world_to_camera = np.asarray(world_to_camera, dtype=np.float64)
-        ids = self._ordered_ids(world_to_camera[2], near)
-        if not len(ids) or self._texture is None or self._quads is None:
+        self._view = np.array(world_to_camera[2], np.float32), near
+        self.update()
+        ids = self._ordered_ids(*self._view)
+        if not len(ids) or self._quads is None:
             return
         K = resized_K(K, (width, height), target.size)
         target.use(moderngl.BLEND)
-        self._texture.use(0)
-        self._program["splats"] = 0
+        self._textures.use()
+        self._program["geometry"] = GEOMETRY
+        self._program["colors"] = COLORS
         self._program["world_to_camera"].write(uniform_matrix(world_to_camera))  # type: ignore[union-attr]
         self._program["focal_px"] = (K[0, 0], K[1, 1])
         self._program["center_px"] = (K[0, 2], K[1, 2])
@@ -150,32 +189,43 @@ class SplatRenderer:
     def release(self) -> None:
         """Free everything and end the sorter's thread. The renderer cannot be used afterwards."""
         self._sorter.close()
-        for thing in (self._quads, self._ids, self._texture, self._program):
+        self._textures.release()
+        for thing in (self._quads, self._ids, self._program):
             if thing is not None:
                 thing.release()
-        self._quads = self._ids = self._texture = None
+        self._quads = self._ids = self._packed = None
 
-    # ---- order -----------------------------------------------------------------------------------------------
+    # ---- rows and their order --------------------------------------------------------------------------------
+
+    def _take_rows(self, packed: PackedSplats) -> None:
+        self._packed = packed
+        self._revision += 1  # the order of other rows means nothing for these
+        self._order = None
+        if len(packed):
+            self._textures.write(packed)
+
+    def _order_key(self, view_row: np.ndarray, near: float) -> OrderKey:
+        """Only this row of the matrix decides the order: panning and rolling about the viewing axis need no sort."""
+        return self._revision, view_row.tobytes(), near
 
     def _ordered_ids(self, view_row: np.ndarray, near: float) -> np.ndarray:
         """Row numbers to draw, in the buffer already when unchanged."""
-        if not len(self._means):
+        if self._packed is None or not len(self._packed):
             return np.zeros(0, dtype=np.uint32)
-        # Only this row of the matrix decides the order: panning and rolling about the viewing axis need no sort.
-        key = (self._revision, np.asarray(view_row, dtype=np.float32).tobytes(), near)
+        means, key = self._packed.means, self._order_key(view_row, near)
         if key != self._wanted_order:
             self._wanted_order = key
-            if self._order is not None and len(self._means) > self._sort_on_thread_above:
-                self._sorter.request(OrderRequest(key, self._means, np.array(view_row, np.float32), near))
-            else:  # few rows, or rows without any order yet
-                self._take_order(DepthOrder(key, depth_order(self._means, view_row, near)))
-        if self.is_order_stale:
-            failure, newest = self._sorter.take_error(), self._sorter.newest
-            if failure is not None:
-                raise failure[1]
-            if newest is not None and newest[1] is not self._order and newest[1].key[0] == self._revision:
-                self._take_order(newest[1])
+            is_there = self._order is not None and self._order.key == key
+            if not is_there and self._order is not None and len(means) > self._on_thread_above:
+                self._sorter.request(OrderRequest(key, means, view_row, near), lane=NEW_ORDER)
+            elif not is_there:  # few rows, or rows without any order yet
+                self._take_order(DepthOrder(key, depth_order(means, view_row, near)))
         assert self._order is not None
+        if self._order.key != key:
+            newest = self._sorter.newest_in(NEW_ORDER)
+            order = None if newest is None else newest[1]
+            if isinstance(order, DepthOrder) and order is not self._order and order.key[0] == self._revision:
+                self._take_order(order)
         return self._order.ids
 
     def _take_order(self, order: DepthOrder) -> None:
@@ -192,40 +242,3 @@ class SplatRenderer:
             self._ids.orphan()  # a draw that still reads the old order keeps its own memory
         if len(order.ids):
             self._ids.write(order.ids.tobytes())
-
-    # ---- data ------------------------------------------------------------------------------------------------
-
-    def _write_texture(self, packed: np.ndarray) -> None:
-        rows = -(-len(packed) // SPLATS_PER_ROW)
-        if self._texture is None or self._texture.height < rows:
-            if self._texture is not None:
-                self._texture.release()
-            size = (SPLATS_PER_ROW * TEXELS_PER_SPLAT, rows + rows // 4)
-            self._texture = self._ctx.texture(size, 4, dtype="f4")
-            self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        padded = np.zeros((rows * SPLATS_PER_ROW, packed.shape[1]), dtype=np.float32)
-        padded[: len(packed)] = packed
-        self._texture.write(padded.tobytes(), viewport=(0, 0, self._texture.width, rows))
-
-
-def pack_splats(gaussians: SplatArrays) -> np.ndarray:
-    """Rows that can be seen, as the four texels per splat the shader reads.
-
-    Returns:
-        mean, opacity | quat wxyz | scale, 0 | color, 0. [n, 16] float32, n <= N in the given order
-    Raises:
-        ValueError: Shapes do not belong together.
-    """
-    n = len(gaussians.means)
-    expected = {"means": (n, 3), "quats": (n, 4), "scales": (n, 3), "opacities": (n,), "colors": (n, 3)}
-    for name, shape in expected.items():
-        if np.shape(getattr(gaussians, name)) != shape:
-            raise ValueError(f"{name} must have shape {shape}, got {np.shape(getattr(gaussians, name))}")
-    packed = np.zeros((n, 16), dtype=np.float32)
-    packed[:, 0:3] = gaussians.means
-    packed[:, 3] = gaussians.opacities
-    packed[:, 4:8] = gaussians.quats
-    packed[:, 8:11] = gaussians.scales
-    packed[:, 12:15] = gaussians.colors
-    is_seen = np.isfinite(packed).all(axis=1) & (packed[:, 3] > ALPHA_MIN) & packed[:, 4:8].any(axis=1)
-    return packed if is_seen.all() else packed[is_seen]

@@ -15,7 +15,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui, implot
 from app.status import ClipStatus, TrainingStatus
 from ui.panels.curve_view import MAX_CHOSEN, CurveView, value_at, value_range
 from ui.panels.state import UiState
-from ui.panels.timeline import STATE_WORDS
+from ui.panels.timeline.clip_words import STATE_WORDS
 from ui.panels.widgets import text_right
 from ui.style import theme
 from ui.style.axis import log_ticks, round_ticks, tick_text

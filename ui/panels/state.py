@@ -13,6 +13,7 @@ from imgui_bundle import ImVec2, imgui
 from app.session.commands import Command
 from ui.gl.image import Rect as PixelRect
 from ui.panels.curve_view import CurveView
+from ui.panels.timeline.view_state import TimelineView
 from ui.style.theme import Fonts
 from ui.style.ui_scale import UiScale
 from ui.viewport.region_tool import RegionTool
@@ -60,6 +61,7 @@ class UiState:
         regions: The region that is being chosen, and the one that stands out.
         curves: What the plots of the training panel show.
         queue_chosen: The waiting clip that keys move; None without one.
+        timeline: What of time is shown.
         is_popup_open: Is a menu or another popup open, so that keys belong to it?
         is_menu_wanted: Open the first menu, for the keyboard.
         is_quality_open: Is the plot of quality over the clips folded out?
@@ -75,6 +77,7 @@ class UiState:
     regions: RegionTool = field(default_factory=RegionTool)
     curves: CurveView = field(default_factory=CurveView)
     queue_chosen: int | None = None
+    timeline: TimelineView = field(default_factory=TimelineView)
     last_heat: str = ""
     wanted_panel: str | None = None
     is_quality_open: bool = False

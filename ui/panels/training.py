@@ -17,7 +17,7 @@ from ui.panels.curves import CurveNeeds, draw_curves
 from ui.panels.plan import draw_plan
 from ui.panels.queue import QueueNeeds, draw_live_view, draw_queue, draw_train_all, draw_usage
 from ui.panels.state import Dispatch, UiState
-from ui.panels.timeline import STATE_WORDS, state_note
+from ui.panels.timeline.clip_words import STATE_WORDS, state_note
 from ui.panels.widgets import primary_button, text_right, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from app.playback.ahead import Ahead
+from app.playback.ahead import MOST_UNASKED, Ahead
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
@@ -133,3 +133,13 @@ def test_only_a_pause_after_work_ahead_is_news(screen: Screen):
     screen.turns(2)
     assert screen.playback.finished != before
     assert screen.playback.finished == screen.playback.finished
+
+
+def test_a_place_that_is_no_more_is_forgotten(screen: Screen):
+    screen.turns()
+    assert screen.playback.cached_frames() == [(0, 6)]
+    screen.playback.renderer.clear()
+    screen.turns(3, draws=False, is_busy=True)
+    assert screen.playback.cached_frames() == [], "for a while it may only be late"
+    screen.turns(MOST_UNASKED, draws=False, is_busy=True)
+    assert screen.playback.cached_frames() == [(0, 6)], "nobody asks for pictures: what is decoded is ready"

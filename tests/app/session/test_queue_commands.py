@@ -71,7 +71,7 @@ def test_all_clips_are_trained_with_a_forecast_for_the_whole_of_it(session: Sess
     assert (session.queue.queued, session.queue.everything) == (None, None)
     assert {state.state for state in session.clip_states} == {"trained"}
     session.dispatch(c.TrainAll())
-    assert titles(session)[-1] == "Every one of these clips is trained"
+    assert titles(session)[-1] == "All of these clips are trained"
 
 
 def test_the_forecast_goes_by_what_trained_clips_took(session: Session) -> None:

@@ -25,6 +25,8 @@ class Splats:
     opacities: np.ndarray
     colors: np.ndarray
     key: Hashable = None
+    n_still: int = 0
+    still_key: Hashable = None
 
     def __len__(self) -> int:
         return len(self.means)

@@ -31,7 +31,7 @@ pose = np.eye(4); pose[2, 3] = 2
 view = (pose, np.array([[20, 0, 16], [0, 20, 12], [0, 0, 1.0]]), 32, 24)
 class One:
     means = np.zeros((1, 3)); quats = np.array([[1, 0, 0, 0]]); scales = np.full((1, 3), .2)
-    opacities = np.ones(1); colors = np.ones((1, 3)); key = 0
+    opacities = np.ones(1); colors = np.ones((1, 3)); key = 0; n_still = 0; still_key = None
 image = ImageTexture(ctx); image.set(np.full((5, 7, 3), 40, np.uint8)); target.draw_image(image)
 splats = SplatRenderer(ctx); splats.upload(One()); splats.draw(target, *view)
 lines = LineRenderer(ctx); lines.set(np.array([[-1, 0, 0], [1, 0, 0]]), np.ones(3)); lines.draw(target, *view)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import moderngl
 import numpy as np
@@ -25,13 +26,24 @@ from tests.ui.gl.scenes import (
     rasterized,
 )
 from ui.gl.camera import resized_K
-from ui.gl.splat_renderer import SPLATS_PER_ROW, SplatRenderer, pack_splats
+from ui.gl.splat_renderer import SplatRenderer
+from ui.gl.splat_rows import SPLATS_PER_ROW, pack_splats
 from ui.gl.targets import Precision, Target
 
 pytestmark = pytest.mark.gl
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 DEADLINE_S = 20.0
+
+
+@dataclass(frozen=True)
+class Held:
+    """Keeps the sorter's thread busy."""
+
+    go_on: threading.Event
+
+    def answer(self) -> None:
+        assert self.go_on.wait(DEADLINE_S)
 
 
 def draw_until_sorted(renderer: SplatRenderer, target: Target, camera: Camera) -> None:
@@ -309,7 +321,7 @@ def test_moved_camera_is_drawn_in_the_last_order_until_the_new_one_is_ready(ctx:
     front, behind = centered_camera(), centered_camera()
     behind.world_to_camera[0, 0] = behind.world_to_camera[2, 2] = -1.0
     target = keep(Target(ctx, (64, 64), precision="f4"))
-    renderer = keep(SplatRenderer(ctx, sort_on_thread_above=1))
+    renderer = keep(SplatRenderer(ctx, on_thread_above=1))
     renderer.upload(splats)
 
     renderer.draw(target, *front.arguments)
@@ -326,19 +338,133 @@ def test_order_of_replaced_rows_is_never_used(
     """An order made for other rows would leave out or repeat rows of these."""
     target, camera = keep(Target(ctx, (64, 64), precision="f4")), centered_camera()
     moved = centered_camera(distance=4.1)
-    renderer = keep(SplatRenderer(ctx, sort_on_thread_above=1))
+    renderer = keep(SplatRenderer(ctx, on_thread_above=1))
     behind_viewer = ball((0, 0, -50), RED)
     renderer.upload(joined(behind_viewer, behind_viewer, ball((0, 0, 0), RED)))
     renderer.draw(target, *camera.arguments)
     draw_until_sorted(renderer, target, moved)  # leaves an order without the rows 0 and 1
 
     renderer.upload(joined(ball((0, 0, -0.8), RED), ball((0, 0, 0.8), BLUE)))
-    monkeypatch.setattr(LatestWorker, "request", lambda *_: None)  # a thread that is late
+    monkeypatch.setattr(LatestWorker, "request", lambda *_, **__: None)  # a thread that is late
     for view, is_stale in ((camera, False), (moved, True)):
         target.clear()
         renderer.draw(target, *view.arguments)
         assert renderer.is_order_stale is is_stale
         assert read_color(target)[32, 32, 0] > 0.9
+
+
+def test_other_gaussians_are_drawn_once_they_are_sorted_and_the_last_ones_until_then(
+    ctx: moderngl.Context, keep: Keep
+) -> None:
+    target, camera = keep(Target(ctx, (64, 64), precision="f4")), centered_camera()
+    renderer = keep(SplatRenderer(ctx, on_thread_above=1))
+    red = replace(joined(ball((0, 0, -0.8), RED), ball((0, 0, 0.8), BLUE)), key="red")
+    blue = replace(joined(ball((0, 0, 0.8), RED), ball((0, 0, -0.8), BLUE), ball((0, 0, 1.8), RED)), key="blue")
+    assert renderer.upload(red)
+    renderer.draw(target, *camera.arguments)
+    go_on = threading.Event()
+    renderer._sorter.request(Held(go_on), lane="held")  # pyright: ignore[reportArgumentType] - answers likewise
+    assert renderer.upload(blue)
+    assert not renderer.upload(blue)
+    target.clear()
+    renderer.draw(target, *camera.arguments)
+    assert (renderer.key, renderer.drawn, renderer.is_order_stale, renderer.has_news) == ("blue", red, True, False)
+    assert read_color(target)[32, 32, 0] > 0.9
+    go_on.set()
+    assert renderer._sorter.wait_idle(DEADLINE_S)
+    assert renderer.has_news
+    target.clear()
+    renderer.draw(target, *camera.arguments)
+    assert (renderer.drawn, renderer.is_order_stale, renderer.has_news) == (blue, False, False)
+    assert read_color(target)[32, 32, 2] > 0.9
+
+
+def test_what_must_not_be_seen_any_more_is_replaced_at_once(ctx: moderngl.Context, keep: Keep) -> None:
+    target, camera = keep(Target(ctx, (64, 64), precision="f4")), centered_camera()
+    renderer = keep(SplatRenderer(ctx, on_thread_above=0))
+    renderer.upload(replace(ball((0, 0, 0), RED), key=1))
+    renderer.draw(target, *camera.arguments)
+    renderer.upload(replace(ball((0, 0, 0), BLUE), key=2), at_once=True)
+    target.clear()
+    renderer.draw(target, *camera.arguments)
+    assert read_color(target)[32, 32, 2] > 0.9
+
+
+def test_a_set_that_cannot_be_packed_on_the_thread_is_told(ctx: moderngl.Context, keep: Keep) -> None:
+    target, camera = keep(Target(ctx, (64, 64))), centered_camera()
+    renderer = keep(SplatRenderer(ctx, on_thread_above=0))
+    renderer.upload(replace(ball((0, 0, 0), RED), key=1))
+    renderer.draw(target, *camera.arguments)
+    good = ball((0, 0, 0), BLUE)
+    renderer.upload(replace(good, key=2, colors=good.colors[0]))
+    assert renderer._sorter.wait_idle(DEADLINE_S)
+    with pytest.raises(ValueError, match="colors must have shape"):
+        renderer.draw(target, *camera.arguments)
+    renderer.draw(target, *camera.arguments)  # the last good ones
+
+
+# ---- what stands still -----------------------------------------------------------------------------------------
+
+
+def clip_frame(n_still: int, frame: int, *, light: float = 1.0, n_moving: int = 700) -> Splats:
+    """A frame of a clip: rows that stand still, in a light, and others that move."""
+    still = make_splats(n_still, seed=1)
+    moving = make_splats(n_moving + 40 * frame, seed=10 + frame)
+    splats = joined(replace(still, colors=still.colors * np.float32(light)), moving)
+    return replace(splats, key=("clip", frame), n_still=n_still, still_key="clip")
+
+
+@pytest.mark.parametrize("n_still", [1, SPLATS_PER_ROW, 2 * SPLATS_PER_ROW + 300])
+def test_what_stands_still_is_written_once_and_drawn_with_every_frame(
+    ctx: moderngl.Context, keep: Keep, n_still: int
+) -> None:
+    target, camera = keep(Target(ctx, (96, 72), precision="f4")), make_camera()
+    renderer = keep(SplatRenderer(ctx))
+    written = []
+    for frame, light in ((0, 1.0), (1, 1.0), (2, 0.5), (3, 0.5), (0, 1.0)):
+        splats = clip_frame(n_still, frame, light=light)
+        renderer.upload(splats)
+        target.clear()
+        renderer.draw(target, *camera.arguments)
+        np.testing.assert_array_equal(read_color(target), drawn(ctx, keep, replace(splats, still_key=None), camera))
+        n_moving = len(splats) - n_still
+        textures = renderer.textures
+        written.append((textures.n_geometry_written - n_moving, textures.n_colors_written - n_moving))
+        assert len(renderer) == len(splats)
+    assert written == [(n_still, n_still), (0, 0), (0, n_still), (0, 0), (0, n_still)]
+
+
+def test_another_clip_or_a_larger_texture_writes_everything(ctx: moderngl.Context, keep: Keep) -> None:
+    target, camera = keep(Target(ctx, (96, 72), precision="f4")), make_camera()
+    renderer = keep(SplatRenderer(ctx))
+    renderer.upload(clip_frame(50, 0))
+    for splats in (
+        replace(clip_frame(50, 1), still_key="other"),
+        clip_frame(50, 2, n_moving=9 * SPLATS_PER_ROW),
+        replace(clip_frame(50, 3), n_still=0, still_key=None),
+        clip_frame(50, 4),
+    ):
+        renderer.upload(splats)
+        assert renderer.textures.n_geometry_written == len(splats)
+        target.clear()
+        renderer.draw(target, *camera.arguments)
+        np.testing.assert_array_equal(read_color(target), drawn(ctx, keep, replace(splats, still_key=None), camera))
+
+
+def test_rows_that_are_left_out_may_stand_still(ctx: moderngl.Context, keep: Keep) -> None:
+    """Too faint ones always; ones without a colour only in the frame in which they have none."""
+    target, camera = keep(Target(ctx, (96, 72), precision="f4")), make_camera()
+    renderer = keep(SplatRenderer(ctx))
+    for frame, spoiled in ((0, False), (1, False), (2, True), (3, False)):
+        splats = clip_frame(60, frame)
+        splats.opacities[[2, 5]] = 0.0
+        if spoiled:
+            splats.colors[7] = np.nan
+        renderer.upload(splats)
+        assert renderer.n_dropped == 2 + spoiled
+        target.clear()
+        renderer.draw(target, *camera.arguments)
+        np.testing.assert_array_equal(read_color(target), drawn(ctx, keep, replace(splats, still_key=None), camera))
 
 
 def test_release_frees_and_can_be_repeated(ctx: moderngl.Context) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pyglet.window import key
 
+from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands
 from app.status import CELL_RANGES, SeamStatus
@@ -15,6 +16,7 @@ from ui.panels.residuals.cells import cell_at, frames_per_column, pixel_cells, w
 from ui.panels.residuals.matrix import cell_colors, matrix_picture
 from ui.panels.residuals.panel import worst_seams
 from ui.panels.state import RESIDUALS
+from ui.viewport.anchor_heat_layer import heat_points
 from ui.viewport.heat_image import value_at
 
 
@@ -163,3 +165,23 @@ def test_every_kind_can_be_chosen_by_key(pilot: Pilot) -> None:
         seen.append(pilot.session.overlays.heat)
     assert sorted(seen) == sorted(HEAT_KINDS)
     assert len(pilot.session.notices) == 0
+
+
+def test_in_a_free_view_anchors_show_their_residual(pilot: Pilot) -> None:
+    pilot.draw(3)
+    before = pilot.picture()
+    pilot.session.dispatch(commands.ShowHeat("error"))
+    pilot.draw(4)
+    pane = pilot.rects["viewport.rendered"]
+    x, y = (int(v) for v in pane.center)
+    around = np.s_[y - 60 : y + 60, x - 60 : x + 60]
+    assert np.abs(pilot.picture()[around].astype(int) - before[around]).mean() > 1.0
+    assert "viewport.heat_bar" in pilot.rects
+
+
+def test_anchors_that_nobody_saw_are_left_out_and_the_hottest_come_last() -> None:
+    heat = AnchorHeat(np.eye(3, dtype=np.float32), np.array([9.0, np.nan, 1.0], np.float32), "E", 1, 0, 0)
+    positions, colors = heat_points(heat)
+    assert np.array_equal(positions, np.eye(3)[[2, 0]])
+    assert colors[1, 3] == 1.0
+    assert colors[0, 3] < 0.5

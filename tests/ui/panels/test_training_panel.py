@@ -202,7 +202,7 @@ def test_the_menu_of_a_clip_trains_from_here_and_brings_versions_back(busy: Pilo
     }
     busy.draw(2)
     busy.tap(*busy.rects["timeline.clip1"].center, mouse.RIGHT)
-    busy.click("clip menu.from_here")
+    busy.click("clip menu.train from here")
     assert busy.sent(TrainClips) == [TrainClips((1, 2))]
     for number, entry, expected in ((2, "restore", RestoreVersion), (1, "remove", RemoveVersion)):
         busy.tap(*busy.rects["timeline.clip0"].center, mouse.RIGHT)
