@@ -44,6 +44,13 @@ class TrainClip:
 
 
 @dataclass(frozen=True, slots=True)
+class TrainClips:
+    """Train those of the clips that are not finished, one after the other; a reference clip among them comes first."""
+
+    clip_indices: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class PauseTraining:
     """Hold the running training where it is."""
 
@@ -68,6 +75,13 @@ class SetFrame:
 @dataclass(frozen=True, slots=True)
 class TogglePlay:
     """Play or hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class FollowTraining:
+    """Go along with the training: the playhead stands in the clip with the newest state, until the user moves it."""
+
+    is_on: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,11 +240,13 @@ Command = (
     | OpenProject
     | TrainNextClip
     | TrainClip
+    | TrainClips
     | PauseTraining
     | ResumeTraining
     | StopTraining
     | SetFrame
     | TogglePlay
+    | FollowTraining
     | LookThrough
     | SetCompare
     | ToggleOverlay

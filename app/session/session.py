@@ -28,6 +28,7 @@ from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.residuals.residuals import Residuals
 from app.session import commands
+from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
 from app.session.notices import Notices
@@ -204,6 +205,9 @@ class Session:
             case commands.TrainClip(clip_index=clip_index, is_confirmed=is_confirmed):
                 self.question = None
                 self.question = live.train(clip_index, is_confirmed=is_confirmed)
+            case commands.TrainClips(clip_indices=clip_indices):
+                self.question = None
+                live.train_unfinished(clip_indices)
             case commands.PauseTraining():
                 live.pause()
             case commands.ResumeTraining():
@@ -214,6 +218,9 @@ class Session:
                 self.timeline.seek(frame_index)
             case commands.TogglePlay():
                 self.timeline.toggle_play()
+            case commands.FollowTraining(is_on=is_on):
+                self.timeline.hold()
+                self.timeline.is_following = is_on
             case commands.LookThrough(camera_index=camera_index):
                 self.view.look(camera_index)
             case commands.SetCompare(mode=mode):
@@ -273,12 +280,12 @@ class Session:
             return
         check_settings(changed, opened.capture)
         opened.project.update(changed)
-        frame_index = self.timeline.frame_index
+        before = self.timeline
         changed_project = opened_project(opened.capture, opened.project, opened.generation)
         self._show(changed_project)
         self.live_training.open(changed_project)
         self._open_residuals(changed_project)
-        self.timeline.seek(frame_index)
+        self.timeline.take_over(before)
 
     # ---------------------------------------------------------------- opening
 
@@ -379,6 +386,7 @@ class Session:
 
     def _refresh(self) -> None:
         """Remake the status values."""
+        follow_training(self.timeline, self.live_training)
         live, clip, opened = self.live_training, self.timeline.clip, self.opened
         live.note_anchors(self.playback.live_anchors(self.timeline))
         self.training = live.status(None if clip is None else clip.clip_index)

@@ -131,6 +131,8 @@ class FakeSession:
         self.rig: CameraRig = NO_CAMERAS
         self.clips: list[Clip] = []
         self.clip_states: list[ClipStatus] = []
+        self.measured: ResidualStatus | None = None  # in place of what residual_status makes up
+        self.cached: list[tuple[int, int]] = []  # what cached_frames answers
         self.project = None
         self.timeline, self.views = Timeline(), Views()
         if has_capture:
@@ -147,6 +149,8 @@ class FakeSession:
     @property
     def residual_status(self) -> ResidualStatus:
         """Two cameras are not measured; frame 12 of camera 5 and the seam at frame 20 are bad."""
+        if self.measured is not None:
+            return self.measured
         n_frames, n_cameras = self.timeline.n_frames, len(self.rig)
         cells = {}
         for column, (low, high) in CELL_RANGES.items():
@@ -157,8 +161,8 @@ class FakeSession:
             values[12, 5] = low if column == "psnr" else high
             cells[column] = values
         seams = tuple(
-            SeamStatus(clip.clip_index, clip.start, score, n_cameras=n_cameras - 2, worst_camera=5)
-            for clip, score in zip(self.clips[1:], (0.4, 2.6), strict=True)
+            SeamStatus(clip.clip_index, clip.start, score, 1.0 + score / 2, n_cameras - 2, 5)
+            for clip, score in zip(self.clips[1:], (0.4, 2.6), strict=False)
         )
         held_out = tuple(index in self.holdout for index in range(n_cameras))
         return ResidualStatus(seams, cells, held_out, n_frames * (n_cameras - 2), n_frames * n_cameras, revision=1)
@@ -172,6 +176,10 @@ class FakeSession:
         return AnchorHeat(
             positions, values, column, (column, frame_index), 0, frame_index, n_cameras=8, n_cameras_all=8
         )
+
+    def cached_frames(self) -> list[tuple[int, int]]:
+        """Runs of frames in memory."""
+        return self.cached
 
     def heat(self, kind: str) -> HeatMap | None:
         """Grows from left to right over the range of its kind, differs between frames, and frame 0 has no E."""
@@ -207,6 +215,8 @@ class FakeSession:
                 self.timeline.seek(command.frame_index)
             case commands.TogglePlay():
                 self.timeline.toggle_play()
+            case commands.FollowTraining(is_on=is_on):
+                self.timeline.is_following = is_on
             case commands.LookThrough():
                 self.view.look(command.camera_index)
             case commands.SetCompare(mode=mode):

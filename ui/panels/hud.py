@@ -19,7 +19,7 @@ from ui.panels.color_bar import COLOR_BAR_SIZE, draw_color_bar
 from ui.panels.comparison import shown_compare
 from ui.panels.regions import draw_region_mark
 from ui.panels.state import Rect, UiState
-from ui.panels.timeline import STATE_WORDS
+from ui.panels.timeline.clip_words import STATE_WORDS
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.theme import Icon
