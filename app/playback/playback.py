@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from app.background.jobs import Jobs
@@ -63,6 +64,7 @@ class Playback:
         self._opened: OpenedProject | None = None
         self._state_of = state_of
         self._n_ahead_seen = 0
+        self._inherited: dict[int, Path | None] = {}
 
     def start(self) -> None:
         """Start the threads now rather than with the first request, and load what they need."""
@@ -74,7 +76,7 @@ class Playback:
         if self._opened is not None and self._opened.generation != opened.generation:
             for store in (self.decoder, self.renderer, self.captured, self.clouds, self.ahead, self._modes):
                 store.clear()
-        self._opened = opened
+        self._opened, self._inherited = opened, {}
 
     def build_first_cloud(self, jobs: Jobs) -> None:
         """Make something to look at until the reference clip has a state, unless there is one."""
@@ -151,7 +153,7 @@ class Playback:
         if request is None:
             return None
         look = Look.of(view, width, height, shown_as=shown_as)
-        full = look if full_size in (None, (width, height)) else Look.of(view, *full_size, shown_as=shown_as)
+        full = look if full_size is None else look.in_size(view, *full_size)
         self.ahead.note(view_id, AskedLook(look, full))
         shown: ShownFrame | None = None
         picture = self._known_picture(request.key, (full, look), view_id)
@@ -220,11 +222,17 @@ class Playback:
             frame_index=frame_index,
             path=state.file,
             generation=opened.generation,
-            reference_path=opened.inherited_path(clip.clip_index),
+            reference_path=self._inherited_path(opened, clip.clip_index),
             clip=clip,
             is_live=state.is_live,
             shown_as=decoded_as(shown_as),
         )
+
+    def _inherited_path(self, opened: OpenedProject, clip_index: int) -> Path | None:
+        """Kept: it is asked for many times in every turn of the loop, and follows from all settings."""
+        if clip_index not in self._inherited:
+            self._inherited[clip_index] = opened.inherited_path(clip_index)
+        return self._inherited[clip_index]
 
     # ---------------------------------------------------------------- beside them
 
