@@ -10,8 +10,21 @@ import numpy as np
 
 from engine.gate.regions import GateRegion
 
-OVERLAY_NAMES = ("show_frusta", "show_inherited", "show_residual", "show_points", "show_cloud", "show_regions")
-COMPARE_MODES = ("off", "wipe", "side")
+OVERLAY_NAMES = (
+    "show_frusta",
+    "show_inherited",
+    "show_residual",
+    "show_points",
+    "show_cloud",
+    "show_regions",
+    "show_coverage",
+    "show_trails",
+)
+COMPARE_MODES = ("off", "wipe", "side", "blink")
+CAPTURED = "captured"
+"""Of Overlays.compare_with: what the camera took."""
+BLINK_HZ = (0.25, 3.0)
+"""Slowest and fastest blinking. More than three flashes a second can cause seizures."""
 
 
 @dataclass(slots=True)
@@ -21,8 +34,12 @@ class Overlays:
     Attributes:
         show_points: The point cloud where a clip is not trained.
         show_cloud: The point cloud in place of the picture of a trained clip.
-        compare: "off", "wipe" or "side": the captured picture over or beside the rendered one.
-        wipe_position: Share of the width that shows the captured picture, 0..1.
+        show_coverage: The space that inherited anchors cover, and how far residual anchors lie from it.
+        show_trails: The ways that Gaussians took over the last frames.
+        compare: "off", "wipe", "side" or "blink": another picture over, beside or in turn with the rendered one.
+        compare_with: The other picture: CAPTURED, or the name of a mode (app.playback.view_modes).
+        wipe_position: Share of the width that shows the other picture, 0..1.
+        blink_hz: How often a second each of the two pictures is seen.
         mode, content: What colours mean and which part of a clip is drawn, by name; see app.playback.view_modes.
         heat: Name of the residual heat map over the picture, see app.residuals.heat_map.HEAT_KINDS; empty for none.
             Where no camera is looked through, the residual of each anchor is shown in its place.
@@ -37,7 +54,11 @@ class Overlays:
     show_points: bool = True
     show_cloud: bool = False
     show_regions: bool = True
+    show_coverage: bool = False
+    show_trails: bool = False
     compare: str = "off"
+    compare_with: str = CAPTURED
+    blink_hz: float = 1.0
     wipe_position: float = 0.5
     mode: str = "color"
     content: str = "all"
@@ -257,7 +278,7 @@ SEAM_RANGE = (0.0, 1.0)
 SEAM_FLAGGED = 0.3
 """Scores above it are pointed out."""
 SEAM_RATIO_RANGE = (1.0, 3.0)
-"""What the colours of seam ratios span: 1 is no seam; inheriting clips have 1.0 to 1.4, others 10 and more."""
+"""What the colours of seam ratios span: at 1 nothing shows; inheriting clips have 1.0 to 1.4, others 10 and more."""
 SEAM_RATIO_FLAGGED = 2.0
 """Ratios above it are pointed out."""
 
@@ -271,8 +292,8 @@ class SeamStatus:
         frame_index: Its first frame.
         score: Excess flicker of static pixels there, less what is normal inside the two clips, in 1/255, a mean over
             cameras: see engine.metrics.clips.seams. None where no camera was measured in both clips.
-        ratio: Change of static pixels there / inside the two clips, over all cameras; 1 is no seam. None where nothing
-            changes inside, or nothing was measured.
+        ratio: Change of static pixels there / inside the two clips, over all cameras; 1 where nothing shows. None where
+            nothing changes inside, or nothing was measured.
         n_cameras: Cameras behind the score.
         worst_camera: The camera with the highest score; None without one.
     """

@@ -147,6 +147,7 @@ class FrameDecoder:
         self._cache: ByteCache[FrameKey, ShownFrame] = ByteCache(cache_bytes)
         self._models: OrderedDict[ModelKey, LoadedClip] = OrderedDict()
         self._files = ClipFiles()
+        self._loading: ModelKey | None = None
         self._last: ShownFrame | None = None
         self._frame_bytes = 0  # of the newest one
         self.worker: LatestWorker[FrameRequest, ShownFrame] = LatestWorker(
@@ -204,6 +205,12 @@ class FrameDecoder:
         loaded = self._models.get(request.model_key)
         return None if loaded is None else loaded.anchors
 
+    def model(self, request: FrameRequest) -> ClipModel | None:
+        """The model of a state, not to be decoded on another thread but in parts (app.playback.contents.part_of); None
+        until it was loaded."""
+        loaded = self._models.get(request.model_key)
+        return None if loaded is None else loaded.model
+
     def colors(self, request: FrameRequest) -> CameraColors | None:
         """What the cameras make of the scene's colours in a state; None until it was loaded, or where unknown."""
         loaded = self._models.get(request.model_key)
@@ -212,6 +219,10 @@ class FrameDecoder:
     def loaded(self, request: FrameRequest) -> LoadedClip | None:
         """The clip of a request if it is in memory. May be asked on any thread."""
         return self._models.get(request.model_key)
+
+    def is_loading(self, request: FrameRequest) -> bool:
+        """Whether the clip of a request is being read right now. May be asked on any thread."""
+        return self._loading == request.model_key
 
     def is_loaded(self, request: FrameRequest) -> bool:
         """Whether the file of this state is not needed any more."""
@@ -279,11 +290,16 @@ class FrameDecoder:
         if identity in models:
             models.move_to_end(identity)
             return models[identity]
-        loaded = self._files.read(request)
+        self._loading = identity
+        try:
+            loaded = self._files.read(request)
+        finally:
+            self._loading = None
         if not self.worker.is_still_wanted:
             return loaded
-        self._cache.drop(lambda key: key[2] == request.clip_index and key[3] != request.revision)
-        kept = [(key, value) for key, value in models.items() if key[2] != request.clip_index]
+        # another revision of the same file is worthless now; another file may be a version that it is compared with
+        self._cache.drop(lambda key: key[:3] == identity[:3] and key[3] != request.revision)
+        kept = [(key, value) for key, value in models.items() if key[:3] != identity[:3]]
         # replaced as a whole, so that the other thread never sees it half changed
         self._models = OrderedDict([*kept[-(MAX_MODELS - 1) :], (identity, loaded)])
         return loaded

@@ -16,11 +16,13 @@ from app.playback.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.capture_pictures import CapturedPictures, Gain
 from app.playback.clouds import CloudRequest, Clouds
 from app.playback.course import Course
+from app.playback.coverage import Coverage, CoverageFinder
 from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest, ShownFrame
 from app.playback.mode_arrays import ModeArrays
 from app.playback.orbit_view import OrbitView
 from app.playback.render import Look, Renderer
 from app.playback.timeline import Timeline
+from app.playback.trails import TrailMaker, TrailRequest, Trails
 from app.playback.view_modes import PLAIN, ShownAs, decoded_as
 from app.project.opened_project import OpenedProject
 from app.status import WantedFrame
@@ -60,7 +62,7 @@ class Playback:
         self.decoder, self.renderer = FrameDecoder(), Renderer()
         self.captured, self.clouds = CapturedPictures(), Clouds()
         self.ahead = Ahead(self.decoder, self.renderer)
-        self._modes = ModeArrays()
+        self._modes, self._coverage, self._trails = ModeArrays(), CoverageFinder(), TrailMaker()
         self._opened: OpenedProject | None = None
         self._state_of = state_of
         self._n_ahead_seen = 0
@@ -74,7 +76,7 @@ class Playback:
     def show(self, opened: OpenedProject) -> None:
         """Take up what is open. What was made of another project is forgotten."""
         if self._opened is not None and self._opened.generation != opened.generation:
-            for store in (self.decoder, self.renderer, self.captured, self.clouds, self.ahead, self._modes):
+            for store in (*self._stores, self.ahead, self._modes):
                 store.clear()
         self._opened, self._inherited = opened, {}
 
@@ -96,6 +98,20 @@ class Playback:
         """All anchors of the clip under the playhead while it trains; None before a state of it was loaded."""
         request = self._request(timeline)
         return None if request is None or not request.is_live else self.decoder.anchors(request)
+
+    def coverage(self, timeline: Timeline) -> Coverage | None:
+        """What inherited anchors cover in the clip under the playhead; None until it is loaded and measured."""
+        request = self._request(timeline)
+        anchors = None if request is None else self.decoder.anchors(request)
+        return None if anchors is None else self._coverage.find(anchors)
+
+    def trails(self, timeline: Timeline) -> Trails | None:
+        """Trails that end at the playhead, or the newest ones of its clip until those are made."""
+        request = self._request(timeline)
+        model = None if request is None else self.decoder.model(request)
+        if request is None or model is None:
+            return None
+        return self._trails.trails(TrailRequest(request.model_key, request.frame_index, model, request.clip))
 
     def is_loaded(self, timeline: Timeline) -> bool:
         """Whether the file of the clip under the playhead is not needed any more. Asks for what is missing."""
@@ -284,6 +300,8 @@ class Playback:
             self.clouds.worker,
             self.renderer.worker,
             self.decoder.worker,
+            self._coverage.worker,
+            self._trails.worker,
         )
 
     @property
@@ -312,8 +330,13 @@ class Playback:
 
     def close(self) -> None:
         """End the threads."""
-        for store in (self.decoder, self.renderer, self.captured, self.clouds):
+        for store in self._stores:
             store.close()
+
+    @property
+    def _stores(self) -> tuple[FrameDecoder | Renderer | CapturedPictures | Clouds | CoverageFinder | TrailMaker, ...]:
+        """Everything that has a thread."""
+        return self.decoder, self.renderer, self.captured, self.clouds, self._coverage, self._trails
 
 
 _TITLES = (
@@ -322,5 +345,7 @@ _TITLES = (
     "The cloud cannot be shown",
     "The picture could not be drawn",
     "The clip cannot be shown",
+    "What inherited anchors cover cannot be shown",
+    "The trails cannot be shown",
 )
 """In the order of the workers."""

@@ -1,15 +1,23 @@
-"""Timeline: the playhead, play state, and which clip a frame belongs to. Knows no pictures."""
+"""Timeline: the playhead, how it plays, and which clip a frame belongs to. Knows no pictures."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
+from app.playback.markers import Markers
 from engine.capture.clip import Clip
+
+SPEEDS = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
+"""How fast a capture can be played, as multiples of its own speed."""
+SEAM_REACH = 12
+"""Frames on either side of a clip's first frame that are played around it."""
 
 
 class Timeline:
     """Frame arithmetic and playing. An empty timeline (no capture) has zero frames and stands at frame 0.
+
+    Ranges of frames name their first and last frame, as people do.
 
     Attributes:
         frame_index: The playhead, in [0, n_frames).
@@ -17,6 +25,12 @@ class Timeline:
         fps: Frames per second of the capture.
         is_playing, is_looping: Play state.
         is_every_frame: Whether playing waits for each frame to be shown, instead of leaving some out.
+        direction: 1 plays forward, -1 backward.
+        speed: Multiple of the capture's own speed, one of SPEEDS.
+        in_frame, out_frame: Where playing begins and ends; None where the capture does. in_frame <= out_frame.
+        around: Frames that are played over and over for the moment, whatever in_frame and out_frame say; None else.
+        is_following: Whether the playhead goes along with the training. Ends when the user moves it.
+        markers: Frames that the user wants to find again.
     """
 
     def __init__(self, clips: Sequence[Clip] = (), *, fps: float = 30.0) -> None:
@@ -27,17 +41,45 @@ class Timeline:
         self.is_playing = False
         self.is_looping = True
         self.is_every_frame = False
-        self._carried_s = 0.0
+        self.direction = 1
+        self.speed = 1.0
+        self.in_frame: int | None = None
+        self.out_frame: int | None = None
+        self.around: tuple[int, int] | None = None
+        self.is_following = False
+        self.markers = Markers()
+        self._carried = 0.0  # frames that are due and not yet gone: less than one, but for rounding not below zero
+
+    def take_over(self, other: Timeline) -> None:
+        """Go on where another timeline of the same frames is, as when they are cut into other clips."""
+        for name in ("is_looping", "is_every_frame", "speed", "markers"):
+            setattr(self, name, getattr(other, name))
+        self.markers.keep_below(self.n_frames)
+        self.set_range(other.in_frame, other.out_frame)
+        self.seek(other.frame_index)
+
+    # ---------------------------------------------------------------- the playhead
 
     @property
     def last_frame(self) -> int:
         """Largest valid frame index; 0 when there are none."""
         return max(self.n_frames - 1, 0)
 
+    def clamped(self, frame_index: float) -> int:
+        """The frame, held inside the capture."""
+        return min(max(int(frame_index), 0), self.last_frame)
+
     def seek(self, frame_index: int) -> None:
-        """Move the playhead, clamped to the capture."""
-        self.frame_index = min(max(int(frame_index), 0), self.last_frame)
-        self._carried_s = 0.0
+        """The user moves the playhead; clamped to the capture. Ends following, and playing around some other place."""
+        self.is_following = False
+        self.go_to(frame_index)
+
+    def go_to(self, frame_index: int) -> None:
+        """Move the playhead as `seek` does, and go on following."""
+        self.frame_index = self.clamped(frame_index)
+        self._carried = 0.0
+        if self.around is not None and not self.around[0] <= self.frame_index <= self.around[1]:
+            self.around = None
 
     def step(self, n_frames: int) -> None:
         """Move by some frames; wraps around when looping."""
@@ -46,15 +88,105 @@ class Timeline:
             target %= self.n_frames
         self.seek(target)
 
+    # ---------------------------------------------------------------- what is played
+
+    @property
+    def play_range(self) -> tuple[int, int]:
+        """First and last frame that playing visits."""
+        if self.around is not None:
+            return self.around
+        first = 0 if self.in_frame is None else self.in_frame
+        return first, self.last_frame if self.out_frame is None else self.out_frame
+
+    def set_range(self, in_frame: int | None, out_frame: int | None) -> None:
+        """Play from one frame to another; None where the capture begins or ends. Clamped, and put in order."""
+        first = None if in_frame is None else self.clamped(in_frame)
+        last = None if out_frame is None else self.clamped(out_frame)
+        if first is not None and last is not None:
+            first, last = min(first, last), max(first, last)
+        self.in_frame, self.out_frame, self.around = first, last, None
+
+    def set_in(self) -> None:
+        """Playing begins at the playhead. An end before it is given up."""
+        is_past_end = self.out_frame is not None and self.out_frame < self.frame_index
+        self.set_range(self.frame_index, None if is_past_end else self.out_frame)
+
+    def set_out(self) -> None:
+        """Playing ends at the playhead. A beginning behind it is given up."""
+        is_before_start = self.in_frame is not None and self.in_frame > self.frame_index
+        self.set_range(None if is_before_start else self.in_frame, self.frame_index)
+
+    def clear_range(self) -> None:
+        """Play all of the capture."""
+        self.set_range(None, None)
+
+    @property
+    def nearest_seam(self) -> int | None:
+        """The first frame of the clip whose beginning is nearest to the playhead; None with a single clip."""
+        if len(self.clips) < 2:
+            return None
+        length = self.clips[0].clip_length
+        place = min(max(round(self.frame_index / length), 1), len(self.clips) - 1)
+        return self.clips[place].start
+
+    def play_around(self, seam_frame: int, reach: int = SEAM_REACH) -> None:
+        """Play the frames on either side of a clip's first frame over and over."""
+        self.seek(seam_frame - reach)
+        self.around = (self.frame_index, self.clamped(seam_frame + reach - 1))
+        self._start(1)
+
+    def toggle_around(self) -> None:
+        """Play around the nearest seam; where that is done already, no more."""
+        if self.around is not None:
+            self.around = None
+            self.is_playing = False
+        elif self.nearest_seam is not None:
+            self.play_around(self.nearest_seam)
+
+    # ---------------------------------------------------------------- playing
+
     def toggle_play(self) -> None:
-        """Play or hold; playing from the last frame starts over."""
-        self.is_playing = not self.is_playing and self.n_frames > 1
-        self._carried_s = 0.0
-        if self.is_playing and not self.is_looping and self.frame_index == self.last_frame:
-            self.frame_index = 0
+        """Play forward or hold; playing from the last frame starts over."""
+        if self.is_playing:
+            self.hold()
+        else:
+            self._start(1)
+
+    def hold(self) -> None:
+        """Stop where the playhead is."""
+        self.is_playing = False
+        self._carried = 0.0
+
+    def shuttle(self, direction: int) -> None:
+        """Play one way; when that is done already, faster.
+
+        Args:
+            direction: 1 forward, -1 backward.
+        """
+        if self.is_playing and self.direction == direction:
+            self.change_speed(1)
+        else:
+            self.speed = min(self.speed, 1.0)
+            self._start(direction)
+
+    def change_speed(self, n_steps: int) -> None:
+        """Faster or slower by steps of SPEEDS, as far as they go."""
+        nearest = min(range(len(SPEEDS)), key=lambda place: abs(SPEEDS[place] - self.speed))
+        self.speed = SPEEDS[min(max(nearest + n_steps, 0), len(SPEEDS) - 1)]
+
+    def _start(self, direction: int) -> None:
+        self.is_playing = self.n_frames > 1
+        self.is_following &= not self.is_playing
+        self.direction = direction
+        self._carried = 0.0
+        first, last = self.play_range
+        start, end = (first, last) if direction > 0 else (last, first)
+        is_at_end = self.frame_index == end and not self.is_looping and self.around is None
+        if self.is_playing and (is_at_end or not first <= self.frame_index <= last):
+            self.frame_index = start
 
     def tick(self, dt_s: float, *, is_shown: bool = True) -> bool:
-        """Let time pass while playing; time left over from whole frames is carried on.
+        """Let time pass while playing; what is left over from whole frames is carried on, so that nothing adds up.
 
         Args:
             dt_s: Seconds since the last tick; negative or non-finite values count as none.
@@ -64,22 +196,30 @@ class Timeline:
         """
         if not self.is_playing or not math.isfinite(dt_s) or dt_s <= 0:
             return False
-        self._carried_s += dt_s
+        self._carried += dt_s * self.fps * self.speed
         # the small addition keeps 3 ticks of 1/30 s at 10 fps from falling one ulp short of a frame
-        n_frames = math.floor(self._carried_s * self.fps + 1e-9)
+        n_frames = math.floor(self._carried + 1e-9)
         if self.is_every_frame:
             n_frames = min(n_frames, 1 if is_shown else 0)
-            self._carried_s = min(self._carried_s, (1 + n_frames) / self.fps)  # time lost is not caught up with
+            self._carried = min(self._carried, 1.0 + n_frames)  # time lost is not caught up with
         if n_frames == 0:
             return False
-        self._carried_s = max(self._carried_s - n_frames / self.fps, 0.0)
+        self._carried -= n_frames
         before = self.frame_index
-        if self.is_looping:
-            self.frame_index = (self.frame_index + n_frames) % self.n_frames
-        else:
-            self.frame_index = min(self.frame_index + n_frames, self.last_frame)
-            self.is_playing = self.frame_index < self.last_frame
+        self._advance(n_frames * self.direction)
         return self.frame_index != before
+
+    def _advance(self, n_frames: int) -> None:
+        """Move on inside of what is played: round and round, or to its end and no farther."""
+        first, last = self.play_range
+        target = self.frame_index + n_frames
+        if self.is_looping or self.around is not None:
+            self.frame_index = first + (target - first) % (last - first + 1)
+            return
+        self.frame_index = min(max(target, first), last)
+        self.is_playing = self.frame_index != (last if self.direction > 0 else first)
+
+    # ---------------------------------------------------------------- clips
 
     def clip_of(self, frame_index: int) -> Clip | None:
         """The clip of a frame; None outside the capture."""
@@ -94,8 +234,10 @@ class Timeline:
 
     def next_clip_start(self, frame_index: int) -> int:
         """First frame of the next clip; the last frame when there is none."""
-        return next((clip.start for clip in self.clips if clip.start > frame_index), self.last_frame)
+        clip = self.clip_of(frame_index)
+        return self.last_frame if clip is None or clip.stop >= self.n_frames else clip.stop
 
     def previous_clip_start(self, frame_index: int) -> int:
         """First frame of this clip, or of the one before when already there."""
-        return next((clip.start for clip in reversed(self.clips) if clip.start < frame_index), 0)
+        clip = self.clip_of(frame_index - 1)
+        return 0 if clip is None else clip.start

@@ -44,6 +44,13 @@ class TrainClip:
 
 
 @dataclass(frozen=True, slots=True)
+class TrainClips:
+    """Train those of the clips that are not finished, one after the other; a reference clip among them comes first."""
+
+    clip_indices: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class PauseTraining:
     """Hold the running training where it is."""
 
@@ -71,6 +78,13 @@ class TogglePlay:
 
 
 @dataclass(frozen=True, slots=True)
+class FollowTraining:
+    """Go along with the training: the playhead stands in the clip with the newest state, until the user moves it."""
+
+    is_on: bool = True
+
+
+@dataclass(frozen=True, slots=True)
 class LookThrough:
     """Look through a capture camera, or freely again with None."""
 
@@ -79,7 +93,7 @@ class LookThrough:
 
 @dataclass(frozen=True, slots=True)
 class SetCompare:
-    """Compare with the captured picture: "off", "wipe" or "side"."""
+    """Compare with another picture: "off", "wipe", "side" or "blink"."""
 
     mode: str
 
@@ -162,6 +176,13 @@ class HomeView:
 
 
 @dataclass(frozen=True, slots=True)
+class SetCompareWith:
+    """What to compare with. other: See Overlays.compare_with."""
+
+    other: str
+
+
+@dataclass(frozen=True, slots=True)
 class SetMode:
     """Let colours mean something else. mode: See app.playback.view_modes.MODES."""
 
@@ -219,11 +240,13 @@ Command = (
     | OpenProject
     | TrainNextClip
     | TrainClip
+    | TrainClips
     | PauseTraining
     | ResumeTraining
     | StopTraining
     | SetFrame
     | TogglePlay
+    | FollowTraining
     | LookThrough
     | SetCompare
     | ToggleOverlay
@@ -231,6 +254,7 @@ Command = (
     | SettingCommand
     | EditCommand
     | HomeView
+    | SetCompareWith
     | SetMode
     | SetContent
     | ShowViews

@@ -43,6 +43,7 @@ class LiveTraining:
         self._unread: SnapshotWritten | None = None
         self._live_counts: tuple[int, int] | None = None
         self._n_ending = 0
+        self._ended_clip: int | None = None
 
     def start(self) -> None:
         """Start the thread of the curves now rather than with the first request."""
@@ -61,6 +62,8 @@ class LiveTraining:
                 service.close()
             else:
                 self._retire(service, before)
+        if before is None or before.generation != opened.generation:
+            self._ended_clip = None
         self._opened = opened
         self.service = TrainingService(
             opened.project,
@@ -144,6 +147,26 @@ class LiveTraining:
             self.service.enqueue(clip_index)
         return None
 
+    def train_unfinished(self, clip_indices: Sequence[int]) -> None:
+        """Train those of the clips that are neither finished nor on their way, a reference clip among them first.
+
+        Raises:
+            ProjectError: One of them cannot be trained; those before it wait for their turn.
+        """
+        service = self.service
+        if service is None:
+            self._tell_nothing_open()
+            return
+        wanted = [
+            clip_index
+            for clip_index in service.catalog.order
+            if clip_index in {*clip_indices} and not service.is_finished(clip_index)
+        ]
+        for clip_index in wanted:
+            service.enqueue(clip_index)
+        if not wanted:
+            self._notices.add("info", "All of these clips are trained")
+
     def _tell_nothing_open(self) -> None:
         self._notices.add("warn", "There is nothing to train yet", "No capture is open.", "Open a capture folder.")
 
@@ -166,6 +189,7 @@ class LiveTraining:
 
     def poll(self) -> Sequence[Event]:
         """Take in what the worker said, and tell the user what is news. Returns all of it, oldest first."""
+        running = None if self.service is None else self.service.running_clip
         events = [] if self.service is None else self.service.poll()
         for event in events:
             tell(event, self._notices)
@@ -173,7 +197,24 @@ class LiveTraining:
                 self._unread = event
             elif isinstance(event, ENDINGS):
                 self._unread = self._live_counts = None
+                if running is not None and self.state_of(running) is not None:
+                    self._ended_clip = running
         return events
+
+    @property
+    def newest_clip(self) -> int | None:
+        """The clip with the newest state to look at: the one that trains once it has one, else the one whose training
+        has ended last, else the last one that is trained; None where there is none."""
+        service = self.service
+        if service is None:
+            return None
+        running = service.running_clip
+        state = None if running is None else service.shown_state(running)
+        if state is not None and state.is_live:
+            return running
+        if self._ended_clip is not None:
+            return self._ended_clip
+        return next((index for index in reversed(service.catalog.order) if service.is_finished(index)), None)
 
     @property
     def unread_clip(self) -> int | None:

@@ -13,18 +13,22 @@ from pathlib import Path
 
 from app.background.jobs import Jobs
 from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
+from app.playback.coverage import Coverage
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
+from app.playback.trails import Trails
 from app.playback.view_modes import CONTENTS, MODES, ShownAs
 from app.playback.views import Views
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.project import Project, check_settings
 from app.project.recents import project_name
+from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.residuals.residuals import Residuals
 from app.session import commands
+from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
 from app.session.notices import Notices
@@ -34,6 +38,7 @@ from app.session.recent_projects import RecentProjects
 from app.session.setting_changes import changed_settings
 from app.session.settings import Settings
 from app.status import (
+    CAPTURED,
     COMPARE_MODES,
     OVERLAY_NAMES,
     ClipStatus,
@@ -200,6 +205,9 @@ class Session:
             case commands.TrainClip(clip_index=clip_index, is_confirmed=is_confirmed):
                 self.question = None
                 self.question = live.train(clip_index, is_confirmed=is_confirmed)
+            case commands.TrainClips(clip_indices=clip_indices):
+                self.question = None
+                live.train_unfinished(clip_indices)
             case commands.PauseTraining():
                 live.pause()
             case commands.ResumeTraining():
@@ -210,6 +218,9 @@ class Session:
                 self.timeline.seek(frame_index)
             case commands.TogglePlay():
                 self.timeline.toggle_play()
+            case commands.FollowTraining(is_on=is_on):
+                self.timeline.hold()
+                self.timeline.is_following = is_on
             case commands.LookThrough(camera_index=camera_index):
                 self.view.look(camera_index)
             case commands.SetCompare(mode=mode):
@@ -226,6 +237,10 @@ class Session:
                 self.overlays.heat = kind
             case commands.SetHoldout() | commands.SetClipLength() | commands.SetTrainSetting() | commands.SetPreset():
                 self._change_settings(command)
+            case commands.SetCompareWith(other=other):
+                if other != CAPTURED and other not in MODES:
+                    raise ValueError(f"pictures to compare with are {CAPTURED}, {', '.join(MODES)}, not {other!r}")
+                self.overlays.compare_with = other
             case commands.SetMode(mode=mode):
                 if mode not in MODES:
                     raise ValueError(f"modes are {', '.join(MODES)}, not {mode!r}")
@@ -265,12 +280,12 @@ class Session:
             return
         check_settings(changed, opened.capture)
         opened.project.update(changed)
-        frame_index = self.timeline.frame_index
+        before = self.timeline
         changed_project = opened_project(opened.capture, opened.project, opened.generation)
         self._show(changed_project)
         self.live_training.open(changed_project)
         self._open_residuals(changed_project)
-        self.timeline.seek(frame_index)
+        self.timeline.take_over(before)
 
     # ---------------------------------------------------------------- opening
 
@@ -371,6 +386,7 @@ class Session:
 
     def _refresh(self) -> None:
         """Remake the status values."""
+        follow_training(self.timeline, self.live_training)
         live, clip, opened = self.live_training, self.timeline.clip, self.opened
         live.note_anchors(self.playback.live_anchors(self.timeline))
         self.training = live.status(None if clip is None else clip.clip_index)
@@ -418,6 +434,14 @@ class Session:
         shown = self.playback.frame(self.timeline, self._shown_as)
         return None if shown is None else shown.anchors
 
+    def shown_coverage(self) -> Coverage | None:
+        """What inherited anchors cover; see Playback.coverage."""
+        return self.playback.coverage(self.timeline)
+
+    def shown_trails(self) -> Trails | None:
+        """The ways of what moves; see Playback.trails."""
+        return self.playback.trails(self.timeline)
+
     def shown_points(self) -> PointArrays | None:
         """A cloud for frames that are not trained; see Playback.cloud."""
         return self.playback.cloud(self.view)
@@ -427,6 +451,16 @@ class Session:
         view_id = self.views.current_index
         return self.playback.render(
             self.timeline, self.view, width, height, full_size=full_size, shown_as=self._shown_as, view_id=view_id
+        )
+
+    def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
+        """The rasterizer's picture that the rendered one is compared with; None where that is a captured one."""
+        if self.overlays.compare_with not in MODES:
+            return None
+        shown_as = ShownAs(self.overlays.compare_with, self.overlays.content)
+        view_id = ("other", self.views.current_index)
+        return self.playback.render(
+            self.timeline, self.view, width, height, full_size=full_size, shown_as=shown_as, view_id=view_id
         )
 
     def cached_frames(self) -> list[tuple[int, int]]:
@@ -440,6 +474,10 @@ class Session:
     def compared_picture(self, camera_index: int, max_width: int) -> Picture | None:
         """What a camera took at the playhead, to be set beside the render; see Playback.compared_picture."""
         return self.playback.compared_picture(self.timeline, camera_index, max_width)
+
+    def anchor_heat(self, column: str) -> AnchorHeat | None:
+        """The residual of each anchor at the playhead; see Residuals.anchor_heat."""
+        return self.residuals.anchor_heat(self.timeline, column)
 
     def heat(self, kind: str) -> HeatMap | None:
         """The residual heat map of the playhead and the camera looked through; see Residuals.heat."""

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from app.playback.orbit_view import OrbitView
-from app.playback.timeline import Timeline
+from app.playback.timeline import SPEEDS, Timeline
 from app.status import COMPARE_MODES, OVERLAY_NAMES, Overlays
 from engine.camera.rig import CameraRig
 from engine.errors import EngineError
@@ -27,6 +27,8 @@ logger = logging.getLogger(__name__)
 MAX_PROJECTS = 60
 MAX_LAYOUT_CHARACTERS = 100_000
 MAX_SIDE_PX = 32_768
+MAX_WORD_CHARACTERS = 40
+MAX_LANES = 20
 SCHEMA = 1
 
 
@@ -43,6 +45,8 @@ class WindowMemory:
         ui_scale: Chosen scale of the interface; None follows the screen.
         layout: Where the panels are, as text of ImGui's; empty before the first time.
         mark_size, mark_opacity: Of anchor marks; None where none was chosen.
+        time_unit: In which the timeline counts; empty where none was chosen.
+        folded_lanes: Lanes of the timeline that are folded away, by name.
         views: By project folder, the one used last at the end; see `view_of` and `show_again`.
     """
 
@@ -53,6 +57,8 @@ class WindowMemory:
     layout: str = ""
     mark_size: float | None = None
     mark_opacity: float | None = None
+    time_unit: str = ""
+    folded_lanes: tuple[str, ...] = ()
     views: dict[str, dict[str, Any]] = field(default_factory=dict)
     _saved: dict[str, Any] = field(default_factory=dict, repr=False)
     _has_failed: bool = False
@@ -74,6 +80,8 @@ class WindowMemory:
             "layout": self.layout,
             "mark_size": self.mark_size,
             "mark_opacity": self.mark_opacity,
+            "time_unit": self.time_unit,
+            "folded_lanes": list(self.folded_lanes),
             "views": [{"project": folder, **view} for folder, view in self.views.items()],
         }
         if document == self._saved:
@@ -107,6 +115,9 @@ def read_window_memory(path: Path | None = None) -> WindowMemory:
     memory.layout = layout if isinstance(layout, str) and len(layout) <= MAX_LAYOUT_CHARACTERS else ""
     memory.mark_size = _number(found.get("mark_size"), 0.1, 10.0)
     memory.mark_opacity = _number(found.get("mark_opacity"), 0.0, 1.0)
+    memory.time_unit = _word(found.get("time_unit"))
+    folded = found.get("folded_lanes")
+    memory.folded_lanes = tuple(filter(None, map(_word, folded[:MAX_LANES]))) if isinstance(folded, list) else ()
     views = found.get("views")
     for view in views if isinstance(views, list) else []:
         if isinstance(view, dict) and isinstance(view.get("project"), str):
@@ -135,7 +146,7 @@ def view_of(session: Viewed) -> dict[str, Any]:
     view, overlays = session.view, session.overlays
     return {
         "frame_index": session.timeline.frame_index,
-        "is_looping": session.timeline.is_looping,
+        **_playing_of(session.timeline),
         "camera": None if view.look_through is None else session.rig.names[view.look_through],
         "pivot": [float(value) for value in view.pivot],
         "distance": float(view.distance),
@@ -154,8 +165,7 @@ def show_again(session: Viewed, kept: dict[str, Any]) -> None:
     frame_index = _number(kept.get("frame_index"), 0, timeline.last_frame)
     if frame_index is not None:
         timeline.seek(int(frame_index))
-    if isinstance(kept.get("is_looping"), bool):
-        timeline.is_looping = kept["is_looping"]
+    _play_again(timeline, kept)
     pivot = kept.get("pivot")
     numbers = {
         "distance": _number(kept.get("distance"), 1e-4, 1e6),
@@ -179,6 +189,37 @@ def show_again(session: Viewed, kept: dict[str, Any]) -> None:
     wipe_position = _number(kept.get("wipe_position"), 0.0, 1.0)
     if wipe_position is not None:
         overlays.wipe_position = wipe_position
+
+
+def _playing_of(timeline: Timeline) -> dict[str, Any]:
+    """How the capture is played, and what is marked in it."""
+    return {
+        "is_looping": timeline.is_looping,
+        "speed": timeline.speed,
+        "in_frame": timeline.in_frame,
+        "out_frame": timeline.out_frame,
+        "markers": [[marker.frame_index, marker.name] for marker in timeline.markers],
+    }
+
+
+def _play_again(timeline: Timeline, kept: dict[str, Any]) -> None:
+    if isinstance(kept.get("is_looping"), bool):
+        timeline.is_looping = kept["is_looping"]
+    if kept.get("speed") in SPEEDS:
+        timeline.speed = float(kept["speed"])
+    ends = [_number(kept.get(name), 0, timeline.last_frame) for name in ("in_frame", "out_frame")]
+    timeline.set_range(*(None if end is None else int(end) for end in ends))
+    markers = kept.get("markers")
+    for marker in markers if isinstance(markers, list) else []:
+        if isinstance(marker, list) and len(marker) == 2 and isinstance(marker[1], str):
+            frame_index = _number(marker[0], 0, timeline.last_frame)
+            if frame_index is not None:
+                timeline.markers.put(int(frame_index), marker[1])
+
+
+def _word(value: Any) -> str:
+    """A short text, else an empty one."""
+    return value if isinstance(value, str) and len(value) <= MAX_WORD_CHARACTERS else ""
 
 
 def _number(value: Any, low: float, high: float) -> float | None:

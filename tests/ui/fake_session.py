@@ -14,8 +14,10 @@ from app.playback.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
+from app.playback.view_modes import ShownAs
 from app.playback.views import Views
 from app.project.recents import RecentProject
+from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands
 from app.session.marking import after_marking
@@ -129,6 +131,8 @@ class FakeSession:
         self.rig: CameraRig = NO_CAMERAS
         self.clips: list[Clip] = []
         self.clip_states: list[ClipStatus] = []
+        self.measured: ResidualStatus | None = None  # in place of what residual_status makes up
+        self.cached: list[tuple[int, int]] = []  # what cached_frames answers
         self.project = None
         self.timeline, self.views = Timeline(), Views()
         if has_capture:
@@ -145,6 +149,8 @@ class FakeSession:
     @property
     def residual_status(self) -> ResidualStatus:
         """Two cameras are not measured; frame 12 of camera 5 and the seam at frame 20 are bad."""
+        if self.measured is not None:
+            return self.measured
         n_frames, n_cameras = self.timeline.n_frames, len(self.rig)
         cells = {}
         for column, (low, high) in CELL_RANGES.items():
@@ -155,11 +161,25 @@ class FakeSession:
             values[12, 5] = low if column == "psnr" else high
             cells[column] = values
         seams = tuple(
-            SeamStatus(clip.clip_index, clip.start, score, n_cameras - 2, 5)
-            for clip, score in zip(self.clips[1:], (0.4, 2.6), strict=True)
+            SeamStatus(clip.clip_index, clip.start, score, 1.0 + score / 2, n_cameras - 2, 5)
+            for clip, score in zip(self.clips[1:], (0.4, 2.6), strict=False)
         )
         held_out = tuple(index in self.holdout for index in range(n_cameras))
         return ResidualStatus(seams, cells, held_out, n_frames * (n_cameras - 2), n_frames * n_cameras, revision=1)
+
+    def anchor_heat(self, column: str) -> AnchorHeat | None:
+        """Rises with the anchors' number; some were not seen."""
+        positions = self._points[:1500]
+        values = np.linspace(0.0, 25.0, len(positions), dtype=np.float32)
+        values[::10] = np.nan
+        frame_index = self.timeline.frame_index
+        return AnchorHeat(
+            positions, values, column, (column, frame_index), 0, frame_index, n_cameras=8, n_cameras_all=8
+        )
+
+    def cached_frames(self) -> list[tuple[int, int]]:
+        """Runs of frames in memory."""
+        return self.cached
 
     def heat(self, kind: str) -> HeatMap | None:
         """Grows from left to right over the range of its kind, differs between frames, and frame 0 has no E."""
@@ -195,12 +215,16 @@ class FakeSession:
                 self.timeline.seek(command.frame_index)
             case commands.TogglePlay():
                 self.timeline.toggle_play()
+            case commands.FollowTraining(is_on=is_on):
+                self.timeline.is_following = is_on
             case commands.LookThrough():
                 self.view.look(command.camera_index)
             case commands.SetCompare(mode=mode):
                 self.overlays.compare = mode
             case commands.ToggleOverlay(name=name):
                 setattr(self.overlays, name, not getattr(self.overlays, name))
+            case commands.SetCompareWith(other=other):
+                self.overlays.compare_with = other
             case commands.SetMode(mode=mode):
                 self.overlays.mode = mode
             case commands.SetContent(content=content):
@@ -283,6 +307,16 @@ class FakeSession:
             ),
         )
 
+    def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
+        """The same in green."""
+        picture = self.request_render(width, height, full_size=full_size)
+        if picture is None:
+            return None
+        source = replace(picture.source, shown_as=ShownAs(self.overlays.compare_with))
+        return replace(
+            picture, image=picture.image * np.array([0, 1, 0], np.uint8), key=("other", picture.key), source=source
+        )
+
     def shown_gaussians(self) -> None:
         """No Gaussians here."""
         return
@@ -290,6 +324,14 @@ class FakeSession:
     def shown_anchors(self) -> AnchorArrays | None:
         """Anchors of trained clips."""
         return self._anchors if self._is_trained() else None
+
+    def shown_coverage(self) -> None:
+        """Nothing is measured here."""
+        return
+
+    def shown_trails(self) -> None:
+        """Nothing moves here."""
+        return
 
     def shown_points(self) -> PointArrays:
         """A coloured ball of points."""

@@ -39,7 +39,7 @@ def test_a_capture_that_was_opened_is_drawn_completely_without_any_event(open_pi
     pilot = open_pilot(session, first_frames=0)
     pilot.rest()
     opened = FakeSession()
-    for name in ("capture", "rig", "clips", "clip_states", "timeline", "view", "regions"):
+    for name in ("capture", "rig", "clips", "clip_states", "timeline", "views", "regions"):
         setattr(session, name, getattr(opened, name))
     news = iter([True])
     session.poll = lambda: next(news, False)  # the session says once that something is new, as it does

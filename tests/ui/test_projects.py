@@ -75,7 +75,7 @@ def test_the_key_that_leads_to_the_question_does_not_answer_it(pilot: Pilot) -> 
     pilot.draw()
     pilot.tap(*pilot.rects["timeline.clip0"].center, button=mouse.RIGHT)
     pilot.key(key.DOWN)  # the keyboard takes over from the pointer
-    pilot.key(key.DOWN)
+    pilot.key(key.UP)
     pilot.key(key.ENTER)
     pilot.draw(3)
     assert pilot.sent(TrainClip) == [TrainClip(0)]
@@ -157,5 +157,6 @@ def test_a_thousand_clips_are_drawn_in_runs_of_one_state(pilot: Pilot) -> None:
     session.timeline = Timeline(session.clips)
     pilot.draw(3)
     bands = [name for name in pilot.rects if name.startswith("timeline.clip")]
-    assert sorted(bands) == ["timeline.clip0", "timeline.clip400", "timeline.clip401", "timeline.clip500"]
-    assert pilot.rects["timeline.clip400"].width >= 1
+    # clips hardly wider than a pixel count in threes, and of each three the one that is worst off
+    assert sorted(bands) == ["timeline.clip0", "timeline.clip399", "timeline.clip402", "timeline.clip501"]
+    assert pilot.rects["timeline.clip399"].width >= 3

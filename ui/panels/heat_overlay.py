@@ -10,13 +10,13 @@ import moderngl
 from imgui_bundle import ImVec2, imgui
 
 from app.playback.color_maps import SIGNED
-from app.playback.orbit_view import OrbitView
+from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatKind, HeatMap
-from app.status import Overlays
 from ui.panels.color_bar import COLOR_BAR_SIZE, bar_number, draw_color_bar
 from ui.panels.state import Rect, UiState
 from ui.panels.widgets import chip
 from ui.style import theme
+from ui.viewport.anchor_heat_layer import ANCHOR_RANGES, AnchorHeatNeeds, anchor_column
 from ui.viewport.heat_image import HeatImage, value_at
 
 COLOR_MAP_OF = {"sequential": "inferno", "signed": SIGNED}
@@ -27,14 +27,8 @@ LEAST_BESIDE = 300.0
 BUSY_REDRAW_S = 0.1
 
 
-class HeatNeeds(Protocol):
+class HeatNeeds(AnchorHeatNeeds, Protocol):
     """What a heat map is drawn from."""
-
-    @property
-    def overlays(self) -> Overlays: ...
-
-    @property
-    def view(self) -> OrbitView: ...
 
     def heat(self, kind: str) -> HeatMap | None: ...
 
@@ -68,7 +62,10 @@ class HeatOverlay:
         """
         self.shown = self._bar = None
         overlays = session.overlays
-        if not overlays.heat or session.view.look_through is None:
+        if not overlays.heat:
+            return
+        if session.view.look_through is None:
+            self._draw_anchors(session, ui, pane)
             return
         kind, draw = HEAT_KINDS[overlays.heat], imgui.get_window_draw_list()
         map_name, (low, high) = COLOR_MAP_OF[kind.color_map], kind.value_range
@@ -86,6 +83,28 @@ class HeatOverlay:
             if imgui.is_item_hovered():
                 across, down = (pointer.x - pane.x0) / pane.width, (pointer.y - pane.y0) / pane.height
                 pointed = value_at(heat.values, across, down)
+        self._draw_bar(ui, pane, kind, kind.value_range, heat_words(kind, heat), pointed)
+
+    def _draw_anchors(self, session: HeatNeeds, ui: UiState, pane: Rect) -> None:
+        """What the points of anchors mean; the points themselves belong to the scene."""
+        heat = session.anchor_heat(anchor_column(session.overlays.heat))
+        if heat is None or heat.is_stale or heat.n_cameras < heat.n_cameras_all:
+            ui.redraw_within(BUSY_REDRAW_S)
+        column = anchor_column(session.overlays.heat)
+        self._draw_bar(
+            ui, pane, HEAT_KINDS[column], ANCHOR_RANGES[column], anchor_words(HEAT_KINDS[column], heat), None
+        )
+
+    def _draw_bar(
+        self,
+        ui: UiState,
+        pane: Rect,
+        kind: HeatKind,
+        value_range: tuple[float, float],
+        words: str,
+        pointed: float | None,
+    ) -> None:
+        draw, map_name, (low, high) = imgui.get_window_draw_list(), COLOR_MAP_OF[kind.color_map], value_range
         bar = Rect(
             pane.x1 - MARGIN - COLOR_BAR_SIZE[0],
             pane.y1 - MARGIN - COLOR_BAR_SIZE[1],
@@ -95,7 +114,7 @@ class HeatOverlay:
         draw_color_bar(draw, bar, map_name, low, high, unit_of(kind), pointed)
         self._bar = bar
         ui.mark_rect("viewport.heat_bar", bar)
-        chip(draw, bar.x1, bar.y0 - 28, heat_words(kind, heat), is_right=True)
+        chip(draw, bar.x1, bar.y0 - 28, words, is_right=True)
 
 
 def heat_words(kind: HeatKind, heat: HeatMap | None) -> str:
@@ -109,6 +128,17 @@ def heat_words(kind: HeatKind, heat: HeatMap | None) -> str:
         return f"{words}; the playhead's is being measured"
     mean = "" if heat.mean is None else f", mean {bar_number(heat.mean, *kind.value_range)} {unit_of(kind)}".rstrip()
     return f"{words}{mean}{f' ({heat.note})' if heat.note else ''}"
+
+
+def anchor_words(kind: HeatKind, heat: AnchorHeat | None) -> str:
+    """What the points show, of which frame, and from how many cameras; or why there are none."""
+    label = f"{kind.label}, of anchors"
+    if heat is None:
+        return f"{label}: being measured"
+    if heat.note:
+        return f"{label}: {heat.note}"
+    words = f"{label}, frame {heat.frame_index}, {heat.n_cameras} of {heat.n_cameras_all} cameras"
+    return f"{words}; the playhead's is being measured" if heat.is_stale else words
 
 
 def unit_of(kind: HeatKind) -> str:

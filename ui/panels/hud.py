@@ -9,15 +9,17 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
+from app.playback.color_maps import SIGNED
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.playback.view_modes import MODES, range_of
 from app.status import ClipStatus, Overlays, RegionsStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from ui.panels.color_bar import COLOR_BAR_SIZE, draw_color_bar
+from ui.panels.comparison import shown_compare
 from ui.panels.regions import draw_region_mark
 from ui.panels.state import Rect, UiState
-from ui.panels.timeline import STATE_WORDS
+from ui.panels.timeline.clip_words import STATE_WORDS
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.theme import Icon
@@ -89,7 +91,7 @@ class Hud:
             if self.text.pending or scene.shown.is_on_its_way:
                 ui.redraw_within(BUSY_REDRAW_S)
         if scene.shows == RENDERED:
-            self._draw_color_bar(session, ui, scene, value)
+            self._draw_color_bars(session, ui, scene, value)
         if not ui.regions.is_active or area.width >= LEGEND_WIDTH:  # what is being chosen needs the room
             self._draw_legend(session, ui, scene, area)
 
@@ -154,24 +156,35 @@ class Hud:
             x, row_height = plate.x1 + GAP, max(row_height, height)
         ui.mark_rect("viewport.free", Rect(area.x0, area.y0, area.x1, bottom - row_height))
 
-    def _draw_color_bar(self, session: HudNeeds, ui: UiState, scene: Scene, value: float | None) -> None:
-        """What the colours of the picture on screen mean, at its lower right, above the plates."""
-        mode = MODES[scene.shown.source.shown_as.mode]
-        if not mode.map_name:
-            return
-        free = ui.rects["viewport.free"]
-        width, height = COLOR_BAR_SIZE
-        if free.width < width + 2 * MARGIN or free.height < height + 2 * MARGIN:
-            return
-        x, y = free.x1 - MARGIN, free.y1 - 6
-        plate = Rect(x - width, y - height, x, y)
-        low, high = range_of(mode.name, session.rig)
-        draw_color_bar(imgui.get_window_draw_list(), plate, mode.map_name, low, high, mode.unit, value)
-        ui.mark_rect("viewport.color_bar", plate)
+    def _draw_color_bars(self, session: HudNeeds, ui: UiState, scene: Scene, value: float | None) -> None:
+        """What the colours of the picture on screen mean, at its lower right above the plates, and at its lower left
+        those of the picture that it is compared with."""
+        free, (width, height) = ui.rects["viewport.free"], COLOR_BAR_SIZE
+        shown, other, coverage = (
+            scene.shown.source.shown_as.mode,
+            session.overlays.compare_with,
+            scene.explaining.coverage,
+        )
+        bars = [(True, "viewport.color_bar", *_bar_of(shown, session.rig), value)]
+        if shown_compare(session) != "off" and other in MODES and other != shown:
+            bars.append((False, "viewport.other_color_bar", *_bar_of(other, session.rig), None))
+        if coverage is not None and len(coverage.points):
+            span = coverage.range
+            bars.append((True, "viewport.coverage_bar", SIGNED, -span, span, "units off covered space", None))
+        bottoms = {True: free.y1 - 6, False: free.y1 - 6}
+        for is_right, name, map_name, low, high, unit, pointed in bars:
+            has_room = free.width >= (width + 2 * MARGIN) * (1 if is_right else 2)
+            if not map_name or not has_room or bottoms[is_right] - height < free.y0 + MARGIN:
+                continue
+            x = free.x1 - MARGIN if is_right else free.x0 + MARGIN + width
+            plate = Rect(x - width, bottoms[is_right] - height, x, bottoms[is_right])
+            bottoms[is_right] = plate.y0 - 4
+            draw_color_bar(imgui.get_window_draw_list(), plate, map_name, low, high, unit, pointed)
+            ui.mark_rect(name, plate)
 
     def _draw_legend(self, session: HudNeeds, ui: UiState, scene: Scene, area: Rect) -> None:
         draw = imgui.get_window_draw_list()
-        is_labelled = session.overlays.compare == "wipe" and session.view.look_through is not None
+        is_labelled = shown_compare(session) in ("wipe", "blink")
         y = (ui.rects["viewport.rendered"].y0 + 44) if is_labelled else area.y0 + 12
         for shape, color, text in legend_rows(session, scene):
             width = imgui.calc_text_size(text).x
@@ -189,6 +202,11 @@ class Hud:
                 draw.add_ngon_filled(middle, 6, theme.u32(color), 4)
             draw.add_text(ImVec2(x + 26, y + 3), theme.u32(theme.TEXT), text)
             y += 28
+
+
+def _bar_of(mode: str, rig: CameraRig) -> tuple[str, float, float, str]:
+    """Map, range and unit of a mode; without a map where its colours stand for no numbers."""
+    return MODES[mode].map_name, *range_of(mode, rig), MODES[mode].unit
 
 
 def _draw_busy(draw: imgui.ImDrawList, middle: ImVec2, color: theme.Color) -> None:

@@ -9,7 +9,7 @@ from ui.panels.state import Rect
 
 @dataclass(frozen=True)
 class Panes:
-    """Where the rendered and the captured picture lie."""
+    """Where the rendered picture lies, and the one that it is compared with: captured, or the frame in another mode."""
 
     rendered: Rect
     captured: Rect | None
@@ -23,16 +23,15 @@ def fit(area: Rect, width: float, height: float) -> Rect:
 
 
 def arrange(area: Rect, image_size: tuple[int, int] | None, compare: str) -> Panes:
-    """Lay out the panes; without a capture camera the whole area is the rendered picture."""
-    if image_size is None:
-        return Panes(area, None)
+    """Lay out the panes. image_size: Of the capture camera; pictures of a free view fill all the room there is."""
     if compare == "side":
         middle = area.center[0]
-        left = fit(Rect(area.x0, area.y0, middle - 2, area.y1), *image_size)
-        right = fit(Rect(middle + 2, area.y0, area.x1, area.y1), *image_size)
+        left, right = Rect(area.x0, area.y0, middle - 2, area.y1), Rect(middle + 2, area.y0, area.x1, area.y1)
+        if image_size is not None:
+            left, right = fit(left, *image_size), fit(right, *image_size)
         return Panes(rendered=right, captured=left)
-    pane = fit(area, *image_size)
-    return Panes(pane, pane if compare == "wipe" else None)
+    pane = area if image_size is None else fit(area, *image_size)
+    return Panes(pane, None if compare == "off" else pane)
 
 
 VIEW_GAP = 3.0

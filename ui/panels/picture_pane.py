@@ -10,7 +10,9 @@ from typing import Protocol
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
+from app.status import CAPTURED
 from ui.panels.actions.action import ActionNeeds
+from ui.panels.comparison import covered_share, is_held, kind_words, other_label, shown_compare
 from ui.panels.heat_overlay import HeatNeeds, HeatOverlay
 from ui.panels.hud import Hud, HudNeeds
 from ui.panels.panes import Panes, arrange
@@ -19,7 +21,7 @@ from ui.panels.regions import draw_chosen_sphere
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import chip
 from ui.style import theme
-from ui.viewport.hud_text import captured_words, pane_text
+from ui.viewport.hud_text import RENDERED, captured_words, pane_text
 from ui.viewport.region_layer import ShownRegions
 from ui.viewport.scene import Scene, SceneNeeds, SceneView
 
@@ -39,6 +41,7 @@ class PicturePane:
         self.hud = Hud()
         self._aimed_at = (0.0, 0.0)
         self._captured_frame: int | None = None
+        self._is_held = False
 
     def release(self) -> None:
         """Free GL objects. GL thread only."""
@@ -73,7 +76,8 @@ class PicturePane:
         if shown is not None:
             width, height = session.rig.image_sizes[shown]
             image_size = (int(width), int(height))
-        panes = arrange(area, image_size, session.overlays.compare)
+        self._is_held = is_active and is_held(session, ui)
+        panes = arrange(area, image_size, "wipe" if self._is_held else shown_compare(session))
         self.pointer.navigate(session, dispatch, ui, panes)
         # Looking through a camera may just have ended; the picture then fills the area from the next frame on.
         self._draw_picture(session, dispatch, ui, area, panes, is_active=is_active)
@@ -133,8 +137,10 @@ class PicturePane:
         else:
             self.scene.marks.pointed_anchor = None
         self._captured_frame = None
-        if panes.captured is not None:
-            self._draw_captured(session, draw, panes)
+        if panes.captured is None:
+            self.scene.forget_other()
+        else:
+            self._draw_captured(session, draw, ui, view, panes)
         draw.pop_clip_rect()
 
     def _value_under_pointer(self, pane: Rect) -> float | None:
@@ -177,43 +183,54 @@ class PicturePane:
         tool.place(self.scene.point_under(session, view, *pixels, depth), eye=view.eye)
         tool.is_placed |= is_click
 
-    def _draw_captured(self, session: PictureNeeds, draw: imgui.ImDrawList, panes: Panes) -> None:
+    def _draw_captured(
+        self, session: PictureNeeds, draw: imgui.ImDrawList, ui: UiState, view: SceneView, panes: Panes
+    ) -> None:
         area = panes.captured
         assert area is not None
-        captured = self.scene.captured(session, round(area.width))
+        other = self.scene.other(session, view)
         shown = self.scene.shown
-        self._captured_frame = None if captured is None else captured.frame_index
-        frames = (None if captured is None else captured.frame_index, shown.source.frame_index)
-        words = (
-            "Captured picture is being read"
-            if captured is None
-            else pane_text(captured_words(captured.has_scene_colors), *frames)
-        )
-        rendered_words = pane_text(shown.kind, *frames[::-1])
+        self._captured_frame = None if other is None else other.frame_index
+        frames = (None if other is None else other.frame_index, shown.source.frame_index)
+        if other is None:
+            is_captured = session.overlays.compare_with == CAPTURED
+            words = (
+                "Captured picture is being read" if is_captured else f"{other_label(session.overlays)} is being drawn"
+            )
+        elif other.shown_as is None:
+            words = pane_text(captured_words(other.has_scene_colors), *frames)
+        else:
+            words = pane_text(kind_words(RENDERED, other.shown_as.label), *frames)
+        rendered_words = pane_text(kind_words(shown.kind, shown.source.shown_as.label), *frames[::-1])
         color = theme.YELLOW if None not in frames and frames[0] != frames[1] else theme.TEXT
-        if session.overlays.compare == "side":
-            if captured is not None:
-                draw.add_image(imgui.ImTextureRef(captured.texture.glo), area.low, area.high)
+        compare = session.overlays.compare
+        if compare == "side" and not self._is_held:
+            if other is not None:
+                draw.add_image(imgui.ImTextureRef(other.texture.glo), area.low, area.high)
             chip(draw, area.x0 + 10, area.y0 + 10, words, color=color)
             chip(draw, panes.rendered.x0 + 10, panes.rendered.y0 + 10, rendered_words, color=color)
             return
-        share = session.overlays.wipe_position
+        share = covered_share(session, ui, is_held=self._is_held)
         x = area.x0 + area.width * share
-        if captured is not None:
+        if other is not None:
             draw.add_image(
-                imgui.ImTextureRef(captured.texture.glo), area.low, ImVec2(x, area.y1), ImVec2(0, 0), ImVec2(share, 1)
+                imgui.ImTextureRef(other.texture.glo), area.low, ImVec2(x, area.y1), ImVec2(0, 0), ImVec2(share, 1)
             )
-        white = theme.u32(theme.PLAYHEAD)
-        draw.add_line_v(x, area.y0, area.y1, white, 2)
-        middle = area.center[1]
-        draw.add_circle_filled(ImVec2(x, middle), 9, white)
-        dark = theme.u32(theme.VOID)
-        draw.add_triangle_filled(ImVec2(x - 6, middle), ImVec2(x - 2, middle - 4), ImVec2(x - 2, middle + 4), dark)
-        draw.add_triangle_filled(ImVec2(x + 6, middle), ImVec2(x + 2, middle + 4), ImVec2(x + 2, middle - 4), dark)
+        if compare == "wipe" and not self._is_held:
+            _draw_handle(draw, area, x)
         if share > 0.15:
             chip(draw, area.x0 + 10, area.y0 + 10, words, color=color)
         if share < 0.85:
             chip(draw, area.x1 - 10, area.y0 + 10, rendered_words, color=color, is_right=True)
+
+
+def _draw_handle(draw: imgui.ImDrawList, area: Rect, x: float) -> None:
+    """The line between the two pictures, and the knob that moves it."""
+    white, dark, middle = theme.u32(theme.PLAYHEAD), theme.u32(theme.VOID), area.center[1]
+    draw.add_line_v(x, area.y0, area.y1, white, 2)
+    draw.add_circle_filled(ImVec2(x, middle), 9, white)
+    draw.add_triangle_filled(ImVec2(x - 6, middle), ImVec2(x - 2, middle - 4), ImVec2(x - 2, middle + 4), dark)
+    draw.add_triangle_filled(ImVec2(x + 6, middle), ImVec2(x + 2, middle + 4), ImVec2(x + 2, middle - 4), dark)
 
 
 def _pixels(pane: Rect, density: float) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import Command
 from ui.gl.image import Rect as PixelRect
+from ui.panels.timeline.view_state import TimelineView
 from ui.style.theme import Fonts
 from ui.style.ui_scale import UiScale
 from ui.viewport.region_tool import RegionTool
@@ -57,6 +58,7 @@ class UiState:
         scale: How large everything is drawn.
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
         regions: The region that is being chosen, and the one that stands out.
+        timeline: What of time is shown.
         is_popup_open: Is a menu or another popup open, so that keys belong to it?
         is_menu_wanted: Open the first menu, for the keyboard.
         is_quality_open: Is the plot of quality over the clips folded out?
@@ -70,6 +72,7 @@ class UiState:
     scale: UiScale = field(default_factory=UiScale)
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
+    timeline: TimelineView = field(default_factory=TimelineView)
     last_heat: str = ""
     wanted_panel: str | None = None
     is_quality_open: bool = False

@@ -11,7 +11,9 @@ from app.residuals.heat_map import HEAT_KINDS
 from app.session.commands import LookThrough, ShowHeat, ShowViews, ToggleOverlay
 from app.status import COMPARE_MODES
 from ui.panels.actions.action import ActionNeeds
-from ui.panels.actions.compare import cloud_overlay, set_compare, shown_compare
+from ui.panels.actions.compare import COMPARE_WORDS, cloud_overlay, set_compare
+from ui.panels.compare_box import draw_compare_box, draw_other_box
+from ui.panels.comparison import shown_compare
 from ui.panels.mode_box import draw_mode_box
 from ui.panels.regions import begin_choosing
 from ui.panels.state import Dispatch, UiState
@@ -19,12 +21,13 @@ from ui.style import theme
 from ui.style.theme import Icon
 
 TOOLBAR_HEIGHT = 38.0
-TOOLBAR_WIDTH = 736.0
-"""With less room, words give way to symbols."""
-MODE_WIDTHS = (124.0, 108.0)
-"""Of the box of modes, where there is room and where there is little, units."""
+TOOLBAR_WIDTH, TIGHT_WIDTH = 1180.0, 580.0
+"""With less room than the first, words give way to symbols; with less than the second, boxes are narrow, too."""
+MODE_WIDTHS, COMPARE_WIDTHS = (124.0, 108.0, 66.0), (130.0, 118.0, 66.0)
+"""Of the boxes of modes and of comparisons, from much room to little, units."""
+BESIDE_CAMERA = 222.0
+"""What the row needs beside these boxes and that of the camera where there is little room, units."""
 MARK_SLIDER = imgui.SliderFlags_.always_clamp
-COMPARE_WORDS = {"off": "Off", "wipe": "Wipe", "side": "Side by side"}
 
 
 class ToolbarNeeds(ActionNeeds, Protocol):
@@ -37,12 +40,14 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None
     shown = session.view.look_through
     names = session.rig.names
     room = imgui.get_content_region_avail().x
-    is_roomy = room > TOOLBAR_WIDTH
+    is_roomy, row = room > TOOLBAR_WIDTH, (room <= TOOLBAR_WIDTH) + (room <= TIGHT_WIDTH)
     imgui.align_text_to_frame_padding()
     if is_roomy:
         imgui.text_disabled("View")
         imgui.same_line()
-    imgui.set_next_item_width(150 if is_roomy else min(120, max(room - 238 - MODE_WIDTHS[1], 40)))
+    imgui.set_next_item_width(
+        150 if is_roomy else min(120, max(room - BESIDE_CAMERA - MODE_WIDTHS[row] - COMPARE_WIDTHS[row], 40))
+    )
     if imgui.begin_combo("##camera", "Free" if shown is None else names[shown]):
         if imgui.selectable("Free", shown is None)[0]:
             dispatch(LookThrough(None))
@@ -59,7 +64,7 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None
     ui.mark("viewport.camera")
     imgui.set_item_tooltip("Look through a capture camera ([ and ])")
     imgui.same_line(0, 8)
-    draw_mode_box(session, dispatch, ui, MODE_WIDTHS[0] if is_roomy else MODE_WIDTHS[1])
+    draw_mode_box(session, dispatch, ui, MODE_WIDTHS[row])
     imgui.same_line(0, 18 if is_roomy else 8)
     if is_roomy:
         imgui.text_disabled("Compare")
@@ -68,9 +73,11 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None
             if _segment(COMPARE_WORDS[mode], shown_compare(session) == mode):
                 set_compare(session, dispatch, mode)
             ui.mark(f"viewport.compare.{mode}")
-            imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")
+            imgui.set_item_tooltip("Beside, over or in turn with another picture (G)")
+        imgui.same_line(0, 6)
+        draw_other_box(session, dispatch, ui, COMPARE_WIDTHS[row])
     else:
-        _draw_compare_box(session, dispatch, ui)
+        draw_compare_box(session, dispatch, ui, COMPARE_WIDTHS[row])
     imgui.same_line(0, 18 if is_roomy else 8)
     _draw_heat_box(session, dispatch, ui, is_roomy=is_roomy)
     imgui.same_line(0, 8)
@@ -110,20 +117,6 @@ def _draw_layouts(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> Non
     imgui.new_line()
 
 
-def _draw_compare_box(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    """All ways to compare in one place, where there is no room for buttons."""
-    shown = shown_compare(session)
-    imgui.set_next_item_width(118)
-    if imgui.begin_combo("##compare", "Compare" if shown == "off" else COMPARE_WORDS[shown]):
-        for mode in COMPARE_MODES:
-            if imgui.selectable(COMPARE_WORDS[mode], shown == mode)[0]:
-                set_compare(session, dispatch, mode)
-            ui.mark(f"viewport.compare.{mode}")
-        imgui.end_combo()
-    ui.mark("viewport.compare")
-    imgui.set_item_tooltip("Beside or over the picture that the camera took (G)")
-
-
 def _draw_heat_box(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, *, is_roomy: bool) -> None:
     """Which residual is shown over the picture, and how strongly."""
     overlays = session.overlays
@@ -157,6 +150,8 @@ def _draw_overlay_menu(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -
         ("show_residual", "Residual anchors (diamonds)", "3"),
         (cloud_overlay(session), "Point cloud", "4"),
         ("show_regions", "Marked regions", "5"),
+        ("show_coverage", "Covered by inherited anchors", "9"),
+        ("show_trails", "Trails of what moves", "0"),
     )
     for name, label, key_label in rows:
         if imgui.menu_item(label, key_label, bool(getattr(session.overlays, name)), True)[0]:

@@ -15,7 +15,7 @@ from engine.text import duration_text
 from ui.panels.clip_quality import draw_clip_quality
 from ui.panels.plan import draw_plan
 from ui.panels.state import Dispatch, UiState
-from ui.panels.timeline import STATE_WORDS, state_note
+from ui.panels.timeline.clip_words import STATE_WORDS, state_note
 from ui.panels.widgets import primary_button, text_right, text_wrapped_dim
 from ui.style import theme
 from ui.style.axis import ticks_that_fit, whole_ticks

@@ -26,7 +26,8 @@ from ui.panels.picture_pane import PicturePane
 from ui.panels.regions import draw_regions
 from ui.panels.residuals.panel import ResidualsNeeds, ResidualsPanel
 from ui.panels.state import CAPTURE, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
-from ui.panels.timeline import TimelineNeeds, draw_timeline
+from ui.panels.timeline.needs import TimelineNeeds
+from ui.panels.timeline.panel import draw_timeline
 from ui.panels.training import draw_training
 from ui.panels.viewport import ViewportNeeds, ViewportPanel
 from ui.shell.dialogs import OpenFolderDialog, draw_help

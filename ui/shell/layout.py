@@ -28,7 +28,7 @@ def lay_out(dock_id: int) -> None:
     internal.dock_builder_remove_node(dock_id)
     internal.dock_builder_add_node(dock_id, internal.DockNodeFlagsPrivate_.dock_space)
     internal.dock_builder_set_node_size(dock_id, size)
-    bottom_height = 176.0 if size.y >= 700.0 else 160.0
+    bottom_height = 244.0 if size.y >= 700.0 else 176.0
     _, bottom, top = internal.dock_builder_split_node_py(dock_id, imgui.Dir.down, bottom_height / max(size.y, 1.0))
     _, left, rest = internal.dock_builder_split_node_py(top, imgui.Dir.left, left_width / max(size.x, 1.0))
     right_share = right_width / max(size.x - left_width, 1.0)

@@ -44,9 +44,10 @@ class Remembering:
             imgui.load_ini_settings_from_memory(self._memory.layout)
 
     def restore_marks(self, session: RememberNeeds) -> None:
-        """Size and opacity of anchor marks, which are the same in all projects."""
+        """What is the same in all projects: size and opacity of anchor marks, unit and lanes of the timeline."""
         if self._memory is None:
             return
+        self._ui.timeline.restore(self._memory.time_unit, self._memory.folded_lanes)
         if self._memory.mark_size is not None:
             session.overlays.mark_size = self._memory.mark_size
         if self._memory.mark_opacity is not None:
@@ -78,6 +79,7 @@ class Remembering:
         memory.ui_scale = self._ui.scale.chosen
         memory.layout = LAYOUT_VERSION + imgui.save_ini_settings_to_memory()
         memory.mark_size, memory.mark_opacity = session.overlays.mark_size, session.overlays.mark_opacity
+        memory.time_unit, memory.folded_lanes = self._ui.timeline.unit, tuple(sorted(self._ui.timeline.folded))
         memory.save()
 
 

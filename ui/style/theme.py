@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import imgui_bundle
@@ -28,6 +29,7 @@ def faded(color: Color, alpha: float) -> Color:
     return (color[0], color[1], color[2], alpha)
 
 
+@lru_cache(maxsize=4096)
 def u32(color: Color) -> int:
     """The packed form that draw lists take."""
     return imgui.color_convert_float4_to_u32(ImVec4(*color))
@@ -75,6 +77,7 @@ class Icon:
     STEP_BACK = "\uf048"
     STEP_FORWARD = "\uf051"
     LOOP = "\uf01e"
+    FOLLOW = "\uf140"
     FOLDER = "\uf07c"
     CAMERA = "\uf03d"
     CHECK = "\uf00c"
@@ -90,6 +93,7 @@ class Icon:
     LAYERS = "\uf5fd"
     COLUMNS = "\uf0db"
     EYE = "\uf06e"
+    SQUARE = "\uf0c8"
     HELP = "\uf059"
     FILM = "\uf008"
     DROP = "\uf019"

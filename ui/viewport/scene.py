@@ -19,7 +19,8 @@ from app.playback.arrays import BACKGROUND, GaussianArrays, Picture, PointArrays
 from app.playback.picture_source import PictureSource
 from app.playback.pointing import pixel_ray, seen_point
 from app.playback.timeline import Timeline
-from app.playback.view_modes import MODES
+from app.playback.view_modes import MODES, ShownAs
+from app.status import CAPTURED as CAPTURED_PICTURE
 from app.status import RegionsStatus, WantedFrame
 from engine.camera.projection import camera_center
 from ui.gl import (
@@ -30,7 +31,9 @@ from ui.gl import (
     Target,
     is_software,
 )
+from ui.viewport.anchor_heat_layer import AnchorHeatLayer, AnchorHeatNeeds
 from ui.viewport.anchor_marks import nearest_under
+from ui.viewport.explaining_layer import ExplainingLayer, ExplainingNeeds
 from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
 from ui.viewport.mark_layer import AnchorCounts, MarkLayer, MarkNeeds
 from ui.viewport.picture_size import MAX_PICTURE_WIDTH, MovingSize, picture_size
@@ -44,7 +47,7 @@ _CLOUD_KINDS = {"static": CLOUD, "moment": FIRST_CLOUD, "pictures": HINT}
 NO_REGIONS = ShownRegions()
 
 
-class SceneNeeds(MarkNeeds, Protocol):
+class SceneNeeds(MarkNeeds, AnchorHeatNeeds, ExplainingNeeds, Protocol):
     """What the picture is made from."""
 
     @property
@@ -64,6 +67,8 @@ class SceneNeeds(MarkNeeds, Protocol):
     ) -> Picture | None: ...
 
     def compared_picture(self, camera_index: int, max_width: int) -> Picture | None: ...
+
+    def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None: ...
 
 
 @dataclass(frozen=True)
@@ -104,17 +109,19 @@ class Composed:
 
 @dataclass(frozen=True)
 class CapturedPicture:
-    """A captured picture on the GPU.
+    """A picture on the GPU that the rendered one is compared with: a captured one, or one in another mode.
 
     Attributes:
         frame_index: The frame it was taken at, which need not be that of the playhead yet.
         has_scene_colors: Whether it was brought into the scene's colours, those of the render.
+        shown_as: What its colours mean; None of a captured picture.
     """
 
     texture: moderngl.Texture
     frame_index: int | None
     is_stale: bool
     has_scene_colors: bool = False
+    shown_as: ShownAs | None = None
 
 
 class Scene:
@@ -130,9 +137,12 @@ class Scene:
         self._cloud = PointRenderer(ctx)
         self.marks = MarkLayer(ctx)
         self.regions = RegionLayer(ctx)
+        self._anchor_heat = AnchorHeatLayer(ctx)
+        self.explaining = ExplainingLayer(ctx)
         self._drawn_key: Hashable = None
         self._asked_sizes: tuple[tuple[int, int], tuple[int, int]] | None = None
         self._asked_capture: tuple[int, int] | None = None
+        self._asked_other: tuple[tuple[int, int], tuple[int, int]] | None = None
         self._near = NEAR
         self._moving_size = MovingSize()
         self._cloud_kind = CLOUD
@@ -152,6 +162,8 @@ class Scene:
             self._cloud,
             self.marks,
             self.regions,
+            self._anchor_heat,
+            self.explaining,
         )
         for thing in owned:
             thing.release()
@@ -178,6 +190,11 @@ class Scene:
         if self._asked_capture is not None:
             captured = session.compared_picture(*self._asked_capture)
             if captured is not None and captured.key != self._captured_key:
+                return True
+        if self._asked_other is not None:
+            size, full_size = self._asked_other
+            other = session.request_other(*size, full_size=full_size)
+            if other is not None and other.key != self._captured_key:
                 return True
         return self._splats.has_news
 
@@ -208,20 +225,29 @@ class Scene:
         if base_key is None:
             shown = self._without_render(shown, points_key, captured)
         is_rendered = base_key is not None
-        marks_key = self.marks.take(session, view, session.shown_gaussians() if is_rendered else None)
+        gaussians = session.shown_gaussians() if is_rendered else None
+        marks_key = self.marks.take(session, view, gaussians)
+        heat_key = self._anchor_heat.take(session, view, gaussians)
+        explaining_key = self.explaining.take(session, view)
         regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
         self.shown = shown
-        if self.is_software and is_rendered and regions.is_empty and self.marks.is_empty(session):
+        if self.is_software and is_rendered and self._has_no_marks(session, regions):
             # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
             self._drawn_key = None
             return Composed(self._picture.texture, shown)
-        key = (view.key, base_key, points_key, captured_key, marks_key, regions_key)
+        over_key = (marks_key, regions_key, explaining_key, heat_key, session.overlays.heat_opacity)
+        key = (view.key, base_key, points_key, captured_key, over_key)
         if key != self._drawn_key or self._splats.is_order_stale:
             self._drawn_key = key
             self._draw(view, base_key, points_key, captured_key, session)
         if self._splats.is_order_stale:
             self.shown = shown = replace(shown, is_on_its_way=True)
         return Composed(self._target.texture, shown)
+
+    def _has_no_marks(self, session: SceneNeeds, regions: ShownRegions) -> bool:
+        """Is nothing to be drawn over the picture?"""
+        are_empty = regions.is_empty and self.explaining.is_empty and self._anchor_heat.is_empty
+        return are_empty and self.marks.is_empty(session)
 
     def captured(self, session: SceneNeeds, width_px: int) -> CapturedPicture | None:
         """What the camera looked through took at the playhead's frame, or at another one until that was decoded; None
@@ -241,6 +267,27 @@ class Scene:
         return CapturedPicture(
             self._captured.texture, source.frame_index, picture.is_stale, has_scene_colors=source.has_scene_colors
         )
+
+    def other(self, session: SceneNeeds, view: SceneView) -> CapturedPicture | None:
+        """What the rendered picture is compared with: see `captured`, or the same frame in another mode."""
+        self._asked_other = None
+        if session.overlays.compare_with == CAPTURED_PICTURE:
+            return self.captured(session, view.width)
+        self._asked_capture = None
+        share = min(MAX_PICTURE_WIDTH / view.width, 1.0)
+        full_size = picture_size(view.width, view.height, share)
+        moving = self._moving_size.share if view.is_moving else 1.0
+        self._asked_other = picture_size(view.width, view.height, share * moving), full_size
+        picture = session.request_other(*self._asked_other[0], full_size=full_size)
+        if picture is None:
+            return None
+        self._captured.set(picture.image, key=picture.key)
+        self._captured_key, source = picture.key, picture.source
+        return CapturedPicture(self._captured.texture, source.frame_index, picture.is_stale, shown_as=source.shown_as)
+
+    def forget_other(self) -> None:
+        """Nothing is compared any more: ask for no other picture."""
+        self._asked_other = None
 
     def _without_render(
         self, shown: ShownPicture, points_key: Hashable, captured: CapturedPicture | None
@@ -382,6 +429,8 @@ class Scene:
             self._cloud.draw(target, *camera, near, shape="circle", size=size, unit=unit, is_depth_tested=True)
         elif captured_key is not None:
             target.draw_image(self._captured)
+        self._anchor_heat.draw(target, view, session.overlays.heat_opacity, self.marks.pixels_per_unit)
+        self.explaining.draw(target, view, self.marks.pixels_per_unit)
         self.marks.draw(target, view, session)
         self.regions.draw(target, camera)
         target.resolve(BACKGROUND)

@@ -15,10 +15,21 @@ from tests.ui.fake_session import FakeSession
 def test_what_was_kept_is_read_again(tmp_path: Path) -> None:
     memory = WindowMemory(tmp_path / "folder" / "window.json", size=(900, 600), ui_scale=1.5, layout="[Window]\n")
     memory.is_maximized, memory.mark_size, memory.mark_opacity = True, 1.5, 0.4
+    memory.time_unit, memory.folded_lanes = "timecode", ("quality", "cache")
     memory.keep_view("/somewhere", view_of(FakeSession()))
     memory.save()
     again = read_window_memory(memory.path)
-    for name in ("size", "is_maximized", "ui_scale", "layout", "mark_size", "mark_opacity", "views"):
+    for name in (
+        "size",
+        "is_maximized",
+        "ui_scale",
+        "layout",
+        "mark_size",
+        "mark_opacity",
+        "time_unit",
+        "folded_lanes",
+        "views",
+    ):
         assert getattr(again, name) == getattr(memory, name), name
 
 
@@ -41,6 +52,21 @@ def test_a_session_goes_back_to_what_it_showed() -> None:
     assert other.view.look_through is None
 
 
+def test_how_it_was_played_and_what_was_marked_comes_back() -> None:
+    left, other = FakeSession(), FakeSession()
+    left.timeline.set_range(3, 20)
+    left.timeline.speed, left.timeline.is_looping = 0.25, False
+    for frame_index, name in ((4, "foul"), (9, "50 % ## of\nall")):
+        left.timeline.markers.put(frame_index, name)
+    show_again(other, json.loads(json.dumps(view_of(left))))
+    assert (other.timeline.play_range, other.timeline.speed, other.timeline.is_looping) == ((3, 20), 0.25, False)
+    assert [*other.timeline.markers] == [*left.timeline.markers]
+    wrong = view_of(left) | {"markers": [[4], 7, ["a", "b"], [1e9, "far"], [True, "x"], [5, 5], [6, "good"]]}
+    third = FakeSession()
+    show_again(third, wrong)
+    assert third.timeline.markers.frames == [6]
+
+
 NONSENSE = [None, True, -1, 10**30, 1e308, -0.5, "", "cam99", [], [1.0, "a", 2.0], [1e300] * 3, {"a": 1}]
 
 
@@ -52,6 +78,8 @@ def test_values_that_make_no_sense_change_nothing_that_can_be_seen(name: str, va
     show_again(session, kept)
     assert np.isfinite(session.view.world_to_camera()).all()
     assert 0 <= session.timeline.frame_index < session.timeline.n_frames
+    first, last = session.timeline.play_range
+    assert 0 <= first <= last < session.timeline.n_frames
     assert 0.0 <= session.overlays.wipe_position <= 1.0
     assert session.overlays.compare in ("off", "wipe", "side")
 

@@ -100,9 +100,8 @@ def main(folder: Path) -> None:
             for camera in random_cameras(20, size, distance=distance, center=center, seed=clip_index)
         ]
         worst_db, worst_share = min(psnr for psnr, _ in figures), max(share for _, share in figures)
-        sys.stdout.write(
-            f"clip {clip_index}, {len(splats)} Gaussians: at least {worst_db:.1f} dB, {worst_share:.3%} of pixels off\n"
-        )
+        worst = f"at least {worst_db:.1f} dB, {worst_share:.3%} of pixels off"
+        sys.stdout.write(f"clip {clip_index}, {len(splats)} Gaussians: {worst}\n")
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pyglet.window import key
 
+from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands
 from app.status import CELL_RANGES, SeamStatus
@@ -15,6 +16,7 @@ from ui.panels.residuals.cells import cell_at, frames_per_column, pixel_cells, w
 from ui.panels.residuals.matrix import cell_colors, matrix_picture
 from ui.panels.residuals.panel import worst_seams
 from ui.panels.state import RESIDUALS
+from ui.viewport.anchor_heat_layer import heat_points
 from ui.viewport.heat_image import value_at
 
 
@@ -60,8 +62,8 @@ def test_bad_is_bright_in_every_column() -> None:
 
 
 def test_seams_without_a_score_are_left_out() -> None:
-    seams = (SeamStatus(1, 10, 0.5), SeamStatus(2, 20), SeamStatus(3, 30, 2.5))
-    assert [seam.clip_index for seam in worst_seams(seams, 5)] == [3, 1]
+    seams = (SeamStatus(1, 10, 0.5, 1.2), SeamStatus(2, 20), SeamStatus(3, 30, 2.5, 2.0), SeamStatus(4, 40, 0.9))
+    assert [seam.clip_index for seam, _ in worst_seams(seams, 5)] == [4, 3, 1]
 
 
 def test_a_value_outside_of_the_map_is_none() -> None:
@@ -105,10 +107,14 @@ def test_the_worst_picture_comes_first_and_a_click_goes_there(pilot: Pilot) -> N
     assert "residuals.worst12.5" in pilot.rects
 
 
-def test_a_seam_leads_to_its_frame_and_its_worst_camera(pilot: Pilot) -> None:
+def test_a_seam_is_played_around_as_its_worst_camera_sees_it(pilot: Pilot) -> None:
     _show(pilot)
     pilot.click("residuals.seam2")
-    assert (pilot.session.timeline.frame_index, pilot.session.view.look_through) == (20, 5)
+    timeline = pilot.session.timeline
+    assert timeline.around is not None
+    assert timeline.around[0] < 20 < timeline.around[1]
+    assert timeline.is_playing
+    assert pilot.session.view.look_through == 5
 
 
 def test_a_heat_map_lies_over_the_picture_with_its_bar_and_the_value_under_the_pointer(pilot: Pilot) -> None:
@@ -163,3 +169,23 @@ def test_every_kind_can_be_chosen_by_key(pilot: Pilot) -> None:
         seen.append(pilot.session.overlays.heat)
     assert sorted(seen) == sorted(HEAT_KINDS)
     assert len(pilot.session.notices) == 0
+
+
+def test_in_a_free_view_anchors_show_their_residual(pilot: Pilot) -> None:
+    pilot.draw(3)
+    before = pilot.picture()
+    pilot.session.dispatch(commands.ShowHeat("error"))
+    pilot.draw(4)
+    pane = pilot.rects["viewport.rendered"]
+    x, y = (int(v) for v in pane.center)
+    around = np.s_[y - 60 : y + 60, x - 60 : x + 60]
+    assert np.abs(pilot.picture()[around].astype(int) - before[around]).mean() > 1.0
+    assert "viewport.heat_bar" in pilot.rects
+
+
+def test_anchors_that_nobody_saw_are_left_out_and_the_hottest_come_last() -> None:
+    heat = AnchorHeat(np.eye(3, dtype=np.float32), np.array([9.0, np.nan, 1.0], np.float32), "E", 1, 0, 0)
+    positions, colors = heat_points(heat)
+    assert np.array_equal(positions, np.eye(3)[[2, 0]])
+    assert colors[1, 3] == 1.0
+    assert colors[0, 3] < 0.5

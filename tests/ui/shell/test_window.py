@@ -226,9 +226,9 @@ def test_arrow_home_end_and_clip_keys(pilot: Pilot) -> None:
 
 
 def test_compare_key_takes_the_nearest_camera_and_cycles(pilot: Pilot) -> None:
-    for _ in range(3):
+    for _ in range(4):
         pilot.key(key.G)
-    assert [command.mode for command in pilot.sent(SetCompare)] == ["wipe", "side", "off"]
+    assert [command.mode for command in pilot.sent(SetCompare)] == ["wipe", "side", "blink", "off"]
     assert len(pilot.sent(LookThrough)) == 1
 
 

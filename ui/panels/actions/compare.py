@@ -5,31 +5,58 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from app.session.commands import LookThrough, SetCompare, ToggleOverlay
-from app.status import COMPARE_MODES
+from app.playback.view_modes import MODES
+from app.session.commands import LookThrough, SetCompare, SetCompareWith, ToggleOverlay
+from app.status import CAPTURED, COMPARE_MODES
 from ui.panels.actions.action import COMPARE, Action, ActionNeeds, Run
 from ui.panels.actions.view import nearest_camera
+from ui.panels.comparison import shown_compare
 from ui.panels.state import Dispatch, UiState
 
+COMPARE_WORDS = {"off": "Off", "wipe": "Wipe", "side": "Side by side", "blink": "Blink"}
 MARK_NAMES = ("show_frusta", "show_inherited", "show_residual")
 """The overlays that Tab shows or hides together."""
 
 
 def set_compare(session: ActionNeeds, dispatch: Dispatch, mode: str) -> None:
-    """Compare with the captured picture; needs a capture camera, so the nearest one is taken from a free view."""
-    if mode != "off" and session.view.look_through is None:
+    """Compare with another picture; a captured one needs a camera, so the nearest one is taken from a free view."""
+    if mode != "off" and session.overlays.compare_with == CAPTURED and session.view.look_through is None:
         dispatch(LookThrough(nearest_camera(session)))
     dispatch(SetCompare(mode))
-
-
-def shown_compare(session: ActionNeeds) -> str:
-    """The comparison on screen: none from a free view, where no camera took a picture."""
-    return "off" if session.view.look_through is None else session.overlays.compare
 
 
 def _cycle_compare(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     shown = COMPARE_MODES.index(shown_compare(session))
     set_compare(session, dispatch, COMPARE_MODES[(shown + 1) % len(COMPARE_MODES)])
+
+
+def set_other(session: ActionNeeds, dispatch: Dispatch, other: str) -> None:
+    """Compare with this picture from now on; wipe where nothing was compared."""
+    dispatch(SetCompareWith(other))
+    if other != session.overlays.mode and session.overlays.compare == "off":
+        set_compare(session, dispatch, "wipe")
+
+
+def _set_other(other: str) -> Run:
+    def choose(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        set_other(session, dispatch, other)
+
+    return choose
+
+
+def _has_other(other: str) -> Callable[[Any], bool]:
+    return lambda session: session.overlays.compare_with == other
+
+
+def _set_compare(mode: str) -> Run:
+    def compare(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        set_compare(session, dispatch, mode)
+
+    return compare
+
+
+def _has_compare(mode: str) -> Callable[[Any], bool]:
+    return lambda session: shown_compare(session) == mode
 
 
 def _is_shown(name: str) -> Callable[[Any], bool]:
@@ -75,10 +102,31 @@ def _overlay(name: str, text: str, key: str) -> Action:
 ACTIONS = (
     Action(
         "compare.next",
-        "Compare with the captured picture: wipe, side by side, off",
+        "Compare with another picture: wipe, side by side, blink, off",
         COMPARE,
         _cycle_compare,
         keys=("G",),
+    ),
+    *(
+        Action(f"compare.{mode}", f"Compare: {words}", COMPARE, _set_compare(mode), is_on=_has_compare(mode))
+        for mode, words in COMPARE_WORDS.items()
+    ),
+    Action(
+        "compare.with_captured",
+        "Compare with the captured picture",
+        COMPARE,
+        _set_other(CAPTURED),
+        is_on=_has_other(CAPTURED),
+    ),
+    *(
+        Action(
+            f"compare.with_{mode.name}",
+            f"Compare with mode: {mode.label}",
+            COMPARE,
+            _set_other(mode.name),
+            is_on=_has_other(mode.name),
+        )
+        for mode in MODES.values()
     ),
     Action(
         "show.marks",
@@ -100,4 +148,6 @@ ACTIONS = (
         is_on=_is_cloud_shown,
     ),
     _overlay("show_regions", "Show or hide marked regions", "5"),
+    _overlay("show_coverage", "Show or hide what inherited anchors cover", "9"),
+    _overlay("show_trails", "Show or hide the trails of what moves", "0"),
 )

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from ui.panels.actions import compare, heat, marking, modes, time, training, view, window
+from ui.panels.actions import compare, heat, marking, modes, playing, time, training, view, window
 from ui.panels.actions.action import Action, ActionNeeds
 from ui.panels.state import Dispatch, UiState
 
 ACTIONS: tuple[Action, ...] = (
     *time.ACTIONS,
+    *playing.ACTIONS,
     *view.ACTIONS,
     *compare.ACTIONS,
     *modes.ACTIONS,
@@ -26,7 +27,10 @@ MOUSE_HELP: tuple[tuple[str, str], ...] = (
     ("Click, wheel", "While a region is chosen: fix its place, change its size (Ctrl + wheel moves the view)"),
     ("Camera click", "Look through the camera whose pyramid it is"),
     ("Timeline drag", "Move through time"),
-    ("White line drag", "Wipe between render and captured picture"),
+    ("White line drag", "Wipe between the two pictures that are compared"),
+    ("Hold B", "See the picture that the render is compared with, alone"),
+    ("Timeline wheel", "Move what is shown (also middle drag); with Ctrl closer or farther, double click for all"),
+    ("Seam click", "Play around the boundary between two clips"),
     ("Folder drop", "Open it: a capture or a project"),
 )
 

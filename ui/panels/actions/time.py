@@ -1,13 +1,14 @@
-"""Actions on time: the playhead, playing, clips."""
+"""Actions on time: the playhead, clips, markers."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from app.playback.timeline import Timeline
-from app.session.commands import SetFrame, TogglePlay
+from app.session.commands import FollowTraining, SetFrame, TogglePlay
 from ui.panels.actions.action import TIME, Action, ActionNeeds, Run
-from ui.panels.state import Dispatch, UiState
+from ui.panels.state import TIMELINE, Dispatch, UiState
+from ui.panels.timeline.marker_box import mark_playhead
 
 
 def go_to_frame(timeline: Timeline, dispatch: Dispatch, frame_index: int) -> None:
@@ -35,7 +36,14 @@ def _first_frame(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _last_frame(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    go_to_frame(session.timeline, dispatch, session.timeline.n_frames - 1)
+    if session.timeline.frame_index == session.timeline.last_frame:
+        dispatch(FollowTraining())
+    else:
+        go_to_frame(session.timeline, dispatch, session.timeline.last_frame)
+
+
+def _follow(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(FollowTraining(not session.timeline.is_following))
 
 
 def _previous_clip(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
@@ -50,40 +58,48 @@ def _toggle_play(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(TogglePlay())
 
 
-def _toggle_every_frame(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    session.timeline.is_every_frame = not session.timeline.is_every_frame
+def _marker_by(direction: int) -> Run:
+    def jump(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        timeline = session.timeline
+        find = timeline.markers.after if direction > 0 else timeline.markers.before
+        marker = find(timeline.frame_index)
+        if marker is not None:
+            go_to_frame(timeline, dispatch, marker.frame_index)
+
+    return jump
 
 
-def _toggle_loop(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    session.timeline.is_looping = not session.timeline.is_looping
+def _jump(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.timeline.is_jump_wanted = True
+    ui.wanted_panel = TIMELINE
+
+
+def _mark(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    mark_playhead(session.timeline, ui)
+    ui.wanted_panel = TIMELINE
 
 
 ACTIONS = (
     Action("time.play", "Play or pause", TIME, _toggle_play, keys=("Space",)),
-    Action("time.back", "One frame back", TIME, _step_by(-1), keys=("Left",), repeats=True),
-    Action("time.forward", "One frame forward", TIME, _step_by(1), keys=("Right",), repeats=True),
+    Action("time.back", "One frame back", TIME, _step_by(-1), keys=("Left", ","), repeats=True),
+    Action("time.forward", "One frame forward", TIME, _step_by(1), keys=("Right", "."), repeats=True),
     Action("time.second_back", "One second back", TIME, _step_second(-1), keys=("Shift+Left",), repeats=True),
     Action("time.second_forward", "One second forward", TIME, _step_second(1), keys=("Shift+Right",), repeats=True),
     Action("time.first", "First frame", TIME, _first_frame, keys=("Home",)),
-    Action("time.last", "Last frame", TIME, _last_frame, keys=("End",)),
+    Action("time.last", "Last frame; there, again: follow the training", TIME, _last_frame, keys=("End",)),
+    Action(
+        "time.follow",
+        "Follow the training: stay in the clip with the newest state",
+        TIME,
+        _follow,
+        is_on=lambda session: session.timeline.is_following,
+    ),
     Action(
         "time.previous_clip", "Start of this or the previous clip", TIME, _previous_clip, keys=("Up",), repeats=True
     ),
     Action("time.next_clip", "Start of the next clip", TIME, _next_clip, keys=("Down",), repeats=True),
-    Action(
-        "time.loop",
-        "Loop on or off",
-        TIME,
-        _toggle_loop,
-        keys=("L",),
-        is_on=lambda session: session.timeline.is_looping,
-    ),
-    Action(
-        "time.every_frame",
-        "Play every frame, or skip frames to keep the speed",
-        TIME,
-        _toggle_every_frame,
-        keys=("E",),
-        is_on=lambda session: session.timeline.is_every_frame,
-    ),
+    Action("time.jump", "Go to a frame, time or clip", TIME, _jump, keys=("Ctrl+G",)),
+    Action("time.mark", "Mark this frame, or name its marker", TIME, _mark, keys=("Ctrl+M",)),
+    Action("time.previous_marker", "Previous marker", TIME, _marker_by(-1), keys=("Shift+Up",), repeats=True),
+    Action("time.next_marker", "Next marker", TIME, _marker_by(1), keys=("Shift+Down",), repeats=True),
 )

@@ -1,0 +1,102 @@
+"""Actions on how time is played: which way, how fast, from where to where; and on what the timeline shows of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from app.playback.timeline import Timeline
+from ui.panels.actions.action import TIME, Action, ActionNeeds, Run
+from ui.panels.state import TIMELINE, Dispatch, UiState
+
+
+def _on_timeline(act: Callable[[Timeline], object]) -> Run:
+    def run(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        act(session.timeline)
+
+    return run
+
+
+def _toggle_every_frame(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    session.timeline.is_every_frame = not session.timeline.is_every_frame
+
+
+def _toggle_loop(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    session.timeline.is_looping = not session.timeline.is_looping
+
+
+def _zoom_by(n_steps: int) -> Run:
+    def zoom(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        ui.timeline.zoom_at_playhead(n_steps, session.timeline)
+
+    return zoom
+
+
+def _pan_by(n_steps: int) -> Run:
+    def pan(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        ui.timeline.pan(n_steps, session.timeline.n_frames)
+
+    return pan
+
+
+def _toggle_fit(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.timeline.toggle_fit(session.timeline)
+
+
+def _next_unit(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.timeline.next_unit()
+
+
+def _clip_menu(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.timeline.is_menu_wanted = True
+    ui.wanted_panel = TIMELINE
+
+
+ACTIONS = (
+    Action(
+        "play.backward", "Play backward; again: faster", TIME, _on_timeline(lambda time: time.shuttle(-1)), keys=("J",)
+    ),
+    Action("play.stop", "Stop playing", TIME, _on_timeline(Timeline.hold), keys=("K",)),
+    Action(
+        "play.forward", "Play forward; again: faster", TIME, _on_timeline(lambda time: time.shuttle(1)), keys=("L",)
+    ),
+    Action("play.slower", "Play slower", TIME, _on_timeline(lambda time: time.change_speed(-1)), keys=("Shift+,",)),
+    Action("play.faster", "Play faster", TIME, _on_timeline(lambda time: time.change_speed(1)), keys=("Shift+.",)),
+    Action(
+        "time.loop",
+        "Loop on or off",
+        TIME,
+        _toggle_loop,
+        keys=("Ctrl+/",),
+        is_on=lambda session: session.timeline.is_looping,
+    ),
+    Action(
+        "time.every_frame",
+        "Play every frame, or skip frames to keep the speed",
+        TIME,
+        _toggle_every_frame,
+        keys=("E",),
+        is_on=lambda session: session.timeline.is_every_frame,
+    ),
+    Action("play.in", "Play from this frame on", TIME, _on_timeline(Timeline.set_in), keys=("I",)),
+    Action("play.out", "Play up to this frame", TIME, _on_timeline(Timeline.set_out), keys=("O",)),
+    Action("play.whole", "Play the whole capture", TIME, _on_timeline(Timeline.clear_range), keys=("X",)),
+    Action(
+        "play.around",
+        "Play around the nearest seam between clips, or no more",
+        TIME,
+        _on_timeline(Timeline.toggle_around),
+        keys=("/",),
+        is_on=lambda session: session.timeline.around is not None,
+    ),
+    Action("timeline.fit", "Timeline: the whole capture, or this clip", TIME, _toggle_fit, keys=("Z",)),
+    Action("timeline.closer", "Timeline: closer", TIME, _zoom_by(1), keys=("Ctrl+Page Up",), repeats=True),
+    Action("timeline.farther", "Timeline: farther", TIME, _zoom_by(-1), keys=("Ctrl+Page Down",), repeats=True),
+    Action(
+        "timeline.earlier", "Timeline: show what is before", TIME, _pan_by(-1), keys=("Shift+Page Up",), repeats=True
+    ),
+    Action(
+        "timeline.later", "Timeline: show what comes after", TIME, _pan_by(1), keys=("Shift+Page Down",), repeats=True
+    ),
+    Action("timeline.unit", "Timeline: frames, seconds or timecode", TIME, _next_unit, keys=("U",)),
+    Action("timeline.menu", "Menu of this clip", TIME, _clip_menu, keys=("Shift+F10",)),
+)

@@ -1,0 +1,68 @@
+"""The boxes in the toolbar that say how the rendered picture is compared, and with what."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from app.playback.view_modes import COLOR, MODES
+from app.session.commands import SetCompareWith
+from app.status import BLINK_HZ, CAPTURED
+from ui.panels.actions.action import ActionNeeds
+from ui.panels.actions.compare import COMPARE_WORDS, set_compare, set_other
+from ui.panels.comparison import other_label, shown_compare
+from ui.panels.state import Dispatch, UiState
+
+SLIDER_WIDTH = 120.0
+
+
+def draw_compare_box(session: ActionNeeds, dispatch: Dispatch, ui: UiState, width: float) -> None:
+    """All ways to compare, and everything to compare with, in one box: where there is no room for buttons."""
+    shown = shown_compare(session)
+    imgui.set_next_item_width(width)
+    is_open = imgui.begin_combo("##compare", "Compare" if shown == "off" else COMPARE_WORDS[shown], _ROOMY)
+    ui.mark("viewport.compare")
+    if not is_open:
+        imgui.set_item_tooltip("Beside, over or in turn with another picture (G)")
+        return
+    for mode, words in COMPARE_WORDS.items():
+        if imgui.selectable(words, shown == mode)[0]:
+            set_compare(session, dispatch, mode)
+        ui.mark(f"viewport.compare.{mode}")
+    imgui.separator()
+    _draw_others(session, dispatch, ui)
+    imgui.end_combo()
+
+
+def draw_other_box(session: ActionNeeds, dispatch: Dispatch, ui: UiState, width: float) -> None:
+    """What to compare with."""
+    imgui.set_next_item_width(width)
+    is_open = imgui.begin_combo("##other", other_label(session.overlays), _ROOMY)
+    ui.mark("viewport.other")
+    if not is_open:
+        imgui.set_item_tooltip("What the rendered picture is compared with; hold B to see it alone")
+        return
+    _draw_others(session, dispatch, ui)
+    imgui.end_combo()
+
+
+def _draw_others(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    overlays = session.overlays
+    imgui.text_disabled("Compare with")
+    others = [(CAPTURED, "Captured picture"), *((mode.name, mode.label) for mode in MODES.values())]
+    for other, words in others:
+        if imgui.selectable("Own colours" if other == COLOR else words, overlays.compare_with == other)[0]:
+            if overlays.compare == "off":
+                set_other(session, dispatch, other)
+            else:
+                dispatch(SetCompareWith(other))
+        ui.mark(f"viewport.other.{other}")
+    imgui.separator()
+    imgui.set_next_item_width(SLIDER_WIDTH)
+    slowest, fastest = BLINK_HZ
+    blink = imgui.slider_float("Blink", overlays.blink_hz, slowest, fastest, "%.2f Hz", _CLAMPED)
+    overlays.blink_hz = blink[1]
+    ui.mark("viewport.blink_hz")
+
+
+_ROOMY = imgui.ComboFlags_.height_largest
+_CLAMPED = imgui.SliderFlags_.always_clamp

@@ -1,0 +1,39 @@
+"""Words for a clip and its state, the same everywhere in the window."""
+
+from __future__ import annotations
+
+from app.status import ClipStatus
+from ui.style.numbers import format_count
+
+STATE_WORDS: dict[str, str] = {
+    "untrained": "not trained",
+    "queued": "waiting",
+    "preparing": "preparing",
+    "training": "training",
+    "paused": "paused",
+    "stopped": "stopped",
+    "trained": "trained",
+    "failed": "failed",
+    "stale": "out of date",
+    "damaged": "damaged",
+}
+
+
+def state_words(state: str) -> str:
+    """A state as the user reads it."""
+    return STATE_WORDS.get(state, state)
+
+
+def state_note(status: ClipStatus) -> str:
+    """What there is to say of a clip's state beyond its word; empty where that says it all."""
+    texts = [status.reason]
+    if status.resume_step is not None and status.state in ("trained", "stale", "damaged"):
+        texts.append(f"It was being trained again: that was stopped at step {format_count(status.resume_step)}.")
+    elif status.resume_step is not None and status.state in ("stopped", "failed"):
+        texts.append(f"Its training goes on at step {format_count(status.resume_step)}.")
+    return " ".join(text for text in texts if text)
+
+
+def clip_title(clip_index: int, reference_index: int) -> str:
+    """A clip by its number; the reference clip says so."""
+    return f"Clip {clip_index}" + (", reference" if clip_index == reference_index else "")

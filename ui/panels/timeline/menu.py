@@ -1,0 +1,94 @@
+"""The menu of a clip: by the right button on its band, or by key for the clip under the playhead."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from app.session.commands import SetFrame, TrainClip, TrainClips
+from engine.capture.clip import Clip
+from ui.panels.state import Dispatch, UiState
+from ui.panels.timeline.clip_words import clip_title, state_words
+from ui.panels.timeline.needs import TimelineNeeds
+from ui.panels.timeline.stage import Stage
+from ui.style.theme import Icon
+
+POPUP = "clip menu"
+
+
+def draw_clip_menu(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> None:
+    """Opens after a click with the right button on the item drawn last, the track; draws the menu while it is open."""
+    ui = stage.ui
+    imgui.open_popup_on_item_click(POPUP, imgui.PopupFlags_.mouse_button_right)
+    if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_blocked_by_popup) and imgui.is_mouse_released(1):
+        ui.timeline.menu_frame = stage.scale.frame_at(imgui.get_io().mouse_pos.x)
+    is_by_key = ui.timeline.is_menu_wanted
+    if is_by_key:
+        ui.timeline.is_menu_wanted = False
+        ui.timeline.menu_frame = session.timeline.frame_index
+        imgui.open_popup(POPUP)
+        imgui.set_nav_cursor_visible(True)  # the keyboard goes on in it at once
+    if not imgui.begin_popup(POPUP):
+        return
+    clip = session.timeline.clip_of(ui.timeline.menu_frame)
+    if clip is not None:
+        state = session.clip_states[clip.clip_index].state
+        imgui.text_disabled(f"{clip_title(clip.clip_index, session.reference_index)}: {state_words(state)}")
+        imgui.separator()
+        _draw_training(clip, session, dispatch, ui, is_by_key=is_by_key)
+        imgui.separator()
+        _draw_time(clip, session, dispatch, ui)
+    imgui.end_popup()
+
+
+def _draw_training(clip: Clip, session: TimelineNeeds, dispatch: Dispatch, ui: UiState, *, is_by_key: bool) -> None:
+    index, reference = clip.clip_index, session.reference_index
+    status = session.clip_states[index]
+    is_free = session.training.state in ("idle", "failed")
+    has_reference = index == reference or session.clip_states[reference].state == "trained"
+    is_finished = status.state in ("trained", "damaged")
+    verb = "Train again" if is_finished else "Train" if status.resume_step is None else "Resume"
+    if _item(ui, "train", f"{Icon.TRAIN}  {verb} this clip", is_enabled=is_free and has_reference):
+        dispatch(TrainClip(index))
+    if is_by_key:
+        imgui.set_item_default_focus()
+    if not has_reference:
+        imgui.text_disabled(f"Clip {reference}, the reference, has to be trained first")
+    later = unfinished(session, index)
+    words = f"{Icon.TRAIN}  Train from here ({len(later)})"
+    if _item(ui, "train from here", words, is_enabled=bool(later) and (has_reference or reference in later)):
+        dispatch(TrainClips(later))
+    everything = unfinished(session, 0)
+    if _item(
+        ui, "train all", f"{Icon.TRAIN}  Train all that is not trained ({len(everything)})", is_enabled=bool(everything)
+    ):
+        dispatch(TrainClips(everything))
+
+
+def _draw_time(clip: Clip, session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    timeline = session.timeline
+    if _item(ui, "go", f"{Icon.PLAY}  Go to its first frame"):
+        dispatch(SetFrame(clip.start))
+    if _item(ui, "range", f"{Icon.LOOP}  Play this clip only", "I, O"):
+        timeline.set_range(clip.start, clip.stop - 1)
+    has_range = timeline.in_frame is not None or timeline.out_frame is not None
+    if _item(ui, "no range", f"{Icon.LOOP}  Play the whole capture", "X", is_enabled=has_range):
+        timeline.clear_range()
+    if clip.clip_index > 0 and _item(ui, "seam", f"{Icon.LOOP}  Play around its beginning", "/"):
+        timeline.play_around(clip.start)
+    if _item(ui, "zoom", f"{Icon.EYE}  Show this clip only", "Z"):
+        ui.timeline.show_clip(clip, timeline.n_frames)
+    if _item(ui, "whole", f"{Icon.EYE}  Show the whole capture", "Z", is_enabled=ui.timeline.is_zoomed):
+        ui.timeline.show_all()
+
+
+def unfinished(session: TimelineNeeds, first_clip: int) -> tuple[int, ...]:
+    """Clips from one on that could be trained and are not."""
+    states = session.clip_states[first_clip:]
+    done = ("trained", "damaged", "preparing", "training", "queued")
+    return tuple(first_clip + place for place, status in enumerate(states) if status.state not in done)
+
+
+def _item(ui: UiState, name: str, label: str, key_label: str = "", *, is_enabled: bool = True) -> bool:
+    is_chosen = imgui.menu_item(label, key_label, False, is_enabled)[0]
+    ui.mark(f"clip menu.{name}")
+    return is_chosen

@@ -1,0 +1,94 @@
+"""The timeline as a whole: rows from top to bottom, and the boxes over them."""
+
+from __future__ import annotations
+
+from imgui_bundle import ImVec2, imgui
+
+from ui.panels.state import Dispatch, Rect, UiState
+from ui.panels.timeline.clip_lane import draw_clip_lane
+from ui.panels.timeline.gutter import WIDTH as GUTTER_WIDTH
+from ui.panels.timeline.gutter import draw_gutter
+from ui.panels.timeline.jump_box import draw_jump_box
+from ui.panels.timeline.marker_box import draw_marker_box
+from ui.panels.timeline.menu import draw_clip_menu
+from ui.panels.timeline.needs import TimelineNeeds
+from ui.panels.timeline.overview import draw_overview
+from ui.panels.timeline.pointer import handle_track
+from ui.panels.timeline.quality_lane import draw_quality_lane
+from ui.panels.timeline.rows import CACHE, MARKERS, MIN_TRACK_HEIGHT, OVERVIEW, QUALITY, RULER, SEAMS, arrange_rows
+from ui.panels.timeline.ruler import draw_hover, draw_played, draw_playhead, draw_ruler
+from ui.panels.timeline.seam_lane import draw_seam_lane
+from ui.panels.timeline.small_lanes import draw_cache_lane, draw_marker_lane
+from ui.panels.timeline.stage import Stage
+from ui.panels.timeline.time_range import TimeScale
+from ui.panels.timeline.transport import draw_transport
+from ui.style import theme
+
+
+def draw_timeline(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """Transport row, then the rows of time."""
+    if session.capture is None:
+        imgui.text_disabled("Frames and clips appear here when a capture is open.")
+        return
+    ui.timeline.take_up(session.capture, session.timeline)
+    if imgui.get_content_region_avail().y >= MIN_TRACK_HEIGHT + imgui.get_frame_height_with_spacing():
+        draw_transport(session, dispatch, ui)  # in a lower panel it gives way: time is worth more than buttons
+    _draw_rows(session, dispatch, ui)
+
+
+def _draw_rows(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    origin, size = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
+    left, right = origin.x + GUTTER_WIDTH, origin.x + max(size.x, GUTTER_WIDTH + 1.0)
+    rows = {
+        row.name: Rect(left, origin.y + row.top, right, origin.y + row.top + row.height)
+        for row in arrange_rows(max(size.y, MIN_TRACK_HEIGHT), ui.timeline.folded, is_zoomed=ui.timeline.is_zoomed)
+    }
+    overview = rows.get(OVERVIEW)
+    track = Rect(left, rows[RULER].y0, right, max(row.y1 for row in rows.values()))
+    stage = _stage(session, ui, track, rows)
+    if overview is not None:
+        draw_overview(stage, overview, session)
+    draw_gutter(rows, origin.x, session, ui)
+    imgui.set_cursor_screen_pos(track.low)
+    imgui.invisible_button("track", ImVec2(track.width, track.height))
+    ui.mark_rect("timeline.track", track)
+    if imgui.is_item_hovered():
+        pointer = imgui.get_io().mouse_pos
+        stage = _stage(session, ui, track, rows, (pointer.x, pointer.y))
+    handle_track(stage, session, dispatch)
+    draw_clip_menu(stage, session, dispatch)
+    _draw_track(stage, session)
+    draw_jump_box(session, dispatch, ui, track)
+    draw_marker_box(session.timeline, ui, track)
+
+
+def _stage(
+    session: TimelineNeeds,
+    ui: UiState,
+    track: Rect,
+    rows: dict[str, Rect],
+    pointer: tuple[float, float] | None = None,
+) -> Stage:
+    n_frames = session.timeline.n_frames
+    scale = TimeScale(track.x0, track.x1, ui.timeline.range_of(n_frames), n_frames)
+    return Stage(imgui.get_window_draw_list(), scale, track, rows, pointer, ui)
+
+
+def _draw_track(stage: Stage, session: TimelineNeeds) -> None:
+    draw, track, timeline = stage.draw, stage.track, session.timeline
+    draw.add_rect_filled(track.low, track.high, theme.u32(theme.BACKDROP), 4)
+    draw.push_clip_rect(track.low, track.high, True)
+    draw_clip_lane(stage, session)
+    if SEAMS in stage.rows:
+        draw_seam_lane(stage, session)
+    if QUALITY in stage.rows:
+        draw_quality_lane(stage, session)
+    if CACHE in stage.rows:
+        draw_cache_lane(stage, session)
+    if MARKERS in stage.rows:
+        draw_marker_lane(stage, timeline)
+    draw_played(stage, timeline)
+    draw_ruler(stage, timeline)
+    draw_hover(stage, timeline)
+    draw_playhead(stage, timeline)
+    draw.pop_clip_rect()

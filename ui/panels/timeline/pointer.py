@@ -1,0 +1,80 @@
+"""What the pointer does over the track: scrub, zoom, pan, play around a seam, go to a marker or edit it."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from app.session.commands import SetFrame
+from ui.panels.state import Dispatch
+from ui.panels.timeline.marker_box import edit_marker
+from ui.panels.timeline.needs import TimelineNeeds
+from ui.panels.timeline.seam_lane import seam_at
+from ui.panels.timeline.small_lanes import marker_at
+from ui.panels.timeline.stage import Stage
+
+LEFT, MIDDLE = 0, 2
+EDGE_PAN_SHARE = 0.02
+"""Share of what is shown by which the view moves on per drawn frame, while a scrub is held beyond its edge."""
+
+
+def handle_track(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> None:
+    """For the item drawn last, the invisible button of the track. Changes what is shown from the next frame on."""
+    _handle_wheel(stage, session)
+    _handle_middle_drag(stage, session)
+    _handle_left(stage, session, dispatch)
+
+
+def _handle_wheel(stage: Stage, session: TimelineNeeds) -> None:
+    """Ctrl and the wheel zoom at the pointer, as pinching does; the wheel alone moves through time, either way."""
+    io, view, n_frames = imgui.get_io(), stage.ui.timeline, session.timeline.n_frames
+    if stage.pointer is None or not (io.mouse_wheel or io.mouse_wheel_h):
+        return
+    if io.key_ctrl:
+        view.zoom(io.mouse_wheel, stage.scale.position_at(stage.pointer[0]), n_frames)
+    else:
+        view.pan(-io.mouse_wheel - io.mouse_wheel_h, n_frames)
+    stage.ui.redraw_within(0.0)
+
+
+def _handle_middle_drag(stage: Stage, session: TimelineNeeds) -> None:
+    view = stage.ui.timeline
+    if stage.pointer is not None and imgui.is_mouse_clicked(MIDDLE):
+        view.is_panning = True
+    if view.is_panning:
+        view.pan_by(-imgui.get_io().mouse_delta.x / stage.scale.per_frame, session.timeline.n_frames)
+        view.is_panning = imgui.is_mouse_down(MIDDLE)
+
+
+def _handle_left(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> None:
+    view, timeline = stage.ui.timeline, session.timeline
+    if imgui.is_item_activated():
+        seam = seam_at(stage, session)
+        view.pressed_seam = None if seam is None else session.clips[seam[0]].start
+        if view.pressed_seam is not None:
+            timeline.play_around(view.pressed_seam)
+            return
+    # A quick drag's last stretch arrives in the same frame as the release, when the item is active no more.
+    is_held = imgui.is_item_active() or imgui.is_item_deactivated()
+    if not is_held:
+        view.pressed_seam = None
+    if is_held and view.pressed_seam is None:
+        _scrub(stage, session, dispatch)
+    if stage.pointer is not None and imgui.is_mouse_double_clicked(LEFT):
+        marker = marker_at(stage, timeline)
+        if marker is not None:
+            edit_marker(timeline, stage.ui, marker.frame_index)
+        elif view.pressed_seam is None:
+            view.show_all()
+
+
+def _scrub(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> None:
+    x, scale, timeline = imgui.get_io().mouse_pos.x, stage.scale, session.timeline
+    marker = marker_at(stage, timeline) if imgui.is_item_activated() else None
+    frame_index = scale.frame_at(x) if marker is None else marker.frame_index
+    if frame_index != timeline.frame_index:
+        dispatch(SetFrame(frame_index))
+    beyond = x - min(max(x, scale.x0), scale.x1)
+    if stage.ui.timeline.is_zoomed and beyond and imgui.is_item_active():
+        step = EDGE_PAN_SHARE * scale.shown.length * (1 if beyond > 0 else -1)
+        stage.ui.timeline.pan_by(step, timeline.n_frames)
+        stage.ui.redraw_within(0.03)

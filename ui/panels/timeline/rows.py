@@ -1,0 +1,69 @@
+"""How the height of the timeline is shared: which rows there are, and which give way where there is not room for all.
+
+Arithmetic only. From top to bottom: overview, ruler, clips, seams, quality, cache, markers. Ruler and clips are always
+there. In a low panel quality gives way first, then markers, cache, seams and the overview, last the transport row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, MARKERS = (
+    "overview",
+    "ruler",
+    "clips",
+    "seams",
+    "quality",
+    "cache",
+    "markers",
+)
+LANES = (SEAMS, QUALITY, CACHE, MARKERS)
+"""Those that can be folded away."""
+ORDER = (OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, MARKERS)
+KEPT_FIRST = (OVERVIEW, SEAMS, CACHE, MARKERS, QUALITY)
+HEIGHTS = {OVERVIEW: 16.0, RULER: 22.0, CLIPS: 32.0, SEAMS: 18.0, QUALITY: 30.0, CACHE: 12.0, MARKERS: 18.0}
+"""Smallest ones, units of the screen."""
+MIN_CLIPS_HEIGHT = 18.0
+LARGEST = {CLIPS: 54.0, QUALITY: 90.0}
+GAP = 2.0
+MIN_TRACK_HEIGHT = HEIGHTS[RULER] + MIN_CLIPS_HEIGHT
+"""Below, the transport row gives way."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Where a row lies, from the top of the track."""
+
+    name: str
+    top: float
+    height: float
+
+
+def arrange_rows(height: float, folded: Collection[str], *, is_zoomed: bool) -> tuple[Row, ...]:
+    """Rows from top to bottom in a height.
+
+    Args:
+        folded: Lanes that are folded away.
+        is_zoomed: Whether there is more than is shown, so that an overview helps.
+    """
+    heights = {RULER: HEIGHTS[RULER], CLIPS: max(min(HEIGHTS[CLIPS], height - HEIGHTS[RULER]), MIN_CLIPS_HEIGHT)}
+    left = height - sum(heights.values())
+    for name in KEPT_FIRST:
+        is_wanted = is_zoomed if name == OVERVIEW else name not in folded
+        if is_wanted and HEIGHTS[name] + GAP > left:
+            break  # a lower one that comes later would fit, and be there without the one that matters more
+        if is_wanted:
+            heights[name] = HEIGHTS[name]
+            left -= HEIGHTS[name] + GAP
+    for name, largest in LARGEST.items():
+        if name in heights and left > 0:
+            grown = min(left, max(largest - heights[name], 0.0))
+            heights[name] += grown
+            left -= grown
+    rows, top = [], 0.0
+    for name in ORDER:
+        if name in heights:
+            rows.append(Row(name, top, heights[name]))
+            top += heights[name] + (0.0 if name == RULER else GAP)
+    return tuple(rows)
