@@ -11,9 +11,9 @@ from typing import Any
 
 from app.background.jobs import Jobs
 from app.background.latest import LatestWorker
-from app.playback.ahead import Ahead, AskedLook
+from app.playback.ahead import Ahead, AskedLook, n_ahead
 from app.playback.arrays import AnchorArrays, Picture, PointArrays
-from app.playback.capture_pictures import CapturedPictures, Gain
+from app.playback.capture_pictures import CapturedPictures, Gain, PictureRequest
 from app.playback.clouds import CloudRequest, Clouds
 from app.playback.course import Course
 from app.playback.coverage import Coverage, CoverageFinder
@@ -67,6 +67,8 @@ class Playback:
         self._state_of = state_of
         self._n_ahead_seen = 0
         self._inherited: dict[int, Path | None] = {}
+        self._compared: dict[tuple[int, int], bool] = {}  # camera and width, asked for since the last turn
+        self._planned_compared: object = None
 
     def start(self) -> None:
         """Start the threads now rather than with the first request, and load what they need."""
@@ -207,6 +209,23 @@ class Playback:
         """
         course = Course.of(timeline)
         self.ahead.plan(course, lambda frame, shown_as: self._request_at(timeline, frame, shown_as), is_busy=is_busy)
+        self._plan_compared(timeline, course)
+
+    def _plan_compared(self, timeline: Timeline, course: Course) -> None:
+        """Captured pictures that are set beside the render come ahead of the playhead, too."""
+        compared, self._compared = tuple(self._compared), {}
+        wanted = (course, compared, self.decoder.revision) if course.is_playing and compared else None
+        if wanted == self._planned_compared or self._opened is None:
+            return
+        self._planned_compared = wanted
+        opened, requests = self._opened, []
+        for frame in course.ahead(n_ahead(course)) if wanted is not None else ():
+            for camera, max_width in compared:
+                gain = self._scene_gain(opened, timeline, frame, camera)
+                capture = opened.capture
+                key = (opened.generation, capture.fingerprint, camera, frame, max_width, capture, gain)
+                requests.append(PictureRequest(*key))
+        self.captured.plan(requests)
 
     def cached_frames(self) -> list[tuple[int, int]]:
         """Frames that can be shown at once, as they are looked at now: first and stop of each run, in order."""
@@ -274,15 +293,18 @@ class Playback:
         opened = self._opened
         if opened is None:
             return None
-        gain = self._scene_gain(opened, timeline, camera_index)
+        self._compared[camera_index, max_width] = True
+        gain = self._scene_gain(opened, timeline, timeline.frame_index, camera_index)
         return self.captured.picture(
             opened.capture, opened.generation, camera_index, timeline.frame_index, max_width, gain
         )
 
-    def _scene_gain(self, opened: OpenedProject, timeline: Timeline, camera_index: int) -> Gain | None:
-        """By which a camera's colours differ from the scene's at the playhead; None where they do not, or nobody
+    def _scene_gain(
+        self, opened: OpenedProject, timeline: Timeline, frame_index: int, camera_index: int
+    ) -> Gain | None:
+        """By which a camera's colours differ from the scene's at a frame; None where they do not, or nobody
         knows."""
-        request = self._request(timeline)
+        request = self._request_at(timeline, frame_index)
         colors = None if request is None else self.decoder.colors(request)
         if request is None or colors is None:
             return None
