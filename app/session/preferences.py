@@ -7,6 +7,7 @@ Knows no window: names of keys and actions, and layouts, are plain values that m
 from __future__ import annotations
 
 import logging
+import threading
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -20,6 +21,7 @@ from engine.user_folders import config_dir
 logger = logging.getLogger(__name__)
 
 SCHEMA = 1
+WRITING_TIMEOUT_S = 5.0
 MAX_BYTES = 4 << 20
 CACHE_MB = (128, 65_536)
 """Least and most memory for decoded frames."""
@@ -69,12 +71,25 @@ class PreferencesFile:
         self.values = _read(self.path)
         self.failure = ""
         self._saved = _document(self.values)
+        self._writing: threading.Thread | None = None
 
     def save(self) -> None:
-        """Write the file if something changed. A disk that refuses costs the change at the next start, no more."""
+        """Write the file now if something changed. A disk that refuses costs the change at the next start, no more."""
+        if self._writing is not None:
+            self._writing.join(WRITING_TIMEOUT_S)
         document = _document(self.values)
-        if document == self._saved:
-            return
+        if document != self._saved:
+            self._write(document)
+
+    def save_soon(self) -> None:
+        """The same on a thread, as a busy disk may take its time."""
+        document = _document(self.values)
+        is_writing = self._writing is not None and self._writing.is_alive()
+        if document != self._saved and not is_writing:  # else the next time
+            self._writing = threading.Thread(target=self._write, args=(document,), name="preferences", daemon=True)
+            self._writing.start()
+
+    def _write(self, document: dict[str, Any]) -> None:
         try:
             write_checked_json(self.path, document)
             self.failure = ""

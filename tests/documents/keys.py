@@ -15,11 +15,12 @@ def keys(row: Action) -> str:
 
 
 def key_tables() -> str:
-    """Every row of the table of actions, in its order."""
+    """Every row of the help sheet, in its order."""
     parts = []
     for group, rows in groupby(ACTIONS, key=lambda row: row.group):
         listed = list(rows)
-        parts.append(f"**{group}**\n\n{table(('key', 'does'), [(keys(row), row.text) for row in listed if row.keys])}")
+        shown = [(keys(row), row.text) for row in listed if row.keys and row.is_in_help]
+        parts.append(f"**{group}**\n\n{table(('key', 'does'), shown)}")
         keyless = "; ".join(row.text for row in listed if not row.keys)
         if keyless:
             parts.append(f"No key of their own: {keyless}.")

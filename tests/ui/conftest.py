@@ -51,6 +51,7 @@ def open_pilot(headless_gl: None) -> Iterator[Callable[..., Pilot]]:
         memory: WindowMemory | None = None,
         preferences: PreferencesFile | None = None,
         first_frames: int = 6,
+        is_eased: bool = False,
     ) -> Pilot:
         width, height = size
         studio = StudioWindow(
@@ -64,6 +65,7 @@ def open_pilot(headless_gl: None) -> Iterator[Callable[..., Pilot]]:
         opened.append(studio)
         # Synthetic events would wait for dispatch_events() otherwise.
         studio.window._enable_event_queue = False
+        studio.frame.ui.navigation.is_motion_reduced = not is_eased
         pilot = Pilot(studio)
         pilot.draw(first_frames)
         return pilot

@@ -15,8 +15,9 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import portable_file_dialogs as native
 
 from app.session.commands import OpenCapture
-from ui.panels.actions.action import TIME, VIEW, WINDOW
-from ui.panels.actions.table import ACTIONS, MOUSE_HELP
+from ui.panels.actions.action import BOOKMARKS, TIME, VIEW, WINDOW
+from ui.panels.actions.table import ACTIONS
+from ui.panels.gestures import mouse_help
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import text_wrapped_dim
 from ui.style import theme
@@ -173,12 +174,12 @@ def draw_help(ui: UiState) -> None:
         ui.redraw_within(0.0)  # only then does what lies below know that it is covered
     if is_shown:
         groups = dict.fromkeys(action.group for action in ACTIONS)
-        left = (TIME, VIEW, WINDOW)
+        left = (TIME, VIEW, BOOKMARKS, WINDOW)
         if imgui.begin_table("sheet", 2, imgui.TableFlags_.sizing_stretch_same):
             imgui.table_next_column()
             for group in left:
                 _draw_group(group, _rows(group, ui))
-            _draw_group("Mouse", list(MOUSE_HELP))
+            _draw_group("Mouse", list(mouse_help(ui.navigation.preset)))
             imgui.table_next_column()
             for group in (group for group in groups if group not in left):
                 _draw_group(group, _rows(group, ui))
@@ -189,7 +190,10 @@ def draw_help(ui: UiState) -> None:
 
 def _rows(group: str, ui: UiState) -> list[tuple[str, str]]:
     """Keys and words of the actions of a group; those without a key come last."""
-    rows = [(", ".join(ui.keys.labels(action)), action.text) for action in ACTIONS if action.group == group]
+    shown = [
+        action for action in ACTIONS if action.group == group and (action.is_in_help or not ui.keys.labels(action))
+    ]
+    rows = [(", ".join(ui.keys.labels(action)), action.text) for action in shown]
     return [*(row for row in rows if row[0]), *((NO_KEY, text) for label, text in rows if not label)]
 
 

@@ -23,13 +23,26 @@ from ui.panels.actions.key_map import KeyMap
 from ui.panels.actions.table import ACTIONS, handle_keys
 from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.heat_overlay import HeatOverlay
+from ui.panels.log import LogNeeds, LogPanel
 from ui.panels.notices import NoticesNeeds, NoticesPanel
 from ui.panels.panel_keys import step_panel
 from ui.panels.picture_pane import PicturePane
 from ui.panels.recent_rows import RecentRows
 from ui.panels.regions import draw_regions
 from ui.panels.residuals.panel import ResidualsNeeds, ResidualsPanel
-from ui.panels.state import CAPTURE, LAYOUTS, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
+from ui.panels.state import (
+    CAPTURE,
+    LAYOUTS,
+    LOG,
+    REGIONS,
+    RESIDUALS,
+    TIMELINE,
+    TRAINING,
+    VIEWPORT,
+    Dispatch,
+    Rect,
+    UiState,
+)
 from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.panel import draw_timeline
 from ui.panels.training import draw_training
@@ -57,6 +70,8 @@ logger = logging.getLogger(__name__)
 
 FIRST_FRAMES = 6
 """A new layout: docked panels get their tabs, then their sizes, then they lose scrollbars that are not needed."""
+FRAMES_TO_DOCK = 2
+"""Until all panels of a kept layout have their tabs; the one that got its tab last is in front."""
 TRAINING_REFRESH_S = 0.2
 """Often enough for numbers that nobody waits for; each frame is taken from the training where the CPU draws."""
 ATTENDED_S = 0.5
@@ -77,6 +92,7 @@ class FrameNeeds(
     QuestionNeeds,
     RememberNeeds,
     NoticesNeeds,
+    LogNeeds,
     ResidualsNeeds,
     Protocol,
 ):
@@ -142,6 +158,7 @@ class Frame:
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
         self.residuals = ResidualsPanel(lambda: ImageTexture(ctx))
         self.notices = NoticesPanel()
+        self.log = LogPanel()
         self.dialog = OpenFolderDialog()
         self.questions = QuestionDialogs()
         self.palette = Palette()
@@ -158,6 +175,7 @@ class Frame:
         self.remembering.restore_marks(session)
         self._failed_panels: set[str] = set()
         self._floating_panels: set[str] = set()
+        self._in_front = [TIMELINE]  # a log in front of it would be a surprise
         self._dock_ids: dict[str, int] = {}
         self._is_welcome = False
         self._panels: tuple[tuple[str, Callable[[FrameNeeds, Dispatch, UiState], None], bool], ...] = (
@@ -167,6 +185,7 @@ class Frame:
             (REGIONS, draw_regions, True),
             (RESIDUALS, self.residuals.draw, True),
             (TIMELINE, draw_timeline, True),
+            (LOG, self.log.draw, True),
         )
 
     # ---- the redraw plan -------------------------------------------------------------------------------------
@@ -270,10 +289,12 @@ class Frame:
         layout = LAYOUTS[0] if ui.is_layout_reset_requested else self.layouts.take_own(ui)
         if layout is not None or not (ui.is_picture_only or is_laid_out(dock_id)):
             ui.is_layout_reset_requested = ui.is_picture_only = False
-            ui.wanted_panel = TRAINING  # of the two that lie over each other
+            self._in_front = [TRAINING, TIMELINE]  # of those that lie over each other; one in each frame
             lay_out(dock_id, layout or LAYOUTS[0])
             self._redraw.request(FIRST_FRAMES)
-        elif (is_welcome := session.capture is None) != self._is_welcome:
+        elif self._in_front and ui.wanted_panel is None and imgui.get_frame_count() > FRAMES_TO_DOCK:
+            ui.wanted_panel = self._in_front.pop()
+        elif (is_welcome := session.capture is None) != self._is_welcome and not self._in_front:
             self._is_welcome = is_welcome
             ui.wanted_panel = VIEWPORT if is_welcome else ui.wanted_panel  # its list is moved in by arrow keys
         step_panel(ui)

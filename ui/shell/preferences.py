@@ -9,6 +9,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.preferences import CACHE_MB
 from ui.panels.actions.window import choose_scale
+from ui.panels.gestures import PRESETS, mouse_help
 from ui.panels.state import UiState
 from ui.panels.widgets import text_wrapped_dim
 from ui.shell.preferences_keys import KeysPage
@@ -20,6 +21,7 @@ TITLE = "Preferences###preferences"
 SIZE = (760.0, 520.0)
 PAGES_WIDTH = 150.0
 LABEL_WIDTH = 200.0
+GESTURE_WIDTH = 150.0
 USUAL_CACHE_MB = 384
 
 
@@ -51,6 +53,7 @@ class PreferencesDialog:
     def __init__(self) -> None:
         self._pages: dict[str, Page] = {
             "General": _Plain(draw_general),
+            "Navigation": _Plain(draw_navigation),
             "Memory": _Plain(draw_memory),
             "Keys": KeysPage(),
         }
@@ -135,6 +138,30 @@ def draw_general(ui: UiState) -> None:
             ui.mark(f"preferences.scale.{scale_text(choice)}")
         imgui.end_combo()
     ui.mark("preferences.scale")
+
+
+def draw_navigation(ui: UiState) -> None:
+    """What the mouse does over a picture, and how the view gets to another place."""
+    navigation = ui.navigation
+    label("Mouse and keys")
+    if imgui.begin_combo("##preset", navigation.preset.label):
+        for preset in PRESETS.values():
+            if imgui.selectable(preset.label, preset.name == navigation.preset.name)[0]:
+                navigation.preset_name = preset.name
+            ui.mark(f"preferences.preset.{preset.name}")
+        imgui.end_combo()
+    ui.mark("preferences.preset")
+    for gesture, words in mouse_help(navigation.preset):
+        imgui.set_cursor_pos_x(LABEL_WIDTH)
+        imgui.text(gesture)
+        imgui.same_line(LABEL_WIDTH + GESTURE_WIDTH)
+        text_wrapped_dim(words)
+    imgui.spacing()
+    label("Motion")
+    navigation.is_motion_reduced = imgui.checkbox("Reduce motion", navigation.is_motion_reduced)[1]
+    ui.mark("preferences.motion")
+    imgui.set_cursor_pos_x(LABEL_WIDTH)
+    text_wrapped_dim("The view jumps to its new place instead of gliding there.")
 
 
 def draw_memory(ui: UiState) -> None:

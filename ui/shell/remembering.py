@@ -18,7 +18,7 @@ from ui.panels.capture import CaptureFacts
 from ui.panels.state import UiState
 
 SAVE_AFTER_S = 5.0
-LAYOUT_VERSION = "; panels of ClipGStream Studio, version 2\n"
+LAYOUT_VERSION = "; panels of ClipGStream Studio, version 3\n"
 """Comes first in the kept layout; another version has other panels and is not taken."""
 
 
@@ -67,10 +67,14 @@ class Remembering:
             take_layout(self._memory.layout)
 
     def restore_marks(self, session: RememberNeeds) -> None:
-        """What is the same in all projects: size and opacity of anchor marks, unit and lanes of the timeline."""
+        """What is the same in all projects: size and opacity of anchor marks, unit and lanes of the timeline, and what
+        mouse and keys do."""
         if self._memory is None:
             return
         self._ui.timeline.restore(self._memory.time_unit, self._memory.folded_lanes)
+        navigation = self._ui.navigation
+        navigation.preset_name = self._memory.navigation
+        navigation.is_motion_reduced = self._memory.is_motion_reduced
         if self._memory.mark_size is not None:
             session.overlays.mark_size = self._memory.mark_size
         if self._memory.mark_opacity is not None:
@@ -79,47 +83,57 @@ class Remembering:
     def follow(self, session: RememberNeeds) -> None:
         """Once per turn of the loop: shows a project that was just opened as it was left, and keeps what changes."""
         memory = self._memory
+        is_due = time.perf_counter() - self._saved_s >= SAVE_AFTER_S
+        if is_due:
+            self._saved_s = time.perf_counter()
+            if self._preferences is not None:
+                self._preferences.save_soon()
+            self._tell(session)
         if memory is None:
-            if time.perf_counter() - self._saved_s >= SAVE_AFTER_S:
-                self.save(session)
             return
         folder = _folder_of(session)
         if folder != self._folder:
             self._folder = folder
             if folder in memory.views:
                 show_again(session, memory.views[folder])
-        if time.perf_counter() - self._saved_s >= SAVE_AFTER_S:
-            self.save(session)
+        if is_due:
+            self._keep(session)
+            memory.save_soon()
         elif folder is not None:
             memory.keep_view(folder, view_of(session))
 
     def save(self, session: RememberNeeds) -> None:
         """Keep everything now."""
-        self._saved_s = time.perf_counter()
         if self._preferences is not None:
             self._preferences.save()
-            self._tell(session, self._preferences.failure, str(self._preferences.path))
+        if self._memory is not None:
+            self._keep(session)
+            self._memory.save()
+        self._tell(session)
+
+    def _keep(self, session: RememberNeeds) -> None:
         memory = self._memory
-        if memory is None:
-            return
+        assert memory is not None
+        self._saved_s = time.perf_counter()
         if self._folder is not None and self._folder == _folder_of(session):
             memory.keep_view(self._folder, view_of(session))
         memory.ui_scale = self._ui.scale.chosen
         memory.layout = present_layout()
+        navigation = self._ui.navigation
+        memory.navigation, memory.is_motion_reduced = navigation.preset.name, navigation.is_motion_reduced
         memory.mark_size, memory.mark_opacity = session.overlays.mark_size, session.overlays.mark_opacity
         memory.time_unit, memory.folded_lanes = self._ui.timeline.unit, tuple(sorted(self._ui.timeline.folded))
-        memory.save()
-        self._tell(session, memory.failure, str(memory.path))
 
-    def _tell(self, session: RememberNeeds, failure: str, path: str) -> None:
+    def _tell(self, session: RememberNeeds) -> None:
         """Say once that nothing can be kept, for whatever file it was found out first."""
-        if not failure or self._has_told:
+        failed = next((file for file in (self._preferences, self._memory) if file is not None and file.failure), None)
+        if failed is None or self._has_told:
             return
         self._has_told = True
         session.notices.add(
             "warn",
             "Preferences cannot be kept",
-            f"{failure} - {path}",
+            f"{failed.failure} - {failed.path}",
             "The program goes on with them until you quit. Projects are not concerned.",
         )
 

@@ -8,16 +8,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.playback.views import Views
-from app.status import Overlays, TrainingStatus, WantedFrame
+from app.status import Overlays, QueueStatus, TrainingStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
 
 TIME, VIEW, COMPARE, MARK, TRAIN, WINDOW = "Time", "View", "Show and compare", "Mark regions", "Train", "Window"
-MODE = "View mode"
+NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
 class ActionNeeds(RegionsNeeds, Protocol):
@@ -33,6 +34,9 @@ class ActionNeeds(RegionsNeeds, Protocol):
     def views(self) -> Views: ...
 
     @property
+    def bookmarks(self) -> Bookmarks: ...
+
+    @property
     def overlays(self) -> Overlays: ...
 
     @property
@@ -40,6 +44,9 @@ class ActionNeeds(RegionsNeeds, Protocol):
 
     @property
     def training(self) -> TrainingStatus: ...
+
+    @property
+    def queue(self) -> QueueStatus: ...
 
     def wanted_frame(self) -> WantedFrame | None: ...
 
@@ -60,6 +67,7 @@ class Action:
         needs_capture: Ignored until a capture is open.
         needs_choosing: Ignored unless a region is being chosen.
         repeats: Holding the key repeats the action.
+        is_in_help: Shown on the help sheet; of a row of keys that do alike, one is enough there.
         is_on: Of what can be on or off, whether it is; menus show a tick.
         lacks: What it needs and is not there at present, as a sentence; empty when it can be run.
         menu: Title of the menu it stands in; empty for that of its group, see ui.panels.actions.menus.
@@ -76,6 +84,7 @@ class Action:
     is_on: Callable[[ActionNeeds], bool] | None = None
     lacks: Callable[[ActionNeeds], str] | None = None
     menu: str = ""
+    is_in_help: bool = True
 
     def is_offered(self, session: ActionNeeds, ui: UiState) -> bool:
         """Whether it can be run now."""
