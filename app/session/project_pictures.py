@@ -13,13 +13,14 @@ from app.playback.arrays import Picture
 from app.playback.frame_decoder import ShownFrame
 from app.playback.orbit_view import OrbitView
 from app.playback.render import Look, RenderRequest, render
+from app.playback.view_modes import PLAIN
 from app.project.opened_project import OpenedProject
 from app.project.project_picture import SIZE, picture_path, read_picture, write_picture
 from engine.kernels.cache import is_cache_warm
 
 logger = logging.getLogger(__name__)
 
-NO_KEY = (0, "", 0, "", 0)
+NO_KEY = (0, "", 0, "", PLAIN, 0)
 """Of the frame: nobody asks for this picture again."""
 CLOSE_S = 3.0
 """The last picture is waited for no longer than this."""

@@ -20,7 +20,7 @@ from ui.shell.fuzzy import match
 
 MOST_SHOWN = 200
 """Entries that are listed; who wants another one types more."""
-FOUND_BY_GROUP, CANNOT_BE_RUN = 2.0, 1.0
+FOUND_BY_GROUP, CANNOT_BE_RUN = 12.0, 1.0
 """By how much such entries give way to others that match as well."""
 
 
