@@ -177,7 +177,9 @@ class Frame:
         self._floating_panels: set[str] = set()
         self._in_front = [TIMELINE]  # a log in front of it would be a surprise
         self._dock_ids: dict[str, int] = {}
-        self._is_welcome = False
+        self._is_welcome = self._is_picture_only = False
+        self._visible_panels: set[str] = set()
+        self._shown_before: set[str] = set()
         self._panels: tuple[tuple[str, Callable[[FrameNeeds, Dispatch, UiState], None], bool], ...] = (
             (VIEWPORT, self.viewport.draw, False),
             (CAPTURE, self.capture.draw, True),
@@ -292,6 +294,12 @@ class Frame:
             self._in_front = [TRAINING, TIMELINE]  # of those that lie over each other; one in each frame
             lay_out(dock_id, layout or LAYOUTS[0])
             self._redraw.request(FIRST_FRAMES)
+        elif ui.is_picture_only != self._is_picture_only:
+            self._is_picture_only = ui.is_picture_only
+            if ui.is_picture_only:
+                self._shown_before = self._visible_panels.copy()
+            else:  # panels that lie over each other come back in the order that they had
+                self._in_front = [title for title, *_ in self._panels if title in self._shown_before]
         elif self._in_front and ui.wanted_panel is None and imgui.get_frame_count() > FRAMES_TO_DOCK:
             ui.wanted_panel = self._in_front.pop()
         elif (is_welcome := session.capture is None) != self._is_welcome and not self._in_front:
@@ -354,6 +362,7 @@ class Frame:
         if is_wanted and (self.ui.keyed_panel == title or (title == VIEWPORT and self._is_welcome)):
             imgui.internal.nav_init_window(imgui.internal.get_current_window(), True)
             imgui.set_nav_cursor_visible(True)
+        (self._visible_panels.add if is_visible else self._visible_panels.discard)(title)
         (self._floating_panels.discard if imgui.is_window_docked() else self._floating_panels.add)(title)
         if imgui.is_window_docked():
             self._dock_ids[title] = imgui.get_window_dock_id()

@@ -15,7 +15,7 @@ SIDE = (236.0, 0.0)
 SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: SIDE, REGIONS: SIDE, RESIDUALS: SIDE, TIMELINE: (0.0, 140.0)}
 """Width and height of docked panels, units. The timeline has its buttons, ruler and bands at this height."""
 SMALLEST_PICTURE = (300.0, 150.0)
-TALL_TIMELINE = 0.5
+TALL_TIMELINE = 0.4
 """Share of the height that the timeline has in the layout for long captures."""
 WIDE_UNITS = 1240.0
 """In a window narrower than this the panels at the sides begin narrower."""

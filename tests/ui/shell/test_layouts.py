@@ -31,7 +31,7 @@ def run(pilot: Pilot, typed: str) -> None:
 def test_layouts_of_the_program_are_shown(pilot: Pilot) -> None:
     usual = pilot.rects["timeline.track"]
     run(pilot, "layout tall timeline")
-    assert pilot.rects["timeline.track"].height > usual.height + 60
+    assert pilot.rects["timeline.track"].height > usual.height + 40
     run(pilot, "layout beginning")
     assert pilot.rects["timeline.track"].height == pytest.approx(usual.height, abs=2)
 
@@ -124,8 +124,8 @@ def test_f6_goes_from_panel_to_panel_and_escape_gives_the_keys_back(pilot: Pilot
 def test_a_click_gives_the_keys_back(pilot: Pilot) -> None:
     pilot.key(key.F6, modifiers=(SHIFT,))
     pilot.draw(2)
-    assert pilot.studio.frame.ui.keyed_panel == "Timeline"
-    pilot.click("timeline.play")
+    assert pilot.studio.frame.ui.keyed_panel == PANELS[-1]
+    pilot.click("capture.free")
     assert pilot.studio.frame.ui.keyed_panel is None
 
 
