@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from app.session.commands import ForgetRecent, OpenCapture
 from app.status import ProjectStatus
-from ui.panels.actions.action import COMPARE, MARK, TIME, VIEW, ActionNeeds
+from ui.panels.actions.action import COMPARE, MARK, PLAY, TIME, VIEW, ActionNeeds
 from ui.panels.actions.table import ACTIONS
 from ui.panels.actions.training import train_or_pause
 from ui.panels.actions.window import choose_scale
@@ -54,12 +54,14 @@ def draw_menu_bar(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
     if _begin_menu("View", ui):
         imgui.begin_disabled(not has_capture)
         _draw_rows((VIEW, COMPARE), session, dispatch, ui)
-        imgui.separator()
-        _draw_rows((TIME,), session, dispatch, ui, is_on_only=True)
         imgui.end_disabled()
         imgui.separator()
         _draw_scale_menu(ui)
         imgui.end_menu()
+    for title, group in (("Time", TIME), ("Play", PLAY)):
+        if _begin_menu(title, ui, is_enabled=has_capture):
+            _draw_rows((group,), session, dispatch, ui)
+            imgui.end_menu()
     if _begin_menu("Train", ui, is_enabled=has_capture):
         is_going = session.training.state in ("starting", "preparing", "running")
         label = f"{Icon.PAUSE}  Pause" if is_going else next_label(session)
@@ -94,12 +96,10 @@ def _item(ui: UiState, label: str, key_label: str = "", *, is_on: bool = False) 
     return is_chosen
 
 
-def _draw_rows(
-    groups: tuple[str, ...], session: MenuNeeds, dispatch: Dispatch, ui: UiState, *, is_on_only: bool = False
-) -> None:
-    """Rows of the table of actions. is_on_only: Those only that can be on or off."""
+def _draw_rows(groups: tuple[str, ...], session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """Rows of the table of actions."""
     for action in ACTIONS:
-        if action.group not in groups or (is_on_only and action.is_on is None):
+        if action.group not in groups:
             continue
         if action.needs_choosing and not ui.regions.is_active:
             continue
