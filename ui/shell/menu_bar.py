@@ -53,12 +53,12 @@ def draw_menu_bar(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
         imgui.end_menu()
     if _begin_menu("View", ui):
         imgui.begin_disabled(not has_capture)
-        _draw_rows((VIEW, COMPARE), session, dispatch, ui)
+        _draw_rows((VIEW,), session, dispatch, ui)
         imgui.end_disabled()
         imgui.separator()
         _draw_scale_menu(ui)
         imgui.end_menu()
-    for title, group in (("Time", TIME), ("Play", PLAY)):
+    for title, group in (("Show", COMPARE), ("Time", TIME), ("Play", PLAY)):
         if _begin_menu(title, ui, is_enabled=has_capture):
             _draw_rows((group,), session, dispatch, ui)
             imgui.end_menu()
