@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from app.session.commands import ForgetRecent, OpenCapture
 from app.status import ProjectStatus
-from ui.panels.actions.action import COMPARE, MARK, PLAY, TIME, VIEW, ActionNeeds
+from ui.panels.actions.action import BOOKMARKS, COMPARE, MARK, NAVIGATE, PLAY, TIME, TRAIN, VIEW, ActionNeeds
 from ui.panels.actions.table import ACTIONS
 from ui.panels.actions.training import train_or_pause
 from ui.panels.actions.window import choose_scale
@@ -54,6 +54,12 @@ def draw_menu_bar(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
     if _begin_menu("View", ui):
         imgui.begin_disabled(not has_capture)
         _draw_rows((VIEW,), session, dispatch, ui)
+        for group in (NAVIGATE, BOOKMARKS):
+            if imgui.begin_menu(group):
+                _draw_rows((group,), session, dispatch, ui)
+                imgui.end_menu()
+            else:
+                ui.mark(f"menu.{group}")
         imgui.end_disabled()
         imgui.separator()
         _draw_scale_menu(ui)
@@ -69,6 +75,7 @@ def draw_menu_bar(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
             label = f"{Icon.PLAY}  Resume"
         if _item(ui, label, "T"):
             train_or_pause(session, dispatch)
+        _draw_rows((TRAIN,), session, dispatch, ui, without=("train.next", "train.quality"))
         imgui.end_menu()
     if _begin_menu("Mark", ui, is_enabled=has_capture):
         _draw_rows((MARK,), session, dispatch, ui)
@@ -96,10 +103,17 @@ def _item(ui: UiState, label: str, key_label: str = "", *, is_on: bool = False) 
     return is_chosen
 
 
-def _draw_rows(groups: tuple[str, ...], session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    """Rows of the table of actions."""
+def _draw_rows(
+    groups: tuple[str, ...],
+    session: MenuNeeds,
+    dispatch: Dispatch,
+    ui: UiState,
+    *,
+    without: tuple[str, ...] = (),
+) -> None:
+    """Rows of the table of actions. without: Ids of those that stand elsewhere."""
     for action in ACTIONS:
-        if action.group not in groups:
+        if action.group not in groups or action.id in without:
             continue
         if action.needs_choosing and not ui.regions.is_active:
             continue
