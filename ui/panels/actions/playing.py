@@ -89,8 +89,8 @@ ACTIONS = (
         is_on=lambda session: session.timeline.around is not None,
     ),
     Action("timeline.fit", "Timeline: the whole capture, or this clip", PLAY, _toggle_fit, keys=("Z",)),
-    Action("timeline.closer", "Timeline: closer", PLAY, _zoom_by(1), keys=("Ctrl+Page Up",), repeats=True),
-    Action("timeline.farther", "Timeline: farther", PLAY, _zoom_by(-1), keys=("Ctrl+Page Down",), repeats=True),
+    Action("timeline.closer", "Timeline: closer", PLAY, _zoom_by(1), keys=("Alt+Page Up",), repeats=True),
+    Action("timeline.farther", "Timeline: farther", PLAY, _zoom_by(-1), keys=("Alt+Page Down",), repeats=True),
     Action(
         "timeline.earlier", "Timeline: show what is before", PLAY, _pan_by(-1), keys=("Shift+Page Up",), repeats=True
     ),
