@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from app.session.commands import ForgetRecent, OpenCapture
 from app.status import ProjectStatus
-from ui.panels.actions.action import COMPARE, MARK, TIME, VIEW, ActionNeeds
+from ui.panels.actions.action import BOOKMARKS, COMPARE, MARK, NAVIGATE, TIME, TRAIN, VIEW, ActionNeeds
 from ui.panels.actions.table import ACTIONS
 from ui.panels.actions.training import train_or_pause
 from ui.panels.actions.window import choose_scale
@@ -53,7 +53,15 @@ def draw_menu_bar(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
         imgui.end_menu()
     if _begin_menu("View", ui):
         imgui.begin_disabled(not has_capture)
-        _draw_rows((VIEW, COMPARE), session, dispatch, ui)
+        _draw_rows((VIEW,), session, dispatch, ui)
+        for group in (NAVIGATE, BOOKMARKS):
+            if imgui.begin_menu(group):
+                _draw_rows((group,), session, dispatch, ui)
+                imgui.end_menu()
+            else:
+                ui.mark(f"menu.{group}")
+        imgui.separator()
+        _draw_rows((COMPARE,), session, dispatch, ui)
         imgui.separator()
         _draw_rows((TIME,), session, dispatch, ui, is_on_only=True)
         imgui.end_disabled()
@@ -67,6 +75,7 @@ def draw_menu_bar(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
             label = f"{Icon.PLAY}  Resume"
         if _item(ui, label, "T"):
             train_or_pause(session, dispatch)
+        _draw_rows((TRAIN,), session, dispatch, ui, without=("train.next", "train.quality"))
         imgui.end_menu()
     if _begin_menu("Mark", ui, is_enabled=has_capture):
         _draw_rows((MARK,), session, dispatch, ui)
@@ -95,10 +104,19 @@ def _item(ui: UiState, label: str, key_label: str = "", *, is_on: bool = False) 
 
 
 def _draw_rows(
-    groups: tuple[str, ...], session: MenuNeeds, dispatch: Dispatch, ui: UiState, *, is_on_only: bool = False
+    groups: tuple[str, ...],
+    session: MenuNeeds,
+    dispatch: Dispatch,
+    ui: UiState,
+    *,
+    is_on_only: bool = False,
+    without: tuple[str, ...] = (),
 ) -> None:
-    """Rows of the table of actions. is_on_only: Those only that can be on or off."""
+    """Rows of the table of actions. is_on_only: Those only that can be on or off. without: Ids of those that stand
+    elsewhere."""
     for action in ACTIONS:
+        if action.id in without:
+            continue
         if action.group not in groups or (is_on_only and action.is_on is None):
             continue
         if action.needs_choosing and not ui.regions.is_active:

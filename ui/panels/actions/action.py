@@ -9,17 +9,18 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
+from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.playback.views import Views
-from app.status import Overlays, TrainingStatus, WantedFrame
+from app.status import Overlays, QueueStatus, TrainingStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from ui.panels.actions.key import Key, parse_key
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
 
 TIME, VIEW, COMPARE, MARK, TRAIN, WINDOW = "Time", "View", "Show and compare", "Mark regions", "Train", "Window"
-MODE = "View mode"
+NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
 class ActionNeeds(RegionsNeeds, Protocol):
@@ -35,6 +36,9 @@ class ActionNeeds(RegionsNeeds, Protocol):
     def views(self) -> Views: ...
 
     @property
+    def bookmarks(self) -> Bookmarks: ...
+
+    @property
     def overlays(self) -> Overlays: ...
 
     @property
@@ -42,6 +46,9 @@ class ActionNeeds(RegionsNeeds, Protocol):
 
     @property
     def training(self) -> TrainingStatus: ...
+
+    @property
+    def queue(self) -> QueueStatus: ...
 
     def wanted_frame(self) -> WantedFrame | None: ...
 
@@ -61,6 +68,7 @@ class Action:
         needs_capture: Ignored until a capture is open.
         needs_choosing: Ignored unless a region is being chosen.
         repeats: Holding the key repeats the action.
+        is_in_help: Shown on the help sheet; of a row of keys that do alike, one is enough there.
         is_on: Of what can be on or off, whether it is; menus show a tick.
     """
 
@@ -73,6 +81,7 @@ class Action:
     needs_choosing: bool = False
     repeats: bool = False
     is_on: Callable[[ActionNeeds], bool] | None = None
+    is_in_help: bool = True
 
     @cached_property
     def parsed_keys(self) -> tuple[Key, ...]:
