@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import pytest
 
-from app.plan.sequence import ClipForecast, clip_forecast, sequence_forecast
+from app.plan.sequence import ClipForecast, clip_forecast, sequence_forecast, together
 from app.project.clip_catalog import ClipRecord
 from app.project.clip_versions import version_path
 from app.session import commands as c
 from app.session.questions import RetrainQuestion, SettingsQuestion
 from app.session.session import Session
 from app.session.settings import Settings
+from app.status import SequenceForecast
 from app.training.service import TrainingService
 from engine.clip_files.clip_state import read_clip_state
 from tests.app.conftest import poll_until
@@ -101,10 +102,10 @@ def test_a_stopped_clip_counts_with_what_is_left_of_it() -> None:
     assert clip_forecast(plan, stopped, begins_afresh=True) == ClipForecast(100, 45.0, 2.0)
     unknown = clip_forecast(replace(plan, training_s=line(None)), ClipRecord())
     assert unknown == ClipForecast(100, None, 2.0)
-    together = sequence_forecast([ClipForecast(100, 45.0, 2.0), unknown])
-    assert together is not None
-    assert (together.n_clips, together.n_steps, together.seconds, together.disk_mb) == (2, 200, None, 4.0)
-    assert sequence_forecast([]) is None
+    going, later = [ClipForecast(100, 45.0, 2.0)], together([unknown, ClipForecast(50, 5.0, 1.0)])
+    assert sequence_forecast(going, later) == SequenceForecast(3, 250, None, 5.0)
+    assert sequence_forecast(going, together([])) == SequenceForecast(1, 100, 45.0, 2.0)
+    assert sequence_forecast([], together([])) is None
 
 
 def test_waiting_clips_are_reordered_taken_out_and_held(session: Session) -> None:
