@@ -93,6 +93,7 @@ class Icon:
     LAYERS = "\uf5fd"
     COLUMNS = "\uf0db"
     EYE = "\uf06e"
+    SQUARE = "\uf0c8"
     HELP = "\uf059"
     FILM = "\uf008"
     DROP = "\uf019"

@@ -375,7 +375,7 @@ def test_a_thousand_clips_are_drawn_with_few_pieces_at_every_zoom(
     track = pilot.rects["timeline.track"]
     bands = [rect for name, rect in pilot.rects.items() if name.startswith("timeline.clip")]
     marks = [name for name in pilot.rects if name.startswith("timeline.seam")]
-    assert 1 < len(bands) <= track.width / 2 + 2
+    assert 1 < len(bands) <= track.width / 3 + 2
     assert len(marks) <= track.width / 9 + 2
     assert all(band.x1 > track.x0 - 4 and band.x0 < track.x1 + 4 for band in bands), "nothing out of sight is drawn"
     assert len(session.notices) == 0
