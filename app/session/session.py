@@ -15,6 +15,7 @@ from app.background.jobs import Jobs
 from app.background.log_reader import LogLine, LogView
 from app.background.usage import UsageMeter
 from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
+from app.playback.bookmarks import Bookmarks
 from app.playback.coverage import Coverage
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
@@ -72,7 +73,7 @@ class Session:
 
     Attributes:
         opened: What is open; None before.
-        timeline, views: What the user looks at; the window may change them directly.
+        timeline, views, bookmarks: What the user looks at; the window may change them directly.
         training, queue, clip_states, plan, regions, usage, project_status: Status values, remade by `poll` and
             `dispatch`. The plan is that of the next clip; None while something trains or nothing is left to train.
         versions: What clips were before they were trained again.
@@ -102,6 +103,7 @@ class Session:
     ) -> None:
         self.opened: OpenedProject | None = None
         self.timeline, self.views = Timeline(), Views()
+        self.bookmarks = Bookmarks()
         self.notices = Notices()
         self.question: Question | None = None
         self.training = TrainingStatus()
@@ -321,6 +323,7 @@ class Session:
         self.versions.open(opened)
         self._open_residuals(opened)
         self.views.look_at(opened.rig)
+        self.bookmarks = Bookmarks()
         self._keep_recent()
         for sentence in opened.capture.warnings:
             self.notices.add("warn", "The capture is odd but usable", sentence)

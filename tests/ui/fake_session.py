@@ -13,10 +13,11 @@ import numpy as np
 
 from app.background.log_reader import LogLine
 from app.playback.arrays import AnchorArrays, Picture, PointArrays
+from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
-from app.playback.view_modes import ShownAs
+from app.playback.view_modes import MODES, ShownAs
 from app.playback.views import Views
 from app.project.recents import RecentProject
 from app.residuals.anchor_heat import AnchorHeat
@@ -145,6 +146,7 @@ class FakeSession:
         self.cached: list[tuple[int, int]] = []  # what cached_frames answers
         self.project = None
         self.timeline, self.views = Timeline(), Views()
+        self.bookmarks = Bookmarks()
         if has_capture:
             self._open(FakeCapture(make_rig()))
 
@@ -305,11 +307,12 @@ class FakeSession:
             revision="trained" if is_trained else "",
             camera_index=self.view.look_through,
             look=self.view.look_key,
+            shown_as=ShownAs(self.overlays.mode, self.overlays.content).label,
             is_loaded=is_trained,
         )
 
     def request_render(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
-        """A gradient that depends on the frame, for trained clips."""
+        """A gradient, for trained clips; where colours stand for numbers, those grow from 0 at the left to 1."""
         if not self._is_trained():
             return None
         self.n_renders += 1
@@ -321,20 +324,26 @@ class FakeSession:
         frame_index = self.timeline.frame_index
         clip = self.timeline.clip_of(frame_index)
         assert clip is not None
+        shown_as = ShownAs(self.overlays.mode, self.overlays.content)
+        has_values = bool(MODES[shown_as.mode].map_name)
         return Picture(
             image,
-            key=(frame_index, width, height, matrix.tobytes()),
+            key=(frame_index, width, height, matrix.tobytes(), shown_as),
+            values=np.tile(np.linspace(0, 1, width, dtype=np.float32), (height, 1)) if has_values else None,
             source=PictureSource(
                 clip.clip_index,
                 frame_index,
                 "trained",
                 camera_index=self.view.look_through,
                 look=self.view.look_key,
+                shown_as=shown_as,
             ),
         )
 
     def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
-        """The same in green."""
+        """The same in green, in the mode that is compared with; None for a captured picture."""
+        if self.overlays.compare_with not in MODES:
+            return None
         picture = self.request_render(width, height, full_size=full_size)
         if picture is None:
             return None

@@ -123,7 +123,7 @@ ACTIONS = (
     Action("train.settings", "Train this clip with other settings", TRAIN, _ask_settings),
     Action("train.stop", "Stop training and keep what was learned", TRAIN, _stop_training, keys=("Ctrl+T",)),
     Action("train.hold_after", "Hold the queue after this clip, or not", TRAIN, _hold_after, keys=("Ctrl+Shift+T",)),
-    Action("queue.next", "Choose the next waiting clip", TRAIN, _next_waiting, keys=("Shift+Q",)),
+    Action("queue.next", "Choose the next waiting clip", TRAIN, _next_waiting, keys=("Shift+N",)),
     Action("queue.earlier", "Chosen waiting clip earlier", TRAIN, _move_waiting(-1), keys=("Ctrl+Shift+Up",)),
     Action("queue.later", "Chosen waiting clip later", TRAIN, _move_waiting(1), keys=("Ctrl+Shift+Down",)),
     Action("queue.remove", "Take the chosen clip out of the queue", TRAIN, _remove_waiting, keys=("Ctrl+Delete",)),
