@@ -5,17 +5,19 @@ Every command is recorded in `commands`; those that only change what is shown ar
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from app.background.log_reader import LogLine
 from app.playback.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
-from app.playback.view_modes import ShownAs
+from app.playback.view_modes import MODES, ShownAs
 from app.playback.views import Views
 from app.project.recents import RecentProject
 from app.residuals.anchor_heat import AnchorHeat
@@ -31,11 +33,14 @@ from app.status import (
     Overlays,
     PlanStatus,
     ProjectStatus,
+    QueueStatus,
     RegionsStatus,
     ResidualStatus,
     SeamStatus,
     SettingStatus,
     TrainingStatus,
+    UsageStatus,
+    VersionStatus,
     WantedFrame,
 )
 from engine.camera.rig import NO_CAMERAS, CameraRig
@@ -100,6 +105,11 @@ class FakeSession:
         )
         self.project_status: ProjectStatus | None = None
         self.question: Question | None = None
+        self.queue = QueueStatus()
+        self.usage = UsageStatus(window_mb=412.0, window_cores=0.1, n_cores=2)
+        self.versions: dict[int, tuple[VersionStatus, ...]] = {}
+        self.curves: dict[int, tuple[list[tuple[int, float]], list[tuple[int, float]]]] = {}
+        self.lines: tuple[LogLine, ...] = ()
         self.training = TrainingStatus(can_train_next=True, next_clip_index=0)
         self.plan: PlanStatus | None = PlanStatus(
             clip_index=0,
@@ -263,6 +273,22 @@ class FakeSession:
         """Remember that the window asked."""
         self.is_closed = True
 
+    # ---- trainings and their files ---------------------------------------------------------------------------
+
+    def clip_curves(self, clip_index: int) -> tuple[Sequence[tuple[int, float]], Sequence[tuple[int, float]]]:
+        """What a test put there; for the clip of the status its histories."""
+        if clip_index == self.training.curve_clip_index:
+            return self.training.loss_history, self.training.psnr_history
+        return self.curves.get(clip_index, ([], []))
+
+    def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]:
+        """What a test put there."""
+        return self.versions.get(clip_index, ())
+
+    def log_lines(self) -> tuple[LogLine, ...]:
+        """What a test put there."""
+        return self.lines
+
     # ---- pictures --------------------------------------------------------------------------------------------
 
     def _is_trained(self) -> bool:
@@ -281,11 +307,12 @@ class FakeSession:
             revision="trained" if is_trained else "",
             camera_index=self.view.look_through,
             look=self.view.look_key,
+            shown_as=ShownAs(self.overlays.mode, self.overlays.content).label,
             is_loaded=is_trained,
         )
 
     def request_render(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
-        """A gradient that depends on the frame, for trained clips."""
+        """A gradient, for trained clips; where colours stand for numbers, those grow from 0 at the left to 1."""
         if not self._is_trained():
             return None
         self.n_renders += 1
@@ -297,20 +324,26 @@ class FakeSession:
         frame_index = self.timeline.frame_index
         clip = self.timeline.clip_of(frame_index)
         assert clip is not None
+        shown_as = ShownAs(self.overlays.mode, self.overlays.content)
+        has_values = bool(MODES[shown_as.mode].map_name)
         return Picture(
             image,
-            key=(frame_index, width, height, matrix.tobytes()),
+            key=(frame_index, width, height, matrix.tobytes(), shown_as),
+            values=np.tile(np.linspace(0, 1, width, dtype=np.float32), (height, 1)) if has_values else None,
             source=PictureSource(
                 clip.clip_index,
                 frame_index,
                 "trained",
                 camera_index=self.view.look_through,
                 look=self.view.look_key,
+                shown_as=shown_as,
             ),
         )
 
     def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
-        """The same in green."""
+        """The same in green, in the mode that is compared with; None for a captured picture."""
+        if self.overlays.compare_with not in MODES:
+            return None
         picture = self.request_render(width, height, full_size=full_size)
         if picture is None:
             return None

@@ -93,6 +93,7 @@ class Icon:
     LAYERS = "\uf5fd"
     COLUMNS = "\uf0db"
     EYE = "\uf06e"
+    SQUARE = "\uf0c8"
     HELP = "\uf059"
     FILM = "\uf008"
     DROP = "\uf019"
@@ -103,6 +104,9 @@ class Icon:
     CLOCK_BACK = "\uf1da"
     BROKEN = "\uf127"
     COMPASS = "\uf14e"
+    UP = "\uf062"
+    DOWN = "\uf063"
+    LOG = "\uf15c"
 
 
 CLIP_ICONS: dict[str, str] = {

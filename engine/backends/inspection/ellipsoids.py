@@ -67,7 +67,8 @@ def ellipsoids(
 def _bodies(gaussians: Gaussians, view: PinholeView) -> np.ndarray:
     """Rows that have a body beyond the near plane. [R] int64"""
     means, quats, scales, opacities, colors = (tensor.numpy() for tensor in gaussians.tensors())
-    depths = means @ view.rotation[2].astype(np.float32) + np.float32(view.translation[2])
+    with np.errstate(invalid="ignore"):  # rows that are not finite are left out below
+        depths = means @ view.rotation[2].astype(np.float32) + np.float32(view.translation[2])
     longest = np.max(scales, axis=1, initial=0.0)
     is_finite = (np.abs(means) < VALUE_MAX).all(axis=1) & (np.abs(colors) < VALUE_MAX).all(axis=1)
     is_turned = (quats * quats).sum(axis=1) > QUAT_NORM_SQUARED_MIN

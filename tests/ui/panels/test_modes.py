@@ -1,0 +1,179 @@
+"""Modes and comparisons in the window: keys, boxes, bars, blinking and the held key. The session is a stand-in."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from pyglet.window import key
+
+import ui.panels.comparison as comparison
+from app.playback.view_modes import CONTENTS, MODES
+from app.session.commands import LookThrough, SetCompare, SetCompareWith, SetContent, SetMode
+from app.status import BLINK_HZ, CAPTURED, ClipStatus, Overlays
+from tests.ui.fake_session import FakeSession
+from tests.ui.pilot import SHIFT, Pilot
+from ui.panels.actions.table import ACTIONS
+from ui.panels.color_bar import bar_number
+from ui.panels.comparison import covered_share, kind_words, other_label
+from ui.panels.state import UiState
+
+DIGITS = (key._1, key._2, key._3, key._4, key._5, key._6, key._7, key._8, key._9)
+
+
+@pytest.fixture
+def trained(open_pilot: Callable[..., Pilot]) -> Pilot:
+    """A window on a clip that is trained."""
+    session = FakeSession()
+    session.clip_states[0] = ClipStatus(state="trained")
+    return open_pilot(session)
+
+
+def test_every_mode_has_a_key_of_its_own_and_leaves_the_others_theirs(trained: Pilot) -> None:
+    for digit in DIGITS[: len(MODES)]:
+        trained.key(digit, modifiers=(SHIFT,))
+    assert [command.mode for command in trained.sent(SetMode)] == list(MODES)
+    assert trained.session.overlays.show_frusta, "1 alone shows and hides cameras"
+
+
+def test_every_mode_and_part_can_be_reached_from_the_table_of_actions() -> None:
+    ids = {action.id for action in ACTIONS}
+    assert {f"mode.{name}" for name in MODES} | {f"content.{name}" for name in CONTENTS} <= ids
+    assert {f"compare.with_{name}" for name in (CAPTURED, *MODES)} <= ids
+
+
+def test_the_box_of_modes_sets_mode_and_part(trained: Pilot) -> None:
+    for name, kind in (("viewport.mode.normals", SetMode), ("viewport.content.f_s", SetContent)):
+        trained.click("viewport.mode")
+        trained.draw(3)
+        trained.click(name)
+        assert len(trained.sent(kind)) == 1
+    trained.draw(2)
+    assert trained.studio.frame.viewport.hud.text.label.endswith("f_s only, Normals")
+
+
+@pytest.mark.parametrize("size", [(900, 600), (1280, 800), (1920, 1000)])
+@pytest.mark.parametrize("n_views", [1, 4])
+def test_the_toolbar_fits(size: tuple[int, int], n_views: int, open_pilot: Callable[..., Pilot]) -> None:
+    session = FakeSession()
+    session.views.show(n_views)
+    pilot = open_pilot(session, size=size)
+    canvas = pilot.rects["viewport.view0" if n_views == 1 else "viewport.view1"]
+    names = ["viewport.camera", "viewport.mode", "viewport.overlays", "viewport.mark"]
+    boxes = [pilot.rects[name] for name in names]
+    assert boxes[-1].x1 <= canvas.x1 + 1
+    for left, right in itertools.pairwise(boxes):
+        assert left.x1 <= right.x0
+    assert all(box.width >= 28 for box in boxes)
+
+
+def test_a_bar_says_what_colours_mean_and_the_value_under_the_pointer(
+    trained: Pilot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    values: list[float | None] = []
+    monkeypatch.setattr("ui.panels.hud.draw_color_bar", lambda *arguments: values.append(arguments[-1]))
+    assert "viewport.color_bar" not in trained.rects
+    trained.key(DIGITS[1], modifiers=(SHIFT,))
+    pane = trained.rects["viewport.rendered"]
+    for share in (0.25, 0.75):
+        trained.move(pane.x0 + share * pane.width, pane.y0 + 0.4 * pane.height)
+        trained.draw(2)
+        assert values[-1] == pytest.approx(share, abs=0.01)
+    trained.move(*trained.rects["viewport.mode"].center)
+    trained.draw(2)
+    assert values[-1] is None
+    assert trained.rects["viewport.color_bar"].x1 <= pane.x1
+
+
+def test_comparing_with_a_mode_needs_no_camera(trained: Pilot) -> None:
+    session = trained.session
+    session.dispatch(SetCompareWith("depth"))
+    before = trained.picture()
+    session.dispatch(SetCompare("wipe"))
+    trained.draw(3)
+    assert trained.sent(LookThrough) == []
+    pane = trained.rects["viewport.rendered"]
+    x, y = int(pane.x0 + 0.25 * pane.width), int(pane.center[1])
+    shown, right = trained.picture(), int(pane.x0 + 0.75 * pane.width)
+    assert shown[y, x, 0] == shown[y, x, 2] == 0, "the other picture is green"
+    np.testing.assert_array_equal(shown[y, right], before[y, right])
+    session.dispatch(SetCompare("side"))
+    trained.draw(3)
+    assert trained.rects["viewport.rendered"].width < 0.55 * pane.width
+
+
+def test_a_captured_picture_still_takes_the_nearest_camera(trained: Pilot) -> None:
+    trained.session.dispatch(SetCompareWith(CAPTURED))
+    trained.key(key.G)
+    assert len(trained.sent(LookThrough)) == 1
+
+
+def test_while_b_is_held_the_other_picture_is_seen_alone(trained: Pilot) -> None:
+    trained.session.dispatch(SetCompareWith("depth"))
+    trained.draw(2)
+    pane = trained.rects["viewport.rendered"]
+    at = int(pane.center[1]), int(pane.x0 + 0.75 * pane.width)
+    assert trained.picture()[at][0] > 0
+    trained.studio.window.dispatch_event("on_key_press", key.B, 0)
+    trained.draw(3)
+    assert trained.picture()[at][0] == 0
+    trained.studio.window.dispatch_event("on_key_release", key.B, 0)
+    trained.draw(3)
+    assert trained.picture()[at][0] > 0
+
+
+class Compared:
+    """As much of a session as a comparison asks for."""
+
+    def __init__(self, **overlays: object) -> None:
+        self.overlays, self.view = Overlays(**overlays), None  # type: ignore[arg-type]
+
+
+def test_blinking_shows_each_picture_for_as_long_and_never_faster_than_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    for hz in BLINK_HZ:
+        session, seen = Compared(compare="blink", blink_hz=hz), []
+        for step in range(1000):
+            ui = UiState()
+            now_s = step / 100.0
+            monkeypatch.setattr(comparison.time, "perf_counter", lambda now_s=now_s: now_s)
+            seen.append(covered_share(session, ui, is_held=False))  # type: ignore[arg-type]
+            assert ui.redraw_in_s is not None
+            assert 0.0 < ui.redraw_in_s <= 0.5 / hz + 1e-9
+        changes = int((np.diff(seen) != 0).sum())
+        assert set(seen) == {0.0, 1.0}
+        assert changes == pytest.approx(20 * hz, abs=1), "two changes a cycle, in ten seconds"
+    assert BLINK_HZ[1] <= 3.0
+    assert Overlays().blink_hz <= 3.0
+
+
+def test_a_held_key_covers_everything_and_a_wipe_its_share() -> None:
+    session, ui = Compared(compare="wipe", wipe_position=0.3), UiState()
+    assert covered_share(session, ui, is_held=False) == 0.3  # type: ignore[arg-type]
+    assert covered_share(session, ui, is_held=True) == 1.0  # type: ignore[arg-type]
+    assert ui.redraw_in_s is None
+
+
+def test_names_of_the_two_pictures() -> None:
+    assert kind_words("Rendered", "Depth") == "Rendered, depth"
+    assert kind_words("Rendered", "") == "Rendered"
+    assert kind_words("Point cloud", "Depth") == "Point cloud"
+    assert other_label(Overlays()) == "Captured picture"
+    assert other_label(Overlays(compare_with="color")) == "Own colours"
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "high", "text"),
+    [
+        (0.0, 0.0, 5.8, "0"),
+        (5.8, 0.0, 5.8, "5.8"),
+        (1.234567, 0.0, 5.8, "1.23"),
+        (-0.00001, -0.5, 0.5, "0"),
+        (100.0, 0.0, 100.0, "100"),
+        (37.4, 0.0, 1000.0, "37"),
+        (0.00012, 0.0, 0.0005, "0.00012"),
+    ],
+)
+def test_numbers_of_a_bar_are_short_and_tell_steps_apart(value: float, low: float, high: float, text: str) -> None:
+    assert bar_number(value, low, high) == text
