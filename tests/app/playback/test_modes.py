@@ -136,7 +136,7 @@ def test_colours_of_births_and_changes(shown: ShownFrame) -> None:
     for birth, hue in enumerate(BIRTH_HUES):
         colors = births.colors[shown.gaussians.births == birth]
         assert len(colors)
-        np.testing.assert_allclose(colors, np.broadcast_to(np.float32(hue), colors.shape), rtol=1e-6)
+        np.testing.assert_allclose(colors, np.broadcast_to(np.array(hue, np.float32), colors.shape), rtol=1e-6)
     is_new = np.isnan(shown.gaussians.changes)
     np.testing.assert_allclose(
         changes.colors[is_new] * 255, np.tile(np.array(hues.SKY) * 255, (is_new.sum(), 1)), atol=0.6
