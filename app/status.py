@@ -278,7 +278,7 @@ SEAM_RANGE = (0.0, 1.0)
 SEAM_FLAGGED = 0.3
 """Scores above it are pointed out."""
 SEAM_RATIO_RANGE = (1.0, 3.0)
-"""What the colours of seam ratios span: 1 is no seam; inheriting clips have 1.0 to 1.4, others 10 and more."""
+"""What the colours of seam ratios span: at 1 nothing shows; inheriting clips have 1.0 to 1.4, others 10 and more."""
 SEAM_RATIO_FLAGGED = 2.0
 """Ratios above it are pointed out."""
 
@@ -292,8 +292,8 @@ class SeamStatus:
         frame_index: Its first frame.
         score: Excess flicker of static pixels there, less what is normal inside the two clips, in 1/255, a mean over
             cameras: see engine.metrics.clips.seams. None where no camera was measured in both clips.
-        ratio: Change of static pixels there / inside the two clips, over all cameras; 1 is no seam. None where nothing
-            changes inside, or nothing was measured.
+        ratio: Change of static pixels there / inside the two clips, over all cameras; 1 where nothing shows. None where
+            nothing changes inside, or nothing was measured.
         n_cameras: Cameras behind the score.
         worst_camera: The camera with the highest score; None without one.
     """

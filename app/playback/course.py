@@ -35,15 +35,15 @@ class Course:
     @classmethod
     def of(cls, timeline: Timeline) -> Course:
         """As the timeline says."""
-        first, last = getattr(timeline, "play_range", (0, timeline.last_frame))
+        first, last = timeline.play_range
         return cls(
             frame_index=timeline.frame_index,
-            direction=-1 if getattr(timeline, "direction", 1) < 0 else 1,
+            direction=timeline.direction,
             first=first,
             last=last,
-            is_looping=timeline.is_looping or getattr(timeline, "around", None) is not None,
+            is_looping=timeline.is_looping or timeline.around is not None,
             is_playing=timeline.is_playing,
-            frames_per_s=timeline.fps * getattr(timeline, "speed", 1.0),
+            frames_per_s=timeline.fps * timeline.speed,
         )
 
     @property

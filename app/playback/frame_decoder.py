@@ -147,6 +147,7 @@ class FrameDecoder:
         self._cache: ByteCache[FrameKey, ShownFrame] = ByteCache(cache_bytes)
         self._models: OrderedDict[ModelKey, LoadedClip] = OrderedDict()
         self._files = ClipFiles()
+        self._loading: ModelKey | None = None
         self._last: ShownFrame | None = None
         self._frame_bytes = 0  # of the newest one
         self.worker: LatestWorker[FrameRequest, ShownFrame] = LatestWorker(
@@ -219,6 +220,10 @@ class FrameDecoder:
         """The clip of a request if it is in memory. May be asked on any thread."""
         return self._models.get(request.model_key)
 
+    def is_loading(self, request: FrameRequest) -> bool:
+        """Whether the clip of a request is being read right now. May be asked on any thread."""
+        return self._loading == request.model_key
+
     def is_loaded(self, request: FrameRequest) -> bool:
         """Whether the file of this state is not needed any more."""
         return request.model_key in self._models
@@ -285,7 +290,11 @@ class FrameDecoder:
         if identity in models:
             models.move_to_end(identity)
             return models[identity]
-        loaded = self._files.read(request)
+        self._loading = identity
+        try:
+            loaded = self._files.read(request)
+        finally:
+            self._loading = None
         if not self.worker.is_still_wanted:
             return loaded
         # another revision of the same file is worthless now; another file may be a version that it is compared with

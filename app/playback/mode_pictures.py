@@ -4,6 +4,7 @@ map on a range that stays the same over time. Runs on the thread that draws.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,7 +24,7 @@ EDGE_SHARE = 0.03
 
 
 def mode_picture(
-    mode: str, gaussians: Gaussians, view: PinholeView, value_range: tuple[float, float]
+    mode: str, gaussians: Gaussians, view: PinholeView, value_range: tuple[float, float], set_back: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """A picture in one of the modes with `is_picture`.
 
@@ -31,6 +32,7 @@ def mode_picture(
         mode: Its name.
         gaussians: What is drawn; rows that cannot be drawn are left out.
         value_range: From app.playback.view_modes.range_of.
+        set_back: How much farther away the camera stands than it seems to, which depths leave out. Scene units
     Returns:
         image: [H, W, 3] uint8
         values: What its colours stand for, NaN where nothing is; None where they stand for no number. [H, W] float32
@@ -39,14 +41,14 @@ def mode_picture(
     """
     match mode:
         case "depth":
-            depth, opacity = _depth_and_opacity(gaussians, view)
+            depth, opacity = _depth_and_opacity(gaussians, view, set_back)
             return _over_background(mapped(depth, MODES[mode].map_name, *value_range), opacity, depth), depth
         case "opacity":
-            _, opacity = _depth_and_opacity(gaussians, view)
+            _, opacity = _depth_and_opacity(gaussians, view, set_back)
             return mapped(opacity, MODES[mode].map_name, *value_range), opacity
         case "normals":
-            depth, opacity = _depth_and_opacity(gaussians, view)
-            normals = normals_of(depth, view)
+            depth, opacity = _depth_and_opacity(gaussians, view, set_back)
+            normals = normals_of(depth, view, set_back)
             colors = 255.0 * (0.5 + 0.5 * np.nan_to_num(normals) * (1.0, 1.0, -1.0))
             return _over_background(colors, opacity, normals[..., 2]), None
         case "overdraw":
@@ -64,19 +66,27 @@ def mode_picture(
             raise ValueError(f"{mode!r} is not a mode that is a picture of numbers")
 
 
-def _depth_and_opacity(gaussians: Gaussians, view: PinholeView) -> tuple[np.ndarray, np.ndarray]:
+def _depth_and_opacity(gaussians: Gaussians, view: PinholeView, set_back: float) -> tuple[np.ndarray, np.ndarray]:
     """Depth, NaN where next to nothing is, and opacity. [H, W] float32 each"""
     import torch
 
     from engine.backends.table import backend_called
 
+    if set_back > 0.0:  # depths from so far away are too coarse in float32: what is left of them is drawn as colours
+        depths = gaussians.means.numpy() @ view.rotation[2] + (view.translation[2] - set_back)
+        colors = torch.from_numpy(np.repeat(depths[:, None], 3, axis=1).astype(np.float32))
+        gaussians = replace(gaussians, colors=colors)
     with torch.no_grad():
         rendering = backend_called().rasterize(
-            gaussians, [view], torch.zeros(3), tile_mask=None, want_means2d=False, want_depth=True
+            gaussians, [view], torch.zeros(3), tile_mask=None, want_means2d=False, want_depth=set_back <= 0.0
         )
         opacity, depth = rendering.alpha[0, :, :, 0].numpy(), rendering.expected_depth
-    assert depth is not None
-    return np.where(opacity >= MIN_OPACITY, depth[0, :, :, 0].numpy(), np.nan).astype(np.float32), opacity
+    if depth is None:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            shown = rendering.image[0, :, :, 0].numpy() / opacity
+    else:
+        shown = depth[0, :, :, 0].numpy()
+    return np.where(opacity >= MIN_OPACITY, shown, np.nan).astype(np.float32), opacity
 
 
 def _over_background(colors: np.ndarray, opacity: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -86,20 +96,21 @@ def _over_background(colors: np.ndarray, opacity: np.ndarray, known: np.ndarray)
     return (colors * share + background * (np.float32(1.0) - share) + np.float32(0.5)).astype(np.uint8)
 
 
-def normals_of(depth: np.ndarray, view: PinholeView) -> np.ndarray:
+def normals_of(depth: np.ndarray, view: PinholeView, set_back: float = 0.0) -> np.ndarray:
     """Unit normals of the surface that a picture of depths shows, from central differences.
 
     Across the edge of a surface only the side that belongs to it counts.
 
     Args:
-        depth: Camera depth, NaN where nothing is. [H, W]
+        depth: Camera depth without `set_back`, NaN where nothing is. [H, W]
+        set_back: Scene units, see `mode_picture`.
     Returns:
         In camera axes (x right, y down, z forward), turned towards the camera; NaN where there are no neighbours.
         [H, W, 3] float32
     """
     y, x = np.mgrid[0 : view.height, 0 : view.width].astype(np.float32)
     rays = np.stack([(x + 0.5 - view.cx) / view.fx, (y + 0.5 - view.cy) / view.fy, np.ones_like(x)], axis=-1)
-    points = rays * depth[..., None]
+    points = np.concatenate([rays[..., :2] * (depth + set_back)[..., None], depth[..., None]], axis=-1)
     normals = np.cross(_difference(points, depth, axis=1), _difference(points, depth, axis=0))
     with np.errstate(invalid="ignore", divide="ignore"):
         normals /= np.linalg.norm(normals, axis=-1, keepdims=True)

@@ -15,18 +15,30 @@ REACH = 3.4
 """Standard deviations beyond which even an opaque Gaussian is fainter than ALPHA_MIN."""
 
 
-def pixel_ray(world_to_camera: np.ndarray, K: np.ndarray, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
+def pixel_ray(
+    world_to_camera: np.ndarray, K: np.ndarray, x: float, y: float, *, start: float = 0.0
+) -> tuple[np.ndarray, np.ndarray]:
     """The ray of a pixel, in the picture that K belongs to.
 
     Args:
         world_to_camera: Rigid map, OpenCV axes. [4, 4]
         K: Intrinsics in pixels, pixel centres at +0.5. [3, 3]
         x, y: px.
+        start: Distance from the camera's centre at which the ray begins, scene units.
     Returns:
-        origin, direction: The camera's centre, and a direction of unit length. [3], [3]
+        origin, direction: The camera's centre, or a point before it, and a direction of unit length. [3], [3]
     """
     direction = world_to_camera[:3, :3].T @ np.linalg.solve(K, np.array([x, y, 1.0]))
-    return camera_center(world_to_camera), direction / np.linalg.norm(direction)
+    direction = direction / np.linalg.norm(direction)
+    return camera_center(world_to_camera) + start * direction, direction
+
+
+def point_beside(world_to_camera: np.ndarray, K: np.ndarray, x: float, y: float, place: np.ndarray) -> np.ndarray:
+    """The point under a pixel that is as deep in the picture as a place before the camera. Arguments as of
+    `pixel_ray`; scene units. [3]"""
+    depth = float(world_to_camera[2, :3] @ place + world_to_camera[2, 3])
+    in_camera = depth * np.linalg.solve(K, np.array([x, y, 1.0]))
+    return world_to_camera[:3, :3].T @ (in_camera - world_to_camera[:3, 3])
 
 
 def seen_point(gaussians: GaussianArrays, origin: np.ndarray, direction: np.ndarray) -> np.ndarray | None:

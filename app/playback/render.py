@@ -37,6 +37,8 @@ class Look:
         key: Of the view, whatever the size; see OrbitView.look_key.
         shown_as: What its colours mean, and of which part of a clip.
         value_range: Of the numbers that its colours stand for.
+        near: Nothing nearer than this is drawn, whatever the scene says; see OrbitView.near.
+        set_back: How much farther away the camera stands than it seems to; see OrbitView.set_back.
     """
 
     key: Hashable
@@ -47,13 +49,17 @@ class Look:
     camera_index: int | None = field(default=None, compare=False)
     world_to_camera: np.ndarray = field(default_factory=lambda: np.eye(4), compare=False)
     K: np.ndarray = field(default_factory=lambda: np.eye(3), compare=False)
+    near: float = field(default=0.0, compare=False)
+    set_back: float = field(default=0.0, compare=False)
 
     @classmethod
     def of(cls, view: OrbitView, width: int, height: int, *, shown_as: ShownAs = PLAIN) -> Look:
         """As a view is now."""
         value_range = range_of(shown_as.mode, view.rig)
         matrices = view.world_to_camera(), view.K(width, height)
-        return cls(view.look_key, width, height, shown_as, value_range, view.look_through, *matrices)
+        return cls(
+            view.look_key, width, height, shown_as, value_range, view.look_through, *matrices, view.near, view.set_back
+        )
 
 
 PictureKey = tuple[FrameKey, Look]
@@ -196,14 +202,14 @@ def _colors(arrays: GaussianArrays, look: Look) -> np.ndarray:
 
     with torch.no_grad():
         rendering = rasterize(
-            _gaussians(arrays),
+            _gaussians(arrays, look),
             torch.from_numpy(look.world_to_camera.astype(np.float32))[None],
             torch.from_numpy(look.K.astype(np.float32))[None],
             look.width,
             look.height,
             backend=backend_called(),
             background=torch.tensor(BACKGROUND),
-            near_plane=arrays.near_plane,
+            near_plane=max(arrays.near_plane, look.near),
         )
         return (rendering.image[0].clamp(0.0, 1.0) * 255.0 + 0.5).to(torch.uint8).numpy()
 
@@ -216,14 +222,19 @@ def _numbers(arrays: GaussianArrays, look: Look) -> tuple[np.ndarray, np.ndarray
     from engine.raster.pinhole_view import pinhole_views
 
     poses, Ks = (torch.from_numpy(m.astype(np.float32))[None] for m in (look.world_to_camera, look.K))
-    (view,) = pinhole_views(poses, Ks, look.width, look.height, arrays.near_plane)
-    return mode_picture(look.shown_as.mode, _gaussians(arrays), view, look.value_range)
+    (view,) = pinhole_views(poses, Ks, look.width, look.height, max(arrays.near_plane, look.near))
+    return mode_picture(look.shown_as.mode, _gaussians(arrays, look), view, look.value_range, look.set_back)
 
 
-def _gaussians(arrays: GaussianArrays) -> Gaussians:
+def _gaussians(arrays: GaussianArrays, look: Look) -> Gaussians:
+    """Sorted by depth where it is seen from so far away that its depths in float32 are too coarse to sort by: the
+    rasterizer keeps the order of equal ones."""
     import torch
 
     from engine.raster import Gaussians
 
     columns = (arrays.means, arrays.quats, arrays.scales, arrays.opacities, arrays.colors)
-    return Gaussians(*(torch.from_numpy(column) for column in columns))
+    order = slice(None)
+    if look.set_back > 0.0:
+        order = np.argsort(arrays.means @ look.world_to_camera[2, :3].astype(np.float32), kind="stable")
+    return Gaussians(*(torch.from_numpy(column[order]) for column in columns))

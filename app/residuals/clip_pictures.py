@@ -6,6 +6,7 @@ For threads, which share one: what is loaded for playback is used, other clips a
 from __future__ import annotations
 
 import threading
+import time
 from collections import OrderedDict
 from typing import TYPE_CHECKING
 
@@ -24,7 +25,7 @@ MAX_CLIPS = 3
 CACHE_BYTES = 64 << 20
 """Renders as floats: the frame before, and the same frame for another kind of map, are mostly there."""
 DECODER_WAIT_S = 1.0
-"""Playback may be loading the very clip; loading it twice at the same time takes longer than waiting."""
+"""Playback may be loading the very clip: to load it twice at the same time takes longer than to wait for it."""
 
 _PictureKey = tuple[ModelKey, int, float]
 
@@ -56,14 +57,11 @@ class ClipPictures:
         Raises:
             ProjectError: Its file is missing or damaged, or does not say what cameras make of its colours.
         """
-        loaded = self._decoder.loaded(request)
-        if loaded is not None and loaded.trained is not None:
-            return loaded.trained
+        known = self._of_playback(request)
+        if known is not None:
+            return known
         with self._lock:
             known = self._clips.get(request.model_key)
-            if known is None and self._decoder.worker.wait_idle(DECODER_WAIT_S):
-                loaded = self._decoder.loaded(request)
-                known = None if loaded is None else loaded.trained
             if known is None:
                 known = self._files.read(request).trained
                 if known is None:
@@ -74,6 +72,14 @@ class ClipPictures:
                     )
                 self._keep(request, known)
             return known
+
+    def _of_playback(self, request: FrameRequest) -> TrainedClip | None:
+        """The clip as playback has it, after waiting for it where that is reading it right now."""
+        until_s = time.monotonic() + DECODER_WAIT_S
+        while self._decoder.is_loading(request) and time.monotonic() < until_s:
+            time.sleep(0.005)
+        loaded = self._decoder.loaded(request)
+        return None if loaded is None else loaded.trained
 
     def _keep(self, request: FrameRequest, trained: TrainedClip) -> None:
         for key in [key for key in self._clips if key[2] == request.clip_index]:  # an earlier state of it

@@ -14,7 +14,7 @@ from collections import OrderedDict
 from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -38,7 +38,7 @@ from app.residuals.measuring_messages import (
     decode_command,
     encode,
 )
-from app.residuals.measuring_order import Item, first_item
+from app.residuals.measuring_order import Item, Look, first_item
 from engine.capture.capture import open_capture
 from engine.errors import EngineError
 from engine.kernels.cache import use_kernel_cache
@@ -53,6 +53,8 @@ logger = logging.getLogger(__name__)
 
 MAX_CLIPS = 3
 """Clips and their kept figures in memory."""
+CAPTURE_CACHE_BYTES = 64 << 20
+"""Pictures of one camera and clip are needed again and again, those of others are not."""
 
 
 class ParentGone(Exception):
@@ -78,24 +80,50 @@ def main(job: MeasureJob, commands: Connection, events: Connection) -> None:
         talk.send(MeasuringEnded())
 
 
-class Talk:
+class Talking(Protocol):
     """What the process hears and says, and when it rests."""
 
-    def __init__(self, job: MeasureJob, commands: Connection, events: Connection) -> None:
-        self._commands, self._events = commands, events
-        self.look, self._share = job.look, job.share
-        self._said: set[str] = set()
-        self._cpu_s = time.process_time()
+    @property
+    def look(self) -> Look:
+        """What the user looks at."""
+        ...
 
     def send(self, event: Event) -> None:
         """Tell the window's process. Raises ParentGone."""
+        ...
+
+    def say(self, message: str) -> None:
+        """Tell the user, once. Raises ParentGone."""
+        ...
+
+    def rest(self) -> None:
+        """Take in commands, and leave time to others. Raises ParentGone."""
+        ...
+
+
+class Talk:
+    """`Talking` through pipes."""
+
+    def __init__(self, job: MeasureJob, commands: Connection, events: Connection) -> None:
+        self._commands, self._events = commands, events
+        self._look, self._share = job.look, job.share
+        self._said: set[str] = set()
+        self._cpu_s = 0.0  # what was computed before it began counts too
+
+    @property
+    def look(self) -> Look:
+        """See `Talking`."""
+        return self._look
+
+    def send(self, event: Event) -> None:
+        """See `Talking`."""
         try:
             self._events.send_bytes(encode(event))
         except OSError as error:
             raise ParentGone from error
 
     def say(self, message: str) -> None:
-        """Tell the user, once."""
+        """See `Talking`."""
         if message not in self._said:
             self._said.add(message)
             self.send(Trouble(message))
@@ -119,7 +147,7 @@ class Talk:
         except (OSError, EOFError) as error:
             raise ParentGone from error
         if isinstance(command, LookAt):
-            self.look = command.look
+            self._look = command.look
         elif isinstance(command, SetShare):
             self._share = command.share
         return True
@@ -128,7 +156,7 @@ class Talk:
 class _Clips:
     """Clips and their kept figures, those used last."""
 
-    def __init__(self, opened: TrainedProject, job: MeasureJob, talk: Talk) -> None:
+    def __init__(self, opened: TrainedProject, job: MeasureJob, talk: Talking) -> None:
         self._opened, self._talk = opened, talk
         self._scope = Scope(job.trained, range(len(opened.capture.rig)), WINDOW_METRICS, "float")
         self._is_kept = job.is_kept
@@ -154,7 +182,7 @@ class _Clips:
         return self._figures[clip_index]
 
 
-def measure(job: MeasureJob, talk: Talk) -> None:
+def measure(job: MeasureJob, talk: Talking) -> None:
     """Measure what the job wants, most wanted first. What cannot be read is told and left out.
 
     Raises:
@@ -162,7 +190,7 @@ def measure(job: MeasureJob, talk: Talk) -> None:
         ParentGone: Nobody listens any more.
     """
     project = open_project(Path(job.project), is_writable=False)
-    capture = open_capture(job.capture, scale=job.scale, follow_links=job.follow_links)
+    capture = open_capture(job.capture, scale=job.scale, cache_bytes=CAPTURE_CACHE_BYTES, follow_links=job.follow_links)
     opened = open_trained(project, capture)
     from engine.metrics.clips.evaluate import Evaluation
 
@@ -192,7 +220,7 @@ def _items(opened: TrainedProject, trained: tuple[int, ...], wanted: np.ndarray)
 
 
 def _measure_item(
-    item: Item, evaluation: Evaluation, clips: _Clips, rows: np.ndarray, pairs: np.ndarray, talk: Talk
+    item: Item, evaluation: Evaluation, clips: _Clips, rows: np.ndarray, pairs: np.ndarray, talk: Talking
 ) -> bool:
     """Measure one camera of one clip; what is done is taken out of rows and pairs. False where the user looked at
     something else before it was done."""
@@ -216,7 +244,7 @@ def _measure_item(
 
 
 def _take(
-    found: EvalRow | PairRow, clip_index: int, camera: int, rows: np.ndarray, pairs: np.ndarray, talk: Talk
+    found: EvalRow | PairRow, clip_index: int, camera: int, rows: np.ndarray, pairs: np.ndarray, talk: Talking
 ) -> None:
     if isinstance(found, EvalRow):
         rows[found.frame_index, camera] = False

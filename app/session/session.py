@@ -13,6 +13,7 @@ from pathlib import Path
 
 from app.background.jobs import Jobs
 from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
+from app.playback.bookmarks import Bookmarks
 from app.playback.coverage import Coverage
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
@@ -65,7 +66,7 @@ class Session:
 
     Attributes:
         opened: What is open; None before.
-        timeline, views: What the user looks at; the window may change them directly.
+        timeline, views, bookmarks: What the user looks at; the window may change them directly.
         training, clip_states, plan, regions, project_status: Status values, remade by `poll` and `dispatch`. The plan
             is that of the next clip; None while something trains or nothing is left to train.
         question: What the user has to answer; None while there is nothing to ask.
@@ -93,6 +94,7 @@ class Session:
     ) -> None:
         self.opened: OpenedProject | None = None
         self.timeline, self.views = Timeline(), Views()
+        self.bookmarks = Bookmarks()
         self.notices = Notices()
         self.question: Question | None = None
         self.training = TrainingStatus()
@@ -303,6 +305,7 @@ class Session:
         self.live_training.open(opened, found.catalog)
         self._open_residuals(opened)
         self.views.look_at(opened.rig)
+        self.bookmarks = Bookmarks()
         self._keep_recent()
         for sentence in opened.capture.warnings:
             self.notices.add("warn", "The capture is odd but usable", sentence)

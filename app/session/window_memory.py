@@ -12,12 +12,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
-
+from app.playback.bookmarks import Bookmarks, read_bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import SPEEDS, Timeline
+from app.playback.view_place import ViewPlace
 from app.status import COMPARE_MODES, OVERLAY_NAMES, Overlays
-from engine.camera.rig import CameraRig
 from engine.errors import EngineError
 from engine.storage.json_files import read_checked_json, write_checked_json
 from engine.user_folders import config_dir
@@ -45,6 +44,8 @@ class WindowMemory:
         ui_scale: Chosen scale of the interface; None follows the screen.
         layout: Where the panels are, as text of ImGui's; empty before the first time.
         mark_size, mark_opacity: Of anchor marks; None where none was chosen.
+        navigation: Name of the preset of gestures, see ui.panels.gestures.
+        is_motion_reduced: Whether the view jumps instead of moving.
         time_unit: In which the timeline counts; empty where none was chosen.
         folded_lanes: Lanes of the timeline that are folded away, by name.
         views: By project folder, the one used last at the end; see `view_of` and `show_again`.
@@ -57,6 +58,8 @@ class WindowMemory:
     layout: str = ""
     mark_size: float | None = None
     mark_opacity: float | None = None
+    navigation: str = "studio"
+    is_motion_reduced: bool = False
     time_unit: str = ""
     folded_lanes: tuple[str, ...] = ()
     views: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -80,6 +83,8 @@ class WindowMemory:
             "layout": self.layout,
             "mark_size": self.mark_size,
             "mark_opacity": self.mark_opacity,
+            "navigation": self.navigation,
+            "is_motion_reduced": self.is_motion_reduced,
             "time_unit": self.time_unit,
             "folded_lanes": list(self.folded_lanes),
             "views": [{"project": folder, **view} for folder, view in self.views.items()],
@@ -115,6 +120,9 @@ def read_window_memory(path: Path | None = None) -> WindowMemory:
     memory.layout = layout if isinstance(layout, str) and len(layout) <= MAX_LAYOUT_CHARACTERS else ""
     memory.mark_size = _number(found.get("mark_size"), 0.1, 10.0)
     memory.mark_opacity = _number(found.get("mark_opacity"), 0.0, 1.0)
+    navigation = found.get("navigation")
+    memory.navigation = navigation if isinstance(navigation, str) else memory.navigation
+    memory.is_motion_reduced = found.get("is_motion_reduced") is True
     memory.time_unit = _word(found.get("time_unit"))
     folded = found.get("folded_lanes")
     memory.folded_lanes = tuple(filter(None, map(_word, folded[:MAX_LANES]))) if isinstance(folded, list) else ()
@@ -138,7 +146,7 @@ class Viewed(Protocol):
     def timeline(self) -> Timeline: ...
 
     @property
-    def rig(self) -> CameraRig: ...
+    def bookmarks(self) -> Bookmarks: ...
 
 
 def view_of(session: Viewed) -> dict[str, Any]:
@@ -147,12 +155,8 @@ def view_of(session: Viewed) -> dict[str, Any]:
     return {
         "frame_index": session.timeline.frame_index,
         **_playing_of(session.timeline),
-        "camera": None if view.look_through is None else session.rig.names[view.look_through],
-        "pivot": [float(value) for value in view.pivot],
-        "distance": float(view.distance),
-        "yaw": float(view.yaw),
-        "pitch": float(view.pitch),
-        "fov_y": float(view.fov_y),
+        **ViewPlace.of(view).values(),
+        "bookmarks": session.bookmarks.values(),
         "shown": [name for name in OVERLAY_NAMES if getattr(overlays, name)],
         "compare": overlays.compare,
         "wipe_position": float(overlays.wipe_position),
@@ -166,20 +170,10 @@ def show_again(session: Viewed, kept: dict[str, Any]) -> None:
     if frame_index is not None:
         timeline.seek(int(frame_index))
     _play_again(timeline, kept)
-    pivot = kept.get("pivot")
-    numbers = {
-        "distance": _number(kept.get("distance"), 1e-4, 1e6),
-        "yaw": _number(kept.get("yaw"), -7.0, 7.0),
-        "pitch": _number(kept.get("pitch"), -1.56, 1.56),
-        "fov_y": _number(kept.get("fov_y"), 0.02, 3.0),
-    }
-    place = [_number(value, -1e6, 1e6) for value in pivot] if isinstance(pivot, list) else []
-    if len(place) == 3 and None not in place and None not in numbers.values():
-        view.pivot = np.array(place, dtype=np.float64)
-        for name, value in numbers.items():
-            setattr(view, name, value)
-    names = list(session.rig.names)
-    view.look_through = names.index(kept["camera"]) if kept.get("camera") in names else None
+    place = ViewPlace.read(kept)
+    if place is not None:
+        place.show(view)
+    session.bookmarks.items = read_bookmarks(kept.get("bookmarks")).items
     shown = kept.get("shown")
     if isinstance(shown, list):
         for name in OVERLAY_NAMES:

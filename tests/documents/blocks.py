@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from tests.documents.commands import command_sections
+from tests.documents.gestures import gesture_tables
 from tests.documents.keys import key_tables
 from tests.documents.settings import presets_table, settings_tables
 from tests.documents.tree import ROOT, tree_block
@@ -14,6 +15,7 @@ from tests.documents.tree import ROOT, tree_block
 GENERATORS: dict[str, Callable[[], str]] = {
     "tree": tree_block,
     "keys": key_tables,
+    "gestures": gesture_tables,
     "commands": command_sections,
     "settings": settings_tables,
     "presets": presets_table,

@@ -15,8 +15,9 @@ def keys(row: Action) -> str:
 
 
 def key_tables() -> str:
-    """Every row of the table of actions, in its order."""
+    """Every row of the help sheet, in its order."""
     parts = []
     for group, rows in groupby(ACTIONS, key=lambda row: row.group):
-        parts.append(f"**{group}**\n\n{table(('key', 'does'), [(keys(row), row.text) for row in rows if row.keys])}")
+        shown = [(keys(row), row.text) for row in rows if row.keys and row.is_in_help]
+        parts.append(f"**{group}**\n\n{table(('key', 'does'), shown)}")
     return "\n\n".join(parts)

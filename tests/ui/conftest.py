@@ -49,12 +49,14 @@ def open_pilot(headless_gl: None) -> Iterator[Callable[..., Pilot]]:
         size: tuple[int, int] = (1280, 800),
         memory: WindowMemory | None = None,
         first_frames: int = 6,
+        is_eased: bool = False,
     ) -> Pilot:
         width, height = size
         studio = StudioWindow(session or FakeSession(), width=width, height=height, fixed_delta_s=1 / 60, memory=memory)
         opened.append(studio)
         # Synthetic events would wait for dispatch_events() otherwise.
         studio.window._enable_event_queue = False
+        studio.frame.ui.navigation.is_motion_reduced = not is_eased
         pilot = Pilot(studio)
         pilot.draw(first_frames)
         return pilot

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from app.playback.arrays import AnchorArrays, Picture, PointArrays
+from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
@@ -135,6 +136,7 @@ class FakeSession:
         self.cached: list[tuple[int, int]] = []  # what cached_frames answers
         self.project = None
         self.timeline, self.views = Timeline(), Views()
+        self.bookmarks = Bookmarks()
         if has_capture:
             self._open(FakeCapture(make_rig()))
 

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from pyglet.window import key
 
+from app.playback.scene_axes import rig_radius
 from app.session.commands import LookThrough, MarkRegion, RedoMark, RemoveRegion, UndoMark
 from app.status import ClipStatus
 from tests.ui.fake_session import FakeSession, make_rig
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from ui.shell.screenshot import read_window
 from ui.style.colors import REGION_COLORS
-from ui.viewport.region_tool import FIRST_RADIUS_SHARE, GROWTH, SHIFT_SHARE, RegionTool, rig_radius
+from ui.viewport.region_tool import FIRST_RADIUS_SHARE, GROWTH, SHIFT_SHARE, RegionTool
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
 

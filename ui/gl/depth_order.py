@@ -27,9 +27,10 @@ def depth_order(means: np.ndarray, view_row: np.ndarray, near: float) -> np.ndar
     Returns:
         Row numbers. [M] uint32, M <= N
     """
-    row = np.asarray(view_row, dtype=np.float32)
-    depths = means @ row[:3] + row[3]  # [N]
-    visible = np.flatnonzero(depths > np.float32(max(near, 0.0)))
+    row = np.asarray(view_row, dtype=np.float64)
+    # From the near plane on: seen from very far away the depths themselves are too coarse to tell neighbours apart.
+    depths = means @ row[:3].astype(np.float32) + np.float32(row[3] - max(near, 0.0))  # [N]
+    visible = np.flatnonzero(depths > 0.0)
     # Positive floats sort like their bit patterns, so depth and row number pack into one integer that an in-place
     # sort without an index array handles: several times faster than argsort.
     keys = depths[visible].view(np.uint32).astype(np.uint64)

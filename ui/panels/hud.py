@@ -83,8 +83,22 @@ class Hud:
         self.text: HudText | None = None
         """What the newest frame says."""
 
-    def draw(self, session: HudNeeds, ui: UiState, area: Rect, scene: Scene, *, value: float | None = None) -> None:
-        """Everything that stands over the picture. value: Under the pointer, where colours stand for numbers."""
+    def draw(
+        self,
+        session: HudNeeds,
+        ui: UiState,
+        area: Rect,
+        scene: Scene,
+        *,
+        value: float | None = None,
+        legend_x: float | None = None,
+    ) -> None:
+        """Everything that stands over the picture.
+
+        Args:
+            value: Under the pointer, where colours stand for numbers.
+            legend_x: Where the legend ends; near the border when None.
+        """
         self.text = self._text(session, scene)
         if self.text is not None:
             self._draw_plates(self.text, ui, area)
@@ -93,7 +107,7 @@ class Hud:
         if scene.shows == RENDERED:
             self._draw_color_bars(session, ui, scene, value)
         if not ui.regions.is_active or area.width >= LEGEND_WIDTH:  # what is being chosen needs the room
-            self._draw_legend(session, ui, scene, area)
+            self._draw_legend(session, ui, scene, area, legend_x or area.x1 - MARGIN)
 
     def _text(self, session: HudNeeds, scene: Scene) -> HudText | None:
         wanted, timeline, shown = session.wanted_frame(), session.timeline, scene.shown
@@ -110,7 +124,7 @@ class Hud:
 
         def camera_name(index: int | None) -> str:
             if index is None:
-                return "free view"
+                return "orthographic view" if session.view.is_orthographic else "free view"
             return session.rig.names[index] + (" (held out)" if index in session.holdout else "")
 
         return hud_text(
@@ -182,15 +196,15 @@ class Hud:
             draw_color_bar(imgui.get_window_draw_list(), plate, map_name, low, high, unit, pointed)
             ui.mark_rect(name, plate)
 
-    def _draw_legend(self, session: HudNeeds, ui: UiState, scene: Scene, area: Rect) -> None:
+    def _draw_legend(self, session: HudNeeds, ui: UiState, scene: Scene, area: Rect, right: float) -> None:
         draw = imgui.get_window_draw_list()
         is_labelled = shown_compare(session) in ("wipe", "blink")
         y = (ui.rects["viewport.rendered"].y0 + 44) if is_labelled else area.y0 + 12
         for shape, color, text in legend_rows(session, scene):
             width = imgui.calc_text_size(text).x
-            x = area.x1 - width - 46
+            x = right - width - 34
             plate = theme.u32(theme.faded(theme.VOID, 0.78))
-            draw.add_rect_filled(ImVec2(x, y), ImVec2(area.x1 - 12, y + 24), plate, 4)
+            draw.add_rect_filled(ImVec2(x, y), ImVec2(right, y + 24), plate, 4)
             middle = ImVec2(x + 14, y + 12)
             if shape in REGION_WORDS:
                 draw_region_mark(draw, middle, shape)

@@ -10,9 +10,11 @@ from typing import Protocol
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
+from app.playback.pointing import point_beside
 from app.status import CAPTURED
 from ui.panels.actions.action import ActionNeeds
 from ui.panels.comparison import covered_share, is_held, kind_words, other_label, shown_compare
+from ui.panels.gizmo import draw_gizmo, gizmo_rect
 from ui.panels.heat_overlay import HeatNeeds, HeatOverlay
 from ui.panels.hud import Hud, HudNeeds
 from ui.panels.panes import Panes, arrange
@@ -68,7 +70,8 @@ class PicturePane:
         buttons = imgui.ButtonFlags_
         flags = buttons.mouse_button_left | buttons.mouse_button_right | buttons.mouse_button_middle
         imgui.invisible_button("canvas", ImVec2(area.width, area.height), flags)
-        is_used = imgui.is_item_activated() or (imgui.is_item_hovered() and imgui.get_io().mouse_wheel != 0.0)
+        wheel = (imgui.get_io().mouse_wheel, imgui.get_io().mouse_wheel_h)
+        is_used = imgui.is_item_activated() or (imgui.is_item_hovered() and any(wheel))
         if is_active:
             ui.mark_rect("viewport.canvas", area)
         shown = session.view.look_through
@@ -78,11 +81,27 @@ class PicturePane:
             image_size = (int(width), int(height))
         self._is_held = is_active and is_held(session, ui)
         panes = arrange(area, image_size, "wipe" if self._is_held else shown_compare(session))
-        self.pointer.navigate(session, dispatch, ui, panes)
+        self.pointer.navigate(
+            session,
+            dispatch,
+            ui,
+            panes,
+            area,
+            lambda x, y: self._pick(session, panes.rendered, x, y),
+            is_active=is_active,
+        )
         # Looking through a camera may just have ended; the picture then fills the area from the next frame on.
         self._draw_picture(session, dispatch, ui, area, panes, is_active=is_active)
+        gizmo = gizmo_rect(area) if panes.captured is None else None
+        if gizmo is not None:
+            pointer = imgui.get_io().mouse_pos
+            draw_gizmo(imgui.get_window_draw_list(), session.view, gizmo, (pointer.x, pointer.y))
+            if is_active:
+                ui.mark_rect("viewport.gizmo", gizmo)
         value = self._value_under_pointer(panes.rendered)
-        self.hud.draw(session, ui, self.heat.beside(area), self.scene, value=value)
+        free = self.heat.beside(area)
+        legend_x = free.x1 - 12 if gizmo is None else min(free.x1 - 12, gizmo.x0 - 8)
+        self.hud.draw(session, ui, free, self.scene, value=value, legend_x=legend_x)
         if ui.regions.is_active and is_active:
             top = panes.captured.y0 + 44 if panes.captured is not None else area.y0 + 12  # below what names the pane
             free = Rect(area.x0 + 12, top, area.x1, area.y1)
@@ -102,14 +121,7 @@ class PicturePane:
         if is_active:
             ui.mark_rect("viewport.rendered", pane)
         density = imgui.get_io().display_framebuffer_scale.x
-        size = (max(round(pane.width * density), 16), max(round(pane.height * density), 16))
-        view = SceneView(
-            world_to_camera=session.view.world_to_camera(),
-            K=session.view.K(*size),
-            width=size[0],
-            height=size[1],
-            is_moving=self.pointer.is_moving,
-        )
+        view = self._scene_view(session, pane)
         self.scene.marks.pixels_per_unit = density
         self._point_at_camera(session, ui, view, pane, density)
         if is_active:
@@ -136,12 +148,33 @@ class PicturePane:
                     _tooltip_beside(text, area)
         else:
             self.scene.marks.pointed_anchor = None
+        if is_active:
+            ui.pointed_anchor = self.scene.marks.pointed_anchor
         self._captured_frame = None
         if panes.captured is None:
             self.scene.forget_other()
         else:
             self._draw_captured(session, draw, ui, view, panes)
         draw.pop_clip_rect()
+
+    def _scene_view(self, session: PictureNeeds, pane: Rect) -> SceneView:
+        density = imgui.get_io().display_framebuffer_scale.x
+        size = (max(round(pane.width * density), 16), max(round(pane.height * density), 16))
+        view = session.view
+        return SceneView(
+            world_to_camera=view.world_to_camera(),
+            K=view.K(*size),
+            width=size[0],
+            height=size[1],
+            is_moving=self.pointer.is_moving,
+            near=view.near,
+        )
+
+    def _pick(self, session: PictureNeeds, pane: Rect, x: float, y: float) -> np.ndarray | None:
+        """The place of the scene that is seen at a point of the window; None where there is nothing."""
+        density = imgui.get_io().display_framebuffer_scale.x
+        view = self._scene_view(session, pane)
+        return self.scene.point_under(session, view, (x - pane.x0) * density, (y - pane.y0) * density)
 
     def _value_under_pointer(self, pane: Rect) -> float | None:
         pointer = imgui.get_io().mouse_pos
@@ -172,15 +205,18 @@ class PicturePane:
             return
         at = (pointer.x, pointer.y)
         is_over = imgui.is_item_hovered() and pane.contains(*at)
-        is_led = is_over and not tool.is_placed and self.pointer.drag is None and at != self._aimed_at
+        is_led = is_over and not tool.is_placed and self.pointer.drag is None
+        is_led &= at != self._aimed_at or session.view.is_moving
         if tool.center is not None and not is_led and not (is_over and is_click):
             return
         self._aimed_at = at
         x, y = at if is_over else pane.center
         away = session.view.pivot if tool.center is None else tool.center
-        depth = max(float(np.linalg.norm(away - view.eye)), 1e-6)
         pixels = ((x - pane.x0) * density, (y - pane.y0) * density)
-        tool.place(self.scene.point_under(session, view, *pixels, depth), eye=view.eye)
+        place = self.scene.point_under(session, view, *pixels)
+        if place is None:
+            place = point_beside(view.world_to_camera, view.K, *pixels, away)
+        tool.place(place, eye=session.view.shown_pose.standpoint)
         tool.is_placed |= is_click
 
     def _draw_captured(

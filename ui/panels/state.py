@@ -8,10 +8,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import Command
 from ui.gl.image import Rect as PixelRect
+from ui.panels.gestures import Navigation
 from ui.panels.timeline.view_state import TimelineView
 from ui.style.theme import Fonts
 from ui.style.ui_scale import UiScale
@@ -58,11 +60,14 @@ class UiState:
         scale: How large everything is drawn.
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
         regions: The region that is being chosen, and the one that stands out.
+        navigation: What mouse and keys do over a picture.
         timeline: What of time is shown.
         is_popup_open: Is a menu or another popup open, so that keys belong to it?
         is_menu_wanted: Open the first menu, for the keyboard.
         is_quality_open: Is the plot of quality over the clips folded out?
         is_quality_seen: Was it scrolled to since then?
+        pointed_anchor: Place of the anchor under the pointer, scene units; None without one. [3]
+        is_view_popup_wanted: Open the popup of lens, axes and bookmarks.
         last_heat: The heat map that was shown last, to be shown again; empty before the first.
         wanted_panel: Title of a panel that is to come to the front, or None.
         redraw_in_s: Shortest wait after which some panel wants to be drawn again, or None.
@@ -72,6 +77,9 @@ class UiState:
     scale: UiScale = field(default_factory=UiScale)
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
+    navigation: Navigation = field(default_factory=Navigation)
+    pointed_anchor: np.ndarray | None = None
+    is_view_popup_wanted: bool = False
     timeline: TimelineView = field(default_factory=TimelineView)
     last_heat: str = ""
     wanted_panel: str | None = None

@@ -15,6 +15,7 @@ from ui.panels.actions.compare import COMPARE_WORDS, cloud_overlay, set_compare
 from ui.panels.compare_box import draw_compare_box, draw_other_box
 from ui.panels.comparison import shown_compare
 from ui.panels.mode_box import draw_mode_box
+from ui.panels.navigation import ViewPopup
 from ui.panels.regions import begin_choosing
 from ui.panels.state import Dispatch, UiState
 from ui.style import theme
@@ -25,7 +26,7 @@ TOOLBAR_WIDTH, TIGHT_WIDTH = 1180.0, 580.0
 """With less room than the first, words give way to symbols; with less than the second, boxes are narrow, too."""
 MODE_WIDTHS, COMPARE_WIDTHS = (124.0, 108.0, 66.0), (130.0, 118.0, 66.0)
 """Of the boxes of modes and of comparisons, from much room to little, units."""
-BESIDE_CAMERA = 222.0
+BESIDE_CAMERA = 268.0
 """What the row needs beside these boxes and that of the camera where there is little room, units."""
 MARK_SLIDER = imgui.SliderFlags_.always_clamp
 
@@ -34,7 +35,7 @@ class ToolbarNeeds(ActionNeeds, Protocol):
     """What the row reads."""
 
 
-def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None:
+def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, popup: ViewPopup) -> None:
     """The row of choices over the picture."""
     imgui.set_cursor_pos(ImVec2(imgui.get_cursor_pos_x() + 8, imgui.get_cursor_pos_y() + 6))
     shown = session.view.look_through
@@ -42,9 +43,6 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None
     room = imgui.get_content_region_avail().x
     is_roomy, row = room > TOOLBAR_WIDTH, (room <= TOOLBAR_WIDTH) + (room <= TIGHT_WIDTH)
     imgui.align_text_to_frame_padding()
-    if is_roomy:
-        imgui.text_disabled("View")
-        imgui.same_line()
     imgui.set_next_item_width(
         150 if is_roomy else min(120, max(room - BESIDE_CAMERA - MODE_WIDTHS[row] - COMPARE_WIDTHS[row], 40))
     )
@@ -85,6 +83,8 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None
         imgui.open_popup("overlays")
     ui.mark("viewport.overlays")
     _draw_overlay_menu(session, dispatch, ui)
+    imgui.same_line(0, 8)
+    popup.draw_button(session, dispatch, ui)
     imgui.same_line(0, 8)
     imgui.begin_disabled(not session.regions.can_mark)
     if _segment(f"{Icon.REGION}  Mark" if is_roomy else Icon.REGION, ui.regions.is_active):

@@ -10,6 +10,7 @@ from imgui_bundle import imgui
 from app.playback.views import Views
 from app.session.commands import ActivateView
 from ui.panels.hud import Hud
+from ui.panels.navigation import ViewPopup
 from ui.panels.panes import view_areas
 from ui.panels.picture_pane import PictureNeeds, PicturePane
 from ui.panels.state import Dispatch, Rect, UiState
@@ -40,6 +41,7 @@ class ViewportPanel:
         self._make_pane = make_pane
         self._panes = [make_pane()]
         self._active = 0
+        self._view_popup = ViewPopup()
 
     def release(self) -> None:
         """Free GL objects. GL thread only."""
@@ -91,7 +93,7 @@ class ViewportPanel:
             return
         bar = Rect(area.x0, area.y0, area.x1, area.y0 + TOOLBAR_HEIGHT)
         imgui.get_window_draw_list().add_rect_filled(bar.low, bar.high, theme.u32(theme.PANEL))
-        draw_toolbar(session, dispatch, ui)
+        draw_toolbar(session, dispatch, ui, self._view_popup)
         below = Rect(area.x0, bar.y1, area.x1, area.y1)
         if below.width >= SMALLEST_PICTURE and below.height >= SMALLEST_PICTURE:
             self._draw_views(session, dispatch, ui, below)

@@ -15,8 +15,9 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import portable_file_dialogs as native
 
 from app.session.commands import OpenCapture
-from ui.panels.actions.action import TIME, VIEW, WINDOW
-from ui.panels.actions.table import ACTIONS, MOUSE_HELP
+from ui.panels.actions.action import BOOKMARKS, TIME, VIEW, WINDOW
+from ui.panels.actions.table import ACTIONS
+from ui.panels.gestures import mouse_help
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import text_wrapped_dim
 from ui.style import theme
@@ -167,12 +168,12 @@ def draw_help(ui: UiState) -> None:
         ui.redraw_within(0.0)  # only then does what lies below know that it is covered
     if is_shown:
         groups = dict.fromkeys(action.group for action in ACTIONS)
-        left = (TIME, VIEW, WINDOW)
+        left = (TIME, VIEW, BOOKMARKS, WINDOW)
         if imgui.begin_table("sheet", 2, imgui.TableFlags_.sizing_stretch_same):
             imgui.table_next_column()
             for group in left:
                 _draw_group(group, _rows(group))
-            _draw_group("Mouse", list(MOUSE_HELP))
+            _draw_group("Mouse", list(mouse_help(ui.navigation.preset)))
             imgui.table_next_column()
             for group in (group for group in groups if group not in left):
                 _draw_group(group, _rows(group))
@@ -182,7 +183,11 @@ def draw_help(ui: UiState) -> None:
 
 
 def _rows(group: str) -> list[tuple[str, str]]:
-    return [(", ".join(action.keys), action.text) for action in ACTIONS if action.group == group and action.keys]
+    return [
+        (", ".join(action.keys), action.text)
+        for action in ACTIONS
+        if action.group == group and action.keys and action.is_in_help
+    ]
 
 
 def _draw_group(title: str, rows: list[tuple[str, str]]) -> None:

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from app.session.commands import ForgetRecent, OpenCapture
 from app.status import ProjectStatus
-from ui.panels.actions.action import COMPARE, MARK, TIME, VIEW, ActionNeeds
+from ui.panels.actions.action import BOOKMARKS, COMPARE, MARK, NAVIGATE, TIME, VIEW, ActionNeeds
 from ui.panels.actions.table import ACTIONS
 from ui.panels.actions.training import train_or_pause
 from ui.panels.actions.window import choose_scale
@@ -53,7 +53,15 @@ def draw_menu_bar(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
         imgui.end_menu()
     if _begin_menu("View", ui):
         imgui.begin_disabled(not has_capture)
-        _draw_rows((VIEW, COMPARE), session, dispatch, ui)
+        _draw_rows((VIEW,), session, dispatch, ui)
+        for group in (NAVIGATE, BOOKMARKS):
+            if imgui.begin_menu(group):
+                _draw_rows((group,), session, dispatch, ui)
+                imgui.end_menu()
+            else:
+                ui.mark(f"menu.{group}")
+        imgui.separator()
+        _draw_rows((COMPARE,), session, dispatch, ui)
         imgui.separator()
         _draw_rows((TIME,), session, dispatch, ui, is_on_only=True)
         imgui.end_disabled()

@@ -44,10 +44,14 @@ class Remembering:
             imgui.load_ini_settings_from_memory(self._memory.layout)
 
     def restore_marks(self, session: RememberNeeds) -> None:
-        """What is the same in all projects: size and opacity of anchor marks, unit and lanes of the timeline."""
+        """What is the same in all projects: size and opacity of anchor marks, unit and lanes of the timeline, and what
+        mouse and keys do."""
         if self._memory is None:
             return
         self._ui.timeline.restore(self._memory.time_unit, self._memory.folded_lanes)
+        navigation = self._ui.navigation
+        navigation.preset_name = self._memory.navigation
+        navigation.is_motion_reduced = self._memory.is_motion_reduced
         if self._memory.mark_size is not None:
             session.overlays.mark_size = self._memory.mark_size
         if self._memory.mark_opacity is not None:
@@ -78,6 +82,8 @@ class Remembering:
             memory.keep_view(self._folder, view_of(session))
         memory.ui_scale = self._ui.scale.chosen
         memory.layout = LAYOUT_VERSION + imgui.save_ini_settings_to_memory()
+        navigation = self._ui.navigation
+        memory.navigation, memory.is_motion_reduced = navigation.preset.name, navigation.is_motion_reduced
         memory.mark_size, memory.mark_opacity = session.overlays.mark_size, session.overlays.mark_opacity
         memory.time_unit, memory.folded_lanes = self._ui.timeline.unit, tuple(sorted(self._ui.timeline.folded))
         memory.save()

@@ -93,6 +93,7 @@ class Icon:
     LAYERS = "\uf5fd"
     COLUMNS = "\uf0db"
     EYE = "\uf06e"
+    SQUARE = "\uf0c8"
     HELP = "\uf059"
     FILM = "\uf008"
     DROP = "\uf019"
@@ -102,6 +103,7 @@ class Icon:
     ADD = "\u002b"
     CLOCK_BACK = "\uf1da"
     BROKEN = "\uf127"
+    COMPASS = "\uf14e"
 
 
 CLIP_ICONS: dict[str, str] = {

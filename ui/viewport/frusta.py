@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from app.playback.scene_axes import rig_radius
 from engine.camera.projection import to_camera, to_pixels
 from engine.camera.rig import CameraRig
 from ui.gl.lines import LINES_PER_FRUSTUM, frusta_lines
-from ui.viewport.region_tool import rig_radius
 
 FRUSTUM_SHARE = 0.09
 """Length of a camera's pyramid as a share of the rig's radius."""

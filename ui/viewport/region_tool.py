@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.playback.scene_axes import rig_radius
 from app.session.commands import MarkRegion
 from engine.camera.rig import CameraRig
 from engine.gate.regions import GateRegion, sphere_region
@@ -23,11 +24,6 @@ GROWTH = 1.1
 """Factor of a tick of the wheel, or a press of a key."""
 SHIFT_SHARE = 0.25
 """A press of a key moves the sphere by this share of its radius."""
-
-
-def rig_radius(rig: CameraRig) -> float:
-    """Mean distance of the cameras from what they look at, scene units."""
-    return float(np.linalg.norm(rig.centers - rig.focus_point(), axis=1).mean())
 
 
 @dataclass(eq=False)

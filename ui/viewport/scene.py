@@ -79,6 +79,8 @@ class SceneView:
         world_to_camera: Rigid map, OpenCV axes. [4, 4]
         K: Intrinsics in pixels of width x height. [3, 3]
         is_moving: The view changes just now; a coarser picture that comes sooner is better.
+        near: Nothing nearer than this is drawn, whatever the scene says: an orthographic view stands far away. Scene
+            units
     """
 
     world_to_camera: np.ndarray
@@ -86,6 +88,7 @@ class SceneView:
     width: int
     height: int
     is_moving: bool
+    near: float = 0.0
 
     @property
     def eye(self) -> np.ndarray:
@@ -382,33 +385,27 @@ class Scene:
     def anchor_text(self, session: SceneNeeds, view: SceneView, x: float, y: float) -> str:
         """What the anchor under a pixel of the view is and why; empty where none is shown or that is unknown. It stands
         out from the next frame on."""
-        found = self.marks.anchor_under(session, view, x, y, self._near)
+        found = self.marks.anchor_under(session, view, x, y, max(self._near, view.near))
         text = "" if found is None else found[0].text(found[1], session.regions.regions)
         self.marks.pointed_anchor = found[0].positions[found[1]] if found is not None and text else None
         return text
 
-    def point_under(self, session: SceneNeeds, view: SceneView, x: float, y: float, depth: float) -> np.ndarray:
-        """The place under a pixel of the view: of the anchor there if anchors are shown, else of what one sees there.
-
-        Args:
-            depth: From the eye, scene units; taken where nothing is to be seen.
-        Returns:
-            Scene units. [3]
-        """
-        found = self.marks.anchor_under(session, view, x, y, self._near)
+    def point_under(self, session: SceneNeeds, view: SceneView, x: float, y: float) -> np.ndarray | None:
+        """The place under a pixel of the view: of the anchor there if anchors are shown, else of what one sees there;
+        None where there is nothing. Scene units. [3]"""
+        near = max(self._near, view.near)
+        found = self.marks.anchor_under(session, view, x, y, near)
         if found is not None:
             return found[0].positions[found[1]].astype(np.float64)
-        origin, direction = pixel_ray(view.world_to_camera, view.K, x, y)
         gaussians = session.shown_gaussians()
         if gaussians is not None:
-            seen = seen_point(gaussians, origin, direction)
-            return origin + depth * direction if seen is None else seen
+            return seen_point(gaussians, *pixel_ray(view.world_to_camera, view.K, x, y, start=view.near))
         cloud = session.shown_points() if session.overlays.show_points else None
         if cloud is not None and not cloud.is_hint:
-            row = nearest_under(cloud.points, view.world_to_camera, view.K, x, y, near=self._near)
+            row = nearest_under(cloud.points, view.world_to_camera, view.K, x, y, near=near)
             if row is not None:
                 return cloud.points[row].astype(np.float64)
-        return origin + depth * direction
+        return None
 
     def _draw(
         self, view: SceneView, base_key: Hashable, points_key: Hashable, captured_key: Hashable, session: SceneNeeds
@@ -420,13 +417,15 @@ class Scene:
             if self._is_picture:
                 target.draw_image(self._picture)
             else:
-                self._splats.draw(target, *camera, self._near)
+                self._splats.draw(target, *camera, max(self._near, view.near))
         elif points_key is not None:
             unit: Literal["px", "world"]
             size, unit = (self._point_size, "world") if self._point_size > 0 else (self._cloud_point_px(view), "px")
             # A picture that stands right before the eye would hide all the others.
             near = HINT_NEAR_SHARE * session.view.distance if self._cloud_kind == HINT else NEAR
-            self._cloud.draw(target, *camera, near, shape="circle", size=size, unit=unit, is_depth_tested=True)
+            self._cloud.draw(
+                target, *camera, max(near, view.near), shape="circle", size=size, unit=unit, is_depth_tested=True
+            )
         elif captured_key is not None:
             target.draw_image(self._captured)
         self._anchor_heat.draw(target, view, session.overlays.heat_opacity, self.marks.pixels_per_unit)

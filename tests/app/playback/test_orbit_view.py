@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.playback.orbit_view import OrbitView, rig_up
+from app.playback.orbit_view import OrbitView
+from app.playback.scene_axes import rig_up
 from engine.camera.rig import CameraRig
 from tests.app.fakes import look_at, ring
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
 from app.project.clip_catalog import ClipCatalog
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.project import Project, open_project
-from app.residuals.measuring_messages import MeasureJob
-from app.residuals.measuring_process import Measurer
 from app.residuals.residuals import Residuals
 from app.training.service import ShownState
 from engine.capture.capture import open_capture
@@ -24,7 +24,7 @@ from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import train
 from tests.clip_headers import with_header
 
-DEADLINE_S = 60.0
+DEADLINE_S = 20.0
 TRAINED_ON = ("1", "2", "3")
 
 
@@ -43,9 +43,21 @@ def color(path: Path, *, seed: int, reference: str | None = None) -> str:
     return stamped.header.fingerprint
 
 
+def write_still_capture(folder: Path) -> Path:
+    """Four cameras and six frames, in which a bright square moves over what stands still."""
+    write_capture(folder, size=(48, 32))
+    for camera in range(4):
+        still = np.random.default_rng(camera).integers(40, 120, (8, 12, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1)
+        for frame, path in enumerate(sorted((folder / "ims" / str(camera)).iterdir())):
+            picture = still.copy()
+            picture[8:20, 4 + 4 * frame : 14 + 4 * frame] = 230
+            Image.fromarray(picture).save(path, quality=95)
+    return folder
+
+
 def make_project(folder: Path) -> Path:
-    """A capture of four cameras and six frames, and a project with both clips trained."""
-    project = train(folder / "p", write_capture(folder / "ring", size=(48, 32)))
+    """A project of such a capture with both clips trained."""
+    project = train(folder / "p", write_still_capture(folder / "ring"))
     reference = color(project / "clips" / "0000.safetensors", seed=1)
     color(project / "clips" / "0001.safetensors", seed=2, reference=reference)
     return project
@@ -69,7 +81,7 @@ class Opened:
         record = self.catalog[clip_index]
         return None if record.file is None else ShownState(record.file, record.revision)
 
-    def heat(self, camera: int, frame: int, kind: str):
+    def heat(self, camera: int, frame: int, kind: str) -> Any:
         """The finished map."""
         self.timeline.seek(frame)
         return until(lambda: self.residuals.heat(self.timeline, camera, kind), lambda map_: not map_.is_stale, self)
@@ -81,7 +93,7 @@ class Opened:
         self.opened.capture.close()
 
 
-def until(ask: Callable[[], object], is_right: Callable[[object], bool], opened: Opened):
+def until(ask: Callable[[], Any], is_right: Callable[[Any], bool], opened: Opened) -> Any:
     """Ask until something comes; what failed is raised."""
     until_s = time.monotonic() + DEADLINE_S
     while True:
@@ -111,6 +123,3 @@ def open_residuals(project: Path) -> Iterator[Callable[..., Opened]]:
     yield make
     for opened in made:
         opened.close()
-
-
-LaunchFake = Callable[[MeasureJob], Measurer]

@@ -31,7 +31,7 @@ def test_means_are_those_of_an_evaluation(open_residuals, document):
     for pair in pairs:
         camera = names.index(pair.camera)
         excess = opened.heat(camera, pair.frame_index, "E").mean
-        assert excess == pytest.approx(LEVELS * mean_excess(pair), rel=ROUNDING, abs=1e-9)
+        assert excess == pytest.approx(LEVELS * (mean_excess(pair) or 0.0), rel=ROUNDING, abs=1e-9)
         for kind, what in (("R", "change"), ("G", "truth_change")):
             share = pair.static_share
             parts = (getattr(pair, f"{what}_static") or 0.0, getattr(pair, f"{what}_moving") or 0.0)

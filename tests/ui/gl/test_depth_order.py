@@ -46,3 +46,12 @@ def test_order_equals_a_stable_sort_reversed(depths: np.ndarray) -> None:
     visible = np.flatnonzero(depths > np.float32(0.25))
     expected = visible[np.argsort(depths[visible], kind="stable")][::-1]
     assert depth_order(points_at(depths), VIEW_ROW, 0.25).tolist() == expected.tolist()
+
+
+def test_neighbours_are_told_apart_from_very_far_away() -> None:
+    """An orthographic view stands ten thousand scene radii away, where float32 depths come in coarse steps."""
+    order = np.random.default_rng(2).permutation(500)
+    means = np.zeros((500, 3), np.float32)
+    means[:, 2] = 1e-4 * order
+    ids = depth_order(means, np.array([0.0, 0.0, 1.0, 10_000.0]), 9_999.0)
+    assert np.array_equal(order[ids], np.arange(500)[::-1])

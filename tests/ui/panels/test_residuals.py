@@ -62,8 +62,8 @@ def test_bad_is_bright_in_every_column() -> None:
 
 
 def test_seams_without_a_score_are_left_out() -> None:
-    seams = (SeamStatus(1, 10, 0.5), SeamStatus(2, 20), SeamStatus(3, 30, 2.5))
-    assert [seam.clip_index for seam in worst_seams(seams, 5)] == [3, 1]
+    seams = (SeamStatus(1, 10, 0.5, 1.2), SeamStatus(2, 20), SeamStatus(3, 30, 2.5, 2.0), SeamStatus(4, 40, 0.9))
+    assert [seam.clip_index for seam, _ in worst_seams(seams, 5)] == [4, 3, 1]
 
 
 def test_a_value_outside_of_the_map_is_none() -> None:
@@ -107,10 +107,14 @@ def test_the_worst_picture_comes_first_and_a_click_goes_there(pilot: Pilot) -> N
     assert "residuals.worst12.5" in pilot.rects
 
 
-def test_a_seam_leads_to_its_frame_and_its_worst_camera(pilot: Pilot) -> None:
+def test_a_seam_is_played_around_as_its_worst_camera_sees_it(pilot: Pilot) -> None:
     _show(pilot)
     pilot.click("residuals.seam2")
-    assert (pilot.session.timeline.frame_index, pilot.session.view.look_through) == (20, 5)
+    timeline = pilot.session.timeline
+    assert timeline.around is not None
+    assert timeline.around[0] < 20 < timeline.around[1]
+    assert timeline.is_playing
+    assert pilot.session.view.look_through == 5
 
 
 def test_a_heat_map_lies_over_the_picture_with_its_bar_and_the_value_under_the_pointer(pilot: Pilot) -> None:

@@ -374,7 +374,7 @@ def test_a_thousand_clips_are_drawn_with_few_pieces_at_every_zoom(
     track = pilot.rects["timeline.track"]
     bands = [rect for name, rect in pilot.rects.items() if name.startswith("timeline.clip")]
     marks = [name for name in pilot.rects if name.startswith("timeline.seam")]
-    assert 1 < len(bands) <= track.width / 2 + 2
+    assert 1 <= len(bands) <= track.width / 3 + 2
     assert len(marks) <= track.width / 9 + 2
     assert all(band.x1 > track.x0 - 4 and band.x0 < track.x1 + 4 for band in bands), "nothing out of sight is drawn"
     assert len(session.notices) == 0
@@ -402,3 +402,51 @@ def test_rows_at_twice_the_scale_are_where_they_are_at_once(open_pilot: Callable
     large = open_pilot(long_session(300, 10), size=(1800, 1200), memory=memory)
     for name, rect in rects.items():  # letters are not quite as wide at another size
         assert np.allclose([*vars(large.rects[name]).values()], [*vars(rect).values()], atol=2), name
+
+
+ROWS = [
+    "timeline.unit",
+    "timeline.lanes",
+    "timeline.fold seams",
+    "timeline.fold cache",
+    "timeline.speed",
+    "timeline.follow",
+]
+
+
+@pytest.mark.parametrize("name", [*ROWS, "timeline.seam3", "timeline.seam7", "timeline.marker128", "quality", "stale"])
+def test_whatever_the_pointer_rests_on_says_what_it_is(open_pilot: Callable[..., Pilot], name: str) -> None:
+    session = long_session(300, 10)
+    session.clip_states[1] = ClipStatus("stale", reason="Its reference was trained again: 100 % ## %s.")
+    pilot = open_pilot(session)
+    pilot.move(5, 5)
+    pilot.draw(60)
+    before = pilot.picture()
+    row = pilot.rects["timeline.fold quality"]
+    places = {"quality": (x_of(pilot, 40.0), row.center[1]), "stale": pilot.rects["timeline.clip1"].center}
+    pilot.move(*(places.get(name) or pilot.rects[name].center))
+    pilot.draw(60)
+    assert (pilot.picture() != before).any(axis=2).sum() > 1_500, "a note covers that many pixels"
+    assert len(session.notices) == 0
+
+
+def test_a_note_tells_the_ratio_of_a_seam_and_the_names_as_they_are(
+    open_pilot: Callable[..., Pilot], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from imgui_bundle import imgui
+
+    said = []
+    monkeypatch.setattr(imgui, "text_unformatted", said.append)
+    session = long_session(300, 10)
+    session.measured = ResidualStatus((SeamStatus(3, 90, 0.5, 2.64),))
+    pilot = open_pilot(session)
+    pilot.move(*pilot.rects["timeline.seam3"].center)
+    pilot.draw(2)
+    assert "between clips 2 and 3, at frame 90" in said[-1]
+    assert "2.6! times" in said[-1]
+    pilot.move(*pilot.rects["timeline.seam4"].center)
+    pilot.draw(2)
+    assert "Not measured" in said[-1]
+    pilot.move(*pilot.rects["timeline.marker128"].center)
+    pilot.draw(2)
+    assert said[-1] == MARKERS[1]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
+from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.playback.views import Views
@@ -19,7 +20,7 @@ from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
 
 TIME, VIEW, COMPARE, MARK, TRAIN, WINDOW = "Time", "View", "Show and compare", "Mark regions", "Train", "Window"
-MODE = "View mode"
+NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
 class ActionNeeds(RegionsNeeds, Protocol):
@@ -33,6 +34,9 @@ class ActionNeeds(RegionsNeeds, Protocol):
 
     @property
     def views(self) -> Views: ...
+
+    @property
+    def bookmarks(self) -> Bookmarks: ...
 
     @property
     def overlays(self) -> Overlays: ...
@@ -61,6 +65,7 @@ class Action:
         needs_capture: Ignored until a capture is open.
         needs_choosing: Ignored unless a region is being chosen.
         repeats: Holding the key repeats the action.
+        is_in_help: Shown on the help sheet; of a row of keys that do alike, one is enough there.
         is_on: Of what can be on or off, whether it is; menus show a tick.
     """
 
@@ -73,6 +78,7 @@ class Action:
     needs_choosing: bool = False
     repeats: bool = False
     is_on: Callable[[ActionNeeds], bool] | None = None
+    is_in_help: bool = True
 
     @cached_property
     def parsed_keys(self) -> tuple[Key, ...]:

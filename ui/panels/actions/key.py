@@ -16,11 +16,14 @@ _NAMES = {
     "Page Down": "page_down",
     "[": "left_bracket",
     "]": "right_bracket",
+    "\\": "backslash",
     ",": "comma",
     ".": "period",
     "/": "slash",
     "-": "minus",
     "+": "equal",
+    **{f"Num {digit}": f"keypad{digit}" for digit in range(10)},
+    "Num .": "keypad_decimal",
 }
 """Keys whose name is not the printed word in lower case."""
 _ANY_SHIFT = ("-", "+", "0")

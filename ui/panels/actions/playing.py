@@ -74,7 +74,7 @@ ACTIONS = (
         "Play every frame, or skip frames to keep the speed",
         TIME,
         _toggle_every_frame,
-        keys=("E",),
+        keys=("Shift+Space",),
         is_on=lambda session: session.timeline.is_every_frame,
     ),
     Action("play.in", "Play from this frame on", TIME, _on_timeline(Timeline.set_in), keys=("I",)),

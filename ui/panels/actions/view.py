@@ -8,7 +8,6 @@ import numpy as np
 
 from app.playback.views import COUNTS
 from app.session.commands import ActivateView, HomeView, LookThrough, ShowViews
-from engine.camera.projection import camera_center
 from ui.panels.actions.action import VIEW, Action, ActionNeeds, Run
 from ui.panels.state import Dispatch, UiState
 
@@ -32,10 +31,10 @@ def _home(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 def nearest_camera(session: ActionNeeds) -> int:
     """The capture camera that looks most like the current view: near in place and direction."""
     rig = session.rig
-    world_to_camera = np.asarray(session.view.world_to_camera(), dtype=np.float64)
-    distances = np.linalg.norm(rig.centers - camera_center(world_to_camera), axis=1)
+    pose = session.view.shown_pose
+    distances = np.linalg.norm(rig.centers - pose.standpoint, axis=1)
     spread = max(float(np.linalg.norm(rig.centers - rig.centers.mean(0), axis=1).max()), 1e-9)
-    turns = 1.0 - rig.forwards @ world_to_camera[2, :3]
+    turns = 1.0 - rig.forwards @ pose.forward
     return int(np.argmin(distances / spread + turns))
 
 

@@ -12,7 +12,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.session.commands import LookThrough, SetFrame
-from app.status import CELL_COLUMNS, CELL_RANGES, LOW_IS_BAD, SEAM_FLAGGED, ResidualStatus, SeamStatus
+from app.status import CELL_COLUMNS, CELL_RANGES, LOW_IS_BAD, ResidualStatus, SeamStatus
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
 from engine.text import duration_text
@@ -21,6 +21,8 @@ from ui.panels.color_bar import COLOR_BAR_SIZE, draw_color_bar
 from ui.panels.residuals.matrix import Matrix
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.thumbnails import ThumbnailNeeds, Thumbnails
+from ui.panels.timeline.columns import shown_ratio
+from ui.panels.timeline.seam_lane import ratio_text, seam_color
 from ui.panels.widgets import elided, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
@@ -67,10 +69,22 @@ def figure_text(value: float, column: str) -> str:
     return f"{value:.{digits}f} {UNITS[column]}".rstrip()
 
 
-def worst_seams(seams: Sequence[SeamStatus], n: int) -> list[SeamStatus]:
-    """The highest scores first."""
-    known = [seam for seam in seams if seam.score is not None]
-    return sorted(known, key=lambda seam: -(seam.score or 0.0))[:n]
+def worst_seams(seams: Sequence[SeamStatus], n: int) -> list[tuple[SeamStatus, float]]:
+    """The highest ratios first."""
+    known = [(seam, ratio) for seam in seams if (ratio := shown_ratio(seam)) is not None]
+    return sorted(known, key=lambda pair: -pair[1])[:n]
+
+
+def seam_words(seam: SeamStatus, rig: CameraRig) -> str:
+    """What is known of a seam, and what a click does."""
+    lines = []
+    if seam.ratio is not None:
+        lines.append(f"What stands still changes {seam.ratio:.2f} times as much as inside the two clips.")
+    if seam.score is not None:
+        lines.append(f"Excess flicker of it: {seam.score:.2f} x 1/255, mean of {seam.n_cameras} cameras.")
+    if seam.worst_camera is not None:
+        lines.append(f"Worst camera: {rig.names[seam.worst_camera]}.")
+    return "\n".join([*lines, "Click to look through it and play around the boundary."])
 
 
 def progress_text(status: ResidualStatus) -> str:
@@ -138,24 +152,22 @@ class ResidualsPanel:
         found = worst_seams(status.seams, N_SEAMS)
         if not found:
             text_wrapped_dim("No boundary between two trained clips is measured yet.")
-        for seam in found:
-            assert seam.score is not None
+        for seam, ratio in found:
             imgui.push_id(seam.clip_index)
-            is_flagged = seam.score > SEAM_FLAGGED
             is_clicked = imgui.selectable("##seam", session.timeline.frame_index == seam.frame_index)[0]
             ui.mark(f"residuals.seam{seam.clip_index}")
-            worst = "" if seam.worst_camera is None else f"; most in {session.rig.names[seam.worst_camera]}"
-            imgui.set_item_tooltip(f"Mean of {seam.n_cameras} cameras, in 1/255{worst}. Click to go there.")
+            imgui.set_item_tooltip(seam_words(seam, session.rig))
             imgui.same_line(0, 0)
-            if is_flagged:
-                imgui.text_colored(ImVec4(*theme.ORANGE), f"{Icon.WARNING} ")
-                imgui.same_line(0, 4)
-            imgui.text(f"{seam.score:.2f}   clip {seam.clip_index - 1} to {seam.clip_index}, frame {seam.frame_index}")
+            imgui.text_colored(ImVec4(*seam_color(ratio)), Icon.SQUARE)
+            imgui.same_line(0, 8)
+            imgui.text(
+                f"{ratio_text(ratio)}   clip {seam.clip_index - 1} to {seam.clip_index}, frame {seam.frame_index}"
+            )
             imgui.pop_id()
             if is_clicked:
-                dispatch(SetFrame(seam.frame_index))
                 if seam.worst_camera is not None:
                     dispatch(LookThrough(seam.worst_camera))
+                session.timeline.play_around(seam.frame_index)
 
     def _draw_columns(self, ui: UiState) -> None:
         imgui.separator_text("Frames and cameras")
@@ -188,7 +200,7 @@ class ResidualsPanel:
             words = figure_text(found, self.column) if is_known else "not measured"
             held_out = " (held out)" if status.is_held_out[camera_index] else ""
             name = session.rig.names[camera_index]
-            imgui.set_tooltip(f"{name}{held_out}, frame {frame_index}: {words}".replace("%", "%%"))
+            imgui.set_tooltip(f"{name}{held_out}, frame {frame_index}: {words}")
         origin = imgui.get_cursor_screen_pos()
         width = min(imgui.get_content_region_avail().x, COLOR_BAR_SIZE[0])
         bar = Rect(origin.x, origin.y, origin.x + width, origin.y + COLOR_BAR_SIZE[1])

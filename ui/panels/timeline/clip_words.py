@@ -1,4 +1,4 @@
-"""What is said of a clip and its state, the same wherever it is said."""
+"""Words for a clip and its state, the same everywhere in the window."""
 
 from __future__ import annotations
 

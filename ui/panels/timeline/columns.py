@@ -9,7 +9,7 @@ import numpy as np
 
 from app.status import SEAM_FLAGGED, SEAM_RATIO_RANGE, ClipStatus, ResidualStatus, SeamStatus
 
-MIN_GROUP_WIDTH = 2.0
+MIN_GROUP_WIDTH = 3.0
 """Clips narrower than this are shown together, units of the screen."""
 STATES = ("untrained", "queued", "trained", "preparing", "training", "paused", "stopped", "stale", "failed", "damaged")
 """By how much a user has to see them: of clips that are shown together, the last one counts."""

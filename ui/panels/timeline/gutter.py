@@ -16,7 +16,7 @@ WIDTH = 84.0
 LANES_BUTTON = 22.0
 POPUP = "lanes"
 NOTES = {
-    SEAMS: "How much more changes at the boundary of two clips than inside of them: 1 is no seam, above 2 worth a look",
+    SEAMS: "How much more changes between two clips than inside of them: 1 means no seam, above 2 is worth a look",
     QUALITY: "Held-out PSNR of each clip, and of each frame where it was measured; 20 to 40 dB",
     CACHE: "Frames that are decoded in memory and shown at once",
     MARKERS: "Markers: Ctrl+M at the playhead",

@@ -27,7 +27,7 @@ FIRST_COLOR = 84
 """Of the colour map: what lies before is as dark as the track."""
 MARK_WIDTH = 7.0
 MIN_TEXT_ROOM = 36.0
-"""A ratio is written where the next mark is no nearer than this."""
+"""A ratio is written unless the next mark is nearer than this."""
 MIN_MARK_DISTANCE = 9.0
 """Seams closer together than this are shown as one, the worst of them."""
 REACH = 6.0
@@ -123,7 +123,7 @@ def _draw_note(session: TimelineNeeds, clip_index: int, ratio: float) -> None:
         words += "\nNot measured"
     else:
         words += f"\nWhat stands still changes {ratio_text(ratio)} times as much as inside of them"
-        words += f"\n1 is no seam; above {SEAM_RATIO_FLAGGED:g} is worth a look"
+        words += f"\n1 means no seam; above {SEAM_RATIO_FLAGGED:g} is worth a look"
     imgui.begin_tooltip()
     imgui.text_unformatted(f"{words}\nClick to play around it (/)")
     imgui.end_tooltip()

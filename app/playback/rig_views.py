@@ -1,0 +1,55 @@
+"""What a view takes from a rig: the lens and the pose of a camera, and the camera that the home view begins at."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from app.playback.view_motion import Pose
+from engine.camera.rig import CameraRig
+
+
+def camera_fov(rig: CameraRig, camera: int) -> float:
+    """Vertical field of view, radians."""
+    height, focal = float(rig.image_sizes[camera, 1]), float(rig.Ks[camera, 1, 1])
+    return 2.0 * math.atan(height / (2.0 * focal))
+
+
+def fitted_K(rig: CameraRig, camera: int, width: int, height: int) -> np.ndarray:
+    """Intrinsics of a camera whose picture is fitted into a viewport and centred. [3, 3] float64"""
+    image_width, image_height = (float(v) for v in rig.image_sizes[camera])
+    scale = min(width / image_width, height / image_height)
+    K = rig.Ks[camera].copy()
+    K[:2] *= scale
+    K[0, 2] += (width - scale * image_width) / 2
+    K[1, 2] += (height - scale * image_height) / 2
+    return K
+
+
+def camera_pose(rig: CameraRig, camera: int, *, otherwise: float) -> Pose:
+    """A camera as a pose about what lies ahead of it as far away as the scene.
+
+    Args:
+        otherwise: Distance of the pivot where the scene does not lie ahead, scene units.
+    """
+    eye, rotation = rig.centers[camera], rig.world_to_camera[camera, :3, :3]
+    ahead = float((rig.focus_point() - eye) @ rotation[2])
+    distance = ahead if ahead > 1e-3 else otherwise
+    return Pose(rotation, eye + distance * rotation[2], distance, distance, camera_fov(rig, camera))
+
+
+def home_camera(rig: CameraRig, focus: np.ndarray, up: np.ndarray) -> int:
+    """A camera that looks level and stands in the middle of the others.
+
+    A dome's mean direction points straight up; only its level part counts, so that the home view is not from above.
+
+    Args:
+        focus: What the cameras look at, scene units. [3]
+        up: Unit vector. [3]
+    """
+    offsets = rig.centers - focus
+    directions = offsets / np.maximum(np.linalg.norm(offsets, axis=1, keepdims=True), 1e-9)
+    heights = directions @ up
+    level_mean = directions.mean(0) - heights.mean() * up
+    return int(np.argmax(directions @ level_mean - 0.5 * np.abs(heights)))

@@ -1,0 +1,65 @@
+"""Actions on bookmarks: views that one comes back to."""
+
+from __future__ import annotations
+
+from app.playback.bookmarks import NUMBERS, Bookmark
+from app.playback.view_place import ViewPlace
+from app.session.commands import SetFrame
+from ui.panels.actions.action import BOOKMARKS, Action, ActionNeeds, Run
+from ui.panels.state import Dispatch, UiState
+
+
+def go_to_bookmark(session: ActionNeeds, dispatch: Dispatch, bookmark: Bookmark) -> None:
+    """Look from there, at its frame if it has one that the capture has."""
+    bookmark.place.show(session.view)
+    if bookmark.frame_index is not None and bookmark.frame_index <= session.timeline.last_frame:
+        dispatch(SetFrame(bookmark.frame_index))
+
+
+def _go(number: int) -> Run:
+    def go(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        bookmark = session.bookmarks.numbered(number)
+        if bookmark is not None:
+            go_to_bookmark(session, dispatch, bookmark)
+
+    return go
+
+
+def _keep(number: int) -> Run:
+    def keep(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        session.bookmarks.set_numbered(number, ViewPlace.of(session.view))
+
+    return keep
+
+
+def _open(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.is_view_popup_wanted = True
+
+
+def _numbered(number: int) -> tuple[Action, Action]:
+    is_first = number == NUMBERS[0]
+    others = f"; {NUMBERS[1]} to {NUMBERS[-1]} likewise" if is_first else ""
+    return (
+        Action(
+            f"bookmark.go{number}",
+            f"Go to bookmark {number}{others}",
+            BOOKMARKS,
+            _go(number),
+            keys=(f"Ctrl+{number}",),
+            is_in_help=is_first,
+        ),
+        Action(
+            f"bookmark.keep{number}",
+            f"Keep this view as bookmark {number}{others}",
+            BOOKMARKS,
+            _keep(number),
+            keys=(f"Ctrl+Shift+{number}",),
+            is_in_help=is_first,
+        ),
+    )
+
+
+ACTIONS = (
+    Action("bookmark.list", "Lens, axes and bookmarks", BOOKMARKS, _open, keys=("Ctrl+B",)),
+    *(action for number in NUMBERS for action in _numbered(number)),
+)
