@@ -191,6 +191,108 @@ class ClipStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class SequenceForecast:
+    """What training several clips one after another takes, as far as it is known.
+
+    Attributes:
+        n_clips: How many are not finished.
+        n_steps: Steps that are left.
+        seconds: Until the last of them is finished; None where nobody can know.
+        disk_mb: What they will take on disk, 10^6 bytes; None where nobody can know.
+    """
+
+    n_clips: int
+    n_steps: int = 0
+    seconds: float | None = None
+    disk_mb: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class QueuedClip:
+    """A clip that waits to be trained.
+
+    Attributes:
+        n_steps: Steps that are left of it.
+        seconds: How long it is expected to take; None where nobody can know.
+        has_own_settings: Whether it is trained with other settings than its project.
+    """
+
+    clip_index: int
+    n_steps: int = 0
+    seconds: float | None = None
+    has_own_settings: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class QueueStatus:
+    """Clips that wait, those that failed, and what all of it takes.
+
+    Attributes:
+        waiting: In the order in which they are trained.
+        failed: Clips whose training failed, each with the reason.
+        is_held: Whether they wait until the user goes on.
+        is_ending_after: Whether they are held once the clip that trains has ended.
+        queued: The clip that trains and those that wait; None without any.
+        everything: All clips that are not finished, whether they wait or not; None where every clip is.
+        progress: Share of the steps of the present sequence that is done, 0..1.
+        n_done: Clips of that sequence that have ended.
+        free_mb: Room on the disk of the project, 10^6 bytes; None where not known.
+        live_view: How often the clip that trains is shown anew: "off", "low" or "live".
+    """
+
+    waiting: tuple[QueuedClip, ...] = ()
+    failed: tuple[tuple[int, str], ...] = ()
+    is_held: bool = False
+    is_ending_after: bool = False
+    queued: SequenceForecast | None = None
+    everything: SequenceForecast | None = None
+    progress: float = 0.0
+    n_done: int = 0
+    free_mb: float | None = None
+    live_view: str = "live"
+
+
+@dataclass(frozen=True, slots=True)
+class UsageStatus:
+    """What the program's processes use of the machine; None where the system does not say.
+
+    Attributes:
+        window_mb, training_mb: Memory, 10^6 bytes.
+        window_cores, training_cores: Processor time per time since the look before: 1 is one core all of the time.
+        n_cores: Of the machine.
+    """
+
+    window_mb: float | None = None
+    window_cores: float | None = None
+    training_mb: float | None = None
+    training_cores: float | None = None
+    n_cores: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class VersionStatus:
+    """What a clip was before it was trained again.
+
+    Attributes:
+        number: Names it for RestoreVersion and RemoveVersion.
+        trained: When it was trained, local time as text.
+        step: Steps it was trained for.
+        held_out_psnr: dB; None where not measured.
+        n_bytes: Size of its file.
+        differences: Settings in which it differs from the finished clip: name, its value, that of the clip.
+        why_not: Why it cannot be brought back now; empty where it can.
+    """
+
+    number: int
+    trained: str = ""
+    step: int = 0
+    held_out_psnr: float | None = None
+    n_bytes: int = 0
+    differences: tuple[tuple[str, str, str], ...] = ()
+    why_not: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class SettingStatus:
     """A training setting that the user may change before the first clip is trained.
 

@@ -48,6 +48,11 @@ class NextPlan:
         """The plan made last."""
         return self._plans.newest
 
+    @property
+    def is_busy(self) -> bool:
+        """Whether a plan is being made, for which the machine may be timed."""
+        return self._plans.is_busy
+
     def status(
         self, service: TrainingService, project: Project, capture: Capture, *, can_measure: bool
     ) -> PlanStatus | None:

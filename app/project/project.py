@@ -3,6 +3,7 @@
 project.json                 settings, see ProjectSettings
 gate.json                    regions in which the user overrules the gate, where there are any
 clips/0000.safetensors       finished clips
+versions/0000/               what was trained before it was trained again
 checkpoints/0000.safetensors unfinished clips: everything needed to go on
 live/                        snapshots of the running training; swept when the project is opened for writing
 prep/                        what clips share, such as backgrounds
@@ -209,7 +210,7 @@ class Project:
 
     def remove_files(self) -> None:
         """Take back a project that has learned nothing: its own files and folders go, other things stay."""
-        for name in ("clips", "checkpoints", "live", "prep", "metrics", "logs"):
+        for name in ("clips", "versions", "checkpoints", "live", "prep", "metrics", "logs"):
             shutil.rmtree(self.folder / name, ignore_errors=True)
         for name in (PROJECT_FILE, GATE_FILE):
             (self.folder / name).unlink(missing_ok=True)

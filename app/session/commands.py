@@ -41,13 +41,72 @@ class TrainClip:
 
     clip_index: int
     is_confirmed: bool = False
+    settings: tuple[tuple[str, int | float | str | bool], ...] = ()
+    """Names and values of settings that this clip alone is to have; see app.training.own_settings."""
+
+
+@dataclass(frozen=True, slots=True)
+class AskTrainSettings:
+    """Ask with which settings of its own a clip is to be trained."""
+
+    clip_index: int
 
 
 @dataclass(frozen=True, slots=True)
 class TrainClips:
-    """Train those of the clips that are not finished, one after the other; a reference clip among them comes first."""
+    """Train those of these clips that are not finished, one after the other, and before them what they need."""
 
     clip_indices: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TrainAll:
+    """Train every clip that is not finished."""
+
+
+@dataclass(frozen=True, slots=True)
+class MoveInQueue:
+    """Put a waiting clip at another position of the queue, counted from 0."""
+
+    clip_index: int
+    position: int
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveFromQueue:
+    """Do not train a waiting clip after all."""
+
+    clip_index: int
+
+
+@dataclass(frozen=True, slots=True)
+class StopAfterClip:
+    """Let the queue wait once the clip that trains has ended, or go on after all."""
+
+    is_wanted: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class SetLiveView:
+    """How often the clip that trains is shown anew: "off", "low" or "live". Trains on meanwhile."""
+
+    mode: str
+
+
+@dataclass(frozen=True, slots=True)
+class RestoreVersion:
+    """Bring back what a clip was before it was trained again; what it is now becomes a version."""
+
+    clip_index: int
+    version: int
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveVersion:
+    """Delete an earlier version of a clip for good."""
+
+    clip_index: int
+    version: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +116,7 @@ class PauseTraining:
 
 @dataclass(frozen=True, slots=True)
 class ResumeTraining:
-    """Go on after a pause."""
+    """Go on after a pause, or with a queue that waits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,12 +294,25 @@ EditCommand = MarkRegion | RemoveRegion | UndoMark | RedoMark
 SettingCommand = SetHoldout | SetClipLength | SetTrainSetting | SetPreset
 """What changes settings that all clips share."""
 
+QueueCommand = (
+    TrainClip
+    | TrainClips
+    | TrainAll
+    | AskTrainSettings
+    | MoveInQueue
+    | RemoveFromQueue
+    | StopAfterClip
+    | SetLiveView
+    | RestoreVersion
+    | RemoveVersion
+)
+"""What is trained when, how it is shown meanwhile, and which version of it counts."""
+
 Command = (
     OpenCapture
     | OpenProject
     | TrainNextClip
-    | TrainClip
-    | TrainClips
+    | QueueCommand
     | PauseTraining
     | ResumeTraining
     | StopTraining

@@ -9,19 +9,24 @@ from collections.abc import Sequence
 
 from app.background.jobs import JobContext, Jobs
 from app.plan.next_plan import NextPlan
+from app.plan.sequence import SequencePlan
 from app.playback.arrays import AnchorArrays
 from app.project.clip_catalog import ClipCatalog
 from app.project.opened_project import OpenedProject
 from app.session.notices import Notices
 from app.session.questions import RetrainQuestion, retrain_question
 from app.session.training_notices import tell
-from app.status import ClipStatus, PlanStatus, TrainingStatus
-from app.training.curves import CurveReader
+from app.status import ClipStatus, PlanStatus, QueueStatus, TrainingStatus
+from app.training.curves import CurveReader, Curves
 from app.training.messages import ENDINGS, Event, SnapshotWritten
 from app.training.service import Launch, ShownState, TrainingService
+from app.training.train_queue import OwnSettings
 from engine.errors import EngineError
 
 logger = logging.getLogger(__name__)
+
+MAX_LISTED = 12
+"""Clips named in a notice."""
 
 
 class LiveTraining:
@@ -33,13 +38,17 @@ class LiveTraining:
         jobs, notices: Of the session.
         launch: Starts a worker.
         can_measure: Whether plans may time the machine.
+        live_view: How often running clips are shown anew, one of app.training.messages.LIVE_VIEWS.
     """
 
-    def __init__(self, jobs: Jobs, notices: Notices, *, launch: Launch, can_measure: bool = True) -> None:
+    def __init__(
+        self, jobs: Jobs, notices: Notices, *, launch: Launch, can_measure: bool = True, live_view: str = "live"
+    ) -> None:
         self.service: TrainingService | None = None
         self._opened: OpenedProject | None = None
         self._jobs, self._notices, self._launch, self._can_measure = jobs, notices, launch, can_measure
-        self._plans, self._curves = NextPlan(), CurveReader()
+        self._plans, self._sequence, self._curves = NextPlan(), SequencePlan(), CurveReader()
+        self._live_view = live_view
         self._unread: SnapshotWritten | None = None
         self._live_counts: tuple[int, int] | None = None
         self._n_ending = 0
@@ -73,9 +82,11 @@ class LiveTraining:
             catalog=catalog,
             curves=self._curves,
         )
+        self.service.live_view = self._live_view
 
     def _retire(self, service: TrainingService, opened: OpenedProject) -> None:
         self._plans.forget()
+        self._sequence.forget()
         self._unread = self._live_counts = None
         if service.worker is None:
             service.close()
@@ -113,14 +124,16 @@ class LiveTraining:
     # ---------------------------------------------------------------- commands
 
     def train_next(self) -> None:
-        """Train the first clip that is not finished.
+        """Train the first clip that is not finished, or go on with a queue that was held.
 
         Raises:
             ProjectError: It cannot be trained.
         """
         service = self.service
         if service is None:
-            self._tell_nothing_open()
+            self.tell_nothing_open()
+        elif service.worker is None and service.queue:
+            service.go_on()
         elif service.next_clip_index is not None:
             service.enqueue(service.next_clip_index)
         elif any(status.state in ("damaged", "stale", "untrained") for status in self.clip_states()):
@@ -133,41 +146,45 @@ class LiveTraining:
         else:
             self._notices.add("info", "Every clip is trained")
 
-    def train(self, clip_index: int, *, is_confirmed: bool) -> RetrainQuestion | None:
+    def train(self, clip_index: int, *, is_confirmed: bool, own: OwnSettings | None = None) -> RetrainQuestion | None:
         """Train a clip, or return what has to be answered before a finished one is trained again.
 
+        Args:
+            own: Settings that it alone is to have.
         Raises:
             ProjectError: It cannot be trained.
         """
         if self.service is None:
-            self._tell_nothing_open()
+            self.tell_nothing_open()
         elif not is_confirmed and self.service.is_finished(clip_index):
             return retrain_question(self.service.catalog, clip_index)
         else:
-            self.service.enqueue(clip_index)
+            self.service.enqueue(clip_index, own or None)
         return None
 
-    def train_unfinished(self, clip_indices: Sequence[int]) -> None:
-        """Train those of the clips that are neither finished nor on their way, a reference clip among them first.
+    @property
+    def opened_project(self) -> OpenedProject:
+        """What is open. There has to be something."""
+        assert self._opened is not None
+        return self._opened
 
-        Raises:
-            ProjectError: One of them cannot be trained; those before it wait for their turn.
-        """
-        service = self.service
-        if service is None:
-            self._tell_nothing_open()
-            return
-        wanted = [
-            clip_index
-            for clip_index in service.catalog.order
-            if clip_index in {*clip_indices} and not service.is_finished(clip_index)
-        ]
-        for clip_index in wanted:
-            service.enqueue(clip_index)
-        if not wanted:
-            self._notices.add("info", "All of these clips are trained")
+    def set_live_view(self, mode: str) -> None:
+        """How often running clips are shown anew, from now on."""
+        self._live_view = mode
+        if self.service is not None:
+            self.service.set_live_view(mode)
 
-    def _tell_nothing_open(self) -> None:
+    def tell_dropped(self, dropped: Sequence[int]) -> None:
+        """Tell the user that clips left the queue, because what they need cannot come."""
+        if dropped:
+            listed = ", ".join(str(index) for index in dropped[:MAX_LISTED])
+            more = f" and {len(dropped) - MAX_LISTED} more" if len(dropped) > MAX_LISTED else ""
+            them = "Clip" if len(dropped) == 1 else "Clips"
+            verb = "waits no more: it needs" if len(dropped) == 1 else "wait no more: they need"
+            self._notices.add("warn", f"{them} {listed}{more} {verb} a clip that is not trained")
+
+    def tell_nothing_open(self) -> None:
+        """Tell the user that no capture is open."""
         self._notices.add("warn", "There is nothing to train yet", "No capture is open.", "Open a capture folder.")
 
     def pause(self) -> None:
@@ -176,9 +193,10 @@ class LiveTraining:
             self.service.pause()
 
     def resume(self) -> None:
-        """Go on after a pause."""
+        """Go on after a pause, or with a queue that was held."""
         if self.service is not None:
             self.service.resume()
+            self.service.go_on()
 
     def stop(self) -> None:
         """End the running training, keep what was learned and empty the queue."""
@@ -199,6 +217,8 @@ class LiveTraining:
                 self._unread = self._live_counts = None
                 if running is not None and self.state_of(running) is not None:
                     self._ended_clip = running
+        if events and self.service is not None:
+            self.tell_dropped(self.service.take_dropped())
         return events
 
     @property
@@ -265,10 +285,23 @@ class LiveTraining:
         can_measure = self._can_measure and not self._jobs.statuses
         return self._plans.status(self.service, self._opened.project, self._opened.capture, can_measure=can_measure)
 
+    def queue(self) -> QueueStatus:
+        """What waits, and what all of it takes."""
+        if self.service is None or self._opened is None:
+            return QueueStatus(live_view=self._live_view)
+        opened = self._opened
+        can_measure = self._can_measure and not self._jobs.statuses and not self._plans.is_busy
+        return self._sequence.status(self.service, opened.project, opened.capture, can_measure=can_measure)
+
+    def curves(self, clip_index: int) -> Curves | None:
+        """Loss and PSNR over the steps of a clip; None until they were read."""
+        return None if self.service is None else self.service.curves_of(clip_index)
+
     @property
     def finished(self) -> tuple[object, ...]:
-        """Identities of the newest plan and curves. Another value means that there is something new to see."""
-        return tuple(None if found is None else found[0] for found in (self._plans.newest, self._curves.worker.newest))
+        """Identities of the newest plans and curves. Another value means that there is something new to see."""
+        newest = (self._plans.newest, self._sequence.newest, self._curves.worker.newest)
+        return tuple(None if found is None else found[0] for found in newest)
 
     def close(self) -> None:
         """End the worker, keeping what was learned, and the threads. Blocks for a few seconds at most."""
@@ -276,3 +309,4 @@ class LiveTraining:
             self.service.close()
         self._curves.close()
         self._plans.close()
+        self._sequence.close()

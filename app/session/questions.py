@@ -23,6 +23,7 @@ class RetrainQuestion:
         is_average: Whether that is an average.
         outdated_seconds: Likewise for training all of `outdated` again.
         resume_step: The step of an earlier try that it goes on from; None when it starts from the beginning.
+        settings: Of its own, with which it is to be trained; see commands.TrainClip.
     """
 
     clip_index: int
@@ -34,6 +35,7 @@ class RetrainQuestion:
     is_average: bool
     outdated_seconds: float | None
     resume_step: int | None
+    settings: tuple[tuple[str, int | float | str | bool], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +53,41 @@ class ProjectQuestion:
     follow_links: bool = False
 
 
-Question = RetrainQuestion | ProjectQuestion
+@dataclass(frozen=True, slots=True)
+class SettingsQuestion:
+    """With which settings of its own is a clip to be trained?
+
+    Attributes:
+        clip_index: The clip.
+        settings: Those that may be others in this clip, as they are now.
+        retrain: What has to be known before a finished clip is trained again; None where it is not finished.
+        has_progress: Whether what was learned before a stop is given up by it.
+    """
+
+    clip_index: int
+    settings: tuple[OwnSetting, ...]
+    retrain: RetrainQuestion | None
+    has_progress: bool
+
+
+@dataclass(frozen=True, slots=True)
+class OwnSetting:
+    """A setting as it is offered for one clip.
+
+    Attributes:
+        value: What it is, or is derived to be.
+        choices: What it may be, where these are words.
+        help_text: What it does and what it may be.
+    """
+
+    name: str
+    label: str
+    value: int | float | str | bool
+    choices: tuple[str, ...] = ()
+    help_text: str = ""
+
+
+Question = RetrainQuestion | SettingsQuestion | ProjectQuestion
 
 
 def retrain_question(catalog: ClipCatalog, clip_index: int) -> RetrainQuestion:

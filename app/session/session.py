@@ -8,10 +8,12 @@ handed.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from app.background.jobs import Jobs
+from app.background.log_reader import LogLine, LogView
+from app.background.usage import UsageMeter
 from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
 from app.playback.bookmarks import Bookmarks
 from app.playback.coverage import Coverage
@@ -29,12 +31,14 @@ from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.residuals.residuals import Residuals
 from app.session import commands
+from app.session.clip_versions import Versions
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
 from app.session.notices import Notices
 from app.session.project_opener import ProjectOpener
 from app.session.questions import ProjectQuestion, Question
+from app.session.queue_commands import QueueCommands
 from app.session.recent_projects import RecentProjects
 from app.session.setting_changes import changed_settings
 from app.session.settings import Settings
@@ -47,14 +51,17 @@ from app.status import (
     Overlays,
     PlanStatus,
     ProjectStatus,
+    QueueStatus,
     RegionsStatus,
     ResidualStatus,
     TrainingStatus,
+    UsageStatus,
+    VersionStatus,
     WantedFrame,
 )
 from app.training.messages import ENDINGS, TrainJob
 from app.training.process import ProcessWorker, Worker
-from app.training.service import Launch
+from app.training.service import Launch, ShownState
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -67,8 +74,10 @@ class Session:
     Attributes:
         opened: What is open; None before.
         timeline, views, bookmarks: What the user looks at; the window may change them directly.
-        training, clip_states, plan, regions, project_status: Status values, remade by `poll` and `dispatch`. The plan
-            is that of the next clip; None while something trains or nothing is left to train.
+        training, queue, clip_states, plan, regions, usage, project_status: Status values, remade by `poll` and
+            `dispatch`. The plan is that of the next clip; None while something trains or nothing is left to train.
+        versions: What clips were before they were trained again.
+        log: What program and training have said.
         question: What the user has to answer; None while there is nothing to ask.
         recent: What was opened lately.
         notices: What the user has to know.
@@ -101,16 +110,26 @@ class Session:
         self.clip_states: list[ClipStatus] = []
         self.plan: PlanStatus | None = None
         self.project_status: ProjectStatus | None = None
+        self.queue = QueueStatus()
+        self.usage = UsageStatus()
         self._launch, self._is_preloading, self._is_closed = launch, is_preloading, False
         self._jobs = Jobs(self._fail)
+        settings = Settings() if settings is None else settings
         self.live_training = LiveTraining(
-            self._jobs, self.notices, launch=self._launch_worker, can_measure=is_preloading
+            self._jobs,
+            self.notices,
+            launch=self._launch_worker,
+            can_measure=is_preloading,
+            live_view=settings.live_view,
         )
+        self.versions = Versions(self._jobs, self.notices, lambda: self.live_training.service)
+        self._queue_commands = QueueCommands(self.live_training, self.versions, self.notices, settings)
+        self._usage, self.log = UsageMeter(), LogView()
         self.playback = Playback(self.live_training.state_of)
         self.residuals = Residuals(self.playback)
         self.marking = Marking()
         self.regions: RegionsStatus = self.marking.status([])
-        self.recent = RecentProjects(Settings() if settings is None else settings)
+        self.recent = RecentProjects(settings)
         self.opener = ProjectOpener(
             self._jobs, self.notices, self._take_opened, project_dir=project_dir, open_path=opener
         )
@@ -204,12 +223,9 @@ class Session:
             case commands.TrainNextClip():
                 self.question = None
                 live.train_next()
-            case commands.TrainClip(clip_index=clip_index, is_confirmed=is_confirmed):
+            case _ if isinstance(command, commands.QueueCommand):
                 self.question = None
-                self.question = live.train(clip_index, is_confirmed=is_confirmed)
-            case commands.TrainClips(clip_indices=clip_indices):
-                self.question = None
-                live.train_unfinished(clip_indices)
+                self.question = self._queue_commands.obey(command)
             case commands.PauseTraining():
                 live.pause()
             case commands.ResumeTraining():
@@ -286,6 +302,7 @@ class Session:
         changed_project = opened_project(opened.capture, opened.project, opened.generation)
         self._show(changed_project)
         self.live_training.open(changed_project)
+        self.versions.open(changed_project)
         self._open_residuals(changed_project)
         self.timeline.take_over(before)
 
@@ -303,6 +320,7 @@ class Session:
         self.marking.open(found.project)  # first: keeps what was marked in the project that is left
         self._show(opened)
         self.live_training.open(opened, found.catalog)
+        self.versions.open(opened)
         self._open_residuals(opened)
         self.views.look_at(opened.rig)
         self.bookmarks = Bookmarks()
@@ -361,7 +379,10 @@ class Session:
     def _news_key(self) -> tuple[object, ...]:
         """Differs whenever a thread has finished something, or there is something else to tell."""
         jobs = tuple((job.name, job.done, job.message) for job in self.jobs)
-        return self.playback.finished, self.live_training.finished, jobs, self.notices.revision, self.recent.missing
+        seen = (self.versions.worker.newest, self.log.worker.newest)
+        looked = tuple(None if found is None else found[0] for found in seen)
+        training = self.live_training.finished
+        return self.playback.finished, training, looked, jobs, self.notices.revision, self.recent.missing
 
     def _release_snapshot(self) -> None:
         """Give a snapshot back once it was read, or where nobody looks at its clip."""
@@ -395,7 +416,8 @@ class Session:
         self.training = live.status(None if clip is None else clip.clip_index)
         self.clip_states = live.clip_states()
         self.regions = self.marking.status(self.clip_states)
-        self.plan = live.plan()
+        self.plan, self.queue = live.plan(), live.queue()
+        self.usage = self._usage.sample(None if live.service is None else live.service.worker_pid)
         if opened is not None:
             n_trained = 0 if live.service is None else live.service.catalog.n_trained
             name = project_name(opened.project.folder.absolute(), opened.project.settings.capture)
@@ -417,8 +439,34 @@ class Session:
         self.residuals.close()
         self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)
         self.playback.close()
+        self.versions.close()
+        self.log.close()
         if self.capture is not None:
             self.capture.close()
+
+    # ---------------------------------------------------------------- trainings and their files
+
+    def clip_curves(self, clip_index: int) -> tuple[Sequence[tuple[int, float]], Sequence[tuple[int, float]]] | None:
+        """(step, value) of a clip's loss and of its held-out PSNR in dB; None until they were read."""
+        curves = self.live_training.curves(clip_index)
+        return None if curves is None else (curves.loss, curves.psnr)
+
+    def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]:
+        """What a clip was before it was trained again, newest first; none until that was read."""
+        return self.versions.statuses(clip_index)
+
+    def version_state(self, clip_index: int, version: int) -> ShownState | None:
+        """An earlier version of a clip as a file to show; None until it was read, and where it cannot be shown."""
+        return self.versions.state(clip_index, version)
+
+    def log_lines(self) -> Sequence[LogLine]:
+        """What the program said, and the training of the clip that trains or is looked at; in the order of time."""
+        clip, project = self.timeline.clip, self.project
+        trains = self.training.state not in ("idle", "failed")
+        clip_index = self.training.clip_index if trains or clip is None else clip.clip_index
+        if project is None or clip_index is None:
+            return self.log.lines(None, None)
+        return self.log.lines(clip_index, project.log_path(clip_index))
 
     # ---------------------------------------------------------------- pictures and arrays
 
@@ -491,6 +539,11 @@ class Session:
 _TITLES: dict[type, str] = {
     commands.TrainClip: "The clip cannot be trained",
     commands.TrainNextClip: "The clip cannot be trained",
+    commands.TrainClips: "The clips cannot be trained",
+    commands.TrainAll: "The clips cannot be trained",
+    commands.AskTrainSettings: "The clip cannot be trained",
+    commands.RestoreVersion: "The version cannot be brought back",
+    commands.RemoveVersion: "The version cannot be removed",
     commands.SetHoldout: "These cameras cannot be held out",
     commands.SetClipLength: "The clip length cannot be changed",
     commands.SetTrainSetting: "The setting cannot be changed",

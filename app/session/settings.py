@@ -1,11 +1,15 @@
-"""The user's preferences: projects opened lately. A small JSON file in the user's configuration folder."""
+"""The user's preferences: projects opened lately, and how often training is shown. A small JSON file in the user's
+configuration folder.
+"""
 
 from __future__ import annotations
 
 import logging
 from pathlib import Path
+from typing import Any
 
 from app.project.recents import RecentProject, read_recents, recents_document, with_entry
+from app.training.messages import LIVE_VIEWS
 from engine.storage.json_files import JsonError, read_checked_json, write_checked_json
 from engine.user_folders import config_dir
 
@@ -19,6 +23,7 @@ class Settings:
 
     Attributes:
         recent: Projects that were opened lately, newest first.
+        live_view: How often the clip that trains is shown anew: "off", "low" or "live".
 
     Args:
         path: The file; the platform's place when None.
@@ -26,7 +31,9 @@ class Settings:
 
     def __init__(self, path: Path | None = None) -> None:
         self.path = config_dir() / "settings.json" if path is None else path
-        self.recent: list[RecentProject] = _read_recent(self.path)
+        document = _read(self.path)
+        self.recent: list[RecentProject] = read_recents(document)
+        self.live_view = found if (found := document.get("live_view")) in LIVE_VIEWS else "live"
 
     def add_recent(self, entry: RecentProject) -> None:
         """Put a project first in the list of recent ones."""
@@ -36,23 +43,33 @@ class Settings:
         """Take a project or capture out of the list; its files stay."""
         self._set_recent([entry for entry in self.recent if entry.folder != folder])
 
+    def set_live_view(self, mode: str) -> None:
+        """Keep how often the clip that trains is shown anew."""
+        self.live_view = mode
+        self._save()
+
     def _set_recent(self, entries: list[RecentProject]) -> None:
         self.recent = entries
+        self._save()
+
+    def _save(self) -> None:
+        document = {"schema": 1, "live_view": self.live_view} | recents_document(self.recent)
         try:
-            write_checked_json(self.path, {"schema": 1} | recents_document(entries))
+            write_checked_json(self.path, document)
         except OSError as error:
             logger.warning("preferences could not be saved (%s) - %s", error.strerror, self.path)
 
 
-def _read_recent(path: Path) -> list[RecentProject]:
+def _read(path: Path) -> dict[str, Any]:
+    """The document; empty where it is missing or damaged."""
     try:
         document = read_checked_json(path, max_bytes=MAX_BYTES)
         for name in ("projects", "recent"):
             if not isinstance(document.get(name, []), list):
                 raise JsonError(f'its entry "{name}" is not a list')
-        return read_recents(document)
     except FileNotFoundError:
-        return []
+        return {}
     except (OSError, JsonError) as error:
         logger.warning("preferences could not be read (%s) - %s", error, path)
-        return []
+        return {}
+    return document

@@ -13,6 +13,9 @@ from dataclasses import asdict, dataclass, field, fields
 from engine.clip_files.clip_header import SettingValue
 from engine.storage.typed_json import to_type
 
+LIVE_VIEWS = ("off", "low", "live")
+"""How often a worker writes snapshots: never, now and then, or as often as they are looked at."""
+
 # ---------------------------------------------------------------- the job
 
 
@@ -28,6 +31,7 @@ class TrainJob:
         holdout: Camera indices never trained on.
         follow_links: Whether files of the capture may lie outside of its folder.
         is_window_open: Leave a core, or at least right of way, to a window.
+        live_view: How often snapshots are written, one of LIVE_VIEWS.
     """
 
     project: str
@@ -40,6 +44,7 @@ class TrainJob:
     overrides: dict[str, SettingValue] = field(default_factory=dict)
     is_window_open: bool = True
     follow_links: bool = False
+    live_view: str = "live"
 
 
 # ---------------------------------------------------------------- commands
@@ -76,6 +81,13 @@ class SnapshotConsumed:
     """The snapshot of this revision was read; the next one may be written."""
 
     revision: int
+
+
+@dataclass(frozen=True, slots=True)
+class SetSnapshots:
+    """Write snapshots this often from now on: one of LIVE_VIEWS."""
+
+    mode: str
 
 
 # ---------------------------------------------------------------- events
@@ -190,7 +202,7 @@ class WorkerDied:
     log_tail: str = ""
 
 
-Command = Pause | Resume | Stop | SnapshotNow | SnapshotConsumed
+Command = Pause | Resume | Stop | SnapshotNow | SnapshotConsumed | SetSnapshots
 Event = (
     WorkerReady
     | StageReported

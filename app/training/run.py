@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from app.background.memory import peak_bytes
+from app.project.clip_versions import forget_oldest, set_aside
 from app.project.project import Project, open_project
 from app.project.project_files import read_metrics
 from app.project.stage_seconds import stages_of
@@ -29,6 +30,7 @@ from app.training.messages import (
     HeldOutMeasured,
     Pause,
     Resume,
+    SetSnapshots,
     SnapshotConsumed,
     SnapshotNow,
     StageReported,
@@ -57,6 +59,8 @@ logger = logging.getLogger(__name__)
 
 REPORT_EVERY_S = 0.1
 SNAPSHOT_EVERY_S = 2.0
+LOW_SNAPSHOT_EVERY_S = 10.0
+"""With a live view that is low."""
 SNAPSHOT_SHARE = 0.05
 """Share of the time that snapshots may cost."""
 HELD_OUT_EVERY_S = 5.0
@@ -71,6 +75,10 @@ METRICS_EVERY_S = 0.5
 Receive = Callable[[float], Command | None]
 """The next command, waiting at most this many seconds. Raises EOFError when nobody is left to send one."""
 Send = Callable[[Event], None]
+
+
+def _snapshot_cadence(live_view: str) -> Cadence:
+    return Cadence(LOW_SNAPSHOT_EVERY_S if live_view == "low" else SNAPSHOT_EVERY_S, SNAPSHOT_SHARE)
 
 
 class StopRequested(Exception):
@@ -118,7 +126,8 @@ class TrainingRun:
         self._watch = StageWatch(clock)
         self._paused_stage: str | None = None
         self._report_cadence = Cadence(REPORT_EVERY_S)
-        self._snapshot_cadence = Cadence(SNAPSHOT_EVERY_S, SNAPSHOT_SHARE)
+        self._live_view = job.live_view
+        self._snapshot_cadence = _snapshot_cadence(job.live_view)
         self._checkpoint_cadence = Cadence(CHECKPOINT_EVERY_S, CHECKPOINT_SHARE)
         self._held_out_cadence = Cadence(HELD_OUT_EVERY_S, HELD_OUT_SHARE)
         self._metrics_cadence = Cadence(METRICS_EVERY_S)
@@ -198,7 +207,8 @@ class TrainingRun:
             )
         )
         self._measure(training)  # renders, so that every kernel is compiled before a window does the same
-        self._write_snapshot(training)
+        if self._live_view != "off":
+            self._write_snapshot(training)
         self._rate.update(training.steps_done, self._clock())
         return training
 
@@ -233,7 +243,7 @@ class TrainingRun:
                 row = {"step": stats.step, "loss": loss, "train_psnr": stats.train_psnr}
                 self._note(row | {"gradient_norm": gradient_norm})
         is_wanted = self._is_snapshot_wanted or self._snapshot_cadence.is_due(now_s)
-        if is_wanted and self._snapshots.is_free and not is_last:
+        if is_wanted and self._live_view != "off" and self._snapshots.is_free and not is_last:
             self._write_snapshot(training)
         if self._held_out_cadence.is_due(now_s) and not is_last:
             self._measure(training)
@@ -303,8 +313,11 @@ class TrainingRun:
             DiskError: The disk refused; everything is as it was.
         """
         assert self._project is not None
-        path = self._project.clip_path(self._job.clip_index)
-        keep_clip(clip, path, self._project.live_dir)
+        project, clip_index = self._project, self._job.clip_index
+        path = project.clip_path(clip_index)
+        fingerprint = clip.state.header.fingerprint
+        keep_clip(clip, path, project.live_dir, lambda: set_aside(project, clip_index, unless=fingerprint))
+        forget_oldest(project, clip_index)
         try:
             self._project.keep_curves(self._job.clip_index)
         except OSError as error:
@@ -344,6 +357,10 @@ class TrainingRun:
                     self._send(TrainingResumed(self._steps_done))
                 case SnapshotNow():
                     self._is_snapshot_wanted = True
+                case SetSnapshots(mode=mode) if mode != self._live_view:
+                    self._live_view = mode
+                    self._snapshot_cadence = _snapshot_cadence(mode)
+                    self._is_snapshot_wanted = mode == "live"
                 case SnapshotConsumed(revision=revision):
                     self._snapshots.consumed(revision)
             if command is None and not (self._is_paused and self._can_wait):

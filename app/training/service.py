@@ -9,7 +9,6 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,11 +19,13 @@ from app.status import ClipStatus, TrainingStatus
 from app.training.curves import CurveReader, Curves, append_thinned, read_curves
 from app.training.messages import (
     ENDINGS,
+    LIVE_VIEWS,
     ClipTrained,
     Event,
     HeldOutMeasured,
     Pause,
     Resume,
+    SetSnapshots,
     SnapshotConsumed,
     SnapshotNow,
     SnapshotWritten,
@@ -38,10 +39,13 @@ from app.training.messages import (
     WorkerDied,
     WorkerReady,
 )
+from app.training.own_settings import with_own
 from app.training.process import ProcessWorker, Worker
 from app.training.stage_order import stage_number
+from app.training.train_queue import OwnSettings, TrainQueue, drop_hopeless, needed_clips
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
+from engine.training.preparation.stages import remove_stages
 
 logger = logging.getLogger(__name__)
 
@@ -78,11 +82,13 @@ class ShownState:
     Attributes:
         revision: Names the state.
         is_live: Whether it is a snapshot, which its worker replaces and removes as it goes on.
+        reference_file: The clip it is shown with, where that is not the project's reference as it is now.
     """
 
     file: Path
     revision: str
     is_live: bool = False
+    reference_file: Path | None = None
 
 
 class TrainingService:
@@ -96,6 +102,11 @@ class TrainingService:
         is_window_open: Passed on to workers, which then leave room for it.
         catalog: What lies on disk; read here, which takes a while in a long project, when None.
         curves: Reads the curves of clips that are looked at; stays open when the service is closed.
+
+    Attributes:
+        queue: Clips that wait.
+        live_view: How often workers write snapshots, one of LIVE_VIEWS.
+        is_ending_after: Whether the queue is held when the clip that trains has ended.
     """
 
     def __init__(
@@ -112,12 +123,16 @@ class TrainingService:
         self.project, self.clips, self.holdout = project, list(clips), tuple(holdout)
         self._launch, self._is_window_open = launch, is_window_open
         self.catalog = ClipCatalog(project, len(self.clips)) if catalog is None else catalog
-        self.queue: deque[int] = deque()
+        self.queue = TrainQueue()
+        self.live_view = "live"
+        self.is_ending_after = False
         self.worker: Worker | None = None
         self.curves = CurveReader() if curves is None else curves
         self._owns_curves = curves is None
-        self._failed: set[int] = set()
+        self._begun: dict[int, OwnSettings] = {}  # settings of their own that unfinished clips were begun with
+        self._dropped: list[int] = []
         self._run: Run | None = None
+        self._worker_pid: int | None = None
         self._stage = StageReported("", 0.0)
         self._step: StepReported | None = None
         self._is_ready = False
@@ -132,6 +147,11 @@ class TrainingService:
     def running_clip(self) -> int | None:
         """The clip that trains; None while nothing does."""
         return None if self.worker is None else self.worker.job.clip_index
+
+    @property
+    def worker_pid(self) -> int | None:
+        """Process of the worker; None while there is none, or before it has said so."""
+        return None if self.worker is None else self._worker_pid
 
     def is_finished(self, clip_index: int) -> bool:
         """Whether a finished clip would be replaced by training this one: it is trained, or damaged."""
@@ -151,7 +171,10 @@ class TrainingService:
         """The first clip that is neither finished nor on its way; None when there is none.
 
         A damaged clip is not among them, nor one that cannot be trained without it: that is for the user to decide.
+        Where the queue is held, it is the first of that.
         """
+        if self.worker is None and self.queue:
+            return next(iter(self.queue))
         taken = {*self.queue, self.running_clip}
         for clip_index in self.catalog.order:
             record = self.catalog[clip_index]
@@ -165,33 +188,113 @@ class TrainingService:
         """Whether training the next clip would start something."""
         return self.project.is_writable and self.next_clip_index is not None and not self._is_stopping
 
-    def enqueue(self, clip_index: int) -> None:
+    @property
+    def unfinished(self) -> list[int]:
+        """Clips that are not finished and up to date and can be trained, in the order of training; also those on
+        their way."""
+        order = self.catalog.order
+        records = [(index, self.catalog[index]) for index in order]
+        return [
+            index
+            for index, record in records
+            if record.state not in ("trained", "damaged") and record.blocked_by is None
+        ]
+
+    def enqueue(self, clip_index: int, own: OwnSettings | None = None) -> None:
         """Train a clip when its turn comes; at once when nothing else does. Who trains a finished one has asked.
 
+        Args:
+            own: Settings that differ from the project's; the training then begins afresh.
         Raises:
-            ProjectError: The project is read-only, there is no such clip, or its reference is missing or damaged.
+            ProjectError: The project is read-only, there is no such clip, a clip that it needs is missing or damaged,
+                or a setting cannot differ between clips.
         """
         self.project.check_writable()
         if not 0 <= clip_index < len(self.clips):
             raise ProjectError(f"There is no clip {clip_index}; clips are 0 to {len(self.clips) - 1}.")
+        if own:
+            with_own(self.project, own)
         coming = {*self.queue, self.running_clip}
-        if clip_index in coming:
+        if clip_index in coming and (clip_index == self.running_clip or own is None):
             return
-        base = self.project.inherited_index(clip_index)
-        if base is not None and base not in coming:
-            if self.catalog[base].state == "damaged":
-                raise ProjectError(
-                    f"Clip {clip_index} needs the reference clip {base}, whose file is damaged.",
-                    hint=f"Restore it from a copy, or train clip {base} again.",
-                    path=self.project.clip_path(base),
-                )
-            if not self.project.is_trained(base):
-                raise ProjectError(
-                    f"Clip {clip_index} needs the reference clip {base}, which is not trained.",
-                    hint=f"Train clip {base} first.",
-                )
-        self.queue.append(clip_index)
+        for base in needed_clips(self.project, clip_index):
+            self._check_needed(clip_index, base, coming)
+        self._add(clip_index, own)
         self._start_next()
+
+    def _check_needed(self, clip_index: int, base: int, coming: set[int | None]) -> None:
+        kind = "the reference clip" if base == self.project.settings.reference_clip else "clip"
+        if base in coming:
+            return
+        if self.catalog[base].state == "damaged":
+            raise ProjectError(
+                f"Clip {clip_index} needs {kind} {base}, whose file is damaged.",
+                hint=f"Restore it from a copy, or train clip {base} again.",
+                path=self.project.clip_path(base),
+            )
+        if not self.project.is_trained(base):
+            raise ProjectError(
+                f"Clip {clip_index} needs {kind} {base}, which is not trained.", hint=f"Train clip {base} first."
+            )
+
+    def _add(self, clip_index: int, own: OwnSettings | None = None) -> None:
+        if self.worker is None and not self.queue:
+            self.queue.forget_done()
+        self.queue.add(clip_index, own)
+
+    def enqueue_all(self, clip_indices: Sequence[int]) -> list[int]:
+        """Train those of these clips that are not finished, in the order of training; what they need comes first.
+
+        Returns:
+            Clips that were left out, because they or what they need is damaged.
+        Raises:
+            ProjectError: The project is read-only.
+        """
+        self.project.check_writable()
+        due, left_out, config = set(self.unfinished), [], self.project.settings.config()
+        rank = {index: place for place, index in enumerate(self.catalog.order)}  # a clip comes after all that it needs
+        coming: set[int | None] = {*self.queue, self.running_clip}
+        for index in sorted({index for index in clip_indices if index in rank}, key=rank.__getitem__):
+            chain, open_ends = set[int](), [index]
+            while open_ends:
+                one = open_ends.pop()
+                if self.catalog[one].state != "trained" and one not in chain and one not in coming:
+                    chain.add(one)
+                    open_ends += needed_clips(self.project, one, config)
+            if not due.issuperset(chain):
+                left_out.append(index)
+                continue
+            for one in sorted(chain, key=rank.__getitem__):
+                self._add(one)
+            coming |= chain
+        self._start_next()
+        return left_out
+
+    def go_on(self) -> None:
+        """Train what waits in a queue that was held."""
+        self.queue.is_held = False
+        self._start_next()
+
+    def stop_after_clip(self, is_wanted: bool) -> None:
+        """Hold the queue when the clip that trains has ended, or not after all."""
+        self.is_ending_after = is_wanted and self.worker is not None
+
+    def set_live_view(self, mode: str) -> None:
+        """How often snapshots are written, from now on; reaches a running worker, which does not wait for it."""
+        if mode not in LIVE_VIEWS:
+            raise ValueError(f"the live view is one of {', '.join(LIVE_VIEWS)}, not {mode!r}")
+        self.live_view = mode
+        if self.worker is not None:
+            self.worker.send(SetSnapshots(mode))
+
+    def drop_hopeless(self) -> list[int]:
+        """Take out of the queue what cannot be trained any more. Returns it."""
+        return drop_hopeless(self.queue, self.running_clip, self.project, self.catalog)
+
+    def take_dropped(self) -> list[int]:
+        """Clips that left the queue because what they need cannot come, once."""
+        dropped, self._dropped = self._dropped, []
+        return dropped
 
     def pause(self) -> None:
         """Hold after the current step."""
@@ -208,6 +311,7 @@ class TrainingService:
     def stop(self, *, keep: bool = True) -> None:
         """End the running clip and empty the queue."""
         self.queue.clear()
+        self.is_ending_after = False
         if self.worker is not None:
             self._is_stopping = True
             self.worker.send(Stop(keep=keep))
@@ -233,9 +337,14 @@ class TrainingService:
             self.curves.close()
 
     def _start_next(self) -> None:
-        if self.worker is not None or not self.queue:
+        if self.worker is not None or not self.queue or self.queue.is_held:
             return
-        clip_index = self.queue.popleft()
+        clip_index, own = self.queue.take()
+        if own is not None:
+            self._begin_afresh(clip_index, own)
+        overrides = dict(self.project.settings.overrides)
+        if self._begun.get(clip_index):
+            overrides = with_own(self.project, self._begun[clip_index])
         settings = self.project.settings
         job = TrainJob(
             project=str(self.project.folder),
@@ -245,13 +354,14 @@ class TrainingService:
             clip_index=clip_index,
             holdout=self.holdout,
             seed=settings.seed,
-            overrides=dict(settings.overrides),
+            overrides=overrides,
             is_window_open=self._is_window_open,
             follow_links=settings.follow_links,
+            live_view=self.live_view,
         )
         self._stage, self._step, self._ending = StageReported("", 0.0), None, None
         self._is_ready = self._is_paused = self._is_stopping = False
-        self._failed.discard(clip_index)
+        self._worker_pid = None
         record = self.catalog[clip_index]
         self._run = Run(clip_index)
         if record.resume_step is not None:
@@ -260,6 +370,13 @@ class TrainingService:
             self._run.held_out_psnr = curves.psnr[-1][1] if curves.psnr else None
         self._n_runs += 1
         self.worker = self._launch(job, self.project)
+
+    def _begin_afresh(self, clip_index: int, own: OwnSettings) -> None:
+        """What was learned with other settings is nothing to go on from."""
+        self._begun[clip_index] = own
+        self.project.discard_progress(clip_index)
+        remove_stages(self.project.prep_dir, clip_index)
+        self.catalog.update(clip_index)
 
     # ---------------------------------------------------------------- events
 
@@ -284,8 +401,8 @@ class TrainingService:
         run = self._run
         assert run is not None
         match event:
-            case WorkerReady():
-                self._is_ready = True
+            case WorkerReady(pid=pid):
+                self._is_ready, self._worker_pid = True, pid
             case StageReported():
                 self._stage = event
             case StepReported():
@@ -315,10 +432,15 @@ class TrainingService:
         self._ending = ending
         self._is_paused = self._is_stopping = False
         self.catalog.update(clip_index)  # also sees what is out of date by it
+        self.queue.note_end(0 if self._run is None else self._run.n_steps)
+        if isinstance(ending, ClipTrained):
+            self._begun.pop(clip_index, None)
         if isinstance(ending, TrainingFailed | WorkerDied):
-            self._failed.add(clip_index)
-            if clip_index == self.project.settings.reference_clip and not self.project.is_trained(clip_index):
-                self.queue.clear()  # what waits needs the reference
+            self.queue.failed[clip_index] = self._message("failed")
+        if self.is_ending_after and self.queue:
+            self.queue.is_held = True
+        self.is_ending_after = False
+        self._dropped += self.drop_hopeless()
         self._start_next()
 
     # ---------------------------------------------------------------- status
@@ -336,6 +458,19 @@ class TrainingService:
             return "starting"
         return "preparing" if self._step is None else "running"
 
+    @property
+    def steps_of_run(self) -> tuple[int, int]:
+        """Steps done and all steps of the clip that trains; zeros before it has said so, and while none does."""
+        return (0, 0) if self.worker is None or self._run is None else (self._run.step, self._run.n_steps)
+
+    @property
+    def eta_s(self) -> float | None:
+        """Seconds until the clip that trains is finished; None when unknown."""
+        step = self._step
+        if step is None or step.steps_per_s <= 0 or self.state != "running":
+            return None
+        return (step.n_steps - step.step) / step.steps_per_s
+
     def status(self, viewed_clip: int | None = None) -> TrainingStatus:
         """Everything about the training as one value.
 
@@ -345,9 +480,8 @@ class TrainingService:
         run, state, step = self._run, self.state, self._step
         clip_index = None if run is None else run.clip_index
         curve_clip = clip_index if self.worker is not None or viewed_clip is None else viewed_clip
-        curves = None if curve_clip is None else self._curves(curve_clip)
+        curves = None if curve_clip is None else self.curves_of(curve_clip)
         rate = step.steps_per_s if step is not None else 0.0
-        left = 0 if step is None else step.n_steps - step.step
         upcoming = self.next_clip_index
         settings = self.project.settings
         is_reference = clip_index == settings.reference_clip or settings.config().independent
@@ -363,7 +497,7 @@ class TrainingService:
             n_stages=n_stages,
             message=self._message(state),
             steps_per_s=rate if state == "running" else 0.0,
-            eta_s=left / rate if rate > 0 and state == "running" else None,
+            eta_s=self.eta_s,
             curve_clip_index=curve_clip,
             gradient_norm=step.gradient_norm if step is not None and math.isfinite(step.gradient_norm) else None,
             loss_history=() if curves is None else curves.loss,
@@ -381,7 +515,7 @@ class TrainingService:
             )
         return self._stage.message if self.worker is not None else ""
 
-    def _curves(self, clip_index: int) -> Curves | None:
+    def curves_of(self, clip_index: int) -> Curves | None:
         """Of the training at hand once it has any; otherwise those on disk, None until they are read."""
         run = self._run
         if run is not None and clip_index == run.clip_index:
@@ -403,9 +537,9 @@ class TrainingService:
         """
         queued = tuple(self.queue)
         running = self.running_clip
-        if self._statuses_of != (self.catalog.revision, queued, running, len(self._failed)):
+        if self._statuses_of != (self.catalog.revision, queued, running, tuple(self.queue.failed)):
             self._statuses = [self._clip_status(index, None) for index in range(len(self.clips))]
-            self._statuses_of = (self.catalog.revision, queued, running, len(self._failed))
+            self._statuses_of = (self.catalog.revision, queued, running, tuple(self.queue.failed))
         if running is not None:
             self._statuses[running] = self._clip_status(running, live_counts)
         return list(self._statuses)
@@ -414,14 +548,16 @@ class TrainingService:
         record, run = self.catalog[clip_index], self._run
         n_inherited, n_own = record.n_anchors if live_counts is None else live_counts
         shown, step, n_steps, psnr = record.state, record.step, record.n_steps, record.held_out_psnr
+        reason = record.reason
         if clip_index == self.running_clip and run is not None:
             words = {"starting": "preparing", "preparing": "preparing", "paused": "paused"}
             shown, step, n_steps = words.get(self.state, "training"), run.step, run.n_steps
             psnr = record.held_out_psnr if run.held_out_psnr is None else run.held_out_psnr
         elif clip_index in self.queue:
             shown = "queued"
-        elif clip_index in self._failed and shown in ("untrained", "stopped"):
+        elif clip_index in self.queue.failed and shown in ("untrained", "stopped"):
             shown = "failed"
+            reason = self.queue.failed[clip_index]
         share = step / n_steps if n_steps else 0.0
         return ClipStatus(
             state=shown,
@@ -430,6 +566,6 @@ class TrainingService:
             n_inherited=n_inherited,
             n_own=n_own,
             resume_step=record.resume_step,
-            reason=record.reason,
+            reason=reason,
             exposure_change=record.exposure_change,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -89,9 +90,11 @@ def is_finite(state: ClipState) -> bool:
     return all(np.isfinite(a).all() for a in state.arrays.values() if np.issubdtype(a.dtype, np.floating))
 
 
-def keep_clip(clip: CompactClip, path: Path, live_dir: Path) -> None:
+def keep_clip(clip: CompactClip, path: Path, live_dir: Path, make_way: Callable[[], object] = lambda: None) -> None:
     """Put a finished clip in its place, after it was written elsewhere, read back and found equal.
 
+    Args:
+        make_way: Called before what lies at `path` is replaced; keeps that.
     Raises:
         DiskError: The disk refused, or what was read back differs.
     """
@@ -105,6 +108,7 @@ def keep_clip(clip: CompactClip, path: Path, live_dir: Path) -> None:
                 path=path,
             )
         path.parent.mkdir(exist_ok=True)
+        make_way()
         replace_file(draft, path, is_durable=True)
     except OSError as error:
         raise disk_error(error, what="The clip", path=path) from error

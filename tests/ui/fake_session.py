@@ -5,11 +5,13 @@ Every command is recorded in `commands`; those that only change what is shown ar
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from app.background.log_reader import LogLine
 from app.playback.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
@@ -31,11 +33,14 @@ from app.status import (
     Overlays,
     PlanStatus,
     ProjectStatus,
+    QueueStatus,
     RegionsStatus,
     ResidualStatus,
     SeamStatus,
     SettingStatus,
     TrainingStatus,
+    UsageStatus,
+    VersionStatus,
     WantedFrame,
 )
 from engine.camera.rig import NO_CAMERAS, CameraRig
@@ -100,6 +105,11 @@ class FakeSession:
         )
         self.project_status: ProjectStatus | None = None
         self.question: Question | None = None
+        self.queue = QueueStatus()
+        self.usage = UsageStatus(window_mb=412.0, window_cores=0.1, n_cores=2)
+        self.versions: dict[int, tuple[VersionStatus, ...]] = {}
+        self.curves: dict[int, tuple[list[tuple[int, float]], list[tuple[int, float]]]] = {}
+        self.lines: tuple[LogLine, ...] = ()
         self.training = TrainingStatus(can_train_next=True, next_clip_index=0)
         self.plan: PlanStatus | None = PlanStatus(
             clip_index=0,
@@ -262,6 +272,22 @@ class FakeSession:
     def close(self) -> None:
         """Remember that the window asked."""
         self.is_closed = True
+
+    # ---- trainings and their files ---------------------------------------------------------------------------
+
+    def clip_curves(self, clip_index: int) -> tuple[Sequence[tuple[int, float]], Sequence[tuple[int, float]]]:
+        """What a test put there; for the clip of the status its histories."""
+        if clip_index == self.training.curve_clip_index:
+            return self.training.loss_history, self.training.psnr_history
+        return self.curves.get(clip_index, ([], []))
+
+    def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]:
+        """What a test put there."""
+        return self.versions.get(clip_index, ())
+
+    def log_lines(self) -> tuple[LogLine, ...]:
+        """What a test put there."""
+        return self.lines
 
     # ---- pictures --------------------------------------------------------------------------------------------
 

@@ -14,14 +14,15 @@ from ui.main import main
 from ui.panels.actions.key import parse_key
 from ui.panels.actions.table import ACTIONS
 from ui.panels.clip_quality import clip_quality
+from ui.panels.curves import MAX_PLOT_POINTS, plot_arrays, seen_part
 from ui.panels.panes import arrange, fit
 from ui.panels.state import Rect
-from ui.panels.training import MAX_PLOT_POINTS, anchors_text, plot_arrays
+from ui.panels.training import anchors_text
 
 
 def test_plot_arrays_are_contiguous_finite_and_short() -> None:
     history = [(step, float("nan") if step == 3 else 1.0 / (step + 1)) for step in range(5000)]
-    steps, values = plot_arrays(history)
+    steps, values = seen_part(*plot_arrays(history), (0.0, 5000.0))
     assert steps.flags.c_contiguous
     assert values.flags.c_contiguous
     assert len(steps) == len(values) == MAX_PLOT_POINTS

@@ -13,6 +13,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import Command
 from ui.gl.image import Rect as PixelRect
+from ui.panels.curve_view import CurveView
 from ui.panels.gestures import Navigation
 from ui.panels.timeline.view_state import TimelineView
 from ui.style.theme import Fonts
@@ -20,8 +21,8 @@ from ui.style.ui_scale import UiScale
 from ui.viewport.region_tool import RegionTool
 
 VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
-RESIDUALS = "Residuals"
-PANELS = (CAPTURE, TRAINING, REGIONS, RESIDUALS, TIMELINE)
+RESIDUALS, LOG = "Residuals", "Log"
+PANELS = (CAPTURE, TRAINING, REGIONS, RESIDUALS, TIMELINE, LOG)
 """Titles of the panels around the picture."""
 Dispatch = Callable[[Command], None]
 """Takes one command of app.session.commands."""
@@ -61,6 +62,8 @@ class UiState:
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
         regions: The region that is being chosen, and the one that stands out.
         navigation: What mouse and keys do over a picture.
+        curves: What the plots of the training panel show.
+        queue_chosen: The waiting clip that keys move; None without one.
         timeline: What of time is shown.
         is_popup_open: Is a menu or another popup open, so that keys belong to it?
         is_menu_wanted: Open the first menu, for the keyboard.
@@ -80,6 +83,8 @@ class UiState:
     navigation: Navigation = field(default_factory=Navigation)
     pointed_anchor: np.ndarray | None = None
     is_view_popup_wanted: bool = False
+    curves: CurveView = field(default_factory=CurveView)
+    queue_chosen: int | None = None
     timeline: TimelineView = field(default_factory=TimelineView)
     last_heat: str = ""
     wanted_panel: str | None = None

@@ -1,40 +1,37 @@
-"""The training panel: what runs, how fast, how well, and the buttons that start, pause and stop it."""
+"""The training panel: what runs, how fast, how well, what waits, and the buttons that start, pause and stop it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Protocol
 
-import numpy as np
-from imgui_bundle import ImVec2, ImVec4, imgui, implot
+from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.session.commands import PauseTraining, ResumeTraining, StopTraining, TrainNextClip
+from app.session.commands import PauseTraining, ResumeTraining, SetFrame, StopTraining, TrainNextClip
 from app.status import ClipStatus, PlanStatus, TrainingStatus
 from engine.capture.clip import Clip
 from engine.text import duration_text
 from ui.panels.clip_quality import draw_clip_quality
+from ui.panels.clip_training_menu import ClipMenuNeeds, draw_clip_training
+from ui.panels.curves import CurveNeeds, draw_curves
 from ui.panels.plan import draw_plan
+from ui.panels.queue import QueueNeeds, draw_live_view, draw_queue, draw_train_all, draw_usage
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import STATE_WORDS, state_note
 from ui.panels.widgets import primary_button, text_right, text_wrapped_dim
 from ui.style import theme
-from ui.style.axis import ticks_that_fit, whole_ticks
 from ui.style.numbers import format_count
 from ui.style.progress_words import stage_words
 from ui.style.theme import Icon
 
-MAX_PLOT_POINTS = 600
-TICK_ROOM = 52.0
-"""What the numbers on the left and the margins take of a plot, units."""
-MIN_TICK_DISTANCE = 46.0
-ROOM_BELOW, QUALITY_ROOM = 190.0, 240.0
-"""Room below the curves for the clips, and for the quality over them when it is folded out, units."""
+LEAST_TABLE = 120.0
+"""Height of the table of clips at least, units."""
 ANCHORS_TOOLTIP = """All anchors of a clip, whichever frames they are alive in.
 Reference clip: reference anchors, which later clips inherit.
 Later clips: inherited + residual anchors."""
 
 
-class TrainingNeeds(Protocol):
+class TrainingNeeds(QueueNeeds, CurveNeeds, ClipMenuNeeds, Protocol):
     """What this panel reads."""
 
     @property
@@ -56,30 +53,28 @@ class TrainingNeeds(Protocol):
     def reference_index(self) -> int: ...
 
 
-def plot_arrays(history: Sequence[tuple[float, float]]) -> tuple[np.ndarray, np.ndarray]:
-    """(step, value) pairs as two contiguous float64 arrays, finite rows only, thinned to MAX_PLOT_POINTS."""
-    pairs = np.asarray(list(history), dtype=np.float64).reshape(-1, 2)
-    pairs = pairs[np.isfinite(pairs).all(axis=1)]
-    if len(pairs) > MAX_PLOT_POINTS:
-        rows = np.linspace(0, len(pairs) - 1, MAX_PLOT_POINTS).round().astype(np.int64)
-        pairs = pairs[rows]
-    return np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
-
-
 def draw_training(session: TrainingNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    """Buttons, progress, curves, quality over the clips, then one row per clip."""
+    """Buttons, progress, queue, curves, quality over the clips, then one row per clip."""
     if session.capture is None:
         text_wrapped_dim("Training starts from here when a capture is open.")
         return
     status = session.training
     _draw_buttons(session, dispatch, ui)
-    if status.state in ("starting", "preparing", "running", "paused", "stopping"):
+    is_going = status.state in ("starting", "preparing", "running", "paused", "stopping")
+    if is_going:
         _draw_progress(status, ui)
-    imgui.spacing()
-    _draw_curves(status, ui)
+        draw_usage(session.usage, ui)
+        draw_live_view(session, dispatch, ui)
+    draw_train_all(session, dispatch, ui)
+    draw_queue(session, dispatch, ui)
+    imgui.set_next_item_open(True, imgui.Cond_.once)
+    is_open = imgui.collapsing_header("Curves")
+    ui.mark("curves.header")
+    if is_open:
+        draw_curves(session, ui)
     draw_clip_quality(session.clip_states, ui)
     imgui.spacing()
-    _draw_clips(session)
+    _draw_clips(session, dispatch, ui)
 
 
 def next_label(session: TrainingNeeds) -> str:
@@ -88,6 +83,8 @@ def next_label(session: TrainingNeeds) -> str:
     if index is None:
         is_all = all(state.state == "trained" for state in session.clip_states)
         return f"{Icon.CHECK}  Every clip is trained" if is_all else f"{Icon.WARNING}  No clip can be trained next"
+    if session.queue.is_held:
+        return f"{Icon.PLAY}  Go on with clip {index}"
     if step is not None:
         return f"{Icon.PLAY}  Resume clip {index} at step {format_count(step)}"
     return f"{Icon.TRAIN}  Train next clip"
@@ -168,65 +165,6 @@ def _pair(left: str, right: str) -> None:
     text_right(right)
 
 
-def _draw_curves(status: TrainingStatus, ui: UiState) -> None:
-    below = ROOM_BELOW + (QUALITY_ROOM if ui.is_quality_open else 0.0)
-    height = min(max((imgui.get_content_region_avail().y - below) / 2, 84.0), 150.0)
-    n_steps = 0 if status.state in ("idle", "failed") else status.n_steps
-    of_clip = "" if status.curve_clip_index is None else f" of clip {status.curve_clip_index}"
-    _draw_curve(
-        f"Held-out PSNR{of_clip}, dB", status.psnr_history, theme.GREEN, height, n_steps, has_markers=True, digits=2
-    )
-    ui.mark("training.psnr")
-    _draw_curve(f"Loss{of_clip}", status.loss_history, theme.SKY, height, n_steps, has_markers=False, digits=4)
-    ui.mark("training.loss")
-
-
-def _draw_curve(
-    title: str,
-    history: Sequence[tuple[int, float]],
-    color: theme.Color,
-    height: float,
-    n_steps: int,
-    *,
-    has_markers: bool,
-    digits: int,
-) -> None:
-    """One curve over the steps of the whole clip, so that it also shows how far the training has come."""
-    steps, values = plot_arrays(history)
-    _pair(title, f"{values[-1]:.{digits}f}" if len(values) else "–")
-    flags = implot.Flags_.canvas_only | implot.Flags_.no_inputs | implot.Flags_.no_frame
-    if not implot.begin_plot(f"##{title}", ImVec2(-1, height), flags):
-        return
-    axis = implot.AxisFlags_.no_menus | implot.AxisFlags_.no_highlight | implot.AxisFlags_.no_tick_marks
-    if len(values):
-        low, high = float(values.min()), float(values.max())
-        margin = max((high - low) * 0.1, abs(high) * 0.01, 1e-6)
-        implot.setup_axes("", "", axis, axis)
-        last = float(max(steps[-1], n_steps, 10))
-        implot.setup_axes_limits(0.0, last, low - margin, high + margin, implot.Cond_.always)
-        _set_step_ticks(last)
-        spec = implot.Spec(line_color=ImVec4(*color), line_weight=2.0)
-        if has_markers:
-            spec.marker = implot.Marker_.circle
-            spec.marker_size = 3.0
-        implot.plot_line(title, steps, values, spec=spec)
-    else:
-        bare = axis | implot.AxisFlags_.no_decorations
-        implot.setup_axes("", "", bare, bare)
-        implot.setup_axes_limits(0.0, 1.0, 0.0, 1.0, implot.Cond_.always)
-        implot.plot_text("appears while a clip trains", 0.5, 0.5)
-    implot.end_plot()
-
-
-def _set_step_ticks(last: float) -> None:
-    """Whole steps along the lower edge."""
-    width = max(imgui.get_content_region_avail().x - TICK_ROOM, 40.0)
-    ticks = whole_ticks(last, max(int(width / MIN_TICK_DISTANCE), 2))
-    halves = {tick: imgui.calc_text_size(format_count(tick)).x / 2 for tick in ticks}
-    kept = ticks_that_fit(last, width, halves, ticks)
-    implot.setup_axis_ticks(implot.ImAxis_.x1, [float(tick) for tick in kept], [format_count(tick) for tick in kept])
-
-
 def anchors_text(n_inherited: int, n_own: int) -> str:
     """Anchors of a clip: of the reference clip a number, of a later one a sum; a dash where there are none yet."""
     if not n_inherited and not n_own:
@@ -234,10 +172,10 @@ def anchors_text(n_inherited: int, n_own: int) -> str:
     return f"{format_count(n_inherited)} + {format_count(n_own)}" if n_inherited else format_count(n_own)
 
 
-def _draw_clips(session: TrainingNeeds) -> None:
+def _draw_clips(session: TrainingNeeds, dispatch: Dispatch, ui: UiState) -> None:
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.borders_inner_h | imgui.TableFlags_.scroll_y
     flags |= imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.pad_outer_x
-    if not imgui.begin_table("clips", 3, flags, ImVec2(0, max(imgui.get_content_region_avail().y - 4, 90))):
+    if not imgui.begin_table("clips", 3, flags, ImVec2(0, max(imgui.get_content_region_avail().y - 4, LEAST_TABLE))):
         return
     imgui.table_setup_scroll_freeze(0, 1)
     imgui.table_setup_column("Clip", imgui.TableColumnFlags_.width_stretch)
@@ -249,18 +187,31 @@ def _draw_clips(session: TrainingNeeds) -> None:
     clipper.begin(min(len(session.clips), len(session.clip_states)))
     while clipper.step():
         for index in range(clipper.display_start, clipper.display_end):
-            _draw_clip_row(session.clips[index], session.clip_states[index])
+            _draw_clip_row(session, session.clips[index], session.clip_states[index], dispatch, ui)
     clipper.end()
     imgui.end_table()
 
 
-def _draw_clip_row(clip: Clip, status: ClipStatus) -> None:
+def _draw_clip_row(session: TrainingNeeds, clip: Clip, status: ClipStatus, dispatch: Dispatch, ui: UiState) -> None:
     imgui.table_next_row()
     imgui.table_next_column()
+    imgui.push_id(clip.clip_index)
+    flags = imgui.SelectableFlags_.span_all_columns | imgui.SelectableFlags_.allow_overlap
+    if imgui.selectable("##row", False, flags)[0]:
+        dispatch(SetFrame(clip.start))
+    imgui.open_popup_on_item_click("row menu", imgui.PopupFlags_.mouse_button_right)
+    if imgui.begin_popup("row menu"):
+        imgui.text_disabled(f"Clip {clip.clip_index}")
+        imgui.separator()
+        draw_clip_training(session, dispatch, ui, clip.clip_index)
+        imgui.end_popup()
+    imgui.pop_id()
+    imgui.same_line(0, 0)
     icon = theme.CLIP_ICONS.get(status.state, "")
     words: str = STATE_WORDS.get(status.state, str(status.state))
     imgui.text(f"{clip.clip_index}")
-    imgui.same_line(24)
+    ui.mark(f"training.clip{clip.clip_index}")
+    imgui.same_line(26 + 8 * (clip.clip_index > 99))
     imgui.text_colored(ImVec4(*theme.status_color(status.state)), f"{icon}  {words}" if icon else words)
     note = state_note(status)
     if note:

@@ -21,11 +21,12 @@ from ui.gl import ImageTexture, free_dropped, n_changes
 from ui.panels.actions.table import handle_keys
 from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.heat_overlay import HeatOverlay
+from ui.panels.log import LogNeeds, LogPanel
 from ui.panels.notices import NoticesNeeds, NoticesPanel
 from ui.panels.picture_pane import PicturePane
 from ui.panels.regions import draw_regions
 from ui.panels.residuals.panel import ResidualsNeeds, ResidualsPanel
-from ui.panels.state import CAPTURE, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
+from ui.panels.state import CAPTURE, LOG, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
 from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.panel import draw_timeline
 from ui.panels.training import draw_training
@@ -47,6 +48,8 @@ logger = logging.getLogger(__name__)
 
 FIRST_FRAMES = 6
 """A new layout: docked panels get their tabs, then their sizes, then they lose scrollbars that are not needed."""
+FRAMES_TO_DOCK = 2
+"""Until all panels of a kept layout have their tabs; the one that got its tab last is in front."""
 TRAINING_REFRESH_S = 0.2
 """Often enough for numbers that nobody waits for; each frame is taken from the training where the CPU draws."""
 ATTENDED_S = 0.5
@@ -66,6 +69,7 @@ class FrameNeeds(
     QuestionNeeds,
     RememberNeeds,
     NoticesNeeds,
+    LogNeeds,
     ResidualsNeeds,
     Protocol,
 ):
@@ -123,6 +127,7 @@ class Frame:
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
         self.residuals = ResidualsPanel(lambda: ImageTexture(ctx))
         self.notices = NoticesPanel()
+        self.log = LogPanel()
         self.dialog = OpenFolderDialog()
         self.questions = QuestionDialogs()
         self._redraw = RedrawPlan()
@@ -136,6 +141,7 @@ class Frame:
         self.remembering.restore_marks(session)
         self._failed_panels: set[str] = set()
         self._floating_panels: set[str] = set()
+        self._in_front = [TIMELINE]  # a log in front of it would be a surprise
         self._dock_ids: dict[str, int] = {}
         self._panels: tuple[tuple[str, Callable[[FrameNeeds, Dispatch, UiState], None], bool], ...] = (
             (VIEWPORT, self.viewport.draw, False),
@@ -144,6 +150,7 @@ class Frame:
             (REGIONS, draw_regions, True),
             (RESIDUALS, self.residuals.draw, True),
             (TIMELINE, draw_timeline, True),
+            (LOG, self.log.draw, True),
         )
 
     # ---- the redraw plan -------------------------------------------------------------------------------------
@@ -238,9 +245,11 @@ class Frame:
         imgui.pop_style_color()
         if ui.is_layout_reset_requested or not is_laid_out(dock_id):
             ui.is_layout_reset_requested = False
-            ui.wanted_panel = TRAINING  # of the two that lie over each other
+            self._in_front = [TRAINING, TIMELINE]  # of those that lie over each other; one in each frame
             lay_out(dock_id)
             self._redraw.request(FIRST_FRAMES)
+        elif self._in_front and ui.wanted_panel is None and imgui.get_frame_count() > FRAMES_TO_DOCK:
+            ui.wanted_panel = self._in_front.pop()
         self._dock_ids.clear()
         for title, draw_panel, has_padding in self._panels:
             self._draw_panel(title, draw_panel, has_padding)

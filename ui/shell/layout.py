@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from imgui_bundle import ImVec2, imgui
 
-from ui.panels.state import CAPTURE, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT
+from ui.panels.state import CAPTURE, LOG, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT
 
 SIDE = (236.0, 0.0)
 SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: SIDE, REGIONS: SIDE, RESIDUALS: SIDE, TIMELINE: (0.0, 140.0)}
@@ -20,7 +20,7 @@ WIDE_UNITS = 1240.0
 
 
 def lay_out(dock_id: int) -> None:
-    """Capture left, training, regions and residuals right, timeline below, the picture in the rest."""
+    """Capture left, training, regions and residuals right, timeline and log below, the picture in the rest."""
     internal = imgui.internal
     size = imgui.get_main_viewport().work_size
     is_wide = size.x >= WIDE_UNITS
@@ -40,6 +40,7 @@ def lay_out(dock_id: int) -> None:
         (REGIONS, right),
         (RESIDUALS, right),
         (TIMELINE, bottom),
+        (LOG, bottom),
     ):
         internal.dock_builder_dock_window(title, node_id)
     node = internal.dock_builder_get_node(middle)  # it stays the central node: the one that gives way

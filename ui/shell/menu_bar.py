@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from app.session.commands import ForgetRecent, OpenCapture
 from app.status import ProjectStatus
-from ui.panels.actions.action import BOOKMARKS, COMPARE, MARK, NAVIGATE, TIME, VIEW, ActionNeeds
+from ui.panels.actions.action import BOOKMARKS, COMPARE, MARK, NAVIGATE, TIME, TRAIN, VIEW, ActionNeeds
 from ui.panels.actions.table import ACTIONS
 from ui.panels.actions.training import train_or_pause
 from ui.panels.actions.window import choose_scale
@@ -75,6 +75,7 @@ def draw_menu_bar(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
             label = f"{Icon.PLAY}  Resume"
         if _item(ui, label, "T"):
             train_or_pause(session, dispatch)
+        _draw_rows((TRAIN,), session, dispatch, ui, without=("train.next", "train.quality"))
         imgui.end_menu()
     if _begin_menu("Mark", ui, is_enabled=has_capture):
         _draw_rows((MARK,), session, dispatch, ui)
@@ -103,10 +104,19 @@ def _item(ui: UiState, label: str, key_label: str = "", *, is_on: bool = False) 
 
 
 def _draw_rows(
-    groups: tuple[str, ...], session: MenuNeeds, dispatch: Dispatch, ui: UiState, *, is_on_only: bool = False
+    groups: tuple[str, ...],
+    session: MenuNeeds,
+    dispatch: Dispatch,
+    ui: UiState,
+    *,
+    is_on_only: bool = False,
+    without: tuple[str, ...] = (),
 ) -> None:
-    """Rows of the table of actions. is_on_only: Those only that can be on or off."""
+    """Rows of the table of actions. is_on_only: Those only that can be on or off. without: Ids of those that stand
+    elsewhere."""
     for action in ACTIONS:
+        if action.id in without:
+            continue
         if action.group not in groups or (is_on_only and action.is_on is None):
             continue
         if action.needs_choosing and not ui.regions.is_active:

@@ -11,10 +11,11 @@ from typing import Protocol
 from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import CloseQuestion, Command, OpenCapture, OpenProject, TrainClip
-from app.session.questions import ProjectQuestion, Question, RetrainQuestion
+from app.session.questions import ProjectQuestion, Question, RetrainQuestion, SettingsQuestion
 from engine.text import duration_text
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, primary_button, text_wrapped_dim
+from ui.shell.train_settings import SettingsDialog
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.theme import Icon
@@ -38,6 +39,7 @@ class QuestionDialogs:
     def __init__(self) -> None:
         self._asked: Question | None = None
         self._chosen = 0
+        self._settings = SettingsDialog()
 
     def draw(self, session: QuestionNeeds, dispatch: Dispatch, ui: UiState) -> None:
         """Draw the dialog of the session's question, if there is one."""
@@ -64,6 +66,8 @@ class QuestionDialogs:
         is_agreed = not is_new and imgui.is_key_pressed(imgui.Key.enter, False)
         if isinstance(question, RetrainQuestion):
             answer = _draw_retrain(question, ui, is_agreed)
+        elif isinstance(question, SettingsQuestion):
+            answer = self._draw_settings(question, ui, is_agreed)
         else:
             answer = self._draw_projects(question, ui, is_agreed)
         imgui.pop_text_wrap_pos()
@@ -74,6 +78,15 @@ class QuestionDialogs:
         imgui.end_popup()
         if answer is not None:
             dispatch(answer)
+
+    def _draw_settings(self, question: SettingsQuestion, ui: UiState, is_agreed: bool) -> Command | None:
+        self._settings.draw(question, ui)
+        if question.retrain is not None:
+            _draw_what_it_means(question.retrain, ui)
+        is_typing = imgui.get_io().want_text_input  # Enter ends what is typed, and is no answer yet
+        if _button_row(ui, "Train" if question.retrain is None else "Train again") or (is_agreed and not is_typing):
+            return self._settings.answer(question)
+        return CloseQuestion() if _cancelled(ui) else None
 
     def _draw_projects(self, question: ProjectQuestion, ui: UiState, is_agreed: bool) -> Command | None:
         imgui.text_wrapped(f"This capture has {len(question.choices)} projects. Which one do you want to open?")
@@ -121,12 +134,21 @@ class QuestionDialogs:
 
 
 def _title(question: Question) -> str:
+    if isinstance(question, SettingsQuestion):
+        return f"Train clip {question.clip_index} with other settings###question"
     if isinstance(question, RetrainQuestion):
         return f"Train clip {question.clip_index} again?###question"
     return "Several projects###question"
 
 
 def _draw_retrain(question: RetrainQuestion, ui: UiState, is_agreed: bool) -> Command | None:
+    _draw_what_it_means(question, ui)
+    if _button_row(ui, "Train again") or is_agreed:
+        return TrainClip(question.clip_index, is_confirmed=True, settings=question.settings)
+    return CloseQuestion() if _cancelled(ui) else None
+
+
+def _draw_what_it_means(question: RetrainQuestion, ui: UiState) -> None:
     for text in retrain_texts(question):
         imgui.text_wrapped(text)
         imgui.spacing()
@@ -136,9 +158,6 @@ def _draw_retrain(question: RetrainQuestion, ui: UiState, is_agreed: bool) -> Co
         imgui.text_wrapped(outdated_text(question))
         ui.mark("question.outdated")
         imgui.spacing()
-    if _button_row(ui, "Train again") or is_agreed:
-        return TrainClip(question.clip_index, is_confirmed=True)
-    return CloseQuestion() if _cancelled(ui) else None
 
 
 def _button_row(ui: UiState, yes: str) -> bool:
@@ -172,7 +191,7 @@ def retrain_texts(question: RetrainQuestion) -> list[str]:
         figure = "" if question.held_out_psnr is None else f" with a held-out PSNR of {question.held_out_psnr:.1f} dB"
         texts = [
             f"{clip} is finished{figure}. It stays as it is, with its figures and curves, until the new training is "
-            "finished."
+            "finished, and is kept as an earlier version then."
         ]
     if question.resume_step is not None:
         texts.append(

@@ -8,8 +8,9 @@ from typing import Protocol
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.notices import Notices
-from app.status import JobStatus, ProjectStatus, TrainingStatus
+from app.status import JobStatus, ProjectStatus, QueueStatus, TrainingStatus, UsageStatus
 from engine.text import duration_text
+from ui.panels.queue import clips_text, usage_text
 from ui.panels.state import UiState
 from ui.panels.widgets import elided
 from ui.style import theme
@@ -37,6 +38,12 @@ class StatusNeeds(Protocol):
 
     @property
     def notices(self) -> Notices: ...
+
+    @property
+    def usage(self) -> UsageStatus: ...
+
+    @property
+    def queue(self) -> QueueStatus: ...
 
 
 def draw_status_bar(session: StatusNeeds, ui: UiState, *, is_software: bool) -> None:
@@ -67,7 +74,11 @@ def status_text(session: StatusNeeds) -> str:
     status = session.training
     if status.state == "running":
         steps = f"step {format_count(status.step)} of {format_count(status.n_steps)}"
-        return f"Training clip {status.clip_index}: {steps}, {duration_text(status.eta_s)} left"
+        queued = session.queue.queued
+        rest = ""
+        if queued is not None and queued.n_clips > 1:
+            rest = f"; {clips_text(queued.n_clips)}, {duration_text(queued.seconds)} in all"
+        return f"Training clip {status.clip_index}: {steps}, {duration_text(status.eta_s)} left{rest}"
     if status.state in ("starting", "preparing", "stopping", "paused"):
         words = {"starting": "Starting", "preparing": "Preparing", "stopping": "Stopping", "paused": "Paused:"}
         return f"{words[status.state]} clip {status.clip_index}  {stage_words(status)}  {status.message or ''}"
@@ -79,4 +90,6 @@ def status_text(session: StatusNeeds) -> str:
 def _right_text(session: StatusNeeds, *, is_software: bool) -> str:
     worst = [notice for notice in session.notices if notice.kind != "info"]
     notices = f"{Icon.WARNING} {len(worst)}    " if worst else ""
-    return f"{notices}{'software drawing' if is_software else 'graphics card'}"
+    usage = usage_text(session.usage)
+    usage = f"{usage}    " if usage else ""
+    return f"{notices}{usage}{'software drawing' if is_software else 'graphics card'}"

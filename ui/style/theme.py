@@ -104,6 +104,9 @@ class Icon:
     CLOCK_BACK = "\uf1da"
     BROKEN = "\uf127"
     COMPASS = "\uf14e"
+    UP = "\uf062"
+    DOWN = "\uf063"
+    LOG = "\uf15c"
 
 
 CLIP_ICONS: dict[str, str] = {

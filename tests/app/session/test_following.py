@@ -58,14 +58,13 @@ def test_a_live_state_is_gone_to_as_soon_as_there_is_one(make_session):
     session.dispatch(c.StopTraining())
 
 
-def test_clips_without_their_reference_are_refused_with_a_notice(make_session):
+def test_clips_without_their_reference_are_trained_after_it(make_session):
     session = make_session()
     session.dispatch(c.SetClipLength(2))
-    session.dispatch(c.TrainClips((1, 2)))
-    assert "reference clip 0, which is not trained" in session.notices[-1].detail
-    assert session.training.state == "idle"
     session.dispatch(c.TrainClips((77,)))
     assert session.training.state == "idle"
+    session.dispatch(c.TrainClips((1, 2)))
+    assert (session.training.clip_index, session.training.queue) == (0, (1, 2))
 
 
 def test_another_clip_length_keeps_the_place_and_the_markers(make_session):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pyglet.window import key, mouse
 
-from app.session.commands import FollowTraining, SetFrame, TrainClip, TrainClips
+from app.session.commands import FollowTraining, SetFrame, TrainAll, TrainClip, TrainClips
 from app.session.window_memory import WindowMemory, read_window_memory
 from app.status import ClipStatus, ResidualStatus, SeamStatus
 from tests.ui.fake_session import FakeSession
@@ -334,7 +334,8 @@ def test_the_menu_of_a_clip_trains_from_there_plays_it_and_shows_it(pilot: Pilot
     choose("train from here")
     choose("train from here", clip=2)
     choose("train all", clip=2)
-    assert pilot.sent(TrainClips) == [TrainClips((1, 2)), TrainClips((2,)), TrainClips((1, 2))]
+    assert pilot.sent(TrainClips) == [TrainClips((1, 2)), TrainClips((2,))]
+    assert pilot.sent(TrainAll) == [TrainAll()]
     choose("range")
     assert session.timeline.play_range == (10, 19)
     choose("no range")

@@ -13,7 +13,7 @@ from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.playback.views import Views
-from app.status import Overlays, TrainingStatus, WantedFrame
+from app.status import Overlays, QueueStatus, TrainingStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from ui.panels.actions.key import Key, parse_key
 from ui.panels.regions import RegionsNeeds
@@ -46,6 +46,9 @@ class ActionNeeds(RegionsNeeds, Protocol):
 
     @property
     def training(self) -> TrainingStatus: ...
+
+    @property
+    def queue(self) -> QueueStatus: ...
 
     def wanted_frame(self) -> WantedFrame | None: ...
 

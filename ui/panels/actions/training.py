@@ -2,9 +2,24 @@
 
 from __future__ import annotations
 
-from app.session.commands import PauseTraining, ResumeTraining, StopTraining, TrainNextClip
-from ui.panels.actions.action import TRAIN, Action, ActionNeeds
-from ui.panels.state import TRAINING, Dispatch, UiState
+from collections.abc import Callable
+
+from app.session.commands import (
+    AskTrainSettings,
+    MoveInQueue,
+    PauseTraining,
+    RemoveFromQueue,
+    ResumeTraining,
+    SetLiveView,
+    StopAfterClip,
+    StopTraining,
+    TrainAll,
+    TrainClip,
+    TrainClips,
+    TrainNextClip,
+)
+from ui.panels.actions.action import TRAIN, WINDOW, Action, ActionNeeds, Run
+from ui.panels.state import LOG, TRAINING, Dispatch, UiState
 
 
 def train_or_pause(session: ActionNeeds, dispatch: Dispatch) -> None:
@@ -33,8 +48,94 @@ def _toggle_quality(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> No
         ui.wanted_panel = TRAINING
 
 
+def _train_all(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(TrainAll())
+
+
+def _train_from_here(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    clip = session.timeline.clip
+    if clip is not None:
+        dispatch(TrainClips(tuple(range(clip.clip_index, len(session.timeline.clips)))))
+
+
+def _ask_settings(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    clip = session.timeline.clip
+    if clip is not None:
+        dispatch(AskTrainSettings(clip.clip_index))
+
+
+def _hold_after(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    if session.training.state not in ("idle", "failed"):
+        dispatch(StopAfterClip(not session.queue.is_ending_after))
+
+
+def _next_waiting(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    waiting = [clip.clip_index for clip in session.queue.waiting]
+    if waiting:
+        place = waiting.index(ui.queue_chosen) + 1 if ui.queue_chosen in waiting else 0
+        ui.queue_chosen, ui.wanted_panel = waiting[place % len(waiting)], TRAINING
+
+
+def _move_waiting(by: int) -> Run:
+    def move(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        waiting = [clip.clip_index for clip in session.queue.waiting]
+        if ui.queue_chosen in waiting:
+            dispatch(MoveInQueue(ui.queue_chosen, max(waiting.index(ui.queue_chosen) + by, 0)))
+
+    return move
+
+
+def _remove_waiting(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    if ui.queue_chosen in [clip.clip_index for clip in session.queue.waiting]:
+        dispatch(RemoveFromQueue(ui.queue_chosen))
+        ui.queue_chosen = None
+
+
+def _retry_failed(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    for clip_index, _ in session.queue.failed:
+        dispatch(TrainClip(clip_index))
+
+
+def _live_view(mode: str) -> Run:
+    def choose(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        dispatch(SetLiveView(mode))
+
+    return choose
+
+
+def _is_live_view(mode: str) -> Callable[[ActionNeeds], bool]:
+    return lambda session: session.queue.live_view == mode
+
+
+def _show_log(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.wanted_panel = LOG
+
+
+def _toggle_log_loss(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.curves.is_log = not ui.curves.is_log
+
+
 ACTIONS = (
     Action("train.quality", "Quality over clips, in the training panel", TRAIN, _toggle_quality, keys=("6",)),
     Action("train.next", "Train the next clip, pause or resume", TRAIN, _train, keys=("T",)),
+    Action("train.all", "Train every clip that is not finished", TRAIN, _train_all, keys=("Shift+T",)),
+    Action("train.from_here", "Train this clip and those after it", TRAIN, _train_from_here),
+    Action("train.settings", "Train this clip with other settings", TRAIN, _ask_settings),
     Action("train.stop", "Stop training and keep what was learned", TRAIN, _stop_training, keys=("Ctrl+T",)),
+    Action("train.hold_after", "Hold the queue after this clip, or not", TRAIN, _hold_after, keys=("Ctrl+Shift+T",)),
+    Action("queue.next", "Choose the next waiting clip", TRAIN, _next_waiting, keys=("Q",)),
+    Action("queue.earlier", "Chosen waiting clip earlier", TRAIN, _move_waiting(-1), keys=("Ctrl+Page Up",)),
+    Action("queue.later", "Chosen waiting clip later", TRAIN, _move_waiting(1), keys=("Ctrl+Page Down",)),
+    Action("queue.remove", "Take the chosen clip out of the queue", TRAIN, _remove_waiting, keys=("Ctrl+Delete",)),
+    Action("queue.retry", "Try failed clips again", TRAIN, _retry_failed),
+    Action("live.off", "Live view off", TRAIN, _live_view("off"), is_on=_is_live_view("off")),
+    Action("live.low", "Live view low: about every 10 s", TRAIN, _live_view("low"), is_on=_is_live_view("low")),
+    Action("live.live", "Live view", TRAIN, _live_view("live"), is_on=_is_live_view("live")),
+    Action(
+        "curves.log",
+        "Loss on a logarithmic scale",
+        TRAIN,
+        _toggle_log_loss,
+    ),
+    Action("window.log", "Show the log", WINDOW, _show_log, keys=("Shift+L",), needs_capture=False),
 )

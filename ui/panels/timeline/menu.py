@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from app.session.commands import SetFrame, TrainClip, TrainClips
+from app.session.commands import SetFrame
 from engine.capture.clip import Clip
+from ui.panels.clip_training_menu import draw_clip_training
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import clip_title, state_words
 from ui.panels.timeline.needs import TimelineNeeds
@@ -34,34 +35,10 @@ def draw_clip_menu(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> 
         state = session.clip_states[clip.clip_index].state
         imgui.text_disabled(f"{clip_title(clip.clip_index, session.reference_index)}: {state_words(state)}")
         imgui.separator()
-        _draw_training(clip, session, dispatch, ui, is_by_key=is_by_key)
+        draw_clip_training(session, dispatch, ui, clip.clip_index, is_by_key=is_by_key)
         imgui.separator()
         _draw_time(clip, session, dispatch, ui)
     imgui.end_popup()
-
-
-def _draw_training(clip: Clip, session: TimelineNeeds, dispatch: Dispatch, ui: UiState, *, is_by_key: bool) -> None:
-    index, reference = clip.clip_index, session.reference_index
-    status = session.clip_states[index]
-    is_free = session.training.state in ("idle", "failed")
-    has_reference = index == reference or session.clip_states[reference].state == "trained"
-    is_finished = status.state in ("trained", "damaged")
-    verb = "Train again" if is_finished else "Train" if status.resume_step is None else "Resume"
-    if _item(ui, "train", f"{Icon.TRAIN}  {verb} this clip", is_enabled=is_free and has_reference):
-        dispatch(TrainClip(index))
-    if is_by_key:
-        imgui.set_item_default_focus()
-    if not has_reference:
-        imgui.text_disabled(f"Clip {reference}, the reference, has to be trained first")
-    later = unfinished(session, index)
-    words = f"{Icon.TRAIN}  Train from here ({len(later)})"
-    if _item(ui, "train from here", words, is_enabled=bool(later) and (has_reference or reference in later)):
-        dispatch(TrainClips(later))
-    everything = unfinished(session, 0)
-    if _item(
-        ui, "train all", f"{Icon.TRAIN}  Train all that is not trained ({len(everything)})", is_enabled=bool(everything)
-    ):
-        dispatch(TrainClips(everything))
 
 
 def _draw_time(clip: Clip, session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
@@ -79,13 +56,6 @@ def _draw_time(clip: Clip, session: TimelineNeeds, dispatch: Dispatch, ui: UiSta
         ui.timeline.show_clip(clip, timeline.n_frames)
     if _item(ui, "whole", f"{Icon.EYE}  Show the whole capture", "Z", is_enabled=ui.timeline.is_zoomed):
         ui.timeline.show_all()
-
-
-def unfinished(session: TimelineNeeds, first_clip: int) -> tuple[int, ...]:
-    """Clips from one on that could be trained and are not."""
-    states = session.clip_states[first_clip:]
-    done = ("trained", "damaged", "preparing", "training", "queued")
-    return tuple(first_clip + place for place, status in enumerate(states) if status.state not in done)
 
 
 def _item(ui: UiState, name: str, label: str, key_label: str = "", *, is_enabled: bool = True) -> bool:

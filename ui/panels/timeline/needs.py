@@ -8,9 +8,10 @@ from typing import Protocol
 from app.playback.timeline import Timeline
 from app.status import ClipStatus, ResidualStatus, TrainingStatus
 from engine.capture.clip import Clip
+from ui.panels.clip_training_menu import ClipMenuNeeds
 
 
-class TimelineNeeds(Protocol):
+class TimelineNeeds(ClipMenuNeeds, Protocol):
     """What this panel reads."""
 
     @property

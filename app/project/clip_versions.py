@@ -1,0 +1,217 @@
+"""Versions of finished clips: what a clip was before it was trained again, kept beside it and brought back on request.
+
+PROJECT/versions/0003/0002.safetensors is the second version of clip 3 that was set aside, 0002.jsonl its curves. Both
+are the files that lay in clips/ and metrics/, with their own checksums. A version that comes back is moved; the clip
+in its place is set aside in turn. At every moment there is a complete file under the clip's name.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.project.project import Project
+from engine.clip_files.clip_header import ClipHeader
+from engine.clip_files.clip_state import read_clip_state
+from engine.errors import ProjectError
+from engine.storage.files import atomic_path, disk_error, replace_file
+
+MAX_VERSIONS = 3
+"""Of one clip; the one that was set aside first goes."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClipVersion:
+    """A version of a clip as it lies on disk. A value.
+
+    Attributes:
+        number: Names it; one that was set aside later has a higher number.
+        path: The clip file.
+        trained_s: When it was trained, seconds since 1970.
+        n_bytes: Size of the file.
+        header: None where it is damaged.
+        damage: Why it cannot be read; empty for a good one.
+    """
+
+    number: int
+    path: Path
+    trained_s: float
+    n_bytes: int
+    header: ClipHeader | None
+    damage: str = ""
+
+    @property
+    def revision(self) -> str:
+        """Names what it shows; equal for equal content."""
+        return "" if self.header is None else f"version-{self.header.fingerprint}"
+
+
+def version_path(project: Project, clip_index: int, number: int) -> Path:
+    """Where a version lies."""
+    return versions_dir(project, clip_index) / f"{number:04d}.safetensors"
+
+
+def versions_dir(project: Project, clip_index: int) -> Path:
+    """Where the versions of a clip lie."""
+    return project.folder / "versions" / f"{clip_index:04d}"
+
+
+def list_versions(project: Project, clip_index: int) -> list[ClipVersion]:
+    """Versions of a clip, the one set aside last first. Reads their headers, and nothing of what is not a version."""
+    found = []
+    for number in _numbers(project, clip_index):
+        path = version_path(project, clip_index, number)
+        header = project.headers.read(path)
+        if header is not None:
+            trained_s = 0.0
+            with suppress(OSError):
+                trained_s = path.stat().st_mtime
+            found.append(ClipVersion(number, path, trained_s, header.n_bytes, header.header, header.damage))
+    return found[::-1]
+
+
+def _numbers(project: Project, clip_index: int) -> list[int]:
+    """Rising."""
+    try:
+        names = os.listdir(versions_dir(project, clip_index))
+    except OSError:
+        return []
+    stems = [name.removesuffix(".safetensors") for name in names if name.endswith(".safetensors")]
+    return sorted(int(stem) for stem in stems if stem.isascii() and stem.isdecimal() and 4 <= len(stem) <= 9)
+
+
+# ---------------------------------------------------------------- keeping
+
+
+def set_aside(project: Project, clip_index: int, *, unless: str = "") -> int | None:
+    """Keep the finished clip and its curves as a version, under their names as well. See `forget_oldest`.
+
+    Args:
+        unless: Fingerprint of what comes in its place: an equal clip is not kept twice.
+    Returns:
+        Its number; None where there is no readable clip, or an equal one.
+    Raises:
+        DiskError: The disk refused; the clip stays where it is.
+    """
+    found = project.headers.read(project.clip_path(clip_index))
+    if found is None or found.header is None or found.header.fingerprint == unless:
+        return None
+    number = max(_numbers(project, clip_index), default=0) + 1
+    target = version_path(project, clip_index, number)
+    try:
+        for folder in (target.parent.parent, target.parent):
+            folder.mkdir(exist_ok=True)  # not the project itself, which may be gone
+        _link_or_copy(project.clip_path(clip_index), target)
+    except OSError as error:
+        raise disk_error(error, what="The earlier version of the clip", path=target) from error
+    with suppress(OSError):  # curves are worth less than the clip
+        _link_or_copy(project.metrics_path(clip_index), target.with_suffix(".jsonl"))
+    return number
+
+
+def forget_oldest(project: Project, clip_index: int) -> None:
+    """Remove the versions of a clip that were set aside first, until MAX_VERSIONS are left. A disk that refuses keeps
+    them a while longer."""
+    for number in _numbers(project, clip_index)[:-MAX_VERSIONS]:
+        with suppress(ProjectError):
+            remove_version(project, clip_index, number)
+
+
+def _link_or_copy(source: Path, target: Path) -> None:
+    """The same file under another name, or a copy where the file system has no links. Times stay."""
+    with atomic_path(target, makes_parents=False) as partial:
+        try:
+            os.link(source, partial)
+        except OSError:
+            shutil.copy2(source, partial)
+
+
+def remove_version(project: Project, clip_index: int, number: int) -> None:
+    """Delete a version and its curves; what is not there is no fault.
+
+    Raises:
+        DiskError: The disk refused.
+    """
+    path = version_path(project, clip_index, number)
+    try:
+        path.unlink(missing_ok=True)
+        path.with_suffix(".jsonl").unlink(missing_ok=True)
+    except OSError as error:
+        raise disk_error(error, what="The removal of a version", path=path) from error
+    with suppress(OSError):  # others are left
+        path.parent.rmdir()
+
+
+# ---------------------------------------------------------------- bringing back
+
+
+def restore_version(project: Project, clip_index: int, number: int) -> None:
+    """Bring a version back as the finished clip; what is finished now becomes a version.
+
+    Clips that were trained on either know by its fingerprint whether they still fit, as after any training. Reads the
+    whole file first; takes a second.
+
+    Raises:
+        ProjectError: The project is read-only, or there is no such version, or it is damaged or does not fit.
+        DiskError: The disk refused; the finished clip is as it was.
+    """
+    project.check_writable()
+    path = version_path(project, clip_index, number)
+    if not path.is_file():
+        raise ProjectError(f"Clip {clip_index} has no version {number} any more.", path=path)
+    header = read_clip_state(path).header
+    reason = why_not(project, clip_index, header)
+    if reason:
+        raise ProjectError(reason, hint="Remove it, or put the file back where it came from.", path=path)
+    set_aside_number = set_aside(project, clip_index, unless=header.fingerprint)
+    clip_path = project.clip_path(clip_index)
+    try:
+        clip_path.parent.mkdir(exist_ok=True)
+        replace_file(path, clip_path, is_durable=True)
+    except OSError as error:
+        if set_aside_number is not None:
+            with suppress(OSError, ProjectError):
+                remove_version(project, clip_index, set_aside_number)
+        raise disk_error(error, what="The clip", path=clip_path) from error
+    with suppress(OSError):
+        project.metrics_path(clip_index).unlink(missing_ok=True)  # those of the clip that was set aside
+        path.with_suffix(".jsonl").rename(project.metrics_path(clip_index))
+
+
+def why_not(project: Project, clip_index: int, header: ClipHeader) -> str:
+    """Why a clip file cannot be clip `clip_index` of this project now; empty where it can."""
+    if header.clip_index != clip_index:
+        return f"The version is of clip {header.clip_index}, not of clip {clip_index}."
+    found = project.headers.read(project.clip_path(clip_index))
+    current = None if found is None else found.header
+    if current is not None:
+        of_project = (current.start, current.n_frames, current.clip_length, current.camera_names, current.role)
+        if (header.start, header.n_frames, header.clip_length, header.camera_names, header.role) != of_project:
+            return "The version belongs to another project: its frames or cameras are others."
+    base = project.inherited_index(clip_index)
+    known = None if base is None else project.headers.read(project.clip_path(base))
+    if header.role == "source" and base is not None:
+        fingerprint = None if known is None or known.header is None else known.header.fingerprint
+        if header.reference_fingerprint != fingerprint:
+            return f"The version was trained on another version of clip {base}, the reference; bring that back first."
+    return ""
+
+
+def reference_file(project: Project, clip_index: int, header: ClipHeader) -> Path | None:
+    """The file with which a clip's version can be shown: the reference, or the version of it that it was trained on.
+
+    None where it inherits nothing, or where that reference is gone.
+    """
+    base = project.inherited_index(clip_index)
+    if header.role != "source" or base is None:
+        return None
+    found = project.headers.read(project.clip_path(base))
+    if found is not None and found.header is not None and found.header.fingerprint == header.reference_fingerprint:
+        return project.clip_path(base)
+    for version in list_versions(project, base):
+        if version.header is not None and version.header.fingerprint == header.reference_fingerprint:
+            return version.path
+    return None

@@ -1,0 +1,69 @@
+"""Settings that one clip of a project may have for itself: how long and how fast it learns, and what it adds.
+
+What clips share stays the project's: sizes of features and decoder, cameras, colours, the gate, and how clips inherit.
+A clip trained with settings of its own is a clip like any other; those that depend on it know it by its fingerprint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from app.project.project import Project
+from app.project.project_files import ProjectSettings
+from engine.clip_files.clip_header import SettingValue
+from engine.errors import ProjectError
+from engine.training.config import LENGTH, LOSS, RATES, SETTINGS, TrainConfig, config_of
+
+_ADDED = ("max_static_points", "max_moving_points", "residual")
+"""What a clip adds of its own."""
+ALLOWED = tuple(name for name, setting in SETTINGS.items() if setting.group in (LENGTH, RATES, LOSS) or name in _ADDED)
+_OF_REFERENCE = ("static_steps", "joint_steps", "max_static_points", "max_moving_points")
+_OF_SOURCE = ("source_steps", "max_moving_points", "residual")
+_OF_BOTH = ("ssim_weight", "volume_weight")
+
+
+def is_source(settings: ProjectSettings, config: TrainConfig, clip_index: int) -> bool:
+    """Whether a clip begins with what another one has learned. config: That of the settings."""
+    if clip_index == settings.reference_clip:
+        return False
+    return not config.independent or config.start == "previous"
+
+
+def offered(project: Project, clip_index: int) -> tuple[str, ...]:
+    """The main ones of a clip: those that a dialog shows."""
+    config = project.settings.config()
+    if not is_source(project.settings, config, clip_index):
+        return (*_OF_REFERENCE, *_OF_BOTH)
+    shared = ("residual",) if config.independent else ()
+    return tuple(name for name in (*_OF_SOURCE, *_OF_BOTH) if name not in shared)
+
+
+def with_own(project: Project, own: Mapping[str, Any]) -> dict[str, SettingValue]:
+    """The project's settings with those of one clip over them, as far as they differ from the defaults.
+
+    Raises:
+        ProjectError: One of them cannot differ between clips, does not exist, or may not have its value.
+    """
+    refused = sorted(own.keys() - set(ALLOWED))
+    if refused:
+        raise ProjectError(
+            f"All clips of a project share {', '.join(refused)}.",
+            hint=f"For one clip, these can be others: {', '.join(ALLOWED)}.",
+        )
+    return config_of({**project.settings.overrides, **own}).difference()
+
+
+def derived_value(config: TrainConfig, name: str, *, n_cameras: int, n_frames: int) -> SettingValue:
+    """What a setting amounts to in a clip of that many frames, where 0 derives it.
+
+    Args:
+        n_cameras: To train on.
+    """
+    n_pictures = n_cameras * n_frames
+    derived = {
+        "static_steps": lambda: config.n_static_steps(n_cameras),
+        "joint_steps": lambda: config.n_joint_steps(n_pictures),
+        "source_steps": lambda: config.n_source_steps(n_pictures),
+    }
+    return derived[name]() if name in derived else getattr(config, name)
