@@ -250,7 +250,7 @@ class Playback:
             frame_index=frame_index,
             path=state.file,
             generation=opened.generation,
-            reference_path=opened.inherited_path(clip.clip_index),
+            reference_path=state.reference_file or opened.inherited_path(clip.clip_index),
             clip=clip,
             is_live=state.is_live,
             shown_as=decoded_as(shown_as),

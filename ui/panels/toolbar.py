@@ -10,9 +10,8 @@ from app.playback.views import COUNTS
 from app.residuals.heat_map import HEAT_KINDS
 from app.session.commands import LookThrough, ShowHeat, ShowViews, ToggleOverlay
 from app.status import COMPARE_MODES
-from ui.panels.actions.action import ActionNeeds
 from ui.panels.actions.compare import COMPARE_WORDS, cloud_overlay, set_compare
-from ui.panels.compare_box import draw_compare_box, draw_other_box
+from ui.panels.compare_box import CompareNeeds, draw_compare_box, draw_other_box
 from ui.panels.comparison import shown_compare
 from ui.panels.mode_box import draw_mode_box
 from ui.panels.navigation import ViewPopup
@@ -31,7 +30,7 @@ BESIDE_CAMERA = 268.0
 MARK_SLIDER = imgui.SliderFlags_.always_clamp
 
 
-class ToolbarNeeds(ActionNeeds, Protocol):
+class ToolbarNeeds(CompareNeeds, Protocol):
     """What the row reads."""
 
 
