@@ -17,7 +17,8 @@ from engine.camera.rig import CameraRig
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
 
-TIME, VIEW, COMPARE, MARK, TRAIN, WINDOW = "Time", "View", "Show and compare", "Mark regions", "Train", "Window"
+TIME, PLAY, VIEW, COMPARE = "Time", "Play and timeline", "View", "Show and compare"
+MARK, TRAIN, WINDOW = "Mark regions", "Train", "Window"
 NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
