@@ -12,7 +12,7 @@ PYTEST := $(BIN)/python -m pytest --numprocesses=$(WORKERS) --dist=loadfile --no
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run check test coverage lint types fmt bench faults docs golden clean
+.PHONY: help setup run check test coverage lint types fmt bench faults docs screenshots golden clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /  make \1	/p' Makefile | expand -t 16
@@ -59,6 +59,9 @@ faults: setup ## damage files and captures, contend for locks, kill trainings, f
 
 docs: setup ## fill the generated parts of the documents: keys, commands, settings, tree
 	@$(BIN)/python -m tests.documents write
+
+screenshots: setup ## pictures of the window for the documents, of PROJECT=folder or of a quick one made from the sample
+	@$(BIN)/python -m tests.screenshots $(if $(PROJECT),--project "$(PROJECT)")
 
 golden: setup ## draw the golden pictures anew; look at each before committing it
 	@$(BIN)/python -m pytest tests --update-golden -k golden

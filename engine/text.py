@@ -17,6 +17,11 @@ def printable(text: str) -> str:
     return "".join(sign if sign.isprintable() or sign in "\n\u00a0" else _escaped(sign) for sign in text)
 
 
+def one_line(text: str) -> str:
+    """Any text in one line: as `printable` has it, and with line breaks written as escapes, too."""
+    return printable(text).replace("\n", "\\n")
+
+
 def shown(value: object) -> str:
     """A value as a message repeats it: as Python writes it, cut off after MAX_SHOWN characters."""
     text = repr(value if not isinstance(value, str) else value[: MAX_SHOWN + 1])

@@ -126,6 +126,19 @@ def _parse_size(text: str) -> tuple[int, int]:
 
 
 def _run_window(options: argparse.Namespace) -> int:
+    from ui.shell import no_window
+
+    try:
+        return _serve_window(options)
+    except Exception as error:
+        why = no_window.reason(error)
+        if not why:
+            raise
+        logging.getLogger(__name__).debug("no window", exc_info=True)
+        return no_window.tell(why)
+
+
+def _serve_window(options: argparse.Namespace) -> int:
     import pyglet
 
     sys.setswitchinterval(SWITCH_INTERVAL_S)
@@ -133,6 +146,7 @@ def _run_window(options: argparse.Namespace) -> int:
     # Sizes are pixels of the screen, of which ui.style.ui_scale makes units; on macOS they are the system's points.
     pyglet.options.dpi_scaling = "stretch" if sys.platform == "darwin" else "real"
     from app.session.commands import OpenCapture
+    from app.session.preferences import PreferencesFile
     from app.session.session import Session
     from app.session.window_memory import read_window_memory
     from ui.shell.window import StudioWindow
@@ -142,7 +156,11 @@ def _run_window(options: argparse.Namespace) -> int:
     if "ui_scale" in options:
         memory.ui_scale = options.ui_scale
     session = Session()
-    window = StudioWindow(session, width=width, height=height, memory=memory)
+    try:
+        window = StudioWindow(session, width=width, height=height, memory=memory, preferences=PreferencesFile())
+    except BaseException:
+        session.close()
+        raise
     try:
         if options.path is not None:
             session.dispatch(OpenCapture(options.path, follow_links=options.follow_links))

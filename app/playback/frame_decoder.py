@@ -154,6 +154,10 @@ class FrameDecoder:
             "playback", self._compute, prepare=prepare_decoding
         )
 
+    def keep_megabytes(self, megabytes: int | None) -> None:
+        """Hold frames up to so many megabytes from the next one on; None for as many as is usual."""
+        self._cache.max_bytes = CACHE_BYTES if megabytes is None else megabytes << 20
+
     def frame(self, request: FrameRequest) -> ShownFrame | None:
         """The frame if it is ready; otherwise it is asked for and the newest finished one is returned.
 

@@ -235,6 +235,13 @@ class HomeView:
 
 
 @dataclass(frozen=True, slots=True)
+class SetFrameMemory:
+    """Keep decoded frames up to so many megabytes; None for as many as is usual."""
+
+    megabytes: int | None
+
+
+@dataclass(frozen=True, slots=True)
 class SetCompareWith:
     """What to compare with. other: See Overlays.compare_with."""
 
@@ -326,6 +333,7 @@ Command = (
     | SettingCommand
     | EditCommand
     | HomeView
+    | SetFrameMemory
     | SetCompareWith
     | SetMode
     | SetContent

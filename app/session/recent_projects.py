@@ -10,6 +10,7 @@ from app.background.jobs import Jobs
 from app.project.clip_catalog import ClipCatalog
 from app.project.opened_project import OpenedProject
 from app.project.recents import RecentProject, missing_folders, project_name
+from app.session.project_pictures import ProjectPictures
 from app.session.settings import Settings
 
 logger = logging.getLogger(__name__)
@@ -20,10 +21,12 @@ class RecentProjects:
 
     Attributes:
         missing: Folders that are not there any more, as far as they were looked for.
+        pictures: Small ones of projects.
     """
 
     def __init__(self, settings: Settings) -> None:
         self.missing: frozenset[Path] = frozenset()
+        self.pictures = ProjectPictures()
         self._settings, self._looks = settings, Jobs()
 
     @property
@@ -46,6 +49,7 @@ class RecentProjects:
     def look(self) -> None:
         """See on a thread which of them are still there: a network folder may take its time."""
         entries = tuple(self.entries)
+        self.pictures.read(tuple(entry.folder for entry in entries))
 
         def found(missing: frozenset[Path]) -> None:
             self.missing = missing
@@ -58,7 +62,9 @@ class RecentProjects:
     def poll(self) -> None:
         """Take in what was found."""
         self._looks.poll()
+        self.pictures.poll()
 
     def close(self) -> None:
-        """End the thread, without waiting for a slow disk."""
+        """End the threads, without waiting for a slow disk; the last small picture is still written."""
         self._looks.close(timeout_s=0.1)
+        self.pictures.close()

@@ -269,6 +269,8 @@ class Session:
                 if content not in CONTENTS:
                     raise ValueError(f"parts of a clip are {', '.join(CONTENTS)}, not {content!r}")
                 self.overlays.content = content
+            case commands.SetFrameMemory(megabytes=megabytes):
+                self.playback.decoder.keep_megabytes(megabytes)
             case commands.HomeView():
                 self.view.home()
             case commands.ShowViews(n=n):
@@ -317,6 +319,7 @@ class Session:
         if found.project is None:  # it is open already
             self.view.home()
             return
+        self._keep_recent()  # the one that is left
         generation = 1 if self.opened is None else self.opened.generation + 1
         opened = opened_project(found.capture, found.project, generation)
         self.marking.open(found.project)  # first: keeps what was marked in the project that is left
@@ -346,6 +349,8 @@ class Session:
     def _keep_recent(self) -> None:
         if self.opened is not None and self.live_training.service is not None:
             self.recent.keep(self.opened, self.live_training.service.catalog)
+            if self._is_preloading:
+                self.recent.pictures.keep(self.opened, self.playback.frame(self.timeline), self.view)
 
     def _fail(self, job_name: str, error: Exception) -> None:
         self.notices.add_failure(f"{job_name} has failed", error)
@@ -383,8 +388,8 @@ class Session:
         jobs = tuple((job.name, job.done, job.message) for job in self.jobs)
         seen = (self.versions.worker.newest, self.log.worker.newest)
         looked = tuple(None if found is None else found[0] for found in seen)
-        training = self.live_training.finished
-        return self.playback.finished, training, looked, jobs, self.notices.revision, self.recent.missing
+        finished = self.playback.finished, self.live_training.finished, self.recent.pictures.revision
+        return *finished, looked, jobs, self.notices.revision, self.recent.missing
 
     def _release_snapshot(self) -> None:
         """Give a snapshot back once it was read, or where nobody looks at its clip."""

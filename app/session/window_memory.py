@@ -51,6 +51,7 @@ class WindowMemory:
         time_unit: In which the timeline counts; empty where none was chosen.
         folded_lanes: Lanes of the timeline that are folded away, by name.
         views: By project folder, the one used last at the end; see `view_of` and `show_again`.
+        failure: Why the file could not be written; empty while it could.
     """
 
     path: Path
@@ -66,7 +67,7 @@ class WindowMemory:
     folded_lanes: tuple[str, ...] = ()
     views: dict[str, dict[str, Any]] = field(default_factory=dict)
     _saved: dict[str, Any] = field(default_factory=dict, repr=False)
-    _has_failed: bool = False
+    failure: str = ""
     _writing: threading.Thread | None = field(default=None, repr=False)
 
     def keep_view(self, folder: str, view: dict[str, Any]) -> None:
@@ -112,9 +113,9 @@ class WindowMemory:
         try:
             write_checked_json(self.path, document)
         except (OSError, EngineError) as error:
-            level = logging.DEBUG if self._has_failed else logging.WARNING  # once is enough
+            level = logging.DEBUG if self.failure else logging.WARNING  # once is enough
             logger.log(level, "the look of the window could not be kept (%s) - %s", error, self.path)
-            self._has_failed = True
+            self.failure = getattr(error, "strerror", None) or str(error)
         self._saved = document
 
 

@@ -18,6 +18,10 @@ def key_tables() -> str:
     """Every row of the help sheet, in its order."""
     parts = []
     for group, rows in groupby(ACTIONS, key=lambda row: row.group):
-        shown = [(keys(row), row.text) for row in rows if row.keys and row.is_in_help]
+        listed = list(rows)
+        shown = [(keys(row), row.text) for row in listed if row.keys and row.is_in_help]
         parts.append(f"**{group}**\n\n{table(('key', 'does'), shown)}")
+        keyless = "; ".join(row.text for row in listed if not row.keys)
+        if keyless:
+            parts.append(f"No key of their own: {keyless}.")
     return "\n\n".join(parts)

@@ -11,6 +11,7 @@ import pytest
 pyglet.options.headless = True  # before pyglet.window is imported anywhere in this process
 pyglet.options.shadow_window = False
 
+from app.session.preferences import PreferencesFile  # noqa: E402
 from app.session.window_memory import WindowMemory  # noqa: E402
 from tests.ui.fake_session import FakeSession  # noqa: E402
 from tests.ui.pilot import Pilot  # noqa: E402
@@ -48,11 +49,19 @@ def open_pilot(headless_gl: None) -> Iterator[Callable[..., Pilot]]:
         *,
         size: tuple[int, int] = (1280, 800),
         memory: WindowMemory | None = None,
+        preferences: PreferencesFile | None = None,
         first_frames: int = 6,
         is_eased: bool = False,
     ) -> Pilot:
         width, height = size
-        studio = StudioWindow(session or FakeSession(), width=width, height=height, fixed_delta_s=1 / 60, memory=memory)
+        studio = StudioWindow(
+            session or FakeSession(),
+            width=width,
+            height=height,
+            fixed_delta_s=1 / 60,
+            memory=memory,
+            preferences=preferences,
+        )
         opened.append(studio)
         # Synthetic events would wait for dispatch_events() otherwise.
         studio.window._enable_event_queue = False

@@ -6,7 +6,7 @@ Every command is recorded in `commands`; those that only change what is shown ar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -81,11 +81,19 @@ class FakeCapture:
 
 
 @dataclass
+class FakePictures:
+    """What the panels read of ProjectPictures."""
+
+    found: dict[Path, Picture] = field(default_factory=dict)
+
+
+@dataclass
 class FakeRecent:
     """What the panels read of RecentProjects."""
 
     entries: list[RecentProject]
     missing: frozenset[Path]
+    pictures: FakePictures = field(default_factory=FakePictures)
 
 
 class FakeSession:

@@ -65,7 +65,7 @@ def test_panes_keep_the_camera_s_aspect_and_do_not_overlap() -> None:
 
 
 def test_the_table_of_actions_is_complete_and_unambiguous() -> None:
-    chords = [key.chord for action in ACTIONS for key in action.parsed_keys]
+    chords = [key.chord for action in ACTIONS for key in map(parse_key, action.keys)]
     assert len(set(chords)) == len(chords)
     assert len({action.id for action in ACTIONS}) == len(ACTIONS)
     assert all(action.text and action.group for action in ACTIONS)

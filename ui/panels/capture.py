@@ -98,7 +98,7 @@ class CapturePanel:
             dispatch(LookThrough(None))
         ui.mark("capture.free")
         imgui.separator()
-        if imgui.begin_child("cameras"):
+        if imgui.begin_child("cameras", child_flags=imgui.ChildFlags_.nav_flattened):
             self._draw_cameras(capture.rig, session, dispatch, ui)
         imgui.end_child()
 

@@ -45,16 +45,16 @@ def draw_color_bar(
         left, right = stops[piece], stops[piece + 1]
         corner = ImVec2(x0 + piece * width, y0)
         draw.add_rect_filled_multi_color(corner, ImVec2(x0 + (piece + 1) * width, y1), left, right, right, left)
-    draw.add_rect(ImVec2(x0, y0), ImVec2(x1, y1), theme.u32(theme.faded(theme.PLAYHEAD, 0.35)))
+    draw.add_rect(ImVec2(x0, y0), ImVec2(x1, y1), theme.u32(theme.faded(theme.ON_PICTURE.playhead, 0.35)))
     text_y = y1 + 5
     low_text, high_text = bar_number(low, low, high), bar_number(high, low, high)
     high_text = f"{high_text} {unit}".rstrip()
-    dim = theme.u32(theme.faded(theme.PLAYHEAD, 0.72))
+    dim = theme.u32(theme.faded(theme.ON_PICTURE.playhead, 0.72))
     draw.add_text(ImVec2(x0, text_y), dim, low_text)
     draw.add_text(ImVec2(x1 - imgui.calc_text_size(high_text).x, text_y), dim, high_text)
     if value_under_pointer is None:
         return
-    white = theme.u32(theme.PLAYHEAD)
+    white = theme.u32(theme.ON_PICTURE.playhead)
     share = min(max((value_under_pointer - low) / (high - low), 0.0), 1.0)
     x = x0 + share * (x1 - x0)
     draw.add_triangle_filled(ImVec2(x - 5, y0 - 6), ImVec2(x + 5, y0 - 6), ImVec2(x, y0 + 1), white)

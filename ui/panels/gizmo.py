@@ -10,12 +10,13 @@ from app.playback.orbit_view import OrbitView
 from app.playback.scene_axes import scene_axes, view_from
 from ui.panels.state import Rect
 from ui.style import theme
+from ui.style.theme import ON_PICTURE
 
 RADIUS, TIP_RADIUS, MARGIN = 32.0, 9.0, 10.0
 SIZE = 2 * (RADIUS + TIP_RADIUS)
 SMALLEST_AREA = 190.0
 """In a picture with a shorter side than this it would only be in the way; units."""
-COLORS = (theme.VERMILLION, theme.GREEN, theme.SKY)
+COLORS = (ON_PICTURE.vermillion, ON_PICTURE.green, ON_PICTURE.sky)
 LETTERS = ("X", "Y", "Z")
 
 
@@ -83,9 +84,9 @@ def draw_gizmo(draw: imgui.ImDrawList, view: OrbitView, rect: Rect, pointer: tup
             draw.add_circle_filled(at, TIP_RADIUS - 2, theme.u32(theme.faded(theme.VOID, 0.9)))
             draw.add_circle(at, TIP_RADIUS - 2, theme.u32(shown), 0, 1.5)
         if is_pointed:
-            draw.add_circle(at, TIP_RADIUS + 1, theme.u32(theme.PLAYHEAD), 0, 2.0)
+            draw.add_circle(at, TIP_RADIUS + 1, theme.u32(ON_PICTURE.playhead), 0, 2.0)
         if tip.sign > 0 or is_pointed:
             text = LETTERS[tip.axis] if tip.sign > 0 else f"-{LETTERS[tip.axis]}"
             size = imgui.calc_text_size(text)
-            ink = theme.TEXT_ON_ACCENT if tip.sign > 0 else theme.TEXT
+            ink = ON_PICTURE.text_on_accent if tip.sign > 0 else ON_PICTURE.text
             draw.add_text(ImVec2(tip.x - size.x / 2, tip.y - size.y / 2), theme.u32(ink), text)

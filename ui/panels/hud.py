@@ -22,8 +22,9 @@ from ui.panels.regions import draw_region_mark
 from ui.panels.state import Rect, UiState
 from ui.panels.timeline.clip_words import STATE_WORDS
 from ui.style import theme
+from ui.style.colors import Color
 from ui.style.numbers import format_count
-from ui.style.theme import Icon
+from ui.style.theme import ON_PICTURE, Icon
 from ui.viewport.hud_text import RENDERED, HudText, count_text, hud_text
 from ui.viewport.picture_rate import PictureRate
 from ui.viewport.region_tool import REGION_WORDS
@@ -142,11 +143,11 @@ class Hud:
         """In rows from below, as many side by side as fit; the label comes first, lowest and leftmost."""
         draw = imgui.get_window_draw_list()
         plates = [
-            (text.label, theme.TEXT, False),
-            (text.rate, theme.TEXT, False),
-            (text.pending, theme.YELLOW, True),
-            (f"{Icon.WARNING}  {text.failure}" if text.failure else "", theme.VERMILLION, False),
-            (text.note, theme.TEXT_DIM if not text.pending else theme.TEXT, False),
+            (text.label, ON_PICTURE.text, False),
+            (text.rate, ON_PICTURE.text, False),
+            (text.pending, ON_PICTURE.yellow, True),
+            (f"{Icon.WARNING}  {text.failure}" if text.failure else "", ON_PICTURE.vermillion, False),
+            (text.note, ON_PICTURE.text_dim if not text.pending else ON_PICTURE.text, False),
         ]
         widest = area.width - 2 * MARGIN - 18
         x, bottom = area.x0 + MARGIN, area.y1 - 10
@@ -208,14 +209,14 @@ class Hud:
             draw.add_rect_filled(ImVec2(x, y), ImVec2(right, y + 24), plate, 4)
             middle = ImVec2(x + 14, y + 12)
             if shape in REGION_WORDS:
-                draw_region_mark(draw, middle, shape)
+                draw_region_mark(draw, middle, shape, ON_PICTURE)
             elif shape == "disc":
                 draw.add_circle_filled(middle, 6, theme.u32(color))
             elif shape == "circle":
                 draw.add_circle(middle, 5, theme.u32(color), 0, 2)
             else:
                 draw.add_ngon_filled(middle, 6, theme.u32(color), 4)
-            draw.add_text(ImVec2(x + 26, y + 3), theme.u32(theme.TEXT), text)
+            draw.add_text(ImVec2(x + 26, y + 3), theme.u32(ON_PICTURE.text), text)
             y += 28
 
 
@@ -224,14 +225,14 @@ def _bar_of(mode: str, rig: CameraRig) -> tuple[str, float, float, str]:
     return MODES[mode].map_name, *range_of(mode, rig), MODES[mode].unit
 
 
-def _draw_busy(draw: imgui.ImDrawList, middle: ImVec2, color: theme.Color) -> None:
+def _draw_busy(draw: imgui.ImDrawList, middle: ImVec2, color: Color) -> None:
     """Three quarters of a circle that turns in eighths."""
     turn = math.tau * int(time.perf_counter() / BUSY_REDRAW_S) / 8
     draw.path_arc_to(middle, 5.5, turn, turn + 0.75 * math.tau, 16)
     draw.path_stroke(theme.u32(color), 2.0)
 
 
-def legend_rows(session: HudNeeds, scene: Scene) -> list[tuple[str, theme.Color, str]]:
+def legend_rows(session: HudNeeds, scene: Scene) -> list[tuple[str, Color, str]]:
     """Shape, colour and words of what is marked."""
     counts = scene.counts
     rows = [("disc", (*hue, 1.0), words) for hue, words in MODES[scene.shown.source.shown_as.mode].legend]
@@ -241,20 +242,20 @@ def legend_rows(session: HudNeeds, scene: Scene) -> list[tuple[str, theme.Color,
     if session.overlays.show_inherited and counts.n_inherited:
         words, n_all = ("reference anchors", n_own) if counts.is_reference else ("inherited anchors", n_inherited)
         text = count_text(counts.n_inherited, n_all, words, frame_index)
-        rows += [("circle", theme.INHERITED, text), *_role_rows("circle", counts.inherited_roles)]
+        rows += [("circle", ON_PICTURE.inherited, text), *_role_rows("circle", counts.inherited_roles)]
     if session.overlays.show_residual and counts.n_residual:
         text = count_text(counts.n_residual, n_own, "residual anchors", frame_index)
-        rows += [("diamond", theme.RESIDUAL, text), *_role_rows("diamond", counts.residual_roles)]
+        rows += [("diamond", ON_PICTURE.residual, text), *_role_rows("diamond", counts.residual_roles)]
     if session.overlays.show_regions:
         for treat, words in REGION_WORDS.items():
             n = sum(region.treat == treat for region in session.regions.regions)
             text = f"{n} {words} region{'s' if n > 1 else ''}"
-            rows += [(treat, theme.REGION_COLORS[treat], text)] if n else []
+            rows += [(treat, ON_PICTURE.region_colors[treat], text)] if n else []
     return rows
 
 
-def _role_rows(shape: str, counts: dict[str, int]) -> Sequence[tuple[str, theme.Color, str]]:
+def _role_rows(shape: str, counts: dict[str, int]) -> Sequence[tuple[str, Color, str]]:
     """Legend of anchors by what they are; nothing where they are all the same."""
     if len(counts) < 2:
         return []
-    return [(shape, theme.ROLE_COLORS[role], f"of them {format_count(n)} {role}") for role, n in counts.items()]
+    return [(shape, ON_PICTURE.role_colors[role], f"of them {format_count(n)} {role}") for role, n in counts.items()]

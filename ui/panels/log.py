@@ -16,7 +16,6 @@ from ui.style.theme import Icon
 LEVEL_CHOICES = (("every level", ""), ("warnings", "WARNING"), ("errors", "ERROR"))
 SOURCE_CHOICES = (("every source", "all"), ("program", "program"), ("training", "training"))
 _RANK = {"DEBUG": 0, "INFO": 1, "WARNING": 2, "ERROR": 3, "CRITICAL": 4}
-_COLORS = {"WARNING": theme.ORANGE, "ERROR": theme.VERMILLION, "CRITICAL": theme.VERMILLION, "DEBUG": theme.TEXT_DIM}
 _MARKS = {"WARNING": Icon.WARNING, "ERROR": Icon.ERROR, "CRITICAL": Icon.ERROR}
 REFRESH_S = 0.5
 """While something trains; it writes its log whenever it likes."""
@@ -142,7 +141,7 @@ class LogPanel:
                 line = shown[index]
                 mark = _MARKS.get(line.level)
                 text = line_text(line)
-                imgui.text_colored(ImVec4(*_COLORS.get(line.level, theme.TEXT)), f"{mark} {text}" if mark else text)
+                imgui.text_colored(ImVec4(*_color(line.level)), f"{mark} {text}" if mark else text)
         clipper.end()
         if imgui.is_window_hovered() and imgui.get_io().mouse_wheel > 0:
             self.is_following = False
@@ -161,3 +160,14 @@ def _combo(name: str, choices: Sequence[tuple[str, str]], chosen: str, ui: UiSta
         imgui.end_combo()
     ui.mark(f"log.{name}")
     return chosen
+
+
+def _color(level: str) -> theme.Color:
+    """Of a line; its sign says the same."""
+    by_level = {
+        "WARNING": theme.ORANGE,
+        "ERROR": theme.VERMILLION,
+        "CRITICAL": theme.VERMILLION,
+        "DEBUG": theme.TEXT_DIM,
+    }
+    return by_level.get(level, theme.TEXT)

@@ -20,11 +20,7 @@ MAX_TOASTS = 4
 ROOM_BELOW = 34.0
 """The line that says what is shown stays readable."""
 
-_LOOKS = {
-    "info": (Icon.INFO, theme.SKY),
-    "warn": (Icon.WARNING, theme.YELLOW),
-    "error": (Icon.ERROR, theme.VERMILLION),
-}
+_ICONS = {"info": Icon.INFO, "warn": Icon.WARNING, "error": Icon.ERROR}
 
 
 class NoticesNeeds(Protocol):
@@ -64,7 +60,8 @@ class NoticesPanel:
             y -= self._draw_toast(index, notice, dispatch, ui, ImVec2(right, y)) + 8
 
     def _draw_toast(self, index: int, notice: Notice, dispatch: Dispatch, ui: UiState, corner: ImVec2) -> float:
-        icon, color = _LOOKS.get(notice.kind, _LOOKS["info"])
+        icon = _ICONS.get(notice.kind, Icon.INFO)
+        color = {"warn": theme.YELLOW, "error": theme.VERMILLION}.get(notice.kind, theme.SKY)
         imgui.set_next_window_pos(corner, imgui.Cond_.always, ImVec2(1.0, 1.0))
         imgui.set_next_window_size(ImVec2(TOAST_WIDTH, 0))
         flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_move

@@ -24,6 +24,7 @@ from ui.panels.regions import draw_chosen_sphere
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import chip
 from ui.style import theme
+from ui.style.theme import ON_PICTURE
 from ui.viewport.hud_text import RENDERED, captured_words, pane_text
 from ui.viewport.region_layer import ShownRegions
 from ui.viewport.scene import Scene, SceneNeeds, SceneView
@@ -241,7 +242,7 @@ class PicturePane:
             kind = other_label(session.overlays) if is_version else kind_words(RENDERED, other.shown_as.label)
             words = pane_text(kind, *frames)
         rendered_words = pane_text(kind_words(shown.kind, shown.source.shown_as.label), *frames[::-1])
-        color = theme.YELLOW if None not in frames and frames[0] != frames[1] else theme.TEXT
+        color = ON_PICTURE.yellow if None not in frames and frames[0] != frames[1] else ON_PICTURE.text
         compare = session.overlays.compare
         if compare == "side" and not self._is_held:
             if other is not None:
@@ -265,7 +266,7 @@ class PicturePane:
 
 def _draw_handle(draw: imgui.ImDrawList, area: Rect, x: float) -> None:
     """The line between the two pictures, and the knob that moves it."""
-    white, dark, middle = theme.u32(theme.PLAYHEAD), theme.u32(theme.VOID), area.center[1]
+    white, dark, middle = theme.u32(ON_PICTURE.playhead), theme.u32(theme.VOID), area.center[1]
     draw.add_line_v(x, area.y0, area.y1, white, 2)
     draw.add_circle_filled(ImVec2(x, middle), 9, white)
     draw.add_triangle_filled(ImVec2(x - 6, middle), ImVec2(x - 2, middle - 4), ImVec2(x - 2, middle + 4), dark)

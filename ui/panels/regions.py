@@ -14,6 +14,7 @@ from ui.panels.state import REGIONS, Dispatch, Rect, UiState
 from ui.panels.widgets import chip, primary_button, text_right, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
+from ui.style.palette import Palette
 from ui.style.theme import Icon
 from ui.viewport.region_tool import REGION_WORDS
 
@@ -179,9 +180,9 @@ def _draw_row(index: int, region: GateRegion, can_mark: bool, ui: UiState) -> bo
     return is_clicked
 
 
-def draw_region_mark(draw: imgui.ImDrawList, middle: ImVec2, treat: str) -> None:
-    """The small sign of a treatment: a whole ring for static, a dashed one for moving."""
-    color = theme.u32(theme.REGION_COLORS[treat])
+def draw_region_mark(draw: imgui.ImDrawList, middle: ImVec2, treat: str, palette: Palette | None = None) -> None:
+    """The small sign of a treatment: a whole ring for static, a dashed one for moving. palette: Not that of panels."""
+    color = theme.u32((theme.REGION_COLORS if palette is None else palette.region_colors)[treat])
     if treat == "static":
         draw.add_circle(middle, 6, color, 0, 2)
         return
@@ -196,12 +197,12 @@ def draw_chosen_sphere(ui: UiState, draw: imgui.ImDrawList, area: Rect, counts: 
     tool = ui.regions
     text = f"      Mark as {REGION_WORDS[tool.treat]}:  radius {tool.radius:.3g}{_held_text(counts)}"
     chip(draw, area.x0, area.y0, text)
-    draw_region_mark(draw, ImVec2(area.x0 + 16, area.y0 + 12), tool.treat)
+    draw_region_mark(draw, ImVec2(area.x0 + 16, area.y0 + 12), tool.treat, theme.ON_PICTURE)
     place = "Click elsewhere moves it" if tool.is_placed else "Click fixes it"
     other = REGION_WORDS["dynamic" if tool.treat == "static" else "static"]
     keys = f"{place}   Wheel size   M {other} instead   Enter marks it   Esc leaves"
     if imgui.calc_text_size(keys).x + 30 < area.width:  # the panel says it too
-        chip(draw, area.x0, area.y0 + 28, keys, color=theme.TEXT_DIM)
+        chip(draw, area.x0, area.y0 + 28, keys, color=theme.ON_PICTURE.text_dim)
 
 
 def _held_text(counts: dict[str, int]) -> str:

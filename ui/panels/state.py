@@ -12,11 +12,14 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import Command
+from app.session.preferences import Preferences
 from ui.gl.image import Rect as PixelRect
+from ui.panels.actions.key_map import KeyMap
 from ui.panels.curve_view import CurveView
 from ui.panels.gestures import Navigation
 from ui.panels.timeline.view_state import TimelineView
-from ui.style.theme import Fonts
+from ui.panels.wishes import Wishes
+from ui.style.fonts import Fonts
 from ui.style.ui_scale import UiScale
 from ui.viewport.region_tool import RegionTool
 
@@ -24,6 +27,9 @@ VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Trainin
 RESIDUALS, LOG = "Residuals", "Log"
 PANELS = (CAPTURE, TRAINING, REGIONS, RESIDUALS, TIMELINE, LOG)
 """Titles of the panels around the picture."""
+LAYOUT_WORDS = {"Standard": "as in the beginning", "Long capture": "with a tall timeline, for long captures"}
+LAYOUTS = tuple(LAYOUT_WORDS)
+"""Layouts of the panels that the program brings; the first is the one to begin with."""
 Dispatch = Callable[[Command], None]
 """Takes one command of app.session.commands."""
 
@@ -59,6 +65,11 @@ class UiState:
     Attributes:
         fonts: Loaded faces.
         scale: How large everything is drawn.
+        preferences: Of the user; changed in place.
+        keys: Which keys run which action.
+        wishes: What is asked of the shell.
+        is_picture_only: Are the panels around the picture hidden?
+        keyed_panel: Title of the panel that arrow keys, Enter and Space belong to, or None.
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
         regions: The region that is being chosen, and the one that stands out.
         navigation: What mouse and keys do over a picture.
@@ -78,6 +89,9 @@ class UiState:
 
     fonts: Fonts = field(default_factory=Fonts)
     scale: UiScale = field(default_factory=UiScale)
+    preferences: Preferences = field(default_factory=Preferences)
+    keys: KeyMap = field(default_factory=KeyMap)
+    wishes: Wishes = field(default_factory=Wishes)
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
     navigation: Navigation = field(default_factory=Navigation)
@@ -90,6 +104,8 @@ class UiState:
     wanted_panel: str | None = None
     is_quality_open: bool = False
     is_quality_seen: bool = False
+    is_picture_only: bool = False
+    keyed_panel: str | None = None
     is_help_open: bool = False
     is_popup_open: bool = False
     is_menu_wanted: bool = False

@@ -13,6 +13,7 @@ from ui.panels.hud import Hud
 from ui.panels.navigation import ViewPopup
 from ui.panels.panes import view_areas
 from ui.panels.picture_pane import PictureNeeds, PicturePane
+from ui.panels.recent_rows import RecentRows
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.toolbar import TOOLBAR_HEIGHT, ToolbarNeeds, draw_toolbar
 from ui.panels.welcome import WelcomeNeeds, draw_welcome
@@ -37,7 +38,8 @@ class ViewportPanel:
         make_pane: Makes what one view is drawn with. GL thread only.
     """
 
-    def __init__(self, make_pane: Callable[[], PicturePane]) -> None:
+    def __init__(self, make_pane: Callable[[], PicturePane], recent_rows: RecentRows) -> None:
+        self.recent_rows = recent_rows
         self._make_pane = make_pane
         self._panes = [make_pane()]
         self._active = 0
@@ -47,6 +49,7 @@ class ViewportPanel:
         """Free GL objects. GL thread only."""
         for pane in self._panes:
             pane.release()
+        self.recent_rows.release()
 
     @property
     def active(self) -> PicturePane:
@@ -89,7 +92,7 @@ class ViewportPanel:
         area = Rect(start.x, start.y, start.x + room.x, start.y + room.y)
         if session.capture is None:
             imgui.get_window_draw_list().add_rect_filled(area.low, area.high, theme.u32(theme.VOID))
-            draw_welcome(session, dispatch, ui, area)
+            draw_welcome(session, dispatch, ui, area, self.recent_rows)
             return
         bar = Rect(area.x0, area.y0, area.x1, area.y0 + TOOLBAR_HEIGHT)
         imgui.get_window_draw_list().add_rect_filled(bar.low, bar.high, theme.u32(theme.PANEL))
@@ -116,4 +119,4 @@ class ViewportPanel:
             if is_used and not is_active:
                 dispatch(ActivateView(index))
             if is_active and views.n_shown > 1:
-                draw.add_rect(part.low, part.high, theme.u32(theme.SKY), 0.0, 2.0)
+                draw.add_rect(part.low, part.high, theme.u32(theme.ON_PICTURE.sky), 0.0, 2.0)

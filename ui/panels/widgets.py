@@ -8,17 +8,18 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from ui.panels.state import Rect, UiState
 from ui.style import theme
+from ui.style.colors import Color
 
 LEAST_WITH_ARROW = 92.0
 """Boxes narrower than this do without an arrow, units."""
 
 
-def text_right(text: str, color: theme.Color = theme.TEXT_DIM) -> None:
+def text_right(text: str, color: Color | None = None) -> None:
     """Text at the right end of the current line, pushed right rather than overlapping what is there."""
     imgui.same_line()
     free = imgui.get_content_region_avail().x - imgui.calc_text_size(text).x
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(free, 0.0))
-    imgui.text_colored(ImVec4(*color), text)
+    imgui.text_colored(ImVec4(*(theme.TEXT_DIM if color is None else color)), text)
 
 
 def text_wrapped_dim(text: str) -> None:
@@ -52,14 +53,19 @@ def pop_bold(ui: UiState) -> None:
 
 
 def chip(
-    draw: imgui.ImDrawList, x: float, y: float, text: str, *, color: theme.Color = theme.TEXT, is_right: bool = False
+    draw: imgui.ImDrawList, x: float, y: float, text: str, *, color: Color | None = None, is_right: bool = False
 ) -> float:
-    """Text on a dark plate over a picture; returns its right edge. With is_right, x is the right edge."""
+    """Text on a dark plate over a picture; returns its right edge.
+
+    Args:
+        color: One of theme.ON_PICTURE, whose text it is when None.
+        is_right: x is the right edge.
+    """
     width = imgui.calc_text_size(text).x + 18
     left = x - width if is_right else x
     plate = Rect(left, y, left + width, y + 24)
     draw.add_rect_filled(plate.low, plate.high, theme.u32(theme.faded(theme.VOID, 0.78)), 4)
-    draw.add_text(ImVec2(left + 9, y + 4), theme.u32(color), text)
+    draw.add_text(ImVec2(left + 9, y + 4), theme.u32(theme.ON_PICTURE.text if color is None else color), text)
     return plate.x1
 
 

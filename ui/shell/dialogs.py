@@ -25,6 +25,8 @@ from ui.style import theme
 _LINUX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
 _POPUP = "Open a capture or project folder"
 _MAX_LISTED = 500
+NO_KEY = "no key"
+"""Such actions are in the menus and in the palette."""
 
 
 def has_native_dialog() -> bool:
@@ -163,7 +165,11 @@ def draw_help(ui: UiState) -> None:
     imgui.set_next_window_size_constraints(ImVec2(880, 100), ImVec2(880, highest))  # in a low window it scrolls
     flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_resize
     flags |= imgui.WindowFlags_.no_collapse
+    imgui.push_style_var(imgui.StyleVar_.window_border_size, 1.0)
+    imgui.push_style_color(imgui.Col_.window_bg, imgui.ImVec4(*theme.POPUP))
     is_shown, is_kept = imgui.begin("Keys and mouse", True, flags)
+    imgui.pop_style_color()
+    imgui.pop_style_var()
     if imgui.is_window_appearing():
         ui.redraw_within(0.0)  # only then does what lies below know that it is covered
     if is_shown:
@@ -172,22 +178,23 @@ def draw_help(ui: UiState) -> None:
         if imgui.begin_table("sheet", 2, imgui.TableFlags_.sizing_stretch_same):
             imgui.table_next_column()
             for group in left:
-                _draw_group(group, _rows(group))
+                _draw_group(group, _rows(group, ui))
             _draw_group("Mouse", list(mouse_help(ui.navigation.preset)))
             imgui.table_next_column()
             for group in (group for group in groups if group not in left):
-                _draw_group(group, _rows(group))
+                _draw_group(group, _rows(group, ui))
             imgui.end_table()
     imgui.end()
     ui.is_help_open = bool(is_kept)
 
 
-def _rows(group: str) -> list[tuple[str, str]]:
-    return [
-        (", ".join(action.keys), action.text)
-        for action in ACTIONS
-        if action.group == group and action.keys and action.is_in_help
+def _rows(group: str, ui: UiState) -> list[tuple[str, str]]:
+    """Keys and words of the actions of a group; those without a key come last."""
+    shown = [
+        action for action in ACTIONS if action.group == group and (action.is_in_help or not ui.keys.labels(action))
     ]
+    rows = [(", ".join(ui.keys.labels(action)), action.text) for action in shown]
+    return [*(row for row in rows if row[0]), *((NO_KEY, text) for label, text in rows if not label)]
 
 
 def _draw_group(title: str, rows: list[tuple[str, str]]) -> None:

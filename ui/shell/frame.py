@@ -15,18 +15,34 @@ import moderngl
 from imgui_bundle import ImVec2, ImVec4, imgui
 from pyglet.window import BaseWindow
 
-from app.session.commands import Command
+from app.session.commands import Command, SetFrameMemory
+from app.session.preferences import Preferences, PreferencesFile
 from app.session.window_memory import WindowMemory
 from ui.gl import ImageTexture, free_dropped, n_changes
-from ui.panels.actions.table import handle_keys
+from ui.panels.actions.key_map import KeyMap
+from ui.panels.actions.table import ACTIONS, handle_keys
 from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.heat_overlay import HeatOverlay
 from ui.panels.log import LogNeeds, LogPanel
 from ui.panels.notices import NoticesNeeds, NoticesPanel
+from ui.panels.panel_keys import step_panel
 from ui.panels.picture_pane import PicturePane
+from ui.panels.recent_rows import RecentRows
 from ui.panels.regions import draw_regions
 from ui.panels.residuals.panel import ResidualsNeeds, ResidualsPanel
-from ui.panels.state import CAPTURE, LOG, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT, Dispatch, Rect, UiState
+from ui.panels.state import (
+    CAPTURE,
+    LAYOUTS,
+    LOG,
+    REGIONS,
+    RESIDUALS,
+    TIMELINE,
+    TRAINING,
+    VIEWPORT,
+    Dispatch,
+    Rect,
+    UiState,
+)
 from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.panel import draw_timeline
 from ui.panels.training import draw_training
@@ -34,13 +50,19 @@ from ui.panels.viewport import ViewportNeeds, ViewportPanel
 from ui.shell.dialogs import OpenFolderDialog, draw_help
 from ui.shell.imgui_backend import ImGuiBackend
 from ui.shell.layout import hold_sizes, is_laid_out, lay_out
+from ui.shell.layouts import Layouts
 from ui.shell.menu_bar import MenuNeeds, draw_menu_bar
+from ui.shell.palette import Palette
+from ui.shell.palette_entries import PaletteNeeds
+from ui.shell.preferences import PreferencesDialog
 from ui.shell.questions import QuestionDialogs, QuestionNeeds
 from ui.shell.redraw import FRAMES_AFTER_INPUT, RedrawPlan
 from ui.shell.remembering import Remembering, RememberNeeds
 from ui.shell.status_bar import HEIGHT as STATUS_BAR_HEIGHT
 from ui.shell.status_bar import StatusNeeds, draw_status_bar
 from ui.style import theme
+from ui.style.fonts import load_fonts
+from ui.style.theme_in_use import ThemeInUse
 from ui.style.ui_scale import UiScale
 from ui.viewport.scene import Scene
 
@@ -65,6 +87,7 @@ class FrameNeeds(
     CaptureNeeds,
     TimelineNeeds,
     MenuNeeds,
+    PaletteNeeds,
     StatusNeeds,
     QuestionNeeds,
     RememberNeeds,
@@ -102,6 +125,7 @@ class Frame:
         on_input: Called after each input that wants a frame, so that it need not wait for the next tick.
         memory: What the window looked like before; None starts afresh and keeps nothing.
         scale: How large everything is drawn.
+        preferences: What the user prefers; None takes what is usual and keeps nothing.
     """
 
     def __init__(
@@ -114,6 +138,7 @@ class Frame:
         on_input: Callable[[], None] = lambda: None,
         memory: WindowMemory | None = None,
         scale: UiScale | None = None,
+        preferences: PreferencesFile | None = None,
     ) -> None:
         self._window = window
         self._ctx = ctx
@@ -121,28 +146,38 @@ class Frame:
         self.scale = scale or UiScale()
         self.backend = ImGuiBackend(window, on_input=self._input_came, fixed_delta_s=fixed_delta_s, scale=self.scale)
         self._on_input = on_input
-        self.ui = UiState(fonts=theme.load_fonts(), scale=self.scale)
-        theme.apply_style()
-        self.viewport = ViewportPanel(lambda: PicturePane(Scene(ctx), HeatOverlay(ctx)))
+        values = Preferences() if preferences is None else preferences.values
+        keys = KeyMap(values.keys)
+        keys.drop_unknown(ACTIONS)
+        self.ui = UiState(fonts=load_fonts(), scale=self.scale, preferences=values, keys=keys)
+        self._cache_mb: int | None = None
+        self._theme = ThemeInUse()
+        self._theme.follow(values.theme)
+        rows = RecentRows(lambda: ImageTexture(ctx))
+        self.viewport = ViewportPanel(lambda: PicturePane(Scene(ctx), HeatOverlay(ctx)), rows)
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
         self.residuals = ResidualsPanel(lambda: ImageTexture(ctx))
         self.notices = NoticesPanel()
         self.log = LogPanel()
         self.dialog = OpenFolderDialog()
         self.questions = QuestionDialogs()
+        self.palette = Palette()
+        self.preferences = PreferencesDialog()
+        self.layouts = Layouts()
         self._redraw = RedrawPlan()
         self._redraw.request(FIRST_FRAMES)
         self._shown: tuple[int, int] | None = None
         self._drawn_s = -1e9
         self._input_s = -1e9
         self._has_news = False
-        self.remembering = Remembering(memory, self.ui)
+        self.remembering = Remembering(memory, self.ui, preferences)
         self.remembering.restore_layout()
         self.remembering.restore_marks(session)
         self._failed_panels: set[str] = set()
         self._floating_panels: set[str] = set()
         self._in_front = [TIMELINE]  # a log in front of it would be a surprise
         self._dock_ids: dict[str, int] = {}
+        self._is_welcome = False
         self._panels: tuple[tuple[str, Callable[[FrameNeeds, Dispatch, UiState], None], bool], ...] = (
             (VIEWPORT, self.viewport.draw, False),
             (CAPTURE, self.capture.draw, True),
@@ -173,6 +208,11 @@ class Frame:
         """Drain the session and move time on. True when a frame has to be drawn."""
         session = self.session
         has_news = self._drain()
+        if self._theme.follow(self.ui.preferences.theme):
+            self.forget_shown()
+        if self._cache_mb != self.ui.preferences.cache_mb:
+            self._cache_mb = self.ui.preferences.cache_mb
+            session.dispatch(SetFrameMemory(self._cache_mb))
         self.remembering.follow(session)
         has_news |= session.timeline.tick(min(dt_s, MAX_TICK_S), is_shown=self.viewport.shows_playhead(session))
         self._has_news |= has_news or self.viewport.has_news(session)
@@ -218,6 +258,9 @@ class Frame:
         self._has_news = False
         self.ui.redraw_in_s = None
         self.ui.rects.clear()
+        if self.layouts.take_kept(self.ui):
+            self._redraw.request(FIRST_FRAMES)
+        self.backend.is_panel_keyed = self._is_panel_keyed()
         self.backend.new_frame()
         self.ui.is_popup_open = self.backend.is_popup_open
         self.ui.is_menu_wanted |= self.backend.take_alt_tap() and not self.ui.is_popup_open
@@ -243,27 +286,40 @@ class Frame:
         imgui.push_style_color(imgui.Col_.window_bg, NOTHING)  # the frame is cleared to the panels' colour
         dock_id = imgui.dock_space_over_viewport(0, imgui.get_main_viewport(), imgui.DockNodeFlags_.none)
         imgui.pop_style_color()
-        if ui.is_layout_reset_requested or not is_laid_out(dock_id):
-            ui.is_layout_reset_requested = False
+        layout = LAYOUTS[0] if ui.is_layout_reset_requested else self.layouts.take_own(ui)
+        if layout is not None or not (ui.is_picture_only or is_laid_out(dock_id)):
+            ui.is_layout_reset_requested = ui.is_picture_only = False
             self._in_front = [TRAINING, TIMELINE]  # of those that lie over each other; one in each frame
-            lay_out(dock_id)
+            lay_out(dock_id, layout or LAYOUTS[0])
             self._redraw.request(FIRST_FRAMES)
         elif self._in_front and ui.wanted_panel is None and imgui.get_frame_count() > FRAMES_TO_DOCK:
             ui.wanted_panel = self._in_front.pop()
+        elif (is_welcome := session.capture is None) != self._is_welcome and not self._in_front:
+            self._is_welcome = is_welcome
+            ui.wanted_panel = VIEWPORT if is_welcome else ui.wanted_panel  # its list is moved in by arrow keys
+        step_panel(ui)
         self._dock_ids.clear()
         for title, draw_panel, has_padding in self._panels:
-            self._draw_panel(title, draw_panel, has_padding)
+            if title == VIEWPORT or not ui.is_picture_only:
+                self._draw_panel(title, draw_panel, has_padding)
         hold_sizes(self._dock_ids)
         if ui.is_open_requested:
             ui.is_open_requested = False
             self.dialog.open()
         self._guard("Open dialog", lambda: self.dialog.draw(dispatch, ui))
         self._guard("Help", lambda: draw_help(ui))
+        self._guard("Layouts", lambda: self.layouts.draw(ui))
+        self._guard("Preferences", lambda: self.preferences.draw(ui))
+        self._guard("Palette", lambda: self.palette.draw(session, dispatch, ui))
         self._guard("Question", lambda: self.questions.draw(session, dispatch, ui))
         size = imgui.get_main_viewport().size
         whole = Rect(0.0, 0.0, size.x, size.y - STATUS_BAR_HEIGHT)
         toast_area = ui.rects.get("viewport.free", whole)
         self._guard("Notices", lambda: self.notices.draw(session, dispatch, ui, toast_area))
+
+    def _is_panel_keyed(self) -> bool:
+        """Do arrow keys move from one item to the next? In the panel that F6 went to, and on the first screen."""
+        return self.ui.keyed_panel is not None or self.session.capture is None
 
     def dispatch(self, command: Command) -> None:
         """Hand a command to the session and plan a redraw."""
@@ -277,7 +333,8 @@ class Frame:
         self.dispatch(OpenCapture(path if path.is_dir() or not path.exists() else path.parent))
 
     def _draw_panel(self, title: str, draw_panel: Callable[..., None], has_padding: bool) -> None:
-        if title == self.ui.wanted_panel:
+        is_wanted = title == self.ui.wanted_panel
+        if is_wanted:
             self.ui.wanted_panel = None
             imgui.set_next_window_focus()
         if not has_padding:
@@ -294,6 +351,9 @@ class Frame:
         is_visible, _ = imgui.begin(title, None, flags)
         if is_bare:
             imgui.pop_style_color()
+        if is_wanted and (self.ui.keyed_panel == title or (title == VIEWPORT and self._is_welcome)):
+            imgui.internal.nav_init_window(imgui.internal.get_current_window(), True)
+            imgui.set_nav_cursor_visible(True)
         (self._floating_panels.discard if imgui.is_window_docked() else self._floating_panels.add)(title)
         if imgui.is_window_docked():
             self._dock_ids[title] = imgui.get_window_dock_id()

@@ -148,6 +148,7 @@ class ImGuiBackend:
 
     Attributes:
         pixels_per_unit: Of the newest frame. Everything that ImGui is told and tells is in units (ui.style.ui_scale).
+        is_panel_keyed: Do arrow keys, Enter and Space move inside of a panel? Set before a frame.
         is_popup_open: Was a menu or another popup open when the newest frame began, or just before?
     """
 
@@ -162,7 +163,7 @@ class ImGuiBackend:
         self._window = window
         self.scale = scale or UiScale()
         self.pixels_per_unit = 1.0
-        self.is_popup_open = False
+        self.is_popup_open = self.is_panel_keyed = False
         self._menu_frames = 0
         self._held_modifiers: set[int] = set()
         self._is_alt_alone = False
@@ -240,7 +241,7 @@ class ImGuiBackend:
         # From one menu to the next by arrow key there are frames without any.
         self._menu_frames = FRAMES_BETWEEN_MENUS if is_open else max(self._menu_frames - 1, 0)
         self.is_popup_open = self._menu_frames > 0
-        if self.is_popup_open:
+        if self.is_popup_open or self.is_panel_keyed:
             io.config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
         elif io.config_flags & imgui.ConfigFlags_.nav_enable_keyboard:
             io.config_flags &= ~imgui.ConfigFlags_.nav_enable_keyboard

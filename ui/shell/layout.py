@@ -9,18 +9,24 @@ from collections.abc import Mapping
 
 from imgui_bundle import ImVec2, imgui
 
-from ui.panels.state import CAPTURE, LOG, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT
+from ui.panels.state import CAPTURE, LAYOUTS, LOG, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT
 
 SIDE = (236.0, 0.0)
 SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: SIDE, REGIONS: SIDE, RESIDUALS: SIDE, TIMELINE: (0.0, 140.0)}
 """Width and height of docked panels, units. The timeline has its buttons, ruler and bands at this height."""
 SMALLEST_PICTURE = (300.0, 150.0)
+TALL_TIMELINE = 0.5
+"""Share of the height that the timeline has in the layout for long captures."""
 WIDE_UNITS = 1240.0
 """In a window narrower than this the panels at the sides begin narrower."""
 
 
-def lay_out(dock_id: int) -> None:
-    """Capture left, training, regions and residuals right, timeline and log below, the picture in the rest."""
+def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
+    """Capture left, training, regions and residuals right, timeline and log below, the picture in the rest.
+
+    Args:
+        name: One of LAYOUTS; others are laid out as the first.
+    """
     internal = imgui.internal
     size = imgui.get_main_viewport().work_size
     is_wide = size.x >= WIDE_UNITS
@@ -29,6 +35,8 @@ def lay_out(dock_id: int) -> None:
     internal.dock_builder_add_node(dock_id, internal.DockNodeFlagsPrivate_.dock_space)
     internal.dock_builder_set_node_size(dock_id, size)
     bottom_height = 244.0 if size.y >= 700.0 else 176.0
+    if name == "Long capture":
+        bottom_height = max(bottom_height, size.y * TALL_TIMELINE)
     _, bottom, top = internal.dock_builder_split_node_py(dock_id, imgui.Dir.down, bottom_height / max(size.y, 1.0))
     _, left, rest = internal.dock_builder_split_node_py(top, imgui.Dir.left, left_width / max(size.x, 1.0))
     right_share = right_width / max(size.x - left_width, 1.0)

@@ -1,20 +1,24 @@
-"""The menu bar. Entries that have a key come from the table of actions, so that both say the same."""
+"""The menu bar, made from the table of actions: the same words and keys as in the palette and the help sheet. What
+depends on what is open, such as recent projects and kept layouts, is added here.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
-from imgui_bundle import imgui
+from imgui_bundle import ImVec2, imgui
 
 from app.session.commands import ForgetRecent, OpenCapture
 from app.status import ProjectStatus
-from ui.panels.actions.action import BOOKMARKS, COMPARE, MARK, NAVIGATE, PLAY, TIME, TRAIN, VIEW, ActionNeeds
-from ui.panels.actions.table import ACTIONS
-from ui.panels.actions.training import train_or_pause
+from engine.text import one_line
+from ui.panels.actions.action import Action, ActionNeeds
+from ui.panels.actions.menus import Menu, menus
 from ui.panels.actions.window import choose_scale
-from ui.panels.state import PANELS, Dispatch, UiState
+from ui.panels.recent_rows import open_recent
+from ui.panels.state import Dispatch, UiState
 from ui.panels.training import TrainingNeeds, next_label
-from ui.panels.welcome import SAMPLE_PATH, WelcomeNeeds, open_recent
+from ui.panels.welcome import SAMPLE_PATH, WelcomeNeeds
 from ui.panels.widgets import elided_path
 from ui.style.theme import Icon
 from ui.style.ui_scale import CHOICES, scale_text
@@ -22,6 +26,7 @@ from ui.style.ui_scale import CHOICES, scale_text
 FIRST_MENU = "File"
 MIN_PATH_WIDTH = 60.0
 """Less of a path says nothing."""
+MENUS = menus()
 
 
 class MenuNeeds(ActionNeeds, TrainingNeeds, WelcomeNeeds, Protocol):
@@ -40,61 +45,64 @@ def draw_menu_bar(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
         bar = imgui.internal.get_current_window()
         imgui.internal.set_focus_id(bar.get_id(FIRST_MENU), bar)  # from there the arrow keys go to the other menus
         imgui.open_popup(FIRST_MENU)
-    has_capture = session.capture is not None
-    if _begin_menu(FIRST_MENU, ui):
-        if _item(ui, f"{Icon.FOLDER}  Open a capture or project folder", "Ctrl+O"):
-            ui.is_open_requested = True
-        _draw_recent_menu(session, dispatch, ui)
-        if SAMPLE_PATH.is_dir() and _item(ui, f"{Icon.FILM}  Open the sample capture"):
-            dispatch(OpenCapture(SAMPLE_PATH))
-        imgui.separator()
-        if _item(ui, "Quit", "Ctrl+Q"):
-            ui.quit_requested = True
-        imgui.end_menu()
-    if _begin_menu("View", ui):
-        imgui.begin_disabled(not has_capture)
-        _draw_rows((VIEW,), session, dispatch, ui)
-        for group in (NAVIGATE, BOOKMARKS):
-            if imgui.begin_menu(group):
-                _draw_rows((group,), session, dispatch, ui)
-                imgui.end_menu()
-            else:
-                ui.mark(f"menu.{group}")
-        imgui.end_disabled()
-        imgui.separator()
-        _draw_scale_menu(ui)
-        imgui.end_menu()
-    for title, group in (("Show", COMPARE), ("Time", TIME), ("Play", PLAY)):
-        if _begin_menu(title, ui, is_enabled=has_capture):
-            _draw_rows((group,), session, dispatch, ui)
+    for menu in MENUS:
+        if _begin_menu(menu.title, ui):
+            _draw_items(menu, session, dispatch, ui)
             imgui.end_menu()
-    if _begin_menu("Train", ui, is_enabled=has_capture):
-        is_going = session.training.state in ("starting", "preparing", "running")
-        label = f"{Icon.PAUSE}  Pause" if is_going else next_label(session)
-        if session.training.state == "paused":
-            label = f"{Icon.PLAY}  Resume"
-        if _item(ui, label, "T"):
-            train_or_pause(session, dispatch)
-        _draw_rows((TRAIN,), session, dispatch, ui, without=("train.next", "train.quality"))
-        imgui.end_menu()
-    if _begin_menu("Mark", ui, is_enabled=has_capture):
-        _draw_rows((MARK,), session, dispatch, ui)
-        imgui.end_menu()
-    if _begin_menu("Window", ui):
-        _draw_window_menu(ui)
-        imgui.end_menu()
     _draw_name(session, ui)
     imgui.end_main_menu_bar()
 
 
-def _begin_menu(title: str, ui: UiState, *, is_enabled: bool = True) -> bool:
+def _begin_menu(title: str, ui: UiState) -> bool:
     menu_id = imgui.internal.get_current_window().get_id(title)
-    if is_enabled and imgui.get_current_context().nav_just_moved_to_id == menu_id:
+    if imgui.get_current_context().nav_just_moved_to_id == menu_id:
         imgui.open_popup(title)  # an arrow key went on to this menu: it opens as under the pointer
-    is_open = imgui.begin_menu(title, is_enabled)
+    is_open = imgui.begin_menu(title)
     if not is_open:
         ui.mark(f"menu.{title}")
     return is_open
+
+
+def _draw_items(menu: Menu, session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """The actions of one menu, and what is added behind some of them."""
+    for item in menu.items:
+        match item:
+            case None:
+                imgui.separator()
+            case Menu():
+                if imgui.begin_menu(item.title):
+                    _draw_items(item, session, dispatch, ui)
+                    imgui.end_menu()
+                else:
+                    ui.mark(f"menu.{item.title}")
+            case _:
+                _draw_action(item, session, dispatch, ui)
+                if item.id in _AFTER:
+                    _AFTER[item.id](session, dispatch, ui)
+    if menu.title == "View":
+        imgui.separator()
+        _draw_scale_menu(ui)
+
+
+def _draw_action(action: Action, session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    if action.needs_choosing and not ui.regions.is_active:
+        return  # they would be most of their menu, and almost always grey
+    why_not = action.why_not(session, ui)
+    is_on = not why_not and action.is_on is not None and action.is_on(session)
+    label = _train_label(session) if action.id == "train.next" else action.text
+    is_chosen = imgui.menu_item(label, ui.keys.label(action), is_on, not why_not)[0]
+    ui.mark(f"menu.{label.rpartition('  ')[2]}")
+    if why_not and imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
+        imgui.set_tooltip(why_not)
+    if is_chosen:
+        action.run(session, dispatch, ui)
+
+
+def _train_label(session: MenuNeeds) -> str:
+    """What the key for training does at the moment."""
+    if session.training.state in ("starting", "preparing", "running"):
+        return f"{Icon.PAUSE}  Pause"
+    return f"{Icon.PLAY}  Resume" if session.training.state == "paused" else next_label(session)
 
 
 def _item(ui: UiState, label: str, key_label: str = "", *, is_on: bool = False) -> bool:
@@ -103,23 +111,18 @@ def _item(ui: UiState, label: str, key_label: str = "", *, is_on: bool = False) 
     return is_chosen
 
 
-def _draw_rows(
-    groups: tuple[str, ...],
-    session: MenuNeeds,
-    dispatch: Dispatch,
-    ui: UiState,
-    *,
-    without: tuple[str, ...] = (),
-) -> None:
-    """Rows of the table of actions. without: Ids of those that stand elsewhere."""
-    for action in ACTIONS:
-        if action.group not in groups or action.id in without:
-            continue
-        if action.needs_choosing and not ui.regions.is_active:
-            continue
-        is_on = action.is_on is not None and session.capture is not None and action.is_on(session)
-        if _item(ui, action.text, action.key_label, is_on=is_on):
-            action.run(session, dispatch, ui)
+def _name_item(name: str, width: float, *, words: str = "", is_enabled: bool = True) -> bool:
+    """A row of a menu that shows any name as it is. width: Of the widest name."""
+    start = imgui.get_cursor_screen_pos()
+    gap = imgui.calc_text_size(words).x + 24 if words else 0.0
+    flags = imgui.SelectableFlags_.none if is_enabled else imgui.SelectableFlags_.disabled
+    is_chosen = imgui.selectable("##name", False, flags, ImVec2(width + gap, 0))[0]
+    draw = imgui.get_window_draw_list()
+    dim = imgui.get_color_u32(imgui.Col_.text_disabled)
+    draw.add_text(start, imgui.get_color_u32(imgui.Col_.text) if is_enabled else dim, one_line(name))
+    if words:
+        draw.add_text(ImVec2(start.x + width + 24, start.y), dim, words)
+    return is_chosen
 
 
 def _draw_scale_menu(ui: UiState) -> None:
@@ -127,59 +130,82 @@ def _draw_scale_menu(ui: UiState) -> None:
         ui.mark("menu.scale")
         return
     scale = ui.scale
-    if _item(ui, f"Automatic ({scale_text(scale.of_screen)})", "Ctrl+0", is_on=scale.chosen is None):
+    if _item(ui, f"Automatic ({scale_text(scale.of_screen)})", is_on=scale.chosen is None):
         choose_scale(ui, None)
     for choice in CHOICES:
         if _item(ui, scale_text(choice), is_on=scale.chosen == choice):
             choose_scale(ui, choice)
-    imgui.separator()
-    imgui.text_disabled("Ctrl + plus and Ctrl + minus change it, too")
     drawn = imgui.get_io().display_framebuffer_scale.x
     if drawn < scale.wanted - 1e-3:
         imgui.text_disabled(f"Drawn at {scale_text(drawn)}: the window has no room for more")
     imgui.end_menu()
 
 
-def _draw_window_menu(ui: UiState) -> None:
-    for title in PANELS:
-        if _item(ui, title):
-            ui.wanted_panel = title
-    imgui.separator()
-    if _item(ui, "Reset the layout"):
-        ui.is_layout_reset_requested = True
-    if _item(ui, f"{Icon.HELP}  Keys and mouse", "F1", is_on=ui.is_help_open):
-        ui.is_help_open = not ui.is_help_open
+def _draw_layouts(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """Layouts that the user has kept: shown by a click, forgotten in a menu of their own."""
+    names = list(ui.preferences.layouts)
+    if not names:
+        return
+    width = max(imgui.calc_text_size(one_line(name)).x for name in names)
+    for index, name in enumerate(names):
+        imgui.push_id(index)
+        if _name_item(name, width):
+            ui.wishes.layout = name
+        ui.mark(f"menu.layout{index}")
+        imgui.pop_id()
+    if imgui.begin_menu("Remove a layout"):
+        for index, name in enumerate(names):
+            imgui.push_id(index)
+            if _name_item(name, width):
+                ui.wishes.layout_removed = name
+            ui.mark(f"menu.layout{index}.remove")
+            imgui.pop_id()
+        imgui.end_menu()
+    else:
+        ui.mark("menu.Remove a layout")
 
 
 def _draw_recent_menu(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    if not imgui.begin_menu("Open a recent project", bool(session.recent.entries)):
+    if imgui.begin_menu("Open a recent project", bool(session.recent.entries)):
+        width = max(imgui.calc_text_size(one_line(entry.name)).x for entry in session.recent.entries)
+        for index, entry in enumerate(session.recent.entries):
+            is_gone = entry.folder in session.recent.missing
+            imgui.push_id(index)
+            words = "not found" if is_gone else entry.trained_text
+            if _name_item(entry.name, width, words=words, is_enabled=not is_gone):
+                dispatch(open_recent(entry))
+            ui.mark(f"menu.recent{index}")
+            imgui.set_item_tooltip(str(entry.folder))
+            imgui.pop_id()
+        gone = [entry.folder for entry in session.recent.entries if entry.folder in session.recent.missing]
+        if gone:
+            imgui.separator()
+            if _item(ui, "Remove those that were not found"):
+                for folder in gone:
+                    dispatch(ForgetRecent(folder))
+        imgui.end_menu()
+    else:
         ui.mark("menu.recent")
-        return
-    for index, entry in enumerate(session.recent.entries):
-        is_gone = entry.folder in session.recent.missing
-        words = "not found" if is_gone else entry.trained_text
-        if imgui.menu_item(f"{entry.name}##{index}", words, False, not is_gone)[0]:
-            dispatch(open_recent(entry))
-        ui.mark(f"menu.recent{index}")
-        imgui.set_item_tooltip(str(entry.folder))
-    gone = [entry.folder for entry in session.recent.entries if entry.folder in session.recent.missing]
-    if gone:
-        imgui.separator()
-        if _item(ui, "Remove those that were not found"):
-            for folder in gone:
-                dispatch(ForgetRecent(folder))
-    imgui.end_menu()
+    if SAMPLE_PATH.is_dir() and _item(ui, f"{Icon.FILM}  Open the sample capture"):
+        dispatch(OpenCapture(SAMPLE_PATH))
+
+
+_AFTER: dict[str, Callable[[MenuNeeds, Dispatch, UiState], None]] = {
+    "window.open": _draw_recent_menu,
+    "window.save_layout": _draw_layouts,
+}
+"""What is added behind an action, by its id."""
 
 
 def _draw_name(session: MenuNeeds, ui: UiState) -> None:
     """What is open: name, how far it is trained and where it lies, as much of it as there is room for."""
     opened = session.project_status
-    name = "no project open" if opened is None else f"{opened.name} - {opened.trained_text}"
+    name = "no project open" if opened is None else f"{one_line(opened.name)} - {opened.trained_text}"
     room = imgui.get_window_width() - imgui.get_cursor_pos_x() - 40
     if opened is not None:
         path_room = room - imgui.calc_text_size(f"{name} - ").x
         if path_room > MIN_PATH_WIDTH:
-            name = f"{name} - {elided_path(str(opened.folder), path_room)}"
+            name = f"{name} - {elided_path(one_line(str(opened.folder)), path_room)}"
     width = imgui.calc_text_size(name).x
     if width > room:
         return

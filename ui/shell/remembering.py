@@ -11,6 +11,8 @@ from typing import Protocol
 from imgui_bundle import imgui
 
 from app.project.project import Project
+from app.session.notices import Notices
+from app.session.preferences import PreferencesFile
 from app.session.window_memory import Viewed, WindowMemory, show_again, view_of
 from ui.panels.capture import CaptureFacts
 from ui.panels.state import UiState
@@ -18,6 +20,23 @@ from ui.panels.state import UiState
 SAVE_AFTER_S = 5.0
 LAYOUT_VERSION = "; panels of ClipGStream Studio, version 3\n"
 """Comes first in the kept layout; another version has other panels and is not taken."""
+
+
+def present_layout() -> str:
+    """Where the panels are now, as text."""
+    return LAYOUT_VERSION + imgui.save_ini_settings_to_memory()
+
+
+def take_layout(text: str) -> bool:
+    """Put the panels where a text of `present_layout` says. Between two frames only.
+
+    Returns:
+        False for a text of another version, which changes nothing.
+    """
+    if not text.startswith(LAYOUT_VERSION):
+        return False
+    imgui.load_ini_settings_from_memory(text)
+    return True
 
 
 class RememberNeeds(Viewed, Protocol):
@@ -29,19 +48,23 @@ class RememberNeeds(Viewed, Protocol):
     @property
     def project(self) -> Project | None: ...
 
+    @property
+    def notices(self) -> Notices: ...
+
 
 class Remembering:
-    """Follows one session in one window. memory: None keeps nothing, as in most tests."""
+    """Follows one session in one window. memory, preferences: None keeps nothing, as in most tests."""
 
-    def __init__(self, memory: WindowMemory | None, ui: UiState) -> None:
-        self._memory, self._ui = memory, ui
+    def __init__(self, memory: WindowMemory | None, ui: UiState, preferences: PreferencesFile | None = None) -> None:
+        self._memory, self._ui, self._preferences = memory, ui, preferences
+        self._has_told = False
         self._folder: str | None = None
         self._saved_s = time.perf_counter()
 
     def restore_layout(self) -> None:
         """Give ImGui its panels back, before the first frame."""
-        if self._memory is not None and self._memory.layout.startswith(LAYOUT_VERSION):
-            imgui.load_ini_settings_from_memory(self._memory.layout)
+        if self._memory is not None:
+            take_layout(self._memory.layout)
 
     def restore_marks(self, session: RememberNeeds) -> None:
         """What is the same in all projects: size and opacity of anchor marks, unit and lanes of the timeline, and what
@@ -60,6 +83,12 @@ class Remembering:
     def follow(self, session: RememberNeeds) -> None:
         """Once per turn of the loop: shows a project that was just opened as it was left, and keeps what changes."""
         memory = self._memory
+        is_due = time.perf_counter() - self._saved_s >= SAVE_AFTER_S
+        if is_due:
+            self._saved_s = time.perf_counter()
+            if self._preferences is not None:
+                self._preferences.save_soon()
+            self._tell(session)
         if memory is None:
             return
         folder = _folder_of(session)
@@ -67,7 +96,7 @@ class Remembering:
             self._folder = folder
             if folder in memory.views:
                 show_again(session, memory.views[folder])
-        if time.perf_counter() - self._saved_s >= SAVE_AFTER_S:
+        if is_due:
             self._keep(session)
             memory.save_soon()
         elif folder is not None:
@@ -75,9 +104,12 @@ class Remembering:
 
     def save(self, session: RememberNeeds) -> None:
         """Keep everything now."""
+        if self._preferences is not None:
+            self._preferences.save()
         if self._memory is not None:
             self._keep(session)
             self._memory.save()
+        self._tell(session)
 
     def _keep(self, session: RememberNeeds) -> None:
         memory = self._memory
@@ -86,11 +118,24 @@ class Remembering:
         if self._folder is not None and self._folder == _folder_of(session):
             memory.keep_view(self._folder, view_of(session))
         memory.ui_scale = self._ui.scale.chosen
-        memory.layout = LAYOUT_VERSION + imgui.save_ini_settings_to_memory()
+        memory.layout = present_layout()
         navigation = self._ui.navigation
         memory.navigation, memory.is_motion_reduced = navigation.preset.name, navigation.is_motion_reduced
         memory.mark_size, memory.mark_opacity = session.overlays.mark_size, session.overlays.mark_opacity
         memory.time_unit, memory.folded_lanes = self._ui.timeline.unit, tuple(sorted(self._ui.timeline.folded))
+
+    def _tell(self, session: RememberNeeds) -> None:
+        """Say once that nothing can be kept, for whatever file it was found out first."""
+        failed = next((file for file in (self._preferences, self._memory) if file is not None and file.failure), None)
+        if failed is None or self._has_told:
+            return
+        self._has_told = True
+        session.notices.add(
+            "warn",
+            "Preferences cannot be kept",
+            f"{failed.failure} - {failed.path}",
+            "The program goes on with them until you quit. Projects are not concerned.",
+        )
 
 
 def _folder_of(session: RememberNeeds) -> str | None:

@@ -16,7 +16,9 @@ import moderngl
 import pyglet
 from pyglet.event import EVENT_HANDLED
 
+from app.session.preferences import PreferencesFile
 from app.session.window_memory import WindowMemory
+from engine.text import one_line
 from ui.gl import free_dropped
 from ui.shell.frame import Frame, FrameNeeds
 from ui.style.ui_scale import MIN_UNITS, UiScale
@@ -74,7 +76,7 @@ def make_window(width: int, height: int, *, is_visible: bool = True) -> Any:
 def window_title(session: WindowNeeds) -> str:
     """The open project, how far it is trained and where it lies."""
     opened = session.project_status
-    return TITLE if opened is None else f"{opened.name} - {opened.trained_text} - {opened.folder} - {TITLE}"
+    return TITLE if opened is None else one_line(f"{opened.name} - {opened.trained_text} - {opened.folder} - {TITLE}")
 
 
 def screen_scale() -> float:
@@ -96,6 +98,7 @@ class StudioWindow:
         width, height: Pixels of the screen; None takes the size it had before, else the default one.
         fixed_delta_s: Seconds per frame as told to ImGui; tests fix it, None measures.
         memory: What the window looked like before; None starts afresh and keeps nothing.
+        preferences: What the user prefers; None takes what is usual and keeps nothing.
     """
 
     def __init__(
@@ -106,6 +109,7 @@ class StudioWindow:
         height: int | None = None,
         fixed_delta_s: float | None = None,
         memory: WindowMemory | None = None,
+        preferences: PreferencesFile | None = None,
     ) -> None:
         self.session = session
         self._memory = memory
@@ -127,6 +131,7 @@ class StudioWindow:
             on_input=self._answer_soon,
             memory=memory,
             scale=scale,
+            preferences=preferences,
         )
         self._handlers = {
             "on_file_drop": self._file_dropped,
@@ -163,6 +168,9 @@ class StudioWindow:
             self.draw()
         if self.frame.ui.quit_requested:
             pyglet.app.exit()
+        if self.frame.ui.wishes.is_fullscreen:
+            self.frame.ui.wishes.is_fullscreen = False
+            self._switch_fullscreen()
         self._show_title()
 
     def _answer_soon(self) -> None:
@@ -195,6 +203,12 @@ class StudioWindow:
             self.draw()
             drawn += 1
 
+    def _switch_fullscreen(self) -> None:
+        """Fill the screen, or go back to a window of the size before. Without a screen there is nothing to fill."""
+        if not pyglet.options.headless:
+            self.window.set_fullscreen(not self.window.fullscreen)
+            self.frame.forget_shown()
+
     def _show_title(self) -> None:
         title = window_title(self.session)
         if title != self._title:
@@ -219,11 +233,10 @@ class StudioWindow:
         self.frame.forget_shown()
 
     def _remember(self) -> None:
-        if self._memory is None:
-            return
-        self._memory.is_maximized = self._fills_screen()
-        if not self._memory.is_maximized:  # else the size to go back to is the one before
-            self._memory.size = self.window.get_size()
+        if self._memory is not None and not self.window.fullscreen:
+            self._memory.is_maximized = self._fills_screen()
+            if not self._memory.is_maximized:  # else the size to go back to is the one before
+                self._memory.size = self.window.get_size()
         self.frame.remembering.save(self.session)
 
     def _fills_screen(self) -> bool:

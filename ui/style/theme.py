@@ -1,27 +1,18 @@
-"""Colours, fonts and spacing of the whole window. Draws nothing by itself.
+"""Colours, symbols and spacing of the whole window. Draws nothing by itself.
 
-Hues that carry meaning are those of ui.style.colors.
+The colours themselves are those of a palette (ui.style.palette), which can be changed while the window is open.
 """
 
 from __future__ import annotations
 
-import logging
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import lru_cache
-from pathlib import Path
 
-import imgui_bundle
 from imgui_bundle import ImVec2, ImVec4, imgui, implot
 
-from app.playback.arrays import BACKGROUND
-from ui.style.colors import GREEN, ORANGE, SKY, VERMILLION, YELLOW, Color, rgb
-from ui.style.colors import HELD_OUT as HELD_OUT  # looked up as theme.HELD_OUT by the panels, as all colours are
-from ui.style.colors import INHERITED as INHERITED
-from ui.style.colors import REGION_COLORS as REGION_COLORS
-from ui.style.colors import RESIDUAL as RESIDUAL
-from ui.style.colors import ROLE_COLORS as ROLE_COLORS
-
-logger = logging.getLogger(__name__)
+from ui.style.colors import Color
+from ui.style.colors import rgb as rgb  # looked up as theme.rgb by the panels
+from ui.style.palette import DARK, PALETTES, Palette, contrast
 
 
 def faded(color: Color, alpha: float) -> Color:
@@ -35,35 +26,59 @@ def u32(color: Color) -> int:
     return imgui.color_convert_float4_to_u32(ImVec4(*color))
 
 
-SKY_LIGHT = rgb(120, 198, 242)
-SKY_DARK = rgb(60, 158, 214)
+ON_PICTURE = DARK
+"""What is written or drawn over a picture takes its colours from here: pictures lie on dark grey in every theme."""
 
-# Surfaces, dark to light
-VOID: Color = (*BACKGROUND, 1.0)
-BACKDROP = rgb(24, 27, 32)
-PANEL = rgb(32, 36, 43)
-RAISED = rgb(44, 49, 58)
-RAISED_HOVER = rgb(56, 63, 75)
-RAISED_ACTIVE = rgb(68, 77, 92)
-OUTLINE = rgb(58, 65, 77)
-TEXT = rgb(226, 230, 236)
-TEXT_DIM = rgb(150, 159, 173)
-TEXT_ON_ACCENT = rgb(10, 20, 30)
+# The colours in use. `use` gives them others, so they are looked up where something is drawn, as theme.SKY, and are
+# never kept: not in a module, not as the default of an argument.
+VOID: Color = DARK.void
+BACKDROP: Color = DARK.backdrop
+PANEL: Color = DARK.panel
+POPUP: Color = DARK.popup
+RAISED: Color = DARK.raised
+RAISED_HOVER: Color = DARK.raised_hover
+RAISED_ACTIVE: Color = DARK.raised_active
+OUTLINE: Color = DARK.outline
+TEXT: Color = DARK.text
+TEXT_DIM: Color = DARK.text_dim
+TEXT_ON_ACCENT: Color = DARK.text_on_accent
+SKY: Color = DARK.sky
+SKY_LIGHT: Color = DARK.sky_light
+SKY_DARK: Color = DARK.sky_dark
+ORANGE: Color = DARK.orange
+GREEN: Color = DARK.green
+YELLOW: Color = DARK.yellow
+VERMILLION: Color = DARK.vermillion
+PURPLE: Color = DARK.purple
+PLAYHEAD: Color = DARK.playhead
+TEXT_ON_PLAYHEAD: Color = DARK.text_on_playhead
+GRID: Color = DARK.grid
+STRIPE: Color = DARK.stripe
+SHADE: Color = DARK.shade
+INHERITED: Color = DARK.inherited
+RESIDUAL: Color = DARK.residual
+HELD_OUT: Color = DARK.held_out
+ROLE_COLORS: Mapping[str, Color] = DARK.role_colors
+REGION_COLORS: Mapping[str, Color] = DARK.region_colors
+CLIP_COLORS: Mapping[str, Color] = DARK.clip_colors
+SWITCHED = tuple(name for name in dict(globals()) if name.isupper() and hasattr(DARK, name.lower()))
+"""Names of the colours that `use` changes."""
 
-PLAYHEAD = rgb(255, 255, 255)
 
-CLIP_COLORS: dict[str, Color] = {
-    "untrained": rgb(96, 104, 118),
-    "queued": rgb(126, 134, 148),
-    "preparing": SKY,
-    "training": SKY,
-    "paused": YELLOW,
-    "stopped": YELLOW,
-    "trained": GREEN,
-    "failed": VERMILLION,
-    "stale": ORANGE,
-    "damaged": VERMILLION,
-}
+def use(palette: Palette) -> None:
+    """Draw everything in these colours from now on. Needs the contexts of ImGui and ImPlot."""
+    take(palette)
+    apply_style()
+
+
+def take(palette: Palette) -> None:
+    """Make these the colours in use, without telling ImGui."""
+    globals().update({name: getattr(palette, name.lower()) for name in SWITCHED})
+
+
+def named(name: str) -> Palette:
+    """The palette of this name; the dark one where there is none."""
+    return PALETTES.get(name, DARK)
 
 
 class Icon:
@@ -123,39 +138,8 @@ CLIP_ICONS: dict[str, str] = {
 }
 
 
-@dataclass(frozen=True)
-class Fonts:
-    """The loaded faces and the sizes used with them, in points of the logical window."""
-
-    bold: imgui.ImFont | None = None
-    body_size: float = 15.0
-    small_size: float = 13.0
-    title_size: float = 26.0
-
-
-def load_fonts() -> Fonts:
-    """Load text and icon faces from the installed imgui-bundle; the built-in face serves when they are missing."""
-    folder = Path(imgui_bundle.__file__).parent / "assets" / "fonts"
-    faces = [folder / "Roboto" / "Roboto-Regular.ttf", folder / "Roboto" / "Roboto-Bold.ttf"]
-    icons = folder / "Font_Awesome_6_Free-Solid-900.otf"
-    if not all(path.is_file() for path in (*faces, icons)):
-        logger.info("Text fonts were not found beside imgui-bundle; using its built-in face - %s", folder)
-        return Fonts()
-    atlas = imgui.get_io().fonts
-    loaded = []
-    for face in faces:  # the first one loaded is the default of the context
-        font = atlas.add_font_from_file_ttf(str(face), Fonts.body_size)
-        merge = imgui.ImFontConfig()
-        merge.merge_mode = True
-        merge.glyph_min_advance_x = Fonts.body_size
-        merge.glyph_offset = ImVec2(0.0, 1.0)
-        atlas.add_font_from_file_ttf(str(icons), Fonts.body_size - 2.0, merge)
-        loaded.append(font)
-    return Fonts(bold=loaded[1])
-
-
 def apply_style() -> None:
-    """Set spacing and colours of ImGui and ImPlot. Call once per context."""
+    """Set spacing and colours of ImGui and ImPlot; again after other colours were taken."""
     style = imgui.get_style()
     style.window_padding = ImVec2(12, 10)
     style.frame_padding = ImVec2(10, 5)
@@ -177,12 +161,15 @@ def apply_style() -> None:
     style.selectable_text_align = ImVec2(0.0, 0.5)
     style.window_menu_button_position = imgui.Dir.none
     col = imgui.Col_
+    is_light = contrast(TEXT, (0.0, 0.0, 0.0, 1.0)) < contrast(TEXT, (1.0, 1.0, 1.0, 1.0))
+    (imgui.style_colors_light if is_light else imgui.style_colors_dark)()  # what is not in the table
+    (implot.style_colors_light if is_light else implot.style_colors_dark)()
     table: dict[int, Color] = {
         col.text: TEXT,
         col.text_disabled: TEXT_DIM,
         col.window_bg: PANEL,
         col.child_bg: faded(PANEL, 0.0),
-        col.popup_bg: rgb(38, 43, 51),
+        col.popup_bg: POPUP,
         col.border: OUTLINE,
         col.frame_bg: BACKDROP,
         col.frame_bg_hovered: RAISED,
@@ -223,10 +210,13 @@ def apply_style() -> None:
         col.table_header_bg: BACKDROP,
         col.table_border_strong: OUTLINE,
         col.table_border_light: faded(OUTLINE, 0.5),
-        col.table_row_bg_alt: rgb(255, 255, 255, 0.02),
+        col.table_row_bg_alt: STRIPE,
         col.text_selected_bg: faded(SKY, 0.35),
         col.drag_drop_target: SKY,
-        col.modal_window_dim_bg: rgb(0, 0, 0, 0.45),
+        col.nav_cursor: SKY,
+        col.input_text_cursor: TEXT,
+        col.text_link: SKY,
+        col.modal_window_dim_bg: SHADE,
     }
     for index, color in table.items():
         style.set_color_(int(index), ImVec4(*color))
@@ -244,7 +234,7 @@ def _apply_plot_style() -> None:
         col.frame_bg: faded(PANEL, 0.0),
         col.plot_bg: BACKDROP,
         col.axis_text: TEXT_DIM,
-        col.axis_grid: rgb(255, 255, 255, 0.10),
+        col.axis_grid: GRID,
     }.items():
         style.set_color_(int(index), ImVec4(*color))
 

@@ -26,7 +26,7 @@ def reference() -> tuple[ClipModel, ClipState]:
         n_frames=CLIP_LENGTH,
         spacing=0.2,
         decoder=to_builtins(decoder_shape(model.decoder)),
-        field=to_builtins(model.field.shape),
+        field=None if model.field is None else to_builtins(model.field.shape),
     )
     state = ClipState(model.own_arrays(), header).stamped()
     model.decoder.requires_grad_(requires_grad=False)

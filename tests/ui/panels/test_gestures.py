@@ -16,6 +16,7 @@ from app.session import commands
 from app.session.window_memory import WindowMemory, read_window_memory
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
+from ui.panels.actions.key import parse_key
 from ui.panels.actions.table import ACTIONS
 from ui.panels.gestures import FLY_KEYS, GESTURE_WORDS, PRESETS, Navigation, gesture_rows, mouse_help
 from ui.panels.gizmo import gizmo_tips, tip_under
@@ -206,7 +207,7 @@ def test_while_one_flies_a_button_looks_around(pilot: Pilot, preset: str) -> Non
 
 
 def test_no_action_wants_the_keys_that_fly() -> None:
-    taken = {parsed.chord for action in ACTIONS for parsed in action.parsed_keys}
+    taken = {parsed.chord for action in ACTIONS for parsed in map(parse_key, action.keys)}
     for letter in FLY_KEYS:
         for is_shift, is_alt in ((False, False), (True, False), (False, True)):
             assert (letter, False, is_shift, is_alt) not in taken

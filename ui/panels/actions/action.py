@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 from app.playback.bookmarks import Bookmarks
@@ -15,7 +14,6 @@ from app.playback.timeline import Timeline
 from app.playback.views import Views
 from app.status import Overlays, QueueStatus, TrainingStatus, WantedFrame
 from engine.camera.rig import CameraRig
-from ui.panels.actions.key import Key, parse_key
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
 
@@ -65,12 +63,15 @@ class Action:
         id: Its name in preferences; never changes.
         text: What it does, for the help sheet, menus and the palette.
         group: Heading of the help sheet.
-        keys: As text, see ui.panels.actions.key; the first one is shown in menus. Empty where it has none.
+        keys: Its own ones as text, see ui.panels.actions.key; the user may give it others (ui.panels.actions.key_map).
+            Empty where it has none.
         needs_capture: Ignored until a capture is open.
         needs_choosing: Ignored unless a region is being chosen.
         repeats: Holding the key repeats the action.
         is_in_help: Shown on the help sheet; of a row of keys that do alike, one is enough there.
         is_on: Of what can be on or off, whether it is; menus show a tick.
+        lacks: What it needs and is not there at present, as a sentence; empty when it can be run.
+        menu: Title of the menu it stands in; empty for that of its group, see ui.panels.actions.menus.
     """
 
     id: str
@@ -82,20 +83,18 @@ class Action:
     needs_choosing: bool = False
     repeats: bool = False
     is_on: Callable[[ActionNeeds], bool] | None = None
+    lacks: Callable[[ActionNeeds], str] | None = None
+    menu: str = ""
     is_in_help: bool = True
-
-    @cached_property
-    def parsed_keys(self) -> tuple[Key, ...]:
-        """Its keys, parsed."""
-        return tuple(parse_key(label) for label in self.keys)
-
-    @property
-    def key_label(self) -> str:
-        """The key that menus show; empty without one."""
-        return self.keys[0] if self.keys else ""
 
     def is_offered(self, session: ActionNeeds, ui: UiState) -> bool:
         """Whether it can be run now."""
+        return not self.why_not(session, ui)
+
+    def why_not(self, session: ActionNeeds, ui: UiState) -> str:
+        """Why it cannot be run now, as a sentence; empty when it can."""
         if self.needs_capture and session.capture is None:
-            return False
-        return ui.regions.is_active or not self.needs_choosing
+            return "Open a capture or a project first."
+        if self.needs_choosing and not ui.regions.is_active:
+            return "Only while a region is being chosen."
+        return "" if self.lacks is None else self.lacks(session)

@@ -53,6 +53,12 @@ class Key:
         """Identity: equal for two keys that are pressed in the same way."""
         return self.name, self.is_ctrl, self.is_shift, self.is_alt
 
+    def collides(self, other: Key) -> bool:
+        """Can one press be both?"""
+        if (self.name, self.is_ctrl, self.is_alt) != (other.name, other.is_ctrl, other.is_alt):
+            return False
+        return self.is_any_shift or other.is_any_shift or self.is_shift == other.is_shift
+
     def is_pressed(self, *, repeats: bool) -> bool:
         """Was it pressed since the last frame? repeats: Or held so long that it repeats."""
         io = imgui.get_io()
@@ -83,3 +89,29 @@ def parse_key(label: str) -> Key:
         raise ValueError(f"'{label}' does not name a key")
     is_any_shift = rest in _ANY_SHIFT and "Shift" not in modifiers
     return Key(label, name, "Ctrl" in modifiers, "Shift" in modifiers, "Alt" in modifiers, is_any_shift)
+
+
+def pressed_label() -> str:
+    """The key that was pressed since the last frame with the modifiers held, as `parse_key` reads it; else empty.
+
+    A modifier alone does not count as one.
+    """
+    io = imgui.get_io()
+    for name, printed in _PRINTED.items():
+        if imgui.is_key_pressed(getattr(imgui.Key, name), False):
+            is_shift = io.key_shift and printed not in _ANY_SHIFT
+            held = (("Ctrl", io.key_ctrl), ("Shift", is_shift), ("Alt", io.key_alt))
+            return "+".join([*(word for word, is_held in held if is_held), printed])
+    return ""
+
+
+def _printed_names() -> dict[str, str]:
+    names = {letter.lower(): letter for letter in "ABCDEFGHIJKLMNOPQRSTUVWXYZ"}
+    names |= {f"_{digit}": str(digit) for digit in range(10)}
+    names |= {f"f{number}": f"F{number}" for number in range(1, 13)}
+    names |= {word.lower(): word for word in ("Home", "End", "Insert", "Delete", "Enter", "Tab", "Backspace", "Escape")}
+    return names | {name: label for label, name in _NAMES.items()}
+
+
+_PRINTED = _printed_names()
+"""By the attribute of imgui.Key, how the key is printed."""

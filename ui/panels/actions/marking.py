@@ -57,6 +57,14 @@ def _redo_mark(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(RedoMark())
 
 
+def _cannot_mark(session: ActionNeeds) -> str:
+    return "" if session.regions.can_mark else session.regions.why_not or "Regions cannot be marked now."
+
+
+def _no_undo(session: ActionNeeds) -> str:
+    return "" if session.regions.can_undo else "There is no mark to take back."
+
+
 _STEERING: dict[str, Any] = {"needs_choosing": True, "repeats": True}
 
 ACTIONS = (
@@ -72,7 +80,14 @@ ACTIONS = (
     Action("mark.farther", "Sphere farther away", MARK, _shift_by(0, 0, 1), keys=("Page Up",), **_STEERING),
     Action("mark.nearer", "Sphere nearer", MARK, _shift_by(0, 0, -1), keys=("Page Down",), **_STEERING),
     Action("mark.highlight_next", "Highlight the next marked region", MARK, _next_region, keys=("N",)),
-    Action("mark.remove", "Remove the highlighted region", MARK, _remove_region, keys=("Delete",)),
-    Action("mark.undo", "Take back the last mark or removal", MARK, _undo_mark, keys=("Ctrl+Z",)),
-    Action("mark.redo", "Do again what was taken back", MARK, _redo_mark, keys=("Ctrl+Shift+Z", "Ctrl+Y")),
+    Action("mark.remove", "Remove the highlighted region", MARK, _remove_region, keys=("Delete",), lacks=_cannot_mark),
+    Action("mark.undo", "Take back the last mark or removal", MARK, _undo_mark, keys=("Ctrl+Z",), lacks=_no_undo),
+    Action(
+        "mark.redo",
+        "Do again what was taken back",
+        MARK,
+        _redo_mark,
+        keys=("Ctrl+Shift+Z", "Ctrl+Y"),
+        lacks=lambda session: "" if session.regions.can_redo else "Nothing was taken back.",
+    ),
 )

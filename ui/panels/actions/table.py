@@ -18,6 +18,7 @@ from ui.panels.actions import (
     window,
 )
 from ui.panels.actions.action import Action, ActionNeeds
+from ui.panels.panel_keys import belongs_to_panel
 from ui.panels.state import Dispatch, UiState
 
 ACTIONS: tuple[Action, ...] = (
@@ -44,5 +45,6 @@ def handle_keys(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     if io.want_text_input or ui.is_popup_open:  # the key that closes a menu does nothing else
         return
     for action in ACTIONS:
-        if any(key.is_pressed(repeats=action.repeats) for key in action.parsed_keys) and action.is_offered(session, ui):
+        keys = (key for key in ui.keys.keys(action) if not belongs_to_panel(key, ui))
+        if any(key.is_pressed(repeats=action.repeats) for key in keys) and action.is_offered(session, ui):
             action.run(session, dispatch, ui)

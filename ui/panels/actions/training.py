@@ -42,6 +42,10 @@ def _stop_training(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> Non
         dispatch(StopTraining())
 
 
+def _nothing_trains(session: ActionNeeds) -> str:
+    return "Nothing is being trained." if session.training.state in ("idle", "failed", "stopping") else ""
+
+
 def _toggle_quality(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_quality_open = not ui.is_quality_open
     if ui.is_quality_open:
@@ -121,7 +125,14 @@ ACTIONS = (
     Action("train.all", "Train every clip that is not finished", TRAIN, _train_all, keys=("Shift+T",)),
     Action("train.from_here", "Train this clip and those after it", TRAIN, _train_from_here),
     Action("train.settings", "Train this clip with other settings", TRAIN, _ask_settings),
-    Action("train.stop", "Stop training and keep what was learned", TRAIN, _stop_training, keys=("Ctrl+T",)),
+    Action(
+        "train.stop",
+        "Stop training and keep what was learned",
+        TRAIN,
+        _stop_training,
+        keys=("Ctrl+T",),
+        lacks=_nothing_trains,
+    ),
     Action("train.hold_after", "Hold the queue after this clip, or not", TRAIN, _hold_after, keys=("Ctrl+Shift+T",)),
     Action("queue.next", "Choose the next waiting clip", TRAIN, _next_waiting, keys=("Shift+N",)),
     Action("queue.earlier", "Chosen waiting clip earlier", TRAIN, _move_waiting(-1), keys=("Ctrl+Shift+Up",)),

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 from ui.panels.actions.action import WINDOW, Action, ActionNeeds, Run
-from ui.panels.state import Dispatch, UiState
+from ui.panels.state import LAYOUT_WORDS, LAYOUTS, PANELS, Dispatch, UiState
+from ui.style.palette import THEMES
 from ui.style.ui_scale import next_choice
 
 
@@ -38,18 +39,116 @@ def _open(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_open_requested = True
 
 
+def _palette(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.wishes.is_palette = True
+
+
+def _preferences(page: str = "") -> Run:
+    def show(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        ui.wishes.preferences_page = page
+
+    return show
+
+
+def _fullscreen(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.wishes.is_fullscreen = True
+
+
+def _picture_only(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.is_picture_only = not ui.is_picture_only
+
+
+def _layout(name: str) -> Run:
+    def show(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        ui.wishes.layout = name
+
+    return show
+
+
+def _save_layout(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.wishes.is_layout_name = True
+
+
+def _step_panel(step: int) -> Run:
+    def go(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        ui.wishes.panel_step = step
+
+    return go
+
+
+def _show_panel(title: str) -> Run:
+    def show(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        ui.is_picture_only = False
+        ui.wanted_panel = title
+
+    return show
+
+
+def _theme(name: Literal["dark", "light", "system"]) -> Run:
+    def take(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        ui.preferences.theme = name
+        ui.redraw_within(0.0)
+
+    return take
+
+
 def _quit(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.quit_requested = True
 
 
 _ALWAYS: dict[str, Any] = {"needs_capture": False}
 
+_FILE: dict[str, Any] = _ALWAYS | {"menu": "File"}
+_PANELS: dict[str, Any] = _ALWAYS | {"menu": "Window/Panels"}
+_LAYOUTS: dict[str, Any] = _ALWAYS | {"menu": "Window/Layouts"}
+_THEMES: dict[str, Any] = _ALWAYS | {"menu": "View/Theme"}
+
 ACTIONS = (
-    Action("window.open", "Open a capture or project folder", WINDOW, _open, keys=("Ctrl+O",), **_ALWAYS),
+    Action("window.open", "Open a capture or project folder", WINDOW, _open, keys=("Ctrl+O",), **_FILE),
+    Action("window.palette", "Find an action by its name", WINDOW, _palette, keys=("Ctrl+K", "Ctrl+P"), **_ALWAYS),
+    Action("window.preferences", "Preferences", WINDOW, _preferences(), keys=("Ctrl+,",), **_FILE),
+    Action("window.keys", "Change keys", WINDOW, _preferences("Keys"), **_FILE),
     Action("window.larger", "Larger interface", WINDOW, _scale_by(1), keys=("Ctrl++",), **_ALWAYS),
     Action("window.smaller", "Smaller interface", WINDOW, _scale_by(-1), keys=("Ctrl+-",), **_ALWAYS),
     Action("window.own_scale", "Interface at the screen's own size", WINDOW, _reset_scale, keys=("Ctrl+0",), **_ALWAYS),
+    Action("window.next_panel", "To the next panel by keyboard", WINDOW, _step_panel(1), keys=("F6",), **_ALWAYS),
+    Action(
+        "window.previous_panel",
+        "To the panel before by keyboard",
+        WINDOW,
+        _step_panel(-1),
+        keys=("Shift+F6",),
+        **_ALWAYS,
+    ),
+    *(
+        Action(f"window.panel.{title.lower()}", f"Show the panel {title}", WINDOW, _show_panel(title), **_PANELS)
+        for title in PANELS
+    ),
+    Action(
+        "window.picture_only",
+        "Picture only, without panels",
+        WINDOW,
+        _picture_only,
+        keys=("Ctrl+Shift+F",),
+        **_ALWAYS,
+    ),
+    Action("window.fullscreen", "Fill the screen", WINDOW, _fullscreen, keys=("F11",), **_ALWAYS),
+    *(
+        Action(
+            f"window.layout.{name.lower().replace(' ', '_')}",
+            f"Layout: {LAYOUT_WORDS[name]}",
+            WINDOW,
+            _layout(name),
+            **_LAYOUTS,
+        )
+        for name in LAYOUTS
+    ),
+    Action("window.save_layout", "Save the layout as ...", WINDOW, _save_layout, **_LAYOUTS),
+    *(
+        Action(f"window.theme.{name}", f"Theme: {words}", WINDOW, _theme(name), **_THEMES)
+        for name, words in THEMES.items()
+    ),
     Action("window.menu", "Menus (also Alt); arrow keys work in them", WINDOW, _menu, keys=("F10",), **_ALWAYS),
-    Action("window.help", "This sheet", WINDOW, _help, keys=("F1",), **_ALWAYS),
-    Action("window.quit", "Quit; what was learned is kept", WINDOW, _quit, keys=("Ctrl+Q",), **_ALWAYS),
+    Action("window.help", "Keys and mouse", WINDOW, _help, keys=("F1",), **_ALWAYS),
+    Action("window.quit", "Quit; what was learned is kept", WINDOW, _quit, keys=("Ctrl+Q",), **_FILE),
 )

@@ -41,7 +41,7 @@ def draw_played(stage: Stage, timeline: Timeline) -> None:
     row, scale, draw, track = stage.rows[RULER], stage.scale, stage.draw, stage.track
     first, last = timeline.play_range
     x0, x1 = scale.left_of(first), scale.left_of(last + 1)
-    shade = theme.u32(theme.faded(theme.VOID, 0.45))
+    shade = theme.u32(theme.SHADE)
     draw.add_rect_filled(track.low, ImVec2(min(max(x0, track.x0), track.x1), track.y1), shade)
     draw.add_rect_filled(ImVec2(min(max(x1, track.x0), track.x1), track.y0), track.high, shade)
     color = theme.u32(theme.SKY if timeline.around is None else theme.ORANGE)
@@ -74,7 +74,9 @@ def draw_playhead(stage: Stage, timeline: Timeline) -> None:
     stage.draw.add_line_v((left + right) / 2, track.y0 + 10, track.y1, white, 2)
     flag = flag_rect(stage, timeline)
     stage.draw.add_rect_filled(flag.low, flag.high, white, 3)
-    stage.draw.add_text(ImVec2(flag.x0 + 6, track.y0 + 1), theme.u32(theme.VOID), _flag_text(stage, timeline))
+    stage.draw.add_text(
+        ImVec2(flag.x0 + 6, track.y0 + 1), theme.u32(theme.TEXT_ON_PLAYHEAD), _flag_text(stage, timeline)
+    )
     stage.ui.mark_rect("timeline.playhead", flag)
 
 

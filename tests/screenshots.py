@@ -1,0 +1,284 @@
+"""`python -m tests.screenshots [NAME ...]`: pictures of the window for the documents, see `make screenshots`.
+
+Opens a trained project and trains nothing. Each screen is a small function over a window that shows the project; a new
+one is a function and a row in SCREENS.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pyglet
+
+pyglet.options.headless = True  # before pyglet.window is imported
+pyglet.options.shadow_window = False
+
+from PIL import Image  # noqa: E402
+from pyglet.window import key  # noqa: E402
+
+from app.cli.cli import main as run_command  # noqa: E402
+from app.playback.arrays import Picture  # noqa: E402
+from app.project.project_picture import fitted  # noqa: E402
+from app.project.recents import RecentProject  # noqa: E402
+from app.session.commands import LookThrough, OpenCapture, SetCompare, SetFrame, ToggleOverlay  # noqa: E402
+from app.session.preferences import PreferencesFile  # noqa: E402
+from app.session.session import Session  # noqa: E402
+from app.session.settings import Settings  # noqa: E402
+from app.session.window_memory import WindowMemory  # noqa: E402
+from engine.assets import asset_path  # noqa: E402
+from tests.ui.pilot import CTRL, Pilot  # noqa: E402
+from ui.shell.screenshot import read_window  # noqa: E402
+from ui.shell.window import StudioWindow  # noqa: E402
+from ui.viewport.hud_text import RENDERED  # noqa: E402
+
+ROOT = Path(__file__).resolve().parents[1]
+OUT = ROOT / "docs" / "images"
+QUICK_PROJECT = ROOT / "out" / "screenshots" / "project"
+SIZE = (1280, 800)
+MOST_BYTES = 300_000
+TIMEOUT_S = 400.0
+"""Kernels may have to be compiled first."""
+SHOWN_FOLDER = Path("/projects")
+"""Where the project seems to lie: pictures name no folder of the machine that they were made on."""
+
+
+class _Session(Session):
+    """The program's session, but for the project's folder in words."""
+
+    def _refresh(self) -> None:
+        super()._refresh()
+        if self.project_status is not None:
+            self.project_status = replace(self.project_status, folder=SHOWN_FOLDER / self.project_status.name)
+
+
+class Stage:
+    """One window on the project. pilot: Its keys and pointer."""
+
+    def __init__(self, project: Path | None, folder: Path, size: tuple[int, int], scale: float, theme: str) -> None:
+        self.session = _Session(settings=Settings(folder / "settings.json"))
+        preferences = PreferencesFile(folder / f"preferences-{theme}.json")
+        preferences.values.theme = "light" if theme == "light" else "dark"
+        self.studio = StudioWindow(
+            self.session,
+            width=round(size[0] * scale),
+            height=round(size[1] * scale),
+            memory=WindowMemory(folder / "window.json", ui_scale=scale),
+            preferences=preferences,
+        )
+        self.studio.window._enable_event_queue = False  # else events of the pilot would wait
+        self.pilot = Pilot(self.studio)
+        if project is not None:
+            self.session.dispatch(OpenCapture(project))
+            self.wait(lambda: self.session.capture is not None, "the project is open")
+            self.session.recent.forget(project.resolve())  # its folder is one of this machine
+
+    def wait(self, is_done: Callable[[], bool], what: str) -> None:
+        """Let the window work until something is so; says what is not, where it takes too long."""
+        deadline_s = time.monotonic() + TIMEOUT_S
+        while not is_done():
+            if time.monotonic() > deadline_s:
+                sys.stderr.write(f"not in time: {what}\n")
+                return
+            self.studio.settle(1)
+            time.sleep(0.01)
+
+    def show_trained(self, frame_index: int | None = None) -> None:
+        """Go to a frame, by default in the middle of the last trained clip, and wait for its picture."""
+        trained = [
+            clip for clip, found in zip(self.session.clips, self.session.clip_states, strict=True) if found.n_own
+        ]
+        if frame_index is None and trained:
+            frame_index = trained[-1].start + trained[-1].n_frames // 2
+        if frame_index is not None:
+            self.session.dispatch(SetFrame(frame_index))
+        self.rest()
+
+    def rest(self) -> None:
+        """Wait until what is shown is what was asked for, and nothing moves any more."""
+        scene = self.studio.frame.viewport.scene
+
+        def is_complete() -> bool:
+            self.studio.settle(2)
+            thumbnails = self.studio.frame.capture.is_waiting
+            return scene.shows == RENDERED and not scene.shown.is_on_its_way and not thumbnails
+
+        self.wait(is_complete, "the trained picture is shown")
+        self.studio.settle(6, until_idle_s=2.0)
+
+    def write(self, path: Path) -> int:
+        """Write what stands in the window, small enough for a repository. Returns its bytes."""
+        image = Image.fromarray(read_window(self.studio.ctx, *self.studio.window.get_framebuffer_size()))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        image.save(path, optimize=True)
+        if path.stat().st_size > MOST_BYTES:
+            image.quantize(256, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.FLOYDSTEINBERG).save(
+                path, optimize=True
+            )
+        return path.stat().st_size
+
+    def close(self) -> None:
+        """End the window and the session."""
+        self.studio.close()
+
+
+# ---- screens -----------------------------------------------------------------------------------------------------
+
+
+def draw_main(stage: Stage) -> None:
+    """A trained frame with its cameras."""
+    stage.show_trained()
+
+
+def draw_training(stage: Stage) -> None:
+    """Plan, curves and quality of the training panel, beside a comparison with the captured picture."""
+    stage.show_trained()
+    stage.session.dispatch(LookThrough(stage.session.holdout[0] if stage.session.holdout else 0))
+    stage.session.dispatch(SetCompare("wipe"))
+    stage.studio.frame.ui.is_quality_open = True
+    stage.rest()
+
+
+def draw_anchors(stage: Stage) -> None:
+    """Inherited and residual anchors over a trained frame."""
+    stage.show_trained()
+    for name in ("show_inherited", "show_residual"):
+        if not getattr(stage.session.overlays, name):
+            stage.session.dispatch(ToggleOverlay(name))
+    stage.rest()
+
+
+def draw_palette(stage: Stage) -> None:
+    """The palette, with something typed."""
+    stage.show_trained()
+    stage.pilot.key(key.K, modifiers=(CTRL,))
+    stage.pilot.type("clip")
+    stage.studio.settle(4)
+
+
+def draw_preferences(stage: Stage) -> None:
+    """Keys of one's own."""
+    stage.show_trained()
+    stage.pilot.key(key.COMMA, modifiers=(CTRL,))
+    stage.pilot.draw(3)
+    stage.pilot.click("preferences.Keys")
+    stage.studio.settle(4)
+
+
+def draw_welcome(stage: Stage) -> None:
+    """The first screen with projects that were opened lately."""
+    stage.studio.settle(8)
+
+
+@dataclass(frozen=True)
+class Screen:
+    """One picture.
+
+    Attributes:
+        name: Of the file.
+        draw: Brings the window to what is to be seen.
+        size, scale, theme: Of the window, units; pixels per unit; "dark" or "light".
+        is_empty: Without a project.
+    """
+
+    name: str
+    draw: Callable[[Stage], None]
+    size: tuple[int, int] = SIZE
+    scale: float = 1.0
+    theme: str = "dark"
+    is_empty: bool = False
+
+
+SCREENS = (
+    Screen("welcome", draw_welcome, is_empty=True),
+    Screen("main", draw_main),
+    Screen("training", draw_training),
+    Screen("anchors", draw_anchors),
+    Screen("palette", draw_palette),
+    Screen("preferences", draw_preferences),
+    Screen("light", draw_main, theme="light"),
+    Screen("small", draw_main, size=(900, 600)),
+    Screen("double", draw_main, size=(900, 600), scale=2.0),
+)
+
+
+def make_quick_project() -> Path:
+    """The project that serves when none is given: the sample's first clips with the smallest preset; made once."""
+    if not (QUICK_PROJECT / "clips").is_dir():
+        sample = str(asset_path("sample"))
+        code = run_command(["train", sample, "--project", str(QUICK_PROJECT), "--clips", "0:2", "--preset", "toy"])
+        if code:
+            sys.exit(code)
+    return QUICK_PROJECT
+
+
+def write_screens(project: Path, out: Path, names: list[str]) -> None:
+    """Make the pictures of these names, or all of them, from a copy of the project."""
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        copy = shutil.copytree(project, folder / project.name)
+        small: Any = None
+        wanted = [screen for screen in SCREENS if not names or screen.name in names]
+        for screen in sorted(
+            wanted, key=lambda screen: screen.is_empty
+        ):  # the first screen shows a picture of the others
+            stage = Stage(None if screen.is_empty else copy, folder, screen.size, screen.scale, screen.theme)
+            try:
+                if screen.is_empty:
+                    _fill_recent(stage, project.name, small)
+                screen.draw(stage)
+                n_bytes = stage.write(out / f"{screen.name}.png")
+                if small is None and not screen.is_empty:
+                    small = _picture_in(stage)
+            finally:
+                stage.close()
+            sys.stdout.write(f"{out / screen.name}.png  {n_bytes / 1000:.0f} kB\n")
+
+
+def _picture_in(stage: Stage) -> Any:
+    """What stands in the middle of the window, as a small picture of the project."""
+    rect = stage.pilot.rects["viewport.rendered"]
+    scale = stage.studio.frame.backend.pixels_per_unit
+    x0, y0, x1, y1 = (round(value * scale) for value in (rect.x0, rect.y0, rect.x1, rect.y1))
+    margin = (y1 - y0) // 5
+    return fitted(stage.pilot.picture()[y0 + margin : y1 - margin, x0:x1])
+
+
+def _fill_recent(stage: Stage, name: str, small: Any) -> None:
+    """Projects in the list of the first screen."""
+    stage.studio.settle(8, until_idle_s=1.0)  # pictures of real projects come first
+    now = datetime.now(UTC)
+    rows = ((name, 3, 3, timedelta()), ("basketball", 2, 70, timedelta(days=1)), ("kitchen", 0, 12, timedelta(days=5)))
+    entries = [
+        RecentProject(str(SHOWN_FOLDER / name), f"/captures/{name}", name, n_trained, n_clips, (now - age).isoformat())
+        for name, n_trained, n_clips, age in rows
+    ]
+    stage.session.recent.entries[:] = entries
+    stage.session.recent.missing = frozenset()
+    if small is not None:
+        stage.session.recent.pictures.found = {entries[0].folder: Picture(small, "project")}
+
+
+def main() -> None:
+    """Parse the command line and write the pictures."""
+    parser = argparse.ArgumentParser(prog="python -m tests.screenshots", description=__doc__)
+    parser.add_argument("names", nargs="*", help=f"of {', '.join(screen.name for screen in SCREENS)}; all by default")
+    parser.add_argument("--project", type=Path, help="trained project (default: one that is made from the sample)")
+    parser.add_argument("--out", type=Path, default=OUT)
+    options = parser.parse_args()
+    unknown = set(options.names) - {screen.name for screen in SCREENS}
+    if unknown:
+        parser.error(f"there is no screen of this name: {', '.join(sorted(unknown))}")
+    write_screens(options.project or make_quick_project(), options.out, options.names)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+"""Which menu each action stands in: the one that it names, else that of the first part of its id, else of its group.
+
+A path such as "View/Theme" is a menu inside a menu. Actions of a group that is not listed here get a menu of that name,
+so that none is left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ui.panels.actions.action import (
+    BOOKMARKS,
+    COMPARE,
+    MARK,
+    MODE,
+    NAVIGATE,
+    PLAY,
+    TIME,
+    TRAIN,
+    VIEW,
+    WINDOW,
+    Action,
+)
+from ui.panels.actions.table import ACTIONS
+
+MOST_ITEMS = 24
+"""As many fit into the smallest window."""
+MENUS = ("File", "View", "Time", "Train", "Mark", "Window")
+"""From left to right; others follow before the last."""
+_MENU_OF_GROUP = {TIME: "Time", VIEW: "View", COMPARE: "View", MARK: "Mark", TRAIN: "Train", WINDOW: "Window"}
+_MENU_OF_GROUP |= {NAVIGATE: "View/Navigate", BOOKMARKS: "View/Bookmarks", MODE: "View/Mode", PLAY: "Time/Play"}
+_MENU_OF_TOPIC = {
+    "compare": "View/Compare",
+    "content": "View/Draw only",
+    "heat": "View/Residuals",
+    "mode": "View/Mode",
+    "navigation": "View/Navigate/Mouse",
+    "play": "Time/Play",
+    "show": "View/Show",
+    "timeline": "Time/Timeline",
+}
+"""By what an id begins with, up to the first dot."""
+
+
+@dataclass
+class Menu:
+    """One menu.
+
+    Attributes:
+        items: Actions, menus inside this one, and None for a line between groups.
+    """
+
+    title: str
+    items: list[Action | Menu | None] = field(default_factory=list)
+
+    def inside(self, title: str) -> Menu:
+        """The menu of this title in this one; made where it is not there yet."""
+        for item in self.items:
+            if isinstance(item, Menu) and item.title == title:
+                return item
+        made = Menu(title)
+        self.items.append(made)
+        return made
+
+
+def menu_path(action: Action) -> str:
+    """Titles of the menus in which an action stands, joined by slashes."""
+    topic = action.id.partition(".")[0]
+    return action.menu or _MENU_OF_TOPIC.get(topic) or _MENU_OF_GROUP.get(action.group, action.group)
+
+
+def menus(actions: tuple[Action, ...] = ACTIONS) -> list[Menu]:
+    """All menus with every action in exactly one of them."""
+    top = {title: Menu(title) for title in MENUS}
+    groups: dict[str, str] = {}
+    for action in actions:
+        path = menu_path(action).split("/")
+        menu = top.setdefault(path[0], Menu(path[0]))
+        for title in path[1:]:
+            menu = menu.inside(title)
+        where = "/".join(path)
+        if groups.setdefault(where, action.group) != action.group:
+            menu.items.append(None)
+            groups[where] = action.group
+        menu.items.append(action)
+    last = top.pop(MENUS[-1])
+    return [menu for menu in (*top.values(), last) if menu.items]
