@@ -124,8 +124,8 @@ ACTIONS = (
     Action("train.stop", "Stop training and keep what was learned", TRAIN, _stop_training, keys=("Ctrl+T",)),
     Action("train.hold_after", "Hold the queue after this clip, or not", TRAIN, _hold_after, keys=("Ctrl+Shift+T",)),
     Action("queue.next", "Choose the next waiting clip", TRAIN, _next_waiting, keys=("Shift+N",)),
-    Action("queue.earlier", "Chosen waiting clip earlier", TRAIN, _move_waiting(-1), keys=("Ctrl+Shift+Page Up",)),
-    Action("queue.later", "Chosen waiting clip later", TRAIN, _move_waiting(1), keys=("Ctrl+Shift+Page Down",)),
+    Action("queue.earlier", "Chosen waiting clip earlier", TRAIN, _move_waiting(-1), keys=("Ctrl+Shift+Up",)),
+    Action("queue.later", "Chosen waiting clip later", TRAIN, _move_waiting(1), keys=("Ctrl+Shift+Down",)),
     Action("queue.remove", "Take the chosen clip out of the queue", TRAIN, _remove_waiting, keys=("Ctrl+Delete",)),
     Action("queue.retry", "Try failed clips again", TRAIN, _retry_failed),
     Action("live.off", "Live view off", TRAIN, _live_view("off"), is_on=_is_live_view("off")),
@@ -136,6 +136,7 @@ ACTIONS = (
         "Loss on a logarithmic scale",
         TRAIN,
         _toggle_log_loss,
+        needs_capture=False,
     ),
     Action("window.log", "Show the log", WINDOW, _show_log, keys=("Shift+L",), needs_capture=False),
 )
