@@ -23,8 +23,20 @@ OVERLAY_NAMES = (
 COMPARE_MODES = ("off", "wipe", "side", "blink")
 CAPTURED = "captured"
 """Of Overlays.compare_with: what the camera took."""
+_VERSION = "version "
 BLINK_HZ = (0.25, 3.0)
 """Slowest and fastest blinking. More than three flashes a second can cause seizures."""
+
+
+def version_name(number: int) -> str:
+    """An earlier version of a clip, for Overlays.compare_with."""
+    return f"{_VERSION}{number}"
+
+
+def version_number(other: str) -> int | None:
+    """Inverse of `version_name`; None of anything else."""
+    number = other.removeprefix(_VERSION)
+    return int(number) if other.startswith(_VERSION) and number.isascii() and number.isdigit() else None
 
 
 @dataclass(slots=True)
@@ -37,7 +49,8 @@ class Overlays:
         show_coverage: The space that inherited anchors cover, and how far residual anchors lie from it.
         show_trails: The ways that Gaussians took over the last frames.
         compare: "off", "wipe", "side" or "blink": another picture over, beside or in turn with the rendered one.
-        compare_with: The other picture: CAPTURED, or the name of a mode (app.playback.view_modes).
+        compare_with: The other picture: CAPTURED, the name of a mode (app.playback.view_modes), or that of an earlier
+            version of the clip, see `version_name`.
         wipe_position: Share of the width that shows the other picture, 0..1.
         blink_hz: How often a second each of the two pictures is seen.
         mode, content: What colours mean and which part of a clip is drawn, by name; see app.playback.view_modes.

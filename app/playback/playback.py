@@ -156,6 +156,7 @@ class Playback:
         full_size: tuple[int, int] | None = None,
         shown_as: ShownAs = PLAIN,
         view_id: Hashable = 0,
+        state_of: StateOf | None = None,
     ) -> Picture | None:
         """The rasterizer's picture of the frame and view; None where nothing is trained or ready.
 
@@ -166,13 +167,15 @@ class Playback:
             full_size: If it is there already in this size, that is given instead.
             shown_as: What its colours mean, and of which part of the clip.
             view_id: Of the place where it is shown.
+            state_of: Other states of clips than those of the project, for instance earlier versions.
         """
-        request = self._request(timeline, shown_as)
+        request = self._request_at(timeline, timeline.frame_index, shown_as, state_of)
         if request is None:
             return None
         look = Look.of(view, width, height, shown_as=shown_as)
         full = look if full_size is None else look.in_size(view, *full_size)
-        self.ahead.note(view_id, AskedLook(look, full))
+        if state_of is None:  # others are not what playing shows next
+            self.ahead.note(view_id, AskedLook(look, full))
         shown: ShownFrame | None = None
         picture = self._known_picture(request.key, (full, look), view_id)
         if picture is None:
@@ -184,6 +187,9 @@ class Playback:
             return self.renderer.picture(request.key, shown, look, view_id=view_id)
         # Until the frame was decoded, the newest one there is, drawn from the view as it is now.
         assert isinstance(key, tuple)
+        is_of_another = key[-2] != request.shown_as or (state_of is not None and key[1] != str(request.path))
+        if is_of_another:  # of another view, which shows another part or another state
+            return self.renderer.newest(view_id)
         picture = self._known_picture(key, (full, look), view_id)
         if picture is None:
             picture = self.renderer.picture(key, shown, look, view_id=view_id)
@@ -241,14 +247,22 @@ class Playback:
         """What is to be decoded for the playhead; None where nothing is trained."""
         return self._request_at(timeline, timeline.frame_index, shown_as)
 
-    def _request_at(self, timeline: Timeline, frame_index: int, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
+    def _request_at(
+        self, timeline: Timeline, frame_index: int, shown_as: ShownAs, state_of: StateOf | None = None
+    ) -> FrameRequest | None:
         clip = timeline.clip_of(frame_index)
-        return None if clip is None else self.request(clip, frame_index, shown_as)
+        return None if clip is None else self.request(clip, frame_index, shown_as, state_of)
 
-    def request(self, clip: Clip, frame_index: int, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
-        """What is to be loaded and decoded for a frame of a clip; None where the clip has no state."""
+    def request(
+        self, clip: Clip, frame_index: int, shown_as: ShownAs = PLAIN, state_of: StateOf | None = None
+    ) -> FrameRequest | None:
+        """What is to be loaded and decoded for a frame of a clip; None where the clip has no state.
+
+        Args:
+            state_of: Other states than those of the project.
+        """
         opened = self._opened
-        state = None if opened is None else self._state_of(clip.clip_index)
+        state = None if opened is None else (state_of or self._state_of)(clip.clip_index)
         if opened is None or state is None:
             return None
         return FrameRequest(
@@ -257,7 +271,7 @@ class Playback:
             frame_index=frame_index,
             path=state.file,
             generation=opened.generation,
-            reference_path=self._inherited_path(opened, clip.clip_index),
+            reference_path=state.reference_file or self._inherited_path(opened, clip.clip_index),
             clip=clip,
             is_live=state.is_live,
             shown_as=decoded_as(shown_as),

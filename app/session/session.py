@@ -58,6 +58,7 @@ from app.status import (
     UsageStatus,
     VersionStatus,
     WantedFrame,
+    version_number,
 )
 from app.training.messages import ENDINGS, TrainJob
 from app.training.process import ProcessWorker, Worker
@@ -256,8 +257,9 @@ class Session:
             case commands.SetHoldout() | commands.SetClipLength() | commands.SetTrainSetting() | commands.SetPreset():
                 self._change_settings(command)
             case commands.SetCompareWith(other=other):
-                if other != CAPTURED and other not in MODES:
-                    raise ValueError(f"pictures to compare with are {CAPTURED}, {', '.join(MODES)}, not {other!r}")
+                if other != CAPTURED and other not in MODES and version_number(other) is None:
+                    known = f"{CAPTURED}, {', '.join(MODES)} and versions"
+                    raise ValueError(f"pictures to compare with are {known}, not {other!r}")
                 self.overlays.compare_with = other
             case commands.SetMode(mode=mode):
                 if mode not in MODES:
@@ -506,12 +508,23 @@ class Session:
 
     def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
         """The rasterizer's picture that the rendered one is compared with; None where that is a captured one."""
-        if self.overlays.compare_with not in MODES:
+        other, state_of = self.overlays.compare_with, None
+        version = version_number(other)
+        if version is not None:
+            other, state_of = self.overlays.mode, lambda clip_index: self.version_state(clip_index, version)
+        if other not in MODES:
             return None
-        shown_as = ShownAs(self.overlays.compare_with, self.overlays.content)
+        shown_as = ShownAs(other, self.overlays.content)
         view_id = ("other", self.views.current_index)
         return self.playback.render(
-            self.timeline, self.view, width, height, full_size=full_size, shown_as=shown_as, view_id=view_id
+            self.timeline,
+            self.view,
+            width,
+            height,
+            full_size=full_size,
+            shown_as=shown_as,
+            view_id=view_id,
+            state_of=state_of,
         )
 
     def cached_frames(self) -> list[tuple[int, int]]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from typing import Protocol
 
 from imgui_bundle import imgui
 
 from app.playback.orbit_view import OrbitView
 from app.playback.view_modes import COLOR, MODES
-from app.status import CAPTURED, Overlays
+from app.status import CAPTURED, Overlays, VersionStatus, version_number
 from ui.panels.state import UiState
 from ui.viewport.hud_text import RENDERED
 
@@ -59,8 +60,21 @@ def kind_words(kind: str, mode_label: str) -> str:
     return f"{kind}, {mode_label.lower()}" if kind == RENDERED and mode_label else kind
 
 
+def missing_words(overlays: Overlays, versions: Sequence[VersionStatus]) -> str:
+    """What stands where the other picture is not there. versions: Of the clip under the playhead."""
+    if overlays.compare_with == CAPTURED:
+        return "Captured picture is being read"
+    number = version_number(overlays.compare_with)
+    if number is not None and number not in [version.number for version in versions]:
+        return f"This clip has no version {number}"
+    return f"{other_label(overlays)} is being drawn"
+
+
 def other_label(overlays: Overlays) -> str:
     """What the other picture is called in menus."""
     if overlays.compare_with == CAPTURED:
         return "Captured picture"
+    number = version_number(overlays.compare_with)
+    if number is not None:
+        return f"Version {number}"
     return "Own colours" if overlays.compare_with == COLOR else MODES[overlays.compare_with].label

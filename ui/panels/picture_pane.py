@@ -11,9 +11,10 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 
 from app.playback.pointing import point_beside
-from app.status import CAPTURED
+from app.status import version_number
 from ui.panels.actions.action import ActionNeeds
-from ui.panels.comparison import covered_share, is_held, kind_words, other_label, shown_compare
+from ui.panels.clip_versions import VersionNeeds
+from ui.panels.comparison import covered_share, is_held, kind_words, missing_words, other_label, shown_compare
 from ui.panels.gizmo import draw_gizmo, gizmo_rect
 from ui.panels.heat_overlay import HeatNeeds, HeatOverlay
 from ui.panels.hud import Hud, HudNeeds
@@ -30,7 +31,7 @@ from ui.viewport.scene import Scene, SceneNeeds, SceneView
 TOOLTIP_AWAY = 22.0
 
 
-class PictureNeeds(SceneNeeds, HudNeeds, ActionNeeds, HeatNeeds, Protocol):
+class PictureNeeds(SceneNeeds, HudNeeds, ActionNeeds, HeatNeeds, VersionNeeds, Protocol):
     """What the picture, and everything that lies over it, is made from."""
 
 
@@ -168,6 +169,7 @@ class PicturePane:
             height=size[1],
             is_moving=self.pointer.is_moving,
             near=view.near,
+            set_back=view.set_back,
         )
 
     def _pick(self, session: PictureNeeds, pane: Rect, x: float, y: float) -> np.ndarray | None:
@@ -229,14 +231,15 @@ class PicturePane:
         self._captured_frame = None if other is None else other.frame_index
         frames = (None if other is None else other.frame_index, shown.source.frame_index)
         if other is None:
-            is_captured = session.overlays.compare_with == CAPTURED
-            words = (
-                "Captured picture is being read" if is_captured else f"{other_label(session.overlays)} is being drawn"
-            )
+            clip = session.timeline.clip
+            versions = () if clip is None else session.clip_versions(clip.clip_index)
+            words = missing_words(session.overlays, versions)
         elif other.shown_as is None:
             words = pane_text(captured_words(other.has_scene_colors), *frames)
         else:
-            words = pane_text(kind_words(RENDERED, other.shown_as.label), *frames)
+            is_version = version_number(session.overlays.compare_with) is not None
+            kind = other_label(session.overlays) if is_version else kind_words(RENDERED, other.shown_as.label)
+            words = pane_text(kind, *frames)
         rendered_words = pane_text(kind_words(shown.kind, shown.source.shown_as.label), *frames[::-1])
         color = theme.YELLOW if None not in frames and frames[0] != frames[1] else theme.TEXT
         compare = session.overlays.compare

@@ -8,10 +8,9 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.playback.views import COUNTS
 from app.session.commands import LookThrough, ShowViews, ToggleOverlay
-from ui.panels.actions.action import ActionNeeds
 from ui.panels.actions.compare import cloud_overlay
 from ui.panels.actions.view import next_layout
-from ui.panels.compare_box import draw_compare_box
+from ui.panels.compare_box import CompareNeeds, draw_compare_box
 from ui.panels.heat_box import draw_heat_box
 from ui.panels.mode_box import draw_mode_box
 from ui.panels.navigation import ViewPopup
@@ -32,7 +31,7 @@ GAP = 8.0
 MARK_SLIDER = imgui.SliderFlags_.always_clamp
 
 
-class ToolbarNeeds(ActionNeeds, Protocol):
+class ToolbarNeeds(CompareNeeds, Protocol):
     """What the row reads."""
 
 

@@ -136,7 +136,8 @@ def test_colours_of_births_and_changes(shown: ShownFrame) -> None:
     for birth, hue in enumerate(BIRTH_HUES):
         colors = births.colors[shown.gaussians.births == birth]
         assert len(colors)
-        np.testing.assert_allclose(colors, np.broadcast_to(np.float32(hue), colors.shape), rtol=1e-6)
+        np.testing.assert_allclose(colors, np.broadcast_to(np.array(hue, np.float32), colors.shape), rtol=1e-6)
+    assert shown.gaussians.changes is not None
     is_new = np.isnan(shown.gaussians.changes)
     np.testing.assert_allclose(
         changes.colors[is_new] * 255, np.tile(np.array(hues.SKY) * 255, (is_new.sum(), 1)), atol=0.6
@@ -186,7 +187,7 @@ def test_ranges_follow_the_rig_and_nothing_else() -> None:
 
 def test_a_mode_that_is_no_picture_of_numbers_is_refused(shown: ShownFrame) -> None:
     with pytest.raises(ValueError, match="'birth' is not a mode"):
-        mode_picture("birth", _gaussians(shown.gaussians), pinhole(view()), (0.0, 1.0))
+        mode_picture("birth", _gaussians(shown.gaussians, request(shown, "color").look), pinhole(view()), (0.0, 1.0))
 
 
 def test_labels_name_everything_that_is_not_as_usual() -> None:

@@ -13,6 +13,7 @@ from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
+from app.playback.view_modes import ShownAs
 from app.project.opened_project import OpenedProject
 from app.training.service import ShownState
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
@@ -261,3 +262,56 @@ def test_the_best_cloud_there_is_is_shown(shown: Shown, make_opened):
     assert kind() is None, "the captured picture says more than the hint"
     shown.train(opened, 0)
     assert kind() == "static"
+
+
+def test_two_places_show_two_modes_and_two_parts_of_one_frame(shown: Shown, make_opened: Callable[..., OpenedProject]):
+    opened = make_opened()
+    shown.open(opened)
+    shown.train(opened, 0)
+    asked = {"first": ShownAs("depth"), "second": ShownAs("birth", "f_s")}
+
+    def pictures() -> dict[str, Picture | None]:
+        return {
+            place: shown.playback.render(shown.timeline, shown.view, *SIZE, shown_as=shown_as, view_id=place)
+            for place, shown_as in asked.items()
+        }
+
+    for _ in range(4):
+        pictures()
+        shown.wait()
+    for place, picture in pictures().items():
+        assert picture is not None
+        assert not picture.is_stale
+        assert picture.source.shown_as == asked[place]
+        assert (picture.values is not None) == (place == "first")
+    assert not shown.playback.take_failures()
+
+
+def test_an_earlier_state_of_a_clip_is_drawn_beside_the_present_one(
+    shown: Shown, make_opened: Callable[..., OpenedProject], tmp_path: Path
+):
+    opened = make_opened()
+    shown.open(opened)
+    path = shown.train(opened, 0)
+    state, earlier = read_clip_state(path), tmp_path / "earlier.safetensors"
+    arrays = dict(state.arrays)
+    arrays["sets.static.positions"] = arrays["sets.static.positions"] + np.float32(40.0)  # out of sight
+    write_clip_state(earlier, ClipState(arrays, state.header).stamped())
+    before = ShownState(earlier, "earlier", False)
+
+    def both() -> tuple[Picture | None, Picture | None]:
+        present = shown.playback.render(shown.timeline, shown.view, *SIZE)
+        other = shown.playback.render(shown.timeline, shown.view, *SIZE, view_id="b", state_of=lambda index: before)
+        return present, other
+
+    for _ in range(4):
+        both()
+        shown.wait()
+    present, other = both()
+    assert present is not None
+    assert other is not None
+    assert not present.is_stale
+    assert not other.is_stale
+    assert (present.source.revision, other.source.revision) == ("state of 0", "earlier")
+    assert present.image.std(axis=(0, 1)).max() > 5.0
+    assert other.image.std(axis=(0, 1)).max() == 0.0, "nothing is in sight"

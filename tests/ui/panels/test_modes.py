@@ -12,12 +12,12 @@ from pyglet.window import key
 import ui.panels.comparison as comparison
 from app.playback.view_modes import CONTENTS, MODES
 from app.session.commands import LookThrough, SetCompare, SetCompareWith, SetContent, SetMode
-from app.status import BLINK_HZ, CAPTURED, ClipStatus, Overlays
+from app.status import BLINK_HZ, CAPTURED, ClipStatus, Overlays, VersionStatus, version_name, version_number
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import SHIFT, Pilot
 from ui.panels.actions.table import ACTIONS
 from ui.panels.color_bar import bar_number
-from ui.panels.comparison import covered_share, kind_words, other_label
+from ui.panels.comparison import covered_share, kind_words, missing_words, other_label
 from ui.panels.state import UiState
 
 DIGITS = (key._1, key._2, key._3, key._4, key._5, key._6, key._7, key._8, key._9)
@@ -153,6 +153,16 @@ def test_a_held_key_covers_everything_and_a_wipe_its_share() -> None:
     assert covered_share(session, ui, is_held=False) == 0.3  # type: ignore[arg-type]
     assert covered_share(session, ui, is_held=True) == 1.0  # type: ignore[arg-type]
     assert ui.redraw_in_s is None
+
+
+def test_an_earlier_version_that_is_not_there_says_so() -> None:
+    overlays, versions = Overlays(compare_with=version_name(3)), [VersionStatus(2)]
+    assert other_label(overlays) == "Version 3"
+    assert missing_words(overlays, versions) == "This clip has no version 3"
+    assert missing_words(overlays, [VersionStatus(3)]) == "Version 3 is being drawn"
+    assert missing_words(Overlays(), versions) == "Captured picture is being read"
+    for other in (CAPTURED, "depth", "version", "version x", "version -1", "version ²"):
+        assert version_number(other) is None
 
 
 def test_names_of_the_two_pictures() -> None:
