@@ -318,7 +318,7 @@ class Playback:
     ) -> Gain | None:
         """By which a camera's colours differ from the scene's at a frame; None where they do not, or nobody
         knows."""
-        request = self._request_at(timeline, frame_index)
+        request = self._request_at(timeline, frame_index, PLAIN)
         colors = None if request is None else self.decoder.colors(request)
         if request is None or colors is None:
             return None
