@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import logging
 
+from app.background.collector import uncollected
+from app.background.libraries import load_libraries
 from engine.kernels.cache import is_cache_warm
 from engine.kernels.compile_ahead import compile_all, warm_up_all
 from engine.kernels.threads import configure_threads
@@ -49,16 +51,20 @@ def use_threads(n_threads: int | None) -> int:
 
 def prepare_drawing() -> None:
     """Once on a thread that draws: compiled kernels, one core, and everything loaded that a first picture needs."""
+    load_libraries()
     warm_cache()
-    use_threads(1)
-    if is_cache_warm():
-        from engine.backends.cpu.raster.warm import warm_up
+    with uncollected():
+        use_threads(1)
+        if is_cache_warm():
+            from engine.backends.cpu.raster.warm import warm_up
 
-        warm_up()
+            warm_up()
 
 
 def prepare_decoding() -> None:
     """Once on a thread that decodes: one core, and everything loaded that a first frame needs."""
-    import engine.model.clip_model  # noqa: F401
+    load_libraries()
+    with uncollected():
+        import engine.model.clip_model  # noqa: F401
 
-    use_threads(1)
+        use_threads(1)

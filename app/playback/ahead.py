@@ -86,7 +86,7 @@ class Ahead:
         if not self._is_settled(course) or (is_busy and not course.is_playing):
             n = 0
         elif course.is_playing:
-            n = min(round(PLAYING_S * course.frames_per_s), MAX_PLAYING)
+            n = n_ahead(course)
         parts = dict.fromkeys(decoded_as(asked.look.shown_as) for asked in self._looks.values()) or (PLAIN,)
         requests = [request_of(frame, part) for frame in course.ahead(n) for part in parts]
         # A snapshot of a running training is replaced before long: not worth the cores while nothing plays.
@@ -155,6 +155,11 @@ class Ahead:
             frames = sorted({key[-1] for key in keys if is_current(key) and self._is_ready(key)})
             self._runs_of, self._runs = identity, _runs(frames)
         return self._runs
+
+
+def n_ahead(course: Course) -> int:
+    """How many frames are made ready while it plays."""
+    return min(round(PLAYING_S * course.frames_per_s), MAX_PLAYING)
 
 
 def _picture_distance(key: PictureKey, course: Course, look_keys: set[Hashable]) -> float:

@@ -3,6 +3,7 @@ made on threads, kept up to a number of bytes."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -81,6 +82,13 @@ class CapturedPictures:
             self._last[camera_index] = known
         return known
 
+    def plan(self, requests: Sequence[PictureRequest]) -> None:
+        """Decode these, in this order, while no picture is asked for: as many as can be kept."""
+        missing = [request for request in requests if request not in self._cache]
+        held = max((picture.image.nbytes for picture in self._last.values()), default=0)
+        n_that_fit = self._cache.max_bytes // (2 * held) if held else 1  # half is for what was shown
+        self.viewing.plan(missing[:n_that_fit])
+
     def _worker(self, request: PictureRequest) -> LatestWorker[PictureRequest, Picture]:
         return self.thumbnails if request.is_thumbnail else self.viewing
 
@@ -97,6 +105,9 @@ class CapturedPictures:
         self.thumbnails.close()
 
     def _compute(self, request: PictureRequest) -> Picture:
+        known = self._cache.get(request)
+        if known is not None:  # it was asked for and planned
+            return known
         image = downsized(request.capture.frame(request.camera_index, request.frame_index), request.max_width)
         if request.scene_gain is not None:
             image = to_reference(image, np.array(request.scene_gain))

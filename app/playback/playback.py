@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from app.background.jobs import Jobs
 from app.background.latest import LatestWorker
-from app.playback.ahead import Ahead, AskedLook
+from app.playback.ahead import Ahead, AskedLook, n_ahead
 from app.playback.arrays import AnchorArrays, Picture, PointArrays
-from app.playback.capture_pictures import CapturedPictures, Gain
+from app.playback.capture_pictures import CapturedPictures, Gain, PictureRequest
 from app.playback.clouds import CloudRequest, Clouds
 from app.playback.course import Course
 from app.playback.coverage import Coverage, CoverageFinder
@@ -65,6 +66,9 @@ class Playback:
         self._opened: OpenedProject | None = None
         self._state_of = state_of
         self._n_ahead_seen = 0
+        self._inherited: dict[int, Path | None] = {}
+        self._compared: dict[tuple[int, int], bool] = {}  # camera and width, asked for since the last turn
+        self._planned_compared: object = None
 
     def start(self) -> None:
         """Start the threads now rather than with the first request, and load what they need."""
@@ -76,7 +80,7 @@ class Playback:
         if self._opened is not None and self._opened.generation != opened.generation:
             for store in (*self._stores, self.ahead, self._modes):
                 store.clear()
-        self._opened = opened
+        self._opened, self._inherited = opened, {}
 
     def build_first_cloud(self, jobs: Jobs) -> None:
         """Make something to look at until the reference clip has a state, unless there is one."""
@@ -169,7 +173,7 @@ class Playback:
         if request is None:
             return None
         look = Look.of(view, width, height, shown_as=shown_as)
-        full = look if full_size in (None, (width, height)) else Look.of(view, *full_size, shown_as=shown_as)
+        full = look if full_size is None else look.in_size(view, *full_size)
         if state_of is None:  # others are not what playing shows next
             self.ahead.note(view_id, AskedLook(look, full))
         shown: ShownFrame | None = None
@@ -211,6 +215,23 @@ class Playback:
         """
         course = Course.of(timeline)
         self.ahead.plan(course, lambda frame, shown_as: self._request_at(timeline, frame, shown_as), is_busy=is_busy)
+        self._plan_compared(timeline, course)
+
+    def _plan_compared(self, timeline: Timeline, course: Course) -> None:
+        """Captured pictures that are set beside the render come ahead of the playhead, too."""
+        compared, self._compared = tuple(self._compared), {}
+        wanted = (course, compared, self.decoder.revision) if course.is_playing and compared else None
+        if wanted == self._planned_compared or self._opened is None:
+            return
+        self._planned_compared = wanted
+        opened, requests = self._opened, []
+        for frame in course.ahead(n_ahead(course)) if wanted is not None else ():
+            for camera, max_width in compared:
+                gain = self._scene_gain(opened, timeline, frame, camera)
+                capture = opened.capture
+                key = (opened.generation, capture.fingerprint, camera, frame, max_width, capture, gain)
+                requests.append(PictureRequest(*key))
+        self.captured.plan(requests)
 
     def cached_frames(self) -> list[tuple[int, int]]:
         """Frames that can be shown at once, as they are looked at now: first and stop of each run, in order."""
@@ -227,7 +248,7 @@ class Playback:
         return self._request_at(timeline, timeline.frame_index, shown_as)
 
     def _request_at(
-        self, timeline: Timeline, frame_index: int, shown_as: ShownAs, state_of: StateOf | None = None
+        self, timeline: Timeline, frame_index: int, shown_as: ShownAs = PLAIN, state_of: StateOf | None = None
     ) -> FrameRequest | None:
         clip = timeline.clip_of(frame_index)
         return None if clip is None else self.request(clip, frame_index, shown_as, state_of)
@@ -250,11 +271,17 @@ class Playback:
             frame_index=frame_index,
             path=state.file,
             generation=opened.generation,
-            reference_path=state.reference_file or opened.inherited_path(clip.clip_index),
+            reference_path=state.reference_file or self._inherited_path(opened, clip.clip_index),
             clip=clip,
             is_live=state.is_live,
             shown_as=decoded_as(shown_as),
         )
+
+    def _inherited_path(self, opened: OpenedProject, clip_index: int) -> Path | None:
+        """Kept: it is asked for many times in every turn of the loop, and follows from all settings."""
+        if clip_index not in self._inherited:
+            self._inherited[clip_index] = opened.inherited_path(clip_index)
+        return self._inherited[clip_index]
 
     # ---------------------------------------------------------------- beside them
 
@@ -280,15 +307,18 @@ class Playback:
         opened = self._opened
         if opened is None:
             return None
-        gain = self._scene_gain(opened, timeline, camera_index)
+        self._compared[camera_index, max_width] = True
+        gain = self._scene_gain(opened, timeline, timeline.frame_index, camera_index)
         return self.captured.picture(
             opened.capture, opened.generation, camera_index, timeline.frame_index, max_width, gain
         )
 
-    def _scene_gain(self, opened: OpenedProject, timeline: Timeline, camera_index: int) -> Gain | None:
-        """By which a camera's colours differ from the scene's at the playhead; None where they do not, or nobody
+    def _scene_gain(
+        self, opened: OpenedProject, timeline: Timeline, frame_index: int, camera_index: int
+    ) -> Gain | None:
+        """By which a camera's colours differ from the scene's at a frame; None where they do not, or nobody
         knows."""
-        request = self._request(timeline)
+        request = self._request_at(timeline, frame_index)
         colors = None if request is None else self.decoder.colors(request)
         if request is None or colors is None:
             return None

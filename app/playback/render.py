@@ -61,6 +61,12 @@ class Look:
             view.look_key, width, height, shown_as, value_range, view.look_through, *matrices, view.near, view.set_back
         )
 
+    def in_size(self, view: OrbitView, width: int, height: int) -> Look:
+        """The same in another size; view is that which it was made of."""
+        if (width, height) == (self.width, self.height):
+            return self
+        return replace(self, width=width, height=height, K=view.K(width, height))
+
 
 PictureKey = tuple[FrameKey, Look]
 

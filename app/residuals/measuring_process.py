@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol
@@ -23,6 +24,8 @@ from app.residuals.measuring_worker import main
 
 MAX_EVENTS_PER_POLL = 200
 """A window that slept must not spend a whole frame on old figures."""
+END_TIMEOUT_S = 0.05
+"""A killed process is gone in a few milliseconds; one that is not is collected later."""
 DIED = (
     "The process that measures ended unexpectedly. What was measured is kept; measuring goes on when a clip is trained"
 )
@@ -51,22 +54,37 @@ LaunchMeasuring = Callable[[MeasureJob], Measurer]
 class MeasuringProcess:
     """A spawned process. See `Measurer`.
 
+    It is started on a thread: the job of a long project does not fit into a pipe at once, so that who starts it
+    waits until the process is far enough to read.
+
     Args:
         job: What to measure.
     """
 
     def __init__(self, job: MeasureJob) -> None:
         context = multiprocessing.get_context("spawn")
-        child_commands, self._commands = context.Pipe(duplex=False)
-        self._events, child_events = context.Pipe(duplex=False)
+        self._child_commands, self._commands = context.Pipe(duplex=False)
+        self._events, self._child_events = context.Pipe(duplex=False)
         self.process = context.Process(
-            target=main, args=(job, child_commands, child_events), name="measuring", daemon=True
+            target=main, args=(job, self._child_commands, self._child_events), name="measuring", daemon=True
         )
-        with undisturbed():
-            self.process.start()
-        child_commands.close()  # the child has its own; ours would hide its end
-        child_events.close()
-        self._has_ended = False
+        self._has_ended = self._is_unwanted = False
+        self._failure = ""
+        self._lock = threading.Lock()
+        self._starter = threading.Thread(target=self._start, name="start measuring", daemon=True)
+        self._starter.start()
+
+    def _start(self) -> None:
+        try:
+            with undisturbed():
+                self.process.start()
+        except OSError as error:
+            self._failure = f"Pictures cannot be measured in the background ({error.strerror or error})."
+        self._child_commands.close()  # the child has its own; ours would hide its end
+        self._child_events.close()
+        with self._lock:
+            if self._is_unwanted:
+                self._finish()
 
     def send(self, command: Command) -> None:
         """See `Measurer`."""
@@ -75,8 +93,11 @@ class MeasuringProcess:
 
     def poll(self) -> list[Event]:
         """See `Measurer`."""
-        if self._has_ended:
+        if self._has_ended or self._starter.is_alive():
             return []
+        if self._failure:
+            self._has_ended = True
+            return [Trouble(self._failure), MeasuringEnded()]
         is_alive = self.process.is_alive()  # asked before the pipe is drained, so that last words are not missed
         events: list[Event] = []
         with suppress(EOFError, OSError, msgspec.DecodeError):
@@ -92,8 +113,15 @@ class MeasuringProcess:
     def end(self) -> None:
         """See `Measurer`. Figures are written whole, one by one, so that nothing but the one at hand is lost."""
         self._has_ended = True
-        if self.process.is_alive():
+        with self._lock:
+            if not self._is_unwanted:
+                self._is_unwanted = True
+                if not self._starter.is_alive():
+                    self._finish()
+
+    def _finish(self) -> None:
+        if self.process.pid is not None:
             self.process.kill()
-        self.process.join(0.2)
+            self.process.join(END_TIMEOUT_S)
         self._commands.close()
         self._events.close()

@@ -153,8 +153,12 @@ class Talk:
         return True
 
 
+class _TrainedAgain(Exception):
+    """A clip was trained again meanwhile: what is loaded is of another version than what is on disk."""
+
+
 class _Clips:
-    """Clips and their kept figures, those used last."""
+    """Clips and their kept figures, those used last. Figures of one version never come under the name of another."""
 
     def __init__(self, opened: TrainedProject, job: MeasureJob, talk: Talking) -> None:
         self._opened, self._talk = opened, talk
@@ -162,12 +166,22 @@ class _Clips:
         self._is_kept = job.is_kept
         self._loaded: OrderedDict[int, TrainedClip] = OrderedDict()
         self._figures: OrderedDict[int, KeptFigures] = OrderedDict()
+        self._fingerprints: dict[int, str] = {}
+
+    def _check_version(self, clip_index: int) -> None:
+        """Raises _TrainedAgain where the file of a clip is not the one it was at first."""
+        found = self._opened.header(clip_index).fingerprint
+        if self._fingerprints.setdefault(clip_index, found) != found:
+            raise _TrainedAgain
 
     def load(self, clip_index: int) -> TrainedClip:
         if clip_index not in self._loaded:
             while len(self._loaded) >= MAX_CLIPS:
                 self._loaded.popitem(last=False)
-            self._loaded[clip_index] = self._opened.load(clip_index)
+            self._check_version(clip_index)
+            loaded = self._opened.load(clip_index)
+            self._check_version(clip_index)
+            self._loaded[clip_index] = loaded
         self._loaded.move_to_end(clip_index)
         return self._loaded[clip_index]
 
@@ -178,7 +192,11 @@ class _Clips:
         if clip_index not in self._figures:
             while len(self._figures) >= MAX_CLIPS:
                 self._figures.popitem(last=False)
-            self._figures[clip_index] = kept_figures(self._opened, self._scope, clip_index, self._talk.say)
+            figures = kept_figures(self._opened, self._scope, clip_index, self._talk.say)
+            before = self._scope.before(clip_index)
+            for index in (clip_index, *(() if before is None else (before,))):
+                self._check_version(index)
+            self._figures[clip_index] = figures
         return self._figures[clip_index]
 
 
@@ -206,6 +224,8 @@ def measure(job: MeasureJob, talk: Talking) -> None:
         except EngineError as error:
             talk.say(str(error))
             is_done = True  # as far as it can be
+        except _TrainedAgain:
+            is_done = True  # the window forgets its figures, and starts another process
         if is_done:
             left.discard(item)
 

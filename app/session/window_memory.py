@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import math
+import threading
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -29,6 +30,7 @@ MAX_SIDE_PX = 32_768
 MAX_WORD_CHARACTERS = 40
 MAX_LANES = 20
 SCHEMA = 1
+WRITING_TIMEOUT_S = 5.0
 
 
 @dataclass
@@ -65,6 +67,7 @@ class WindowMemory:
     views: dict[str, dict[str, Any]] = field(default_factory=dict)
     _saved: dict[str, Any] = field(default_factory=dict, repr=False)
     _has_failed: bool = False
+    _writing: threading.Thread | None = field(default=None, repr=False)
 
     def keep_view(self, folder: str, view: dict[str, Any]) -> None:
         """Keep what was looked at in a project; the one that was not used for longest is forgotten."""
@@ -74,8 +77,23 @@ class WindowMemory:
             del self.views[old]
 
     def save(self) -> None:
-        """Write the file if something changed. A disk that refuses costs the memory, nothing else."""
-        document = {
+        """Write the file now if something changed. A disk that refuses costs the memory, nothing else."""
+        if self._writing is not None:
+            self._writing.join(WRITING_TIMEOUT_S)
+        document = self._document()
+        if document != self._saved:
+            self._write(document)
+
+    def save_soon(self) -> None:
+        """The same on a thread: a disk that is busy with a training's files may take a second to be certain."""
+        document = self._document()
+        is_writing = self._writing is not None and self._writing.is_alive()
+        if document != self._saved and not is_writing:  # else the next time
+            self._writing = threading.Thread(target=self._write, args=(document,), name="window memory", daemon=True)
+            self._writing.start()
+
+    def _document(self) -> dict[str, Any]:
+        return {
             "schema": SCHEMA,
             "size": None if self.size is None else list(self.size),
             "is_maximized": self.is_maximized,
@@ -89,8 +107,8 @@ class WindowMemory:
             "folded_lanes": list(self.folded_lanes),
             "views": [{"project": folder, **view} for folder, view in self.views.items()],
         }
-        if document == self._saved:
-            return
+
+    def _write(self, document: dict[str, Any]) -> None:
         try:
             write_checked_json(self.path, document)
         except (OSError, EngineError) as error:

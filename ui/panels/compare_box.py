@@ -1,4 +1,4 @@
-"""The boxes in the toolbar that say how the rendered picture is compared, and with what."""
+"""The box in the toolbar that says how the rendered picture is compared, and with what."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from app.status import BLINK_HZ, CAPTURED, version_name
 from ui.panels.actions.action import ActionNeeds
 from ui.panels.actions.compare import COMPARE_WORDS, set_compare, set_other
 from ui.panels.clip_versions import VersionNeeds, version_text
-from ui.panels.comparison import other_label, shown_compare
+from ui.panels.comparison import shown_compare
 from ui.panels.state import Dispatch, UiState
+from ui.panels.widgets import box_flags
 
 SLIDER_WIDTH = 120.0
 
@@ -22,10 +23,10 @@ class CompareNeeds(ActionNeeds, VersionNeeds, Protocol):
 
 
 def draw_compare_box(session: CompareNeeds, dispatch: Dispatch, ui: UiState, width: float) -> None:
-    """All ways to compare, and everything to compare with, in one box: where there is no room for buttons."""
+    """All ways to compare, and everything to compare with, in one box. width: Units."""
     shown = shown_compare(session)
     imgui.set_next_item_width(width)
-    is_open = imgui.begin_combo("##compare", "Compare" if shown == "off" else COMPARE_WORDS[shown], _ROOMY)
+    is_open = imgui.begin_combo("##compare", "Compare" if shown == "off" else COMPARE_WORDS[shown], box_flags(width))
     ui.mark("viewport.compare")
     if not is_open:
         imgui.set_item_tooltip("Beside, over or in turn with another picture (G)")
@@ -35,18 +36,6 @@ def draw_compare_box(session: CompareNeeds, dispatch: Dispatch, ui: UiState, wid
             set_compare(session, dispatch, mode)
         ui.mark(f"viewport.compare.{mode}")
     imgui.separator()
-    _draw_others(session, dispatch, ui)
-    imgui.end_combo()
-
-
-def draw_other_box(session: CompareNeeds, dispatch: Dispatch, ui: UiState, width: float) -> None:
-    """What to compare with."""
-    imgui.set_next_item_width(width)
-    is_open = imgui.begin_combo("##other", other_label(session.overlays), _ROOMY)
-    ui.mark("viewport.other")
-    if not is_open:
-        imgui.set_item_tooltip("What the rendered picture is compared with; hold B to see it alone")
-        return
     _draw_others(session, dispatch, ui)
     imgui.end_combo()
 
@@ -83,5 +72,4 @@ def _draw_versions(session: CompareNeeds, dispatch: Dispatch, ui: UiState) -> No
         ui.mark(f"viewport.other.{other}")
 
 
-_ROOMY = imgui.ComboFlags_.height_largest
 _CLAMPED = imgui.SliderFlags_.always_clamp

@@ -10,6 +10,7 @@ from typing import Protocol
 from imgui_bundle import ImVec2, imgui
 
 from app.playback.color_maps import SIGNED
+from app.playback.course import Course
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.playback.view_modes import MODES, range_of
@@ -116,7 +117,7 @@ class Hud:
             return None
         rate, now_s = None, time.perf_counter()
         if timeline.is_playing and shown_frame is not None:  # a cloud stands still, whatever the playhead does
-            self._rate.note(shown_frame, timeline.n_frames, now_s)
+            self._rate.note(shown_frame, Course.of(timeline), now_s)
             rate = self._rate.rate(now_s, is_every_frame=timeline.is_every_frame)
         else:
             self._rate.stop()

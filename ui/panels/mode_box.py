@@ -9,6 +9,7 @@ from app.session.commands import SetContent, SetMode
 from ui.panels.actions.action import ActionNeeds
 from ui.panels.actions.modes import mode_key
 from ui.panels.state import Dispatch, UiState
+from ui.panels.widgets import box_flags
 from ui.style import theme
 
 
@@ -22,7 +23,7 @@ def draw_mode_box(session: ActionNeeds, dispatch: Dispatch, ui: UiState, width: 
     is_plain = overlays.mode == COLOR and overlays.content == ALL
     if not is_plain:  # what is seen is not the scene: that should be noticed
         imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.YELLOW))
-    is_open = imgui.begin_combo("##mode", words, imgui.ComboFlags_.height_largest)
+    is_open = imgui.begin_combo("##mode", words, box_flags(width))
     if not is_plain:
         imgui.pop_style_color()
     ui.mark("viewport.mode")

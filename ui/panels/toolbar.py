@@ -7,26 +7,27 @@ from typing import Protocol
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.playback.views import COUNTS
-from app.residuals.heat_map import HEAT_KINDS
-from app.session.commands import LookThrough, ShowHeat, ShowViews, ToggleOverlay
-from app.status import COMPARE_MODES
-from ui.panels.actions.compare import COMPARE_WORDS, cloud_overlay, set_compare
-from ui.panels.compare_box import CompareNeeds, draw_compare_box, draw_other_box
-from ui.panels.comparison import shown_compare
+from app.session.commands import LookThrough, ShowViews, ToggleOverlay
+from ui.panels.actions.compare import cloud_overlay
+from ui.panels.actions.view import next_layout
+from ui.panels.compare_box import CompareNeeds, draw_compare_box
+from ui.panels.heat_box import draw_heat_box
 from ui.panels.mode_box import draw_mode_box
 from ui.panels.navigation import ViewPopup
 from ui.panels.regions import begin_choosing
 from ui.panels.state import Dispatch, UiState
+from ui.panels.widgets import box_flags
 from ui.style import theme
 from ui.style.theme import Icon
 
 TOOLBAR_HEIGHT = 38.0
-TOOLBAR_WIDTH, TIGHT_WIDTH = 1180.0, 580.0
-"""With less room than the first, words give way to symbols; with less than the second, boxes are narrow, too."""
-MODE_WIDTHS, COMPARE_WIDTHS = (124.0, 108.0, 66.0), (130.0, 118.0, 66.0)
-"""Of the boxes of modes and of comparisons, from much room to little, units."""
-BESIDE_CAMERA = 268.0
-"""What the row needs beside these boxes and that of the camera where there is little room, units."""
+WORDY_WIDTH, LAYOUTS_WIDTH = 820.0, 520.0
+"""With less room than the first, words give way to symbols; with less than the second, so do the numbers of views."""
+WORDY, SYMBOLS = 264.0, 150.0
+"""What the buttons between the boxes and the numbers of views take, with words and without, units."""
+N_BOXES = 4
+LEAST_BOX, MOST_BOX = 46.0, 150.0
+GAP = 8.0
 MARK_SLIDER = imgui.SliderFlags_.always_clamp
 
 
@@ -40,12 +41,13 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, popup: 
     shown = session.view.look_through
     names = session.rig.names
     room = imgui.get_content_region_avail().x
-    is_roomy, row = room > TOOLBAR_WIDTH, (room <= TOOLBAR_WIDTH) + (room <= TIGHT_WIDTH)
+    is_wordy = room > WORDY_WIDTH
+    n_layouts = len(COUNTS) if room > LAYOUTS_WIDTH else 1
+    fixed = (WORDY if is_wordy else SYMBOLS) + n_layouts * (imgui.get_frame_height() + 2)
+    width = min(max((room - fixed) / N_BOXES - GAP, LEAST_BOX), MOST_BOX)
     imgui.align_text_to_frame_padding()
-    imgui.set_next_item_width(
-        150 if is_roomy else min(120, max(room - BESIDE_CAMERA - MODE_WIDTHS[row] - COMPARE_WIDTHS[row], 40))
-    )
-    if imgui.begin_combo("##camera", "Free" if shown is None else names[shown]):
+    imgui.set_next_item_width(width)
+    if imgui.begin_combo("##camera", "Free" if shown is None else names[shown], box_flags(width)):
         if imgui.selectable("Free", shown is None)[0]:
             dispatch(LookThrough(None))
         for index, name in enumerate(names):
@@ -60,33 +62,22 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, popup: 
         imgui.end_combo()
     ui.mark("viewport.camera")
     imgui.set_item_tooltip("Look through a capture camera ([ and ])")
-    imgui.same_line(0, 8)
-    draw_mode_box(session, dispatch, ui, MODE_WIDTHS[row])
-    imgui.same_line(0, 18 if is_roomy else 8)
-    if is_roomy:
-        imgui.text_disabled("Compare")
-        for mode in COMPARE_MODES:
-            imgui.same_line(0, 8 if mode == "off" else 2)
-            if _segment(COMPARE_WORDS[mode], shown_compare(session) == mode):
-                set_compare(session, dispatch, mode)
-            ui.mark(f"viewport.compare.{mode}")
-            imgui.set_item_tooltip("Beside, over or in turn with another picture (G)")
-        imgui.same_line(0, 6)
-        draw_other_box(session, dispatch, ui, COMPARE_WIDTHS[row])
-    else:
-        draw_compare_box(session, dispatch, ui, COMPARE_WIDTHS[row])
-    imgui.same_line(0, 18 if is_roomy else 8)
-    _draw_heat_box(session, dispatch, ui, is_roomy=is_roomy)
-    imgui.same_line(0, 8)
-    if imgui.button(f"{Icon.EYE}  Show" if is_roomy else f"{Icon.EYE}##show"):
+    imgui.same_line(0, GAP)
+    draw_mode_box(session, dispatch, ui, width)
+    imgui.same_line(0, GAP)
+    draw_compare_box(session, dispatch, ui, width)
+    imgui.same_line(0, GAP)
+    draw_heat_box(session, dispatch, ui, width)
+    imgui.same_line(0, GAP)
+    if imgui.button(f"{Icon.EYE}  Show" if is_wordy else f"{Icon.EYE}##show"):
         imgui.open_popup("overlays")
     ui.mark("viewport.overlays")
     _draw_overlay_menu(session, dispatch, ui)
-    imgui.same_line(0, 8)
+    imgui.same_line(0, GAP)
     popup.draw_button(session, dispatch, ui)
-    imgui.same_line(0, 8)
+    imgui.same_line(0, GAP)
     imgui.begin_disabled(not session.regions.can_mark)
-    if _segment(f"{Icon.REGION}  Mark" if is_roomy else Icon.REGION, ui.regions.is_active):
+    if _segment(f"{Icon.REGION}  Mark" if is_wordy else Icon.REGION, ui.regions.is_active):
         if ui.regions.is_active:
             ui.regions.leave()
         else:
@@ -96,48 +87,28 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, popup: 
     words = session.regions.why_not or "Say of a part of the scene that it is static, or that it moves (M)"
     if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_disabled):
         imgui.set_tooltip(words)
-    _draw_layouts(session, dispatch, ui)
+    _draw_layouts(session, dispatch, ui, n_layouts)
 
 
-def _draw_layouts(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    """How many views, at the right end where there is room."""
-    width = imgui.get_frame_height()
-    imgui.same_line()
-    left = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - len(COUNTS) * (width + 2) - 8
-    if left < imgui.get_cursor_pos_x():
+def _draw_layouts(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, n_buttons: int) -> None:
+    """How many views, at the right end; one button that goes on to the next number where there is little room."""
+    width, shown = imgui.get_frame_height(), session.views.n_shown
+    imgui.same_line(0, GAP)
+    free = imgui.get_content_region_avail().x - n_buttons * (width + 2) - GAP
+    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + max(free, 0.0))
+    if n_buttons == 1:
+        if imgui.button(f"{shown}##views", ImVec2(width, 0)):
+            next_layout(session, dispatch, ui)
+        ui.mark("viewport.views")
+        imgui.set_item_tooltip("One, two or four views (V)")
         return
-    imgui.set_cursor_pos_x(left)
     for n in COUNTS:
-        if _segment(f"{n}##views", session.views.n_shown == n, width):
+        if _segment(f"{n}##views", shown == n, width):
             dispatch(ShowViews(n))
         ui.mark(f"viewport.views{n}")
         imgui.set_item_tooltip(f"{n} view{'s' if n > 1 else ''} (V)")
         imgui.same_line(0, 2)
     imgui.new_line()
-
-
-def _draw_heat_box(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, *, is_roomy: bool) -> None:
-    """Which residual is shown over the picture, and how strongly."""
-    overlays = session.overlays
-    imgui.set_next_item_width(132 if is_roomy else 64)
-    shown = HEAT_KINDS[overlays.heat].label if overlays.heat else "Heat map"
-    if imgui.begin_combo("##heat", shown, imgui.ComboFlags_.height_large):
-        if imgui.selectable("None", not overlays.heat)[0]:
-            dispatch(ShowHeat(""))
-        ui.mark("viewport.heat.none")
-        for kind in HEAT_KINDS.values():
-            if imgui.selectable(kind.label, overlays.heat == kind.name)[0]:
-                dispatch(ShowHeat(kind.name))
-            ui.mark(f"viewport.heat.{kind.name}")
-            imgui.set_item_tooltip(kind.meaning)
-        imgui.separator()
-        imgui.set_next_item_width(150)
-        percent = imgui.slider_float("Opacity", overlays.heat_opacity * 100.0, 10.0, 100.0, "%.0f %%", MARK_SLIDER)[1]
-        overlays.heat_opacity = percent / 100.0
-        ui.mark("viewport.heat.opacity")
-        imgui.end_combo()
-    ui.mark("viewport.heat")
-    imgui.set_item_tooltip("Where the render differs, from the frame before or from what the camera took (7)")
 
 
 def _draw_overlay_menu(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -> None:

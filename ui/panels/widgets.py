@@ -9,6 +9,9 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from ui.panels.state import Rect, UiState
 from ui.style import theme
 
+LEAST_WITH_ARROW = 92.0
+"""Boxes narrower than this do without an arrow, units."""
+
 
 def text_right(text: str, color: theme.Color = theme.TEXT_DIM) -> None:
     """Text at the right end of the current line, pushed right rather than overlapping what is there."""
@@ -82,3 +85,9 @@ def _longest_fit(text: str, width: float, cut: Callable[[int], str]) -> str:
         else:
             too_long = middle
     return cut(fits)
+
+
+def box_flags(width: float) -> int:
+    """Of a box of choices in a row of them: all choices at once, and no arrow where its word needs the room."""
+    flags = int(imgui.ComboFlags_.height_largest)
+    return flags if width >= LEAST_WITH_ARROW else flags | int(imgui.ComboFlags_.no_arrow_button)

@@ -68,15 +68,20 @@ class Remembering:
             if folder in memory.views:
                 show_again(session, memory.views[folder])
         if time.perf_counter() - self._saved_s >= SAVE_AFTER_S:
-            self.save(session)
+            self._keep(session)
+            memory.save_soon()
         elif folder is not None:
             memory.keep_view(folder, view_of(session))
 
     def save(self, session: RememberNeeds) -> None:
         """Keep everything now."""
+        if self._memory is not None:
+            self._keep(session)
+            self._memory.save()
+
+    def _keep(self, session: RememberNeeds) -> None:
         memory = self._memory
-        if memory is None:
-            return
+        assert memory is not None
         self._saved_s = time.perf_counter()
         if self._folder is not None and self._folder == _folder_of(session):
             memory.keep_view(self._folder, view_of(session))
@@ -86,7 +91,6 @@ class Remembering:
         memory.navigation, memory.is_motion_reduced = navigation.preset.name, navigation.is_motion_reduced
         memory.mark_size, memory.mark_opacity = session.overlays.mark_size, session.overlays.mark_opacity
         memory.time_unit, memory.folded_lanes = self._ui.timeline.unit, tuple(sorted(self._ui.timeline.folded))
-        memory.save()
 
 
 def _folder_of(session: RememberNeeds) -> str | None:

@@ -105,16 +105,20 @@ def hud_text(
         pending=pending,
         failure=failure,
         note=_note(shown, wanted, state, state_words),
-        rate="" if rate is None else rate_text(rate, fps),
+        rate="" if rate is None else rate_text(rate),
     )
 
 
-def rate_text(rate: ShownRate, fps: float) -> str:
-    """How fast pictures really follow each other, and whether all frames are among them."""
-    words = f"{'–' if rate.per_s is None else f'{rate.per_s:.1f}'} of {fps:g} fps"
+def rate_text(rate: ShownRate) -> str:
+    """How fast pictures really follow each other, and how many of the frames are among them."""
+    words = f"{'–' if rate.per_s is None else f'{rate.per_s:.1f}'} of {rate.wanted_per_s:g} fps"
     if rate.is_every_frame:
         return f"{words}, every frame"
-    return f"{words}, frames skipped" if rate.has_skipped else words
+    if rate.every_nth > 1:
+        is_teen = rate.every_nth % 100 in (11, 12, 13)
+        ending = "th" if is_teen else {1: "st", 2: "nd", 3: "rd"}.get(rate.every_nth % 10, "th")
+        return f"{words}, every {rate.every_nth}{ending} frame"
+    return f"{words}, some frames skipped" if rate.has_skipped else words
 
 
 def captured_words(has_scene_colors: bool) -> str:

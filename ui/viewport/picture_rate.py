@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+from app.playback.course import Course
 
 WINDOW_S = 2.0
 """The rate is that of the last seconds."""
@@ -18,12 +20,16 @@ class ShownRate:
     Attributes:
         per_s: Pictures per second; None before there was time to count.
         has_skipped: Whether frames were left out between them.
+        every_nth: Of the frames that were to be played, one in about so many was shown.
+        wanted_per_s: How many there would be if none was left out.
         is_every_frame: Whether playback waits for each frame.
     """
 
     per_s: float | None
     has_skipped: bool = False
     is_every_frame: bool = False
+    every_nth: int = 1
+    wanted_per_s: float = 30.0
 
 
 class PictureRate:
@@ -33,27 +39,29 @@ class PictureRate:
         self._started_s: float | None = None
         self._before_s = 0.0  # the last change before those that are counted
         self._frame: int | None = None
-        self._changes: deque[tuple[float, bool]] = deque()
+        self._changes: deque[tuple[float, int]] = deque()  # when, and how many frames on
+        self._wanted_per_s = 30.0
 
     def stop(self) -> None:
         """Playback has ended; the next note begins anew."""
         self._started_s, self._frame = None, None
         self._changes.clear()
 
-    def note(self, frame_index: int, n_frames: int, now_s: float) -> None:
+    def note(self, frame_index: int, course: Course, now_s: float) -> None:
         """A picture of this frame is on screen now, whether it is another one or not.
 
         Args:
-            n_frames: Of the capture: after the last one comes the first.
+            course: What is played, in which direction and how fast.
             now_s: Seconds of a clock that never goes back.
         """
+        self._wanted_per_s = course.frames_per_s
         if self._started_s is None or self._frame is None:
             self._started_s = self._before_s = now_s
             self._frame = frame_index
             return
         if frame_index != self._frame:
-            has_skipped = frame_index != (self._frame + 1) % max(n_frames, 1)
-            self._changes.append((now_s, has_skipped))
+            steps = replace(course, frame_index=self._frame, is_playing=True).distance(frame_index)
+            self._changes.append((now_s, round(steps)))
             self._frame = frame_index
 
     def rate(self, now_s: float, *, is_every_frame: bool = False) -> ShownRate:
@@ -62,11 +70,12 @@ class PictureRate:
         while recent and recent[0][0] <= now_s - WINDOW_S:
             self._before_s = recent.popleft()[0]
         if self._started_s is None or now_s - self._started_s < LEAST_S:
-            return ShownRate(None, is_every_frame=is_every_frame)
+            return ShownRate(None, is_every_frame=is_every_frame, wanted_per_s=self._wanted_per_s)
         if not recent:
-            return ShownRate(0.0, is_every_frame=is_every_frame)
+            return ShownRate(0.0, is_every_frame=is_every_frame, wanted_per_s=self._wanted_per_s)
         # From change to change, so that where the window happens to begin does not matter; what is late counts.
         seconds = recent[-1][0] - self._before_s
         late_s = now_s - recent[-1][0] - seconds / len(recent)
         per_s = len(recent) / max(seconds + max(late_s, 0.0), 1e-3)
-        return ShownRate(per_s, any(has_skipped for _, has_skipped in recent), is_every_frame)
+        steps = [n for _, n in recent]
+        return ShownRate(per_s, max(steps) > 1, is_every_frame, round(sum(steps) / len(steps)), self._wanted_per_s)

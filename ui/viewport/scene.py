@@ -322,6 +322,7 @@ class Scene:
             return None, shown
         if self._picture.set(picture.image, key=picture.key) and picture.duration_s > 0:
             self._moving_size.note_picture(picture.size[0] / full_size[0], picture.duration_s * 1e3)
+        self._picture.fit((view.width, view.height))
         self._picture_key, self._values = picture.key, picture.values
         is_coarse = is_quick and picture.size[0] < full_size[0] and not timeline.is_playing
         return picture.key, replace(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 import threading
 
@@ -28,6 +29,20 @@ def test_only_the_calling_thread_steps_back() -> None:
     thread.join()
     assert seen == [wanted]
     assert os.getpriority(os.PRIO_PROCESS, threading.main_thread().native_id or 0) == before
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only Linux has a class for what nobody waits for")
+def test_an_idle_process_and_its_threads_compute_with_what_nobody_else_wants() -> None:
+    code = """
+import os, threading
+from app.background.priority import idle_process
+idle_process()
+show = lambda: print(os.getpriority(os.PRIO_PROCESS, 0), os.sched_getscheduler(0) == os.SCHED_IDLE)
+show()
+thread = threading.Thread(target=show); thread.start(); thread.join()
+"""
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert said.splitlines() == ["19 True", "19 True"]
 
 
 def test_the_spacing_of_a_grid_is_its_step() -> None:

@@ -143,3 +143,25 @@ def test_a_place_that_is_no_more_is_forgotten(screen: Screen):
     assert screen.playback.cached_frames() == [], "for a while it may only be late"
     screen.turns(MOST_UNASKED, draws=False, is_busy=True)
     assert screen.playback.cached_frames() == [(0, 6)], "nobody asks for pictures: what is decoded is ready"
+
+
+def test_captured_pictures_that_are_compared_come_ahead_while_it_plays(screen: Screen):
+    playback = screen.playback
+
+    def turn() -> None:
+        playback.compared_picture(screen.timeline, 1, 640)
+        screen.turn()
+        assert playback.captured.viewing.wait_idle(WAIT_S)
+
+    turn()
+    assert playback.captured.viewing.n_ahead == 0
+    screen.timeline.toggle_play()
+    for _ in range(3):
+        turn()
+    assert playback.captured.viewing.n_ahead == screen.timeline.n_frames - 1
+    for frame in range(screen.timeline.n_frames):
+        screen.timeline.seek(frame)
+        picture = playback.compared_picture(screen.timeline, 1, 640)
+        assert picture is not None
+        assert (picture.is_stale, picture.source.frame_index) == (False, frame)
+    assert playback.take_failures() == []

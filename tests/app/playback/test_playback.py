@@ -73,7 +73,6 @@ def test_a_trained_frame_comes_at_a_later_call_and_says_what_it_is(shown: Shown,
         shown.train(opened, index)
     shown.timeline.seek(4)
     assert shown.playback.frame(shown.timeline) is None
-    assert not shown.playback.is_loaded(shown.timeline)
     shown.wait()
     frame = shown.playback.frame(shown.timeline)
     assert frame is not None
@@ -131,7 +130,6 @@ def test_the_next_project_shows_nothing_of_the_one_before(shown: Shown, make_ope
     assert shown.playback.captured_picture(1, 0, 640) is not None
     shown.open(second)
     shown.train(second, 0)  # the same revision of the same clip
-    assert not shown.playback.is_loaded(shown.timeline)
     assert shown.playback.frame(shown.timeline) is None
     assert shown.playback.render(shown.timeline, shown.view, *SIZE) is None
     assert shown.playback.captured_picture(1, 0, 640) is None

@@ -20,6 +20,7 @@ from app.residuals.measuring_order import Look
 from app.residuals.measuring_process import DIED, MeasuringProcess
 from app.status import CELL_COLUMNS, ResidualStatus
 from tests.app.residuals.conftest import DEADLINE_S, Opened, color
+from tests.app.residuals.test_measuring_worker import job_of
 
 
 class FakeMeasurer:
@@ -268,6 +269,7 @@ def test_a_process_that_is_killed_is_told_once_and_nothing_is_lost(open_residual
     opened = open_residuals(launch=launch)
     opened.residuals.look_at(opened.timeline, None)
     poll_until(opened, lambda status: status.is_measuring)
+    made[0]._starter.join(DEADLINE_S)
     pid = made[0].process.pid
     assert pid is not None
     os.kill(pid, signal.SIGKILL)
@@ -287,3 +289,27 @@ def test_a_capture_that_disappears_is_told(open_residuals, project):
     status = poll_until(opened, lambda status: not status.is_measuring)
     assert "ring" in status.message
     assert status.n_done == 0
+
+
+def test_a_process_that_is_not_wanted_any_more_while_it_starts_is_ended(project):
+    process = MeasuringProcess(job_of(project, rows=np.zeros((6, 4), bool), pairs=np.zeros((6, 4), bool)))
+    process.end()
+    process.end()
+    process._starter.join(DEADLINE_S)
+    process.process.join(DEADLINE_S)
+    assert not process.process.is_alive()
+    assert process.poll() == []
+
+
+def test_a_process_that_cannot_be_started_is_told(project, monkeypatch):
+    def refuse(process) -> None:
+        raise OSError(12, "Cannot allocate memory")
+
+    monkeypatch.setattr("multiprocessing.context.SpawnProcess.start", refuse)
+    process = MeasuringProcess(job_of(project))
+    process._starter.join(DEADLINE_S)
+    assert process.poll() == [
+        Trouble("Pictures cannot be measured in the background (Cannot allocate memory)."),
+        MeasuringEnded(),
+    ]
+    process.end()

@@ -28,6 +28,8 @@ from app.residuals.measuring_messages import (
 )
 from app.residuals.measuring_order import Look, first_item
 from app.residuals.measuring_worker import ParentGone, Talk, measure
+from engine.clip_files.clip_state import read_clip_state
+from tests.app.residuals.conftest import color
 
 
 class Heard:
@@ -150,6 +152,33 @@ def test_what_the_user_looks_at_comes_first_even_in_the_middle(project):
     assert order[0] == (0, 2)
     assert order[1] == (1, 3), "at once, not after the clip that was begun"
     assert len(heard.rows) == 24 == len(set(heard.rows))
+
+
+class Retraining(Heard):
+    """A clip is trained again before its first picture is measured."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(Look(1))
+        self._path: Path | None = path
+
+    def send(self, event) -> None:
+        super().send(event)
+        if self._path is not None:
+            reference = read_clip_state(self._path.with_name("0000.safetensors")).header.fingerprint
+            color(self._path, seed=8, reference=reference)
+            self._path = None
+
+
+def test_figures_of_one_version_are_not_kept_under_the_name_of_another(project, monkeypatch):
+    monkeypatch.setattr(measuring_worker, "MAX_CLIPS", 1)  # everything is read again and again
+    path = project / "clips" / "0001.safetensors"
+    heard = Retraining(path)
+    measure(job_of(project), heard)
+    assert {0, 1, 2} <= {frame for frame, _ in heard.rows}
+    opened = open_trained(open_project(project, is_writable=False))
+    kept = list(read_kept(opened, [0, 1], [1], nothing_left))
+    assert [found.rows for found in kept] == [[]]
+    assert not [event for event in heard.events if isinstance(event, Trouble)]
 
 
 def test_a_damaged_clip_costs_itself_alone(project):

@@ -9,8 +9,10 @@ from app.residuals import measuring
 from app.residuals.figures import RowFigures
 from app.residuals.measuring_messages import Measured
 from app.session.commands import SetClipLength, TrainClip, TrainNextClip
+from app.training import run
 from engine.clip_files.clip_state import read_clip_state, write_clip_state
-from tests.app.conftest import poll_until
+from tests.app.conftest import DEADLINE_S, poll_until
+from tests.app.fakes import make_slow
 from tests.app.residuals.test_measuring import Launched
 from tests.clip_headers import with_header
 
@@ -87,3 +89,31 @@ def test_a_clip_that_cannot_be_read_is_told_once_and_marked(open_session, launch
     for _ in range(5):
         session.poll()
     assert len(session.notices) == 1
+
+
+def test_a_clip_has_heat_while_it_trains_and_what_is_gone_is_no_fault(make_session, monkeypatch):
+    monkeypatch.setattr(run, "SNAPSHOT_EVERY_S", 0.0)
+    monkeypatch.setattr(run, "SNAPSHOT_SHARE", 1.0)
+    session = make_session(make_training=make_slow)
+    session.dispatch(TrainNextClip())
+    seen = []
+
+    def is_another_shown() -> bool:
+        session.shown_gaussians()  # the window reads it, so that the next one comes
+        heat = session.residuals.heat(session.timeline, 1, "error")
+        if heat is not None and heat.values is not None and heat.key not in seen:
+            seen.append(heat.key)
+        return len(seen) >= 3
+
+    poll_until(session, is_another_shown, what="heat of three live states")
+    assert all(key.main.revision.startswith("live-") for key in seen)
+    assert len({key.main.revision for key in seen}) == 3
+    session.residuals._heat.worker.forget()
+    for path in session.project.live_dir.iterdir():
+        path.write_bytes(b"gone")
+    monkeypatch.setattr(session.playback.decoder, "loaded", lambda request: None)
+    session.timeline.seek(1)
+    session.residuals.heat(session.timeline, 2, "error")
+    assert session.residuals._heat.worker.wait_idle(DEADLINE_S)
+    session.poll()
+    assert not any(notice.title == "The residual cannot be shown" for notice in session.notices)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import threading
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+import app.session.window_memory
 from app.session.window_memory import MAX_PROJECTS, WindowMemory, read_window_memory, show_again, view_of
 from tests.ui.fake_session import FakeSession
 
@@ -120,3 +123,24 @@ def test_a_disk_that_refuses_costs_no_more_than_the_memory(tmp_path: Path) -> No
     memory = WindowMemory(tmp_path / "file" / "window.json")
     memory.keep_view("/project", {})
     memory.save()
+
+
+def test_saving_soon_waits_for_no_disk_and_loses_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module, began, go_on = app.session.window_memory, threading.Event(), threading.Event()
+    write = module.write_checked_json
+
+    def slow(path: Path, document: dict[str, Any]) -> None:
+        began.set()
+        assert go_on.wait(20.0)
+        write(path, document)
+
+    monkeypatch.setattr(module, "write_checked_json", slow)
+    memory = WindowMemory(tmp_path / "window.json", mark_size=1.0)
+    memory.save_soon()
+    assert began.wait(20.0)
+    memory.mark_size = 2.0
+    memory.save_soon()  # the first one is still being written
+    assert not memory.path.exists()
+    go_on.set()
+    memory.save()
+    assert read_window_memory(memory.path).mark_size == 2.0

@@ -86,3 +86,19 @@ def test_picture_fills_its_rectangle_and_nothing_else(ctx: moderngl.Context, kee
     row = read_color(target)[5]
     np.testing.assert_allclose(row[10:30], np.tile([0.2, 0.2, 0.2, 1.0], (20, 1)), atol=1e-6)
     assert np.flatnonzero(row[:, 3] == 0).tolist() == [*range(10), *range(30, 40)]
+
+
+def test_pixel_for_pixel_nothing_is_interpolated(ctx: moderngl.Context, keep: Keep) -> None:
+    picture = keep(ImageTexture(ctx))
+    picture.fit((5, 7))  # before there is one
+    picture.set(np.zeros((7, 5, 3), np.uint8))
+    smooth, sharp = (moderngl.LINEAR, moderngl.LINEAR), (moderngl.NEAREST, moderngl.NEAREST)
+    assert picture.texture.filter == smooth
+    picture.fit((5, 7))
+    assert picture.texture.filter == sharp
+    picture.fit((10, 14))
+    assert picture.texture.filter == smooth
+    squares = keep(ImageTexture(ctx, is_smooth=False))
+    squares.set(np.zeros((7, 5, 3), np.uint8))
+    squares.fit((10, 14))
+    assert squares.texture.filter == sharp

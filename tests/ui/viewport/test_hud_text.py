@@ -139,15 +139,20 @@ def test_a_cloud_in_place_of_a_trained_picture_says_so():
 
 def test_while_playing_the_label_names_both_frames_and_the_rate_is_told():
     shown = showing(frame_index=3, is_on_its_way=True)
-    text = text_of(shown, replace(WANTED, frame_index=5), rate=ShownRate(4.0, has_skipped=True))
+    text = text_of(
+        shown, replace(WANTED, frame_index=5), rate=ShownRate(4.0, has_skipped=True, every_nth=2, wanted_per_s=10.0)
+    )
     assert "frame 3 (playhead 5)   0.30 s" in text.label
-    assert (text.pending, text.rate) == ("", "4.0 of 10 fps, frames skipped")
+    assert (text.pending, text.rate) == ("", "4.0 of 10 fps, every 2nd frame")
 
 
 def test_rates():
-    assert rate_text(ShownRate(None), 30.0) == "– of 30 fps"
-    assert rate_text(ShownRate(29.5), 29.97) == "29.5 of 29.97 fps"
-    assert rate_text(ShownRate(4.0, is_every_frame=True), 30.0) == "4.0 of 30 fps, every frame"
+    assert rate_text(ShownRate(None)) == "– of 30 fps"
+    assert rate_text(ShownRate(29.5, wanted_per_s=29.97)) == "29.5 of 29.97 fps"
+    assert rate_text(ShownRate(4.0, is_every_frame=True)) == "4.0 of 30 fps, every frame"
+    assert rate_text(ShownRate(28.0, has_skipped=True)) == "28.0 of 30 fps, some frames skipped"
+    assert rate_text(ShownRate(5.0, has_skipped=True, every_nth=6)) == "5.0 of 30 fps, every 6th frame"
+    assert rate_text(ShownRate(10.0, has_skipped=True, every_nth=3)) == "10.0 of 30 fps, every 3rd frame"
 
 
 def test_compared_pictures_of_different_frames_never_share_a_label():
