@@ -43,7 +43,7 @@ class SequenceRequest:
     catalog: ClipCatalog = field(compare=False)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Kinds:
     """A plan for every kind of clip.
 
@@ -53,6 +53,9 @@ class Kinds:
 
     plans: Mapping[Kind, TrainingPlan]
     free_mb: float | None = None
+
+
+NO_KINDS, NOTHING = Kinds({}), SequenceForecast(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,10 +86,8 @@ def clip_forecast(plan: TrainingPlan | None, record: ClipRecord, *, begins_afres
     return ClipForecast(n_steps, seconds, plan.disk_mb.value)
 
 
-def sequence_forecast(parts: Sequence[ClipForecast]) -> SequenceForecast | None:
-    """All of them together; None of none."""
-    if not parts:
-        return None
+def together(parts: Sequence[ClipForecast]) -> SequenceForecast:
+    """All of them, one after the other."""
     return SequenceForecast(
         len(parts),
         sum(part.n_steps for part in parts),
@@ -95,9 +96,31 @@ def sequence_forecast(parts: Sequence[ClipForecast]) -> SequenceForecast | None:
     )
 
 
+def sequence_forecast(going: Sequence[ClipForecast], later: SequenceForecast) -> SequenceForecast | None:
+    """The clip that trains, if any, and what comes after it; None of nothing."""
+    if not going and not later.n_clips:
+        return None
+    now = together(going)
+    return SequenceForecast(
+        now.n_clips + later.n_clips,
+        now.n_steps + later.n_steps,
+        _sum([now.seconds, later.seconds]),
+        _sum([now.disk_mb, later.disk_mb]),
+    )
+
+
 def _sum(values: Sequence[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return sum(known) if len(known) == len(values) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """What waits and what is left, without the clip that trains."""
+
+    clips: tuple[QueuedClip, ...] = ()
+    queued: SequenceForecast = NOTHING
+    everything: SequenceForecast = NOTHING
 
 
 class SequencePlan:
@@ -106,7 +129,8 @@ class SequencePlan:
     def __init__(self) -> None:
         self._worker: LatestWorker[SequenceRequest, Kinds] = LatestWorker("sequence", _kinds)
         self._parts: list[ClipForecast] = []
-        self._parts_of: tuple[object, ...] = ()
+        self._kept = Waiting()
+        self._waiting_of: tuple[object, ...] = ()
 
     @property
     def newest(self) -> tuple[SequenceRequest, Kinds] | None:
@@ -126,60 +150,65 @@ class SequencePlan:
         is_known = newest is not None and newest[0].basis == basis and (newest[0].can_measure or not can_measure)
         if not is_known:
             self._worker.request(request)
-        kinds = Kinds({}) if newest is None or newest[0].project is not project else newest[1]
-        parts = self._clip_parts(service, project, kinds)
-        running = service.running_clip
-        if running is not None:
-            parts = [*parts]
-            parts[running] = _running_part(service, parts[running])
-        waiting = tuple(service.queue)
-        on_its_way = [parts[index] for index in (*(() if running is None else (running,)), *waiting)]
-        due = {*service.unfinished, *waiting, *(() if running is None else (running,))}
-        status, steps_done = service.steps_of_run, service.queue.steps_done
-        n_left = sum(part.n_steps for part in on_its_way)
+        kinds = NO_KINDS if newest is None or newest[0].project is not project else newest[1]
+        running, steps = service.running_clip, service.steps_of_run
+        waiting = self._waiting(service, project, kinds)
+        going = () if running is None else (_running_part(service, self._parts[running]),)
+        queued, everything = sequence_forecast(going, waiting.queued), sequence_forecast(going, waiting.everything)
+        n_done = service.queue.steps_done + steps[0]
         return QueueStatus(
-            waiting=tuple(
-                QueuedClip(
-                    index, parts[index].n_steps, parts[index].seconds, service.queue.own_settings(index) is not None
-                )
-                for index in waiting
-            ),
+            waiting=waiting.clips,
             failed=tuple(sorted(service.queue.failed.items())),
-            is_held=service.queue.is_held and bool(waiting),
+            is_held=service.queue.is_held and bool(waiting.clips),
             is_ending_after=service.is_ending_after,
-            queued=sequence_forecast(on_its_way),
-            everything=sequence_forecast([parts[index] for index in sorted(due)]),
-            progress=(steps_done + status[0]) / max(steps_done + status[0] + n_left, 1),
+            queued=queued,
+            everything=everything,
+            progress=n_done / max(n_done + (0 if queued is None else queued.n_steps), 1),
             n_done=service.queue.n_done,
             free_mb=kinds.free_mb,
             live_view=service.live_view,
         )
 
-    def _clip_parts(self, service: TrainingService, project: Project, kinds: Kinds) -> list[ClipForecast]:
-        """One per clip, as if none trained; made anew only when something has changed, since clips may be thousands."""
-        own = tuple(index for index in service.queue if service.queue.own_settings(index) is not None)
-        parts_of = (id(service), service.catalog.revision, id(kinds.plans) if kinds.plans else 0, own)
-        if parts_of != self._parts_of:
-            self._parts_of = parts_of
-            settings, config = project.settings, project.settings.config()
-            self._parts = [
-                clip_forecast(
-                    kinds.plans.get((is_source(settings, config, clip.clip_index), clip.n_frames)),
-                    service.catalog[clip.clip_index],
-                    begins_afresh=clip.clip_index in own,
-                )
-                for clip in service.clips
-            ]
-        return self._parts
+    def _waiting(self, service: TrainingService, project: Project, kinds: Kinds) -> Waiting:
+        """What does not depend on the clip that trains; made anew only when something has changed, since clips may be
+        thousands and this is asked for at every change of the picture."""
+        queue, running = service.queue, service.running_clip
+        clips = tuple(queue)
+        own = tuple(index for index in clips if queue.own_settings(index) is not None)
+        waiting_of = (id(service), service.catalog.revision, kinds, running, clips, own)
+        if waiting_of == self._waiting_of:
+            return self._kept
+        self._waiting_of = waiting_of
+        parts = self._parts = _clip_parts(service, project, kinds, own)
+        due = {*service.unfinished, *clips} - {running}
+        self._kept = Waiting(
+            tuple(QueuedClip(index, parts[index].n_steps, parts[index].seconds, index in own) for index in clips),
+            together([parts[index] for index in clips]),
+            together([parts[index] for index in sorted(due)]),
+        )
+        return self._kept
 
     def forget(self) -> None:
         """Another capture was opened."""
         self._worker.forget()
-        self._parts_of = ()
+        self._waiting_of = ()
 
     def close(self) -> None:
         """End the thread; it may be waiting for a child process that times the machine, so not for long."""
         self._worker.close(timeout_s=0.2)
+
+
+def _clip_parts(service: TrainingService, project: Project, kinds: Kinds, own: Sequence[int]) -> list[ClipForecast]:
+    """One per clip, as if none trained. own: Those that begin afresh, with settings of their own."""
+    settings, config = project.settings, project.settings.config()
+    return [
+        clip_forecast(
+            kinds.plans.get((is_source(settings, config, clip.clip_index), clip.n_frames)),
+            service.catalog[clip.clip_index],
+            begins_afresh=clip.clip_index in own,
+        )
+        for clip in service.clips
+    ]
 
 
 def _running_part(service: TrainingService, whole: ClipForecast) -> ClipForecast:

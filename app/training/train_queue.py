@@ -27,6 +27,7 @@ class TrainQueue:
 
     def __init__(self) -> None:
         self._clips: list[int] = []
+        self._waiting: set[int] = set()  # the same: they may be thousands
         self._own: dict[int, OwnSettings] = {}
         self.is_held = False
         self.failed: dict[int, str] = {}
@@ -39,7 +40,7 @@ class TrainQueue:
         return len(self._clips)
 
     def __contains__(self, clip_index: object) -> bool:
-        return clip_index in self._clips
+        return clip_index in self._waiting
 
     def own_settings(self, clip_index: int) -> OwnSettings | None:
         """Settings that a waiting clip was given; None for those of its project."""
@@ -49,32 +50,35 @@ class TrainQueue:
         """Let a clip wait behind the others. One that waits keeps its place and takes over the settings."""
         if own is not None:
             self._own[clip_index] = dict(own)
-        if clip_index not in self._clips:
+        if clip_index not in self._waiting:
             self._clips.append(clip_index)
+            self._waiting.add(clip_index)
 
     def take(self) -> tuple[int, OwnSettings | None]:
         """The first clip and its settings; it waits no more. The queue must not be empty."""
         clip_index = self._clips.pop(0)
+        self._waiting.discard(clip_index)
         self.failed.pop(clip_index, None)
         return clip_index, self._own.pop(clip_index, None)
 
     def move(self, clip_index: int, position: int) -> None:
         """Put a waiting clip at a position, counted from 0 without it; held inside the queue."""
-        if clip_index in self._clips:
+        if clip_index in self._waiting:
             self._clips.remove(clip_index)
             self._clips.insert(min(max(position, 0), len(self._clips)), clip_index)
 
     def remove(self, clip_index: int) -> None:
         """Let a clip wait no more, if it does."""
-        if clip_index in self._clips:
+        if clip_index in self._waiting:
             self._clips.remove(clip_index)
+            self._waiting.discard(clip_index)
         self._own.pop(clip_index, None)
         if not self._clips:
             self.is_held = False
 
     def clear(self) -> None:
         """Let none wait."""
-        self._clips, self._own, self.is_held = [], {}, False
+        self._clips, self._waiting, self._own, self.is_held = [], set(), {}, False
 
     def note_end(self, n_steps: int) -> None:
         """A clip ended, whichever way."""

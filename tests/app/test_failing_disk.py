@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from app.project.clip_versions import list_versions
 from app.training import keeping
 from app.training import messages as m
 from app.training.messages import Pause, SnapshotConsumed, Stop
@@ -109,6 +110,38 @@ def test_a_clip_that_cannot_be_put_in_its_place_is_a_checkpoint_until_it_can(ben
     assert it.steps(20) is False
     assert isinstance(it.events[-1], m.ClipTrained)
     assert not it.checkpoint.exists()
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EROFS])
+def test_a_finished_clip_stays_where_it_cannot_be_kept_as_a_version(bench, monkeypatch, number):
+    it = bench(n_steps=5)
+    assert it.steps(20) is False
+    before = it.project.clip_path(0).read_bytes()
+    it._n_steps = 8
+    it.start()
+    is_full = [True]
+    link, copy = os.link, shutil.copy2
+
+    def refuse(instead):
+        def act(source, target, **options):
+            if is_full[0]:
+                raise OSError(number, os.strerror(number), str(target))
+            return instead(source, target, **options)
+
+        return act
+
+    monkeypatch.setattr("os.link", refuse(link))
+    monkeypatch.setattr("shutil.copy2", refuse(copy))
+    assert it.steps(12) is True
+    assert it.project.clip_path(0).read_bytes() == before
+    assert read_clip_state(it.checkpoint).header.step == 8
+    (told,) = it.of(m.WarningRaised)
+    assert "The earlier version of the clip could not be written" in told.detail
+    is_full[0] = False
+    assert it.steps(20) is False
+    (version,) = list_versions(it.project, 0)
+    assert version.path.read_bytes() == before
+    assert read_clip_state(it.project.clip_path(0)).header.step == 8
 
 
 def test_without_a_window_it_gives_up_after_some_tries_and_the_same_command_finishes(bench, monkeypatch):

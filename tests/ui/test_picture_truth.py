@@ -208,7 +208,7 @@ def test_table_legend_and_arrays_count_the_same_anchors(window: Pilot) -> None:
 
 def test_playing_every_frame_shows_each_one(window: Pilot) -> None:
     show_frame(window, 0)
-    window.key(key.E)
+    window.key(key.SPACE, modifiers=(key.LSHIFT,))
     window.key(key.SPACE)
     seen: list[int] = []
 

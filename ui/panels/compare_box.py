@@ -19,7 +19,7 @@ SLIDER_WIDTH = 120.0
 
 
 class CompareNeeds(ActionNeeds, VersionNeeds, Protocol):
-    """What the boxes read."""
+    """What the box reads."""
 
 
 def draw_compare_box(session: CompareNeeds, dispatch: Dispatch, ui: UiState, width: float) -> None:

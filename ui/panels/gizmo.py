@@ -13,7 +13,7 @@ from ui.style import theme
 
 RADIUS, TIP_RADIUS, MARGIN = 32.0, 9.0, 10.0
 SIZE = 2 * (RADIUS + TIP_RADIUS)
-SMALLEST_AREA = 240.0
+SMALLEST_AREA = 190.0
 """In a picture with a shorter side than this it would only be in the way; units."""
 COLORS = (theme.VERMILLION, theme.GREEN, theme.SKY)
 LETTERS = ("X", "Y", "Z")

@@ -169,6 +169,7 @@ class PicturePane:
             height=size[1],
             is_moving=self.pointer.is_moving,
             near=view.near,
+            set_back=view.set_back,
         )
 
     def _pick(self, session: PictureNeeds, pane: Rect, x: float, y: float) -> np.ndarray | None:

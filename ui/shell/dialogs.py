@@ -15,7 +15,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import portable_file_dialogs as native
 
 from app.session.commands import OpenCapture
-from ui.panels.actions.action import BOOKMARKS, TIME, VIEW, WINDOW
+from ui.panels.actions.action import BOOKMARKS, PLAY, TIME, WINDOW
 from ui.panels.actions.table import ACTIONS
 from ui.panels.gestures import mouse_help
 from ui.panels.state import Dispatch, UiState
@@ -168,7 +168,7 @@ def draw_help(ui: UiState) -> None:
         ui.redraw_within(0.0)  # only then does what lies below know that it is covered
     if is_shown:
         groups = dict.fromkeys(action.group for action in ACTIONS)
-        left = (TIME, VIEW, BOOKMARKS, WINDOW)
+        left = (TIME, PLAY, BOOKMARKS, WINDOW)
         if imgui.begin_table("sheet", 2, imgui.TableFlags_.sizing_stretch_same):
             imgui.table_next_column()
             for group in left:

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from app.session.commands import ForgetRecent, OpenCapture
 from app.status import ProjectStatus
-from ui.panels.actions.action import BOOKMARKS, COMPARE, MARK, NAVIGATE, TIME, TRAIN, VIEW, ActionNeeds
+from ui.panels.actions.action import BOOKMARKS, COMPARE, MARK, NAVIGATE, PLAY, TIME, TRAIN, VIEW, ActionNeeds
 from ui.panels.actions.table import ACTIONS
 from ui.panels.actions.training import train_or_pause
 from ui.panels.actions.window import choose_scale
@@ -60,14 +60,14 @@ def draw_menu_bar(session: MenuNeeds, dispatch: Dispatch, ui: UiState) -> None:
                 imgui.end_menu()
             else:
                 ui.mark(f"menu.{group}")
-        imgui.separator()
-        _draw_rows((COMPARE,), session, dispatch, ui)
-        imgui.separator()
-        _draw_rows((TIME,), session, dispatch, ui, is_on_only=True)
         imgui.end_disabled()
         imgui.separator()
         _draw_scale_menu(ui)
         imgui.end_menu()
+    for title, group in (("Show", COMPARE), ("Time", TIME), ("Play", PLAY)):
+        if _begin_menu(title, ui, is_enabled=has_capture):
+            _draw_rows((group,), session, dispatch, ui)
+            imgui.end_menu()
     if _begin_menu("Train", ui, is_enabled=has_capture):
         is_going = session.training.state in ("starting", "preparing", "running")
         label = f"{Icon.PAUSE}  Pause" if is_going else next_label(session)
@@ -109,15 +109,11 @@ def _draw_rows(
     dispatch: Dispatch,
     ui: UiState,
     *,
-    is_on_only: bool = False,
     without: tuple[str, ...] = (),
 ) -> None:
-    """Rows of the table of actions. is_on_only: Those only that can be on or off. without: Ids of those that stand
-    elsewhere."""
+    """Rows of the table of actions. without: Ids of those that stand elsewhere."""
     for action in ACTIONS:
-        if action.id in without:
-            continue
-        if action.group not in groups or (is_on_only and action.is_on is None):
+        if action.group not in groups or action.id in without:
             continue
         if action.needs_choosing and not ui.regions.is_active:
             continue

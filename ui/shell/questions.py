@@ -83,7 +83,7 @@ class QuestionDialogs:
         self._settings.draw(question, ui)
         if question.retrain is not None:
             _draw_what_it_means(question.retrain, ui)
-        is_typing = imgui.get_io().want_text_input  # Enter ends what is typed, and is no answer yet
+        is_typing = imgui.get_io().want_text_input  # Enter ends what is typed, and does not answer yet
         if _button_row(ui, "Train" if question.retrain is None else "Train again") or (is_agreed and not is_typing):
             return self._settings.answer(question)
         return CloseQuestion() if _cancelled(ui) else None

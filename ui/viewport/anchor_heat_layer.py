@@ -104,7 +104,7 @@ class AnchorHeatLayer:
             positions, colors = heat_points(heat)
             if gaussians is not None and len(positions):
                 camera = (view.world_to_camera, view.K, view.width, view.height)
-                is_seen = ~self._occlusion.hidden(positions, gaussians, *camera)
+                is_seen = ~self._occlusion.hidden(positions, gaussians, *camera, near=view.near, set_back=view.set_back)
                 positions, colors = positions[is_seen], colors[is_seen]
             self._points.set(positions, colors, key=key)
         return key
@@ -112,5 +112,4 @@ class AnchorHeatLayer:
     def draw(self, target: Target, view: SceneView, opacity: float, pixels_per_unit: float) -> None:
         """Draw over what the target holds."""
         if self._is_shown:
-            camera = (view.world_to_camera, view.K, view.width, view.height)
-            self._points.draw(target, *camera, shape="circle", size=POINT_SIZE * pixels_per_unit, opacity=opacity)
+            self._points.draw(target, *view.camera, shape="circle", size=POINT_SIZE * pixels_per_unit, opacity=opacity)

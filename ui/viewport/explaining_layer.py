@@ -85,13 +85,12 @@ class ExplainingLayer:
 
     def draw(self, target: Target, view: SceneView, pixels_per_unit: float) -> None:
         """Draw over what the target holds."""
-        camera = (view.world_to_camera, view.K, view.width, view.height)
         if self.coverage is not None:
-            self._outlines.draw(target, *camera, width_px=1.2 * pixels_per_unit, opacity=OUTLINE_OPACITY)
+            self._outlines.draw(target, *view.camera, width_px=1.2 * pixels_per_unit, opacity=OUTLINE_OPACITY)
             size = DISTANCE_SIZE * pixels_per_unit
-            self._distances.draw(target, *camera, shape="diamond", size=size)
+            self._distances.draw(target, *view.camera, shape="diamond", size=size)
         if self._trails is not None:
-            self._paths.draw(target, *camera, width_px=TRAIL_WIDTH * pixels_per_unit)
+            self._paths.draw(target, *view.camera, width_px=TRAIL_WIDTH * pixels_per_unit)
 
 
 def sphere_outlines(centers: np.ndarray, radii: np.ndarray, eye: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

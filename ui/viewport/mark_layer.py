@@ -160,7 +160,8 @@ class MarkLayer:
             return marks.colors
         camera = (view.world_to_camera, view.K, view.width, view.height)
         colors = marks.colors.copy()
-        colors[self._occlusion.hidden(marks.positions, gaussians, *camera), 3] *= HIDDEN_SHARE
+        hidden = self._occlusion.hidden(marks.positions, gaussians, *camera, near=view.near, set_back=view.set_back)
+        colors[hidden, 3] *= HIDDEN_SHARE
         return colors
 
     def _sort(self, anchors: AnchorArrays) -> None:
@@ -184,24 +185,23 @@ class MarkLayer:
 
     def draw(self, target: Target, view: SceneView, session: MarkNeeds) -> None:
         """Draw over what the target holds."""
-        camera = (view.world_to_camera, view.K, view.width, view.height)
         overlays, unit = session.overlays, self.pixels_per_unit
         size, opacity = self._look(session)
         room = np.sqrt(view.width * view.height) / (ROOMY_SIDE * unit)
         size *= float(np.clip(room, SMALLEST_SHARE, 1.0))
         if overlays.show_frusta and session.view.look_through is None:
             # from inside a camera the others are only in the way
-            self._frusta.draw(target, *camera, width_px=1.5 * unit, opacity=0.8)
+            self._frusta.draw(target, *view.camera, width_px=1.5 * unit, opacity=0.8)
         rim = RIM * min(size, 1.0) * unit
         if self.counts.n_inherited and overlays.show_inherited:
             ring = RING_SIZE * size * unit
-            self._inherited.draw(target, *camera, shape="ring", size=ring, outline_px=rim, opacity=opacity)
+            self._inherited.draw(target, *view.camera, shape="ring", size=ring, outline_px=rim, opacity=opacity)
         if self.counts.n_residual and overlays.show_residual:
             diamond = DIAMOND_SIZE * size * unit
-            self._residual.draw(target, *camera, shape="diamond", size=diamond, outline_px=rim, opacity=opacity)
+            self._residual.draw(target, *view.camera, shape="diamond", size=diamond, outline_px=rim, opacity=opacity)
         if self.pointed_anchor is not None:
             around = POINTED_SHARE * DIAMOND_SIZE * size * unit
-            self._pointed.draw(target, *camera, shape="ring", size=around, outline_px=rim)
+            self._pointed.draw(target, *view.camera, shape="ring", size=around, outline_px=rim)
 
     # ---- the pointer -----------------------------------------------------------------------------------------
 
@@ -223,4 +223,6 @@ class MarkLayer:
         if not session.overlays.show_frusta or session.view.look_through is not None:
             return None
         reach_px = REACH * self.pixels_per_unit
-        return camera_under(session.rig, view.world_to_camera, view.K, x, y, near=NEAR, reach_px=reach_px)
+        return camera_under(
+            session.rig, view.world_to_camera, view.K, x, y, near=max(NEAR, view.near), reach_px=reach_px
+        )

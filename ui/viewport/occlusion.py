@@ -38,6 +38,9 @@ class OcclusionMap:
         K: np.ndarray,
         width: int,
         height: int,
+        *,
+        near: float = 0.0,
+        set_back: float = 0.0,
     ) -> np.ndarray:
         """Which positions lie behind the Gaussians, seen from a camera. [N] bool
 
@@ -46,11 +49,13 @@ class OcclusionMap:
             gaussians: Of the picture.
             world_to_camera: Rigid map, OpenCV axes. [4, 4]
             K: Intrinsics in pixels of width x height. [3, 3]
+            near: What is nearer than this is not drawn, whatever the Gaussians say. Scene units
+            set_back: How much farther away the camera stands than it seems to, scene units.
         """
         self._choose(gaussians)
         cell_px = max(width / CELLS_ACROSS, 1.0)
         n_x, n_y = int(np.ceil(width / cell_px)), int(np.ceil(height / cell_px))
-        _, depths, cells = _cells(self._means, world_to_camera, K, cell_px, (n_x, n_y), gaussians.near_plane)
+        _, depths, cells = _cells(self._means, world_to_camera, K, cell_px, (n_x, n_y), max(near, gaussians.near_plane))
         nearest = np.full((n_y + 2) * (n_x + 2), np.inf, np.float32)  # with a rim of empty cells
         np.minimum.at(nearest, cells, depths)
         nearest = nearest.reshape(n_y + 2, n_x + 2)
@@ -61,7 +66,7 @@ class OcclusionMap:
         seen = np.pad(farthest, 1, constant_values=np.inf).reshape(-1)
         result = np.zeros(len(positions), bool)
         rows, mark_depths, mark_cells = _cells(positions, world_to_camera, K, cell_px, (n_x, n_y), 0.0)
-        result[rows] = mark_depths > BEHIND * seen[mark_cells]
+        result[rows] = mark_depths - set_back > BEHIND * (seen[mark_cells] - set_back)
         return result
 
     def _choose(self, gaussians: GaussianArrays) -> None:

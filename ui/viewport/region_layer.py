@@ -100,7 +100,7 @@ class RegionLayer:
         return key
 
     def draw(self, target: Target, camera: tuple[Any, ...]) -> None:
-        """Draw what was taken. camera: world_to_camera, K, width, height."""
+        """Draw what was taken. camera: Of ui.viewport.scene.SceneView."""
         self._anchors.draw(target, *camera, shape="circle", size=4.5, outline_px=1.0, opacity=0.9)
         for lines, halo, width_px in zip(self._lines, self._halos, (THIN_PX, THICK_PX), strict=True):
             halo.draw(target, *camera, width_px=width_px + HALO_PX, opacity=0.45)

@@ -81,6 +81,7 @@ class SceneView:
         is_moving: The view changes just now; a coarser picture that comes sooner is better.
         near: Nothing nearer than this is drawn, whatever the scene says: an orthographic view stands far away. Scene
             units
+        set_back: How much farther away the camera stands than it seems to, scene units.
     """
 
     world_to_camera: np.ndarray
@@ -89,11 +90,17 @@ class SceneView:
     height: int
     is_moving: bool
     near: float = 0.0
+    set_back: float = 0.0
 
     @property
     def eye(self) -> np.ndarray:
         """Where from, scene units. [3]"""
         return camera_center(self.world_to_camera)
+
+    @property
+    def camera(self) -> tuple[np.ndarray, np.ndarray, int, int, float]:
+        """What marks and lines are drawn with: world_to_camera, K, width, height, near."""
+        return self.world_to_camera, self.K, self.width, self.height, max(NEAR, self.near)
 
     @property
     def key(self) -> Hashable:
@@ -432,7 +439,7 @@ class Scene:
         self._anchor_heat.draw(target, view, session.overlays.heat_opacity, self.marks.pixels_per_unit)
         self.explaining.draw(target, view, self.marks.pixels_per_unit)
         self.marks.draw(target, view, session)
-        self.regions.draw(target, camera)
+        self.regions.draw(target, view.camera)
         target.resolve(BACKGROUND)
 
     def _cloud_point_px(self, view: SceneView) -> float:

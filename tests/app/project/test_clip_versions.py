@@ -134,12 +134,12 @@ def test_a_version_of_another_clip_or_project_is_refused(tmp_path: Path) -> None
     train(project, 0, "a")
     train(project, 0, "b")
     path = version_path(project, 0, 7)
-    for entries, said in (
-        ({"clip_index": 3}, "of clip 3, not of clip 0"),
-        ({"n_frames": 9}, "another project"),
-        ({"camera_names": ["elsewhere"]}, "another project"),
+    for header, said in (
+        (clip_header(3, fingerprint="x", start=0), "of clip 3, not of clip 0"),
+        (clip_header(0, fingerprint="x", n_frames=9), "another project"),
+        (clip_header(0, fingerprint="x", camera_names=["elsewhere"]), "another project"),
     ):
-        write_header(path, clip_header(entries.pop("clip_index", 0), **{"fingerprint": "x", "start": 0}, **entries))
+        write_header(path, header)
         with pytest.raises(ProjectError, match=said):
             restore_version(project, 0, 7)
     assert current(project, 0) == "b"

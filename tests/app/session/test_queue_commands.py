@@ -7,13 +7,15 @@ from dataclasses import replace
 
 import pytest
 
-from app.plan.sequence import ClipForecast, clip_forecast, sequence_forecast
+from app.plan.sequence import ClipForecast, clip_forecast, sequence_forecast, together
 from app.project.clip_catalog import ClipRecord
 from app.project.clip_versions import version_path
+from app.project.project import Project
 from app.session import commands as c
 from app.session.questions import RetrainQuestion, SettingsQuestion
 from app.session.session import Session
 from app.session.settings import Settings
+from app.status import SequenceForecast
 from app.training.service import TrainingService
 from engine.clip_files.clip_state import read_clip_state
 from tests.app.conftest import poll_until
@@ -28,6 +30,11 @@ def session(make_session: Make) -> Session:
     made = make_session()
     made.dispatch(c.SetClipLength(1))
     return made
+
+
+def project_of(session: Session) -> Project:
+    assert session.project is not None
+    return session.project
 
 
 def wait_idle(session: Session) -> None:
@@ -82,7 +89,7 @@ def test_the_forecast_goes_by_what_trained_clips_took(session: Session) -> None:
     assert everything is not None
     assert everything.n_clips == 4
     assert everything.seconds is not None
-    size_mb = session.project.clip_path(1).stat().st_size / 1e6
+    size_mb = project_of(session).clip_path(1).stat().st_size / 1e6
     assert everything.disk_mb == pytest.approx(4 * size_mb, rel=0.2)
     assert session.queue.free_mb is not None
 
@@ -101,10 +108,10 @@ def test_a_stopped_clip_counts_with_what_is_left_of_it() -> None:
     assert clip_forecast(plan, stopped, begins_afresh=True) == ClipForecast(100, 45.0, 2.0)
     unknown = clip_forecast(replace(plan, training_s=line(None)), ClipRecord())
     assert unknown == ClipForecast(100, None, 2.0)
-    together = sequence_forecast([ClipForecast(100, 45.0, 2.0), unknown])
-    assert together is not None
-    assert (together.n_clips, together.n_steps, together.seconds, together.disk_mb) == (2, 200, None, 4.0)
-    assert sequence_forecast([]) is None
+    going, later = [ClipForecast(100, 45.0, 2.0)], together([unknown, ClipForecast(50, 5.0, 1.0)])
+    assert sequence_forecast(going, later) == SequenceForecast(3, 250, None, 5.0)
+    assert sequence_forecast(going, together([])) == SequenceForecast(1, 100, 45.0, 2.0)
+    assert sequence_forecast([], together([])) is None
 
 
 def test_waiting_clips_are_reordered_taken_out_and_held(session: Session) -> None:
@@ -125,7 +132,7 @@ def test_waiting_clips_are_reordered_taken_out_and_held(session: Session) -> Non
 
 
 def test_a_clip_moved_before_what_it_needs_waits_no_more(session: Session) -> None:
-    session.project.update(replace(session.project.settings, overrides={"field": "continue"}))
+    project_of(session).update(replace(project_of(session).settings, overrides={"field": "continue"}))
     session.dispatch(c.TrainAll())
     session.dispatch(c.RemoveFromQueue(2))
     assert [clip.clip_index for clip in session.queue.waiting] == [1]
@@ -158,7 +165,7 @@ def test_training_a_clip_with_other_settings_asks_what_has_to_be_known(session: 
     assert question.retrain is not None
     assert question.retrain.outdated == (1, 2, 3, 4, 5)
     values = {setting.name: setting.value for setting in question.settings}
-    assert values["joint_steps"] == session.project.settings.config().n_joint_steps(3)
+    assert values["joint_steps"] == project_of(session).settings.config().n_joint_steps(3)
     session.dispatch(c.TrainClip(0, settings=(("joint_steps", 9),)))
     unconfirmed = session.question
     assert isinstance(unconfirmed, RetrainQuestion)
@@ -166,7 +173,7 @@ def test_training_a_clip_with_other_settings_asks_what_has_to_be_known(session: 
     session.dispatch(c.TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
     assert session.question is None
     wait_idle(session)
-    assert read_clip_state(session.project.clip_path(0)).header.step == 9
+    assert read_clip_state(project_of(session).clip_path(0)).header.step == 9
     assert {state.state for state in session.clip_states[1:]} == {"stale"}
     session.dispatch(c.TrainClip(1, settings=(("gate", "off"),)))
     assert "share gate" in session.notices[-1].detail
@@ -187,14 +194,14 @@ def test_a_version_comes_back_and_dependants_are_out_of_date_as_after_training(s
     assert session.clip_states[1].state == "stale"
     shown = session.version_state(0, 1)
     assert shown is not None
-    assert (shown.file, shown.reference_file) == (version_path(session.project, 0, 1), None)
+    assert (shown.file, shown.reference_file) == (version_path(project_of(session), 0, 1), None)
     assert shown.revision.startswith("version-")
     session.dispatch(c.RestoreVersion(0, 1))
     session.dispatch(c.RestoreVersion(0, 1))  # a second click
     poll_until(session, lambda: not session.jobs, what="the version")
     assert titles(session)[-1] == "Clip 0 is back as it was"
     assert [state.state for state in session.clip_states[:2]] == ["trained", "trained"]
-    assert read_clip_state(session.project.clip_path(0)).header.step == N_STEPS
+    assert read_clip_state(project_of(session).clip_path(0)).header.step == N_STEPS
     poll_until(session, lambda: [one.step for one in session.clip_versions(0)] == [9], what="the other version")
     session.dispatch(c.RestoreVersion(0, session.clip_versions(0)[0].number))
     poll_until(session, lambda: not session.jobs)
@@ -225,7 +232,7 @@ def test_a_damaged_version_is_a_notice_and_the_clip_stays(session: Session) -> N
     wait_idle(session)
     session.dispatch(c.TrainClip(0, is_confirmed=True, settings=(("joint_steps", 9),)))
     wait_idle(session)
-    path = version_path(session.project, 0, 1)
+    path = version_path(project_of(session), 0, 1)
     path.unlink()
     path.write_bytes(b"\xff" * 50)
     poll_until(session, lambda: len(session.clip_versions(0)) == 1)
@@ -249,7 +256,7 @@ def test_the_live_view_is_kept_for_the_next_time(session: Session, tmp_path) -> 
 
 
 def test_the_log_holds_what_program_and_training_said(session: Session) -> None:
-    path = session.project.log_path(0)
+    path = project_of(session).log_path(0)
     path.parent.mkdir(exist_ok=True)
     path.write_text("2026-01-02 03:04:05,678 WARNING app.training.run: the disk is full\n  more of it\n")
     poll_until(session, lambda: any(line.source == "clip 0" for line in session.log_lines()))
@@ -282,8 +289,10 @@ def test_curves_of_several_clips_are_read(session: Session) -> None:
     session.dispatch(c.TrainClips((0, 1)))
     wait_idle(session)
     for index in (0, 1):
-        poll_until(session, lambda index=index: bool(session.clip_curves(index) and session.clip_curves(index)[0]))
-    loss, psnr = session.clip_curves(1)
+        poll_until(session, lambda index=index: session.clip_curves(index) not in (None, ([], [])))
+    found = session.clip_curves(1)
+    assert found is not None
+    loss, psnr = found
     assert loss[-1][0] == N_STEPS
     assert psnr[-1] == (N_STEPS, 20.0 + N_STEPS)
 
@@ -296,4 +305,4 @@ def test_closing_ends_the_clip_that_trains_and_starts_no_other(make_session: Mak
     session.close()
     assert session.live_training.service is not None
     assert session.live_training.service.worker is None
-    assert [path.name for path in session.project.folder.glob("checkpoints/*")] == ["0000.safetensors"]
+    assert [path.name for path in project_of(session).folder.glob("checkpoints/*")] == ["0000.safetensors"]

@@ -110,12 +110,12 @@ def test_a_waiting_clip_is_dragged_to_another_place(busy: Pilot) -> None:
 
 
 def test_keys_choose_move_and_remove_waiting_clips(busy: Pilot) -> None:
-    busy.key(key.PAGEDOWN, modifiers=(CTRL,))
+    busy.key(key.DOWN, modifiers=(CTRL, SHIFT))
     assert busy.sent(MoveInQueue) == [], "nothing is chosen"
-    busy.key(key.Q)
-    busy.key(key.Q)
-    busy.key(key.PAGEDOWN, modifiers=(CTRL,))
-    busy.key(key.PAGEUP, modifiers=(CTRL,))
+    busy.key(key.N, modifiers=(SHIFT,))
+    busy.key(key.N, modifiers=(SHIFT,))
+    busy.key(key.DOWN, modifiers=(CTRL, SHIFT))
+    busy.key(key.UP, modifiers=(CTRL, SHIFT))
     busy.key(key.DELETE, modifiers=(CTRL,))
     busy.key(key.DELETE, modifiers=(CTRL,))
     assert busy.sent(MoveInQueue) == [MoveInQueue(0, 2), MoveInQueue(0, 0)]

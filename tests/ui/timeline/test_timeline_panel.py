@@ -94,13 +94,13 @@ def test_the_part_that_is_shown_is_dragged_in_the_overview(pilot: Pilot) -> None
 
 def test_the_timeline_is_zoomed_and_moved_by_keys(pilot: Pilot) -> None:
     pilot.session.timeline.seek(14)
-    pilot.key(key.PAGEUP, modifiers=(CTRL,))
-    pilot.key(key.PAGEUP, modifiers=(CTRL,))
+    pilot.key(key.PAGEUP, modifiers=(key.LALT,))
+    pilot.key(key.PAGEUP, modifiers=(key.LALT,))
     assert shown(pilot).length == pytest.approx(30 / 1.25**2)
     start = shown(pilot).start
     pilot.key(key.PAGEUP, modifiers=(SHIFT,))
     assert shown(pilot).start < start
-    pilot.key(key.PAGEDOWN, modifiers=(CTRL,))
+    pilot.key(key.PAGEDOWN, modifiers=(key.LALT,))
     assert shown(pilot).length == pytest.approx(30 / 1.25)
     pilot.key(key.Z)
     assert shown(pilot) == TimeRange(0.0, 30.0)

@@ -49,3 +49,16 @@ def test_another_scene_is_looked_at_anew() -> None:
     occlusion, mark = OcclusionMap(), np.array([[0, 0, 4.0]], np.float32)
     assert occlusion.hidden(mark, wall(2.0), POSE, K, WIDTH, HEIGHT)[0]
     assert not occlusion.hidden(mark, wall(5.0, key="other"), POSE, K, WIDTH, HEIGHT)[0]
+
+
+def test_how_far_away_an_orthographic_camera_stands_says_nothing_about_what_is_hidden() -> None:
+    """The same wall and marks, seen from ten thousand units farther away through a lens as much longer."""
+    far = 10_000.0
+    pose, long = POSE.copy(), K.copy()
+    pose[2, 3] += far
+    long[[0, 1], [0, 1]] *= far / 2.0
+    marks = np.array([[0, 0, 1], [0, 0, 2], [0, 0, 4]], np.float32)
+    found = OcclusionMap().hidden(marks, wall(2.0), pose, long, WIDTH, HEIGHT, near=far, set_back=far)
+    assert found.tolist() == [False, False, True]
+    cut = OcclusionMap().hidden(marks, wall(2.0), pose, long, WIDTH, HEIGHT, near=far + 3.0, set_back=far)
+    assert not cut.any(), "a wall that is cut off hides nothing"

@@ -19,7 +19,8 @@ from ui.panels.actions.key import Key, parse_key
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
 
-TIME, VIEW, COMPARE, MARK, TRAIN, WINDOW = "Time", "View", "Show and compare", "Mark regions", "Train", "Window"
+TIME, PLAY, VIEW, COMPARE = "Time", "Play and timeline", "View", "Show and compare"
+MARK, TRAIN, WINDOW = "Mark regions", "Train", "Window"
 NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.playback.timeline import Timeline
-from ui.panels.actions.action import TIME, Action, ActionNeeds, Run
+from ui.panels.actions.action import PLAY, Action, ActionNeeds, Run
 from ui.panels.state import TIMELINE, Dispatch, UiState
 
 
@@ -53,18 +53,18 @@ def _clip_menu(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 ACTIONS = (
     Action(
-        "play.backward", "Play backward; again: faster", TIME, _on_timeline(lambda time: time.shuttle(-1)), keys=("J",)
+        "play.backward", "Play backward; again: faster", PLAY, _on_timeline(lambda time: time.shuttle(-1)), keys=("J",)
     ),
-    Action("play.stop", "Stop playing", TIME, _on_timeline(Timeline.hold), keys=("K",)),
+    Action("play.stop", "Stop playing", PLAY, _on_timeline(Timeline.hold), keys=("K",)),
     Action(
-        "play.forward", "Play forward; again: faster", TIME, _on_timeline(lambda time: time.shuttle(1)), keys=("L",)
+        "play.forward", "Play forward; again: faster", PLAY, _on_timeline(lambda time: time.shuttle(1)), keys=("L",)
     ),
-    Action("play.slower", "Play slower", TIME, _on_timeline(lambda time: time.change_speed(-1)), keys=("Shift+,",)),
-    Action("play.faster", "Play faster", TIME, _on_timeline(lambda time: time.change_speed(1)), keys=("Shift+.",)),
+    Action("play.slower", "Play slower", PLAY, _on_timeline(lambda time: time.change_speed(-1)), keys=("Shift+,",)),
+    Action("play.faster", "Play faster", PLAY, _on_timeline(lambda time: time.change_speed(1)), keys=("Shift+.",)),
     Action(
         "time.loop",
         "Loop on or off",
-        TIME,
+        PLAY,
         _toggle_loop,
         keys=("Ctrl+/",),
         is_on=lambda session: session.timeline.is_looping,
@@ -72,31 +72,31 @@ ACTIONS = (
     Action(
         "time.every_frame",
         "Play every frame, or skip frames to keep the speed",
-        TIME,
+        PLAY,
         _toggle_every_frame,
         keys=("Shift+Space",),
         is_on=lambda session: session.timeline.is_every_frame,
     ),
-    Action("play.in", "Play from this frame on", TIME, _on_timeline(Timeline.set_in), keys=("I",)),
-    Action("play.out", "Play up to this frame", TIME, _on_timeline(Timeline.set_out), keys=("O",)),
-    Action("play.whole", "Play the whole capture", TIME, _on_timeline(Timeline.clear_range), keys=("X",)),
+    Action("play.in", "Play from this frame on", PLAY, _on_timeline(Timeline.set_in), keys=("I",)),
+    Action("play.out", "Play up to this frame", PLAY, _on_timeline(Timeline.set_out), keys=("O",)),
+    Action("play.whole", "Play the whole capture", PLAY, _on_timeline(Timeline.clear_range), keys=("X",)),
     Action(
         "play.around",
         "Play around the nearest seam between clips, or no more",
-        TIME,
+        PLAY,
         _on_timeline(Timeline.toggle_around),
         keys=("/",),
         is_on=lambda session: session.timeline.around is not None,
     ),
-    Action("timeline.fit", "Timeline: the whole capture, or this clip", TIME, _toggle_fit, keys=("Z",)),
-    Action("timeline.closer", "Timeline: closer", TIME, _zoom_by(1), keys=("Ctrl+Page Up",), repeats=True),
-    Action("timeline.farther", "Timeline: farther", TIME, _zoom_by(-1), keys=("Ctrl+Page Down",), repeats=True),
+    Action("timeline.fit", "Timeline: the whole capture, or this clip", PLAY, _toggle_fit, keys=("Z",)),
+    Action("timeline.closer", "Timeline: closer", PLAY, _zoom_by(1), keys=("Alt+Page Up",), repeats=True),
+    Action("timeline.farther", "Timeline: farther", PLAY, _zoom_by(-1), keys=("Alt+Page Down",), repeats=True),
     Action(
-        "timeline.earlier", "Timeline: show what is before", TIME, _pan_by(-1), keys=("Shift+Page Up",), repeats=True
+        "timeline.earlier", "Timeline: show what is before", PLAY, _pan_by(-1), keys=("Shift+Page Up",), repeats=True
     ),
     Action(
-        "timeline.later", "Timeline: show what comes after", TIME, _pan_by(1), keys=("Shift+Page Down",), repeats=True
+        "timeline.later", "Timeline: show what comes after", PLAY, _pan_by(1), keys=("Shift+Page Down",), repeats=True
     ),
-    Action("timeline.unit", "Timeline: frames, seconds or timecode", TIME, _next_unit, keys=("U",)),
-    Action("timeline.menu", "Menu of this clip", TIME, _clip_menu, keys=("Shift+F10",)),
+    Action("timeline.unit", "Timeline: frames, seconds or timecode", PLAY, _next_unit, keys=("U",)),
+    Action("timeline.menu", "Menu of this clip", PLAY, _clip_menu, keys=("Shift+F10",)),
 )
