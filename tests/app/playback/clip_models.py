@@ -21,6 +21,7 @@ def reference() -> tuple[ClipModel, ClipState]:
     """A reference clip whose static and moving anchors are its own."""
     model = make_model(has_motion=True)
     model.decoder.requires_grad_(requires_grad=True)
+    assert model.field is not None
     header = make_header(
         clip_length=CLIP_LENGTH,
         n_frames=CLIP_LENGTH,
