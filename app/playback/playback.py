@@ -248,7 +248,7 @@ class Playback:
         return self._request_at(timeline, timeline.frame_index, shown_as)
 
     def _request_at(
-        self, timeline: Timeline, frame_index: int, shown_as: ShownAs, state_of: StateOf | None = None
+        self, timeline: Timeline, frame_index: int, shown_as: ShownAs = PLAIN, state_of: StateOf | None = None
     ) -> FrameRequest | None:
         clip = timeline.clip_of(frame_index)
         return None if clip is None else self.request(clip, frame_index, shown_as, state_of)
@@ -318,7 +318,7 @@ class Playback:
     ) -> Gain | None:
         """By which a camera's colours differ from the scene's at a frame; None where they do not, or nobody
         knows."""
-        request = self._request_at(timeline, frame_index)
+        request = self._request_at(timeline, frame_index, PLAIN)
         colors = None if request is None else self.decoder.colors(request)
         if request is None or colors is None:
             return None

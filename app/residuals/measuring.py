@@ -134,6 +134,8 @@ class Measuring:
         if revisions == self._revisions:
             return
         changed = [index for index, known in enumerate(self._revisions) if known != revisions[index]]
+        if opened.project.settings.config().field == "continue":  # all are seen with the field of the last one
+            changed = list(range(len(revisions)))
         self._revisions = revisions
         for clip_index in changed:
             self._figures.forget(clip_index)

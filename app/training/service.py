@@ -220,7 +220,7 @@ class TrainingService:
         for base in needed_clips(self.project, clip_index):
             self._check_needed(clip_index, base, coming)
         self._add(clip_index, own)
-        self._start_next()
+        self.go_on()
 
     def _check_needed(self, clip_index: int, base: int, coming: set[int | None]) -> None:
         kind = "the reference clip" if base == self.project.settings.reference_clip else "clip"
@@ -267,7 +267,7 @@ class TrainingService:
             for one in sorted(chain, key=rank.__getitem__):
                 self._add(one)
             coming |= chain
-        self._start_next()
+        self.go_on()
         return left_out
 
     def go_on(self) -> None:

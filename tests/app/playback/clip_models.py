@@ -21,12 +21,13 @@ def reference() -> tuple[ClipModel, ClipState]:
     """A reference clip whose static and moving anchors are its own."""
     model = make_model(has_motion=True)
     model.decoder.requires_grad_(requires_grad=True)
+    assert model.field is not None
     header = make_header(
         clip_length=CLIP_LENGTH,
         n_frames=CLIP_LENGTH,
         spacing=0.2,
         decoder=to_builtins(decoder_shape(model.decoder)),
-        field=to_builtins(model.field.shape),
+        field=None if model.field is None else to_builtins(model.field.shape),
     )
     state = ClipState(model.own_arrays(), header).stamped()
     model.decoder.requires_grad_(requires_grad=False)

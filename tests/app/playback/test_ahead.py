@@ -1,4 +1,4 @@
-"""Ahead: what is decoded and drawn before it is asked for, and which frames are said to be ready."""
+"""Ahead: what is decoded and drawn before anybody asks, and which frames count as ready."""
 
 from __future__ import annotations
 
@@ -64,7 +64,9 @@ def test_while_it_stands_the_next_frames_become_ready_into_the_next_clip(screen:
         screen.timeline.seek(frame)
         picture = screen.playback.render(screen.timeline, screen.view, *SIZE, full_size=FULL)
         assert picture is not None
-        assert (picture.is_stale, picture.source.frame_index) == (False, frame), "what is said to be ready is"
+        assert (picture.is_stale, picture.source.frame_index) == (False, frame), (
+            "a frame that counts as ready is shown at once"
+        )
         assert picture.size == (FULL if frame else SIZE), "sharp ones follow; the window itself asks for that of now"
 
 

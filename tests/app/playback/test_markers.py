@@ -42,6 +42,8 @@ def test_too_long_a_name_is_cut_and_too_many_markers_are_refused():
     markers = filled([*range(MAX_MARKERS)])
     assert not markers.put(MAX_MARKERS, "one more")
     assert markers.put(7, "x" * 500), "an old one still takes another name"
-    assert len(markers.at(7).name) == MAX_NAME_CHARACTERS
+    renamed = markers.at(7)
+    assert renamed is not None
+    assert len(renamed.name) == MAX_NAME_CHARACTERS
     markers.keep_below(10)
     assert markers.frames == [*range(10)]

@@ -435,10 +435,10 @@ def test_what_lies_before_an_orthographic_view_is_cut_off_and_picking_agrees():
     gaussians = gaussians_at(np.stack([at, wall]), scales=0.05, opacities=0.99)
     matrix, K = view.world_to_camera(), view.K(WIDTH, HEIGHT)
     pixel = project(view, at, WIDTH, HEIGHT)
-    found = seen_point(gaussians, *pixel_ray(matrix, K, *pixel, start=view.near))
+    found = seen_point(gaussians, *pixel_ray(matrix, K, pixel[0], pixel[1], start=view.near))
     assert found is not None
     assert np.linalg.norm(found - at) < 1e-3 * view.radius
-    beside = point_beside(matrix, K, *pixel, view.pivot)
+    beside = point_beside(matrix, K, pixel[0], pixel[1], view.pivot)
     assert np.allclose(project(view, beside, WIDTH, HEIGHT), pixel, atol=1e-6)
     assert (beside - view.pivot) @ view.forward == pytest.approx(0.0, abs=1e-9)
 

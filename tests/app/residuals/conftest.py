@@ -55,9 +55,9 @@ def write_still_capture(folder: Path) -> Path:
     return folder
 
 
-def make_project(folder: Path) -> Path:
+def make_project(folder: Path, **overrides: Any) -> Path:
     """A project of such a capture with both clips trained."""
-    project = train(folder / "p", write_still_capture(folder / "ring"))
+    project = train(folder / "p", write_still_capture(folder / "ring"), **overrides)
     reference = color(project / "clips" / "0000.safetensors", seed=1)
     color(project / "clips" / "0001.safetensors", seed=2, reference=reference)
     return project

@@ -19,7 +19,7 @@ from app.residuals.measuring_messages import LookAt, Measured, MeasureJob, Measu
 from app.residuals.measuring_order import Look
 from app.residuals.measuring_process import DIED, MeasuringProcess
 from app.status import CELL_COLUMNS, ResidualStatus
-from tests.app.residuals.conftest import DEADLINE_S, Opened, color
+from tests.app.residuals.conftest import DEADLINE_S, Opened, color, make_project
 from tests.app.residuals.test_measuring_worker import job_of
 
 
@@ -212,6 +212,21 @@ def test_a_clip_that_is_trained_again_is_forgotten_at_once_and_its_neighbours_bo
     assert launched.all[0].is_ended, "figures of the old version must not be taken for those of the new one"
     poll_until(opened, lambda status: status.is_measuring)
     assert len(launched.all) == 2
+
+
+def test_where_one_field_is_for_all_clips_a_new_one_makes_all_figures_old(tmp_path, launched):
+    project = make_project(tmp_path, field="continue")
+    evaluate(project)
+    opened = Opened(project, launch=launched)
+    poll_until(opened, lambda status: status.n_done == 24)
+    header = opened.project.headers.read(project / "clips" / "0000.safetensors")
+    assert header is not None
+    assert header.header is not None
+    color(project / "clips" / "0001.safetensors", seed=3, reference=header.header.fingerprint)
+    opened.catalog.update(1)
+    status = poll(opened, 1)
+    assert not any(np.isfinite(status.cells[column]).any() for column in CELL_COLUMNS)
+    opened.close()
 
 
 def test_when_the_reference_is_trained_again_everything_is_forgotten(open_residuals, launched, project):

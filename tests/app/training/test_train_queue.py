@@ -148,6 +148,20 @@ def test_the_queue_is_held_after_a_clip_and_goes_on_when_told(six: OpenedProject
     assert trained_order(run_out(service)) == ["0001", "0002"]
 
 
+@pytest.mark.parametrize("is_all", [False, True])
+def test_whoever_trains_something_goes_on_with_a_held_queue(six: OpenedProject, is_all: bool) -> None:
+    service = make_service(six)
+    service.enqueue_all(range(3))
+    service.stop_after_clip(True)
+    run_out(service)
+    if is_all:
+        service.enqueue_all(range(3))
+    else:
+        service.enqueue(4)
+    assert (service.running_clip, service.queue.is_held) == (1, False)
+    assert trained_order(run_out(service)) == ["0001", "0002"] + ([] if is_all else ["0004"])
+
+
 def test_a_damaged_clip_and_those_that_need_it_are_left_out(six: OpenedProject) -> None:
     write_trained(six, 0).write_bytes(b"\xff" * 64)
     service = make_service(six)

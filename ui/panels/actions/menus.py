@@ -8,7 +8,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ui.panels.actions.action import BOOKMARKS, COMPARE, MARK, NAVIGATE, PLAY, TIME, TRAIN, VIEW, WINDOW, Action
+from ui.panels.actions.action import (
+    BOOKMARKS,
+    COMPARE,
+    MARK,
+    MODE,
+    NAVIGATE,
+    PLAY,
+    TIME,
+    TRAIN,
+    VIEW,
+    WINDOW,
+    Action,
+)
 from ui.panels.actions.table import ACTIONS
 
 MOST_ITEMS = 24
@@ -16,7 +28,7 @@ MOST_ITEMS = 24
 MENUS = ("File", "View", "Time", "Train", "Mark", "Window")
 """From left to right; others follow before the last."""
 _MENU_OF_GROUP = {TIME: "Time", VIEW: "View", COMPARE: "View", MARK: "Mark", TRAIN: "Train", WINDOW: "Window"}
-_MENU_OF_GROUP |= {NAVIGATE: "View/Navigate", BOOKMARKS: "View/Bookmarks", PLAY: "Time/Play"}
+_MENU_OF_GROUP |= {NAVIGATE: "View/Navigate", BOOKMARKS: "View/Bookmarks", MODE: "View/Mode", PLAY: "Time/Play"}
 _MENU_OF_TOPIC = {
     "compare": "View/Compare",
     "content": "View/Draw only",
