@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from app.playback.scene_axes import horizontal_axes
+from app.playback.scene_axes import cross, horizontal_axes
 
 NO_ROLL = 1e-9
 """Smaller ones come from rounding."""
@@ -20,10 +20,10 @@ def rotation_of(up: np.ndarray, yaw: float, pitch: float, roll: float = 0.0) -> 
     e0, e1 = horizontal_axes(up)
     level = math.cos(yaw) * e0 + math.sin(yaw) * e1
     forward = math.cos(pitch) * level - math.sin(pitch) * up
-    right = np.cross(level, up)
-    down = np.cross(forward, right)
+    right = cross(level, up)
+    down = cross(forward, right)
     rolled = math.cos(roll) * right + math.sin(roll) * down
-    return np.stack([rolled, np.cross(forward, rolled), forward])
+    return np.stack([rolled, cross(forward, rolled), forward])
 
 
 def angles_of(up: np.ndarray, rotation: np.ndarray) -> tuple[float, float, float]:
@@ -38,7 +38,7 @@ def angles_of(up: np.ndarray, rotation: np.ndarray) -> tuple[float, float, float
     rise = float(np.clip(forward @ up, -1.0, 1.0))
     level = forward - rise * up
     if float(np.linalg.norm(level)) < 1e-6:  # then the right hand side says where it is turned to
-        level = np.cross(up, right)
+        level = cross(up, right)
         return math.atan2(float(level @ e1), float(level @ e0)), -math.copysign(math.pi / 2, rise), 0.0
     yaw, pitch = math.atan2(float(level @ e1), float(level @ e0)), -math.asin(rise)
     level_right, level_down, _ = rotation_of(up, yaw, pitch)

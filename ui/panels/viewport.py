@@ -57,6 +57,11 @@ class ViewportPanel:
         return self._panes[self._active]
 
     @property
+    def panes(self) -> list[PicturePane]:
+        """All pictures that were made, in the order of their views."""
+        return self._panes
+
+    @property
     def scene(self) -> Scene:
         """What the active view's picture is drawn with."""
         return self.active.scene
