@@ -19,6 +19,10 @@ logger = logging.getLogger(__name__)
 MAX_FAILED = 64
 
 
+def nothing() -> None:
+    """For whoever need not be woken."""
+
+
 class LatestWorker(Generic[Request, Result]):
     """Computes results off the calling thread; the newest request wins. The thread starts with the first request.
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.background.kernels import prepare_decoding
-from app.background.latest import LatestWorker
+from app.background.latest import LatestWorker, nothing
 from app.playback.arrays import AnchorArrays, GaussianArrays
 from app.playback.contents import ClipParts
 from app.playback.picture_source import UNKNOWN, PictureSource
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 
 CACHE_BYTES = 384 << 20
 """Decoded frames kept in memory."""
-MAX_MODELS = 3
-"""Loaded clips kept in memory: the shown one, its reference, and the one shown before."""
+MAX_MODELS = 6
+"""Loaded clips kept in memory, some megabytes each: those around the playhead, and versions to compare with."""
 
 
 ModelKey = tuple[int, str, int, str]
@@ -150,8 +150,9 @@ class FrameDecoder:
         self._loading: ModelKey | None = None
         self._last: ShownFrame | None = None
         self._frame_bytes = 0  # of the newest one
+        self.on_frame: Callable[[], None] = nothing
         self.worker: LatestWorker[FrameRequest, ShownFrame] = LatestWorker(
-            "playback", self._compute, prepare=prepare_decoding
+            "playback", self._compute, prepare=prepare_decoding, on_done=lambda: self.on_frame()
         )
 
     def keep_megabytes(self, megabytes: int | None) -> None:

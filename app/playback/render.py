@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.background.kernels import prepare_drawing
-from app.background.latest import LatestWorker
+from app.background.latest import LatestWorker, nothing
 from app.playback.arrays import BACKGROUND, GaussianArrays, Picture
 from app.playback.frame_decoder import FrameKey, ShownFrame
 from app.playback.mode_arrays import drawn_arrays
@@ -95,9 +95,10 @@ class Renderer:
     """Pictures on demand. Methods are for one thread, not the one it owns."""
 
     def __init__(self, *, cache_bytes: int = CACHE_BYTES) -> None:
+        self.on_picture: Callable[[], None] = nothing
         self._cache: ByteCache[PictureKey, Picture] = ByteCache(cache_bytes)
         self.worker: LatestWorker[RenderRequest, Picture] = LatestWorker(
-            "renderer", self._compute, prepare=prepare_drawing
+            "renderer", self._compute, prepare=prepare_drawing, on_done=lambda: self.on_picture()
         )
         self._asked: dict[Hashable, RenderRequest] = {}
         self._taken_up: dict[Hashable, object] = {}

@@ -8,6 +8,7 @@ handed.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -67,6 +68,9 @@ from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import EngineError
+
+ATTENDED_S = 2.0
+"""For so long after the view or the playhead has moved, cores are for what is shown."""
 
 
 class Session:
@@ -134,6 +138,8 @@ class Session:
         self.opener = ProjectOpener(
             self._jobs, self.notices, self._take_opened, project_dir=project_dir, open_path=opener
         )
+        self._looked_at: object = None
+        self._looked_s = -ATTENDED_S
         self._seen = self._news_key()
         self.recent.look()
         if is_preloading:  # while others import, starting a thread makes the window wait
@@ -371,9 +377,13 @@ class Session:
         self._release_snapshot()
         has_changed |= bool(events) | self.marking.poll()
         is_training = self.live_training.is_busy and self.training.state != "paused"
+        looked_at = (self.view.look_key, self.timeline.frame_index)
+        if looked_at != self._looked_at:
+            self._looked_at, self._looked_s = looked_at, time.monotonic()
+        is_attended = time.monotonic() - self._looked_s < ATTENDED_S
         if self._is_preloading:
             self.residuals.look_at(self.timeline, self.view.look_through)
-        has_changed |= self.residuals.poll(is_training=is_training)
+        has_changed |= self.residuals.poll(is_training=is_training or is_attended)
         self._tell_failures()
         self.playback.work_ahead(self.timeline, is_busy=self.live_training.is_busy)
         seen = self._news_key()
@@ -431,6 +441,10 @@ class Session:
             self.project_status = ProjectStatus(
                 name, opened.project.folder, n_trained, len(opened.clips), opened.project.is_writable
             )
+
+    def wake_by(self, wake: Callable[[], None]) -> None:
+        """Call this, on some thread, when a frame or picture that was asked for is there; it must not block."""
+        self.playback.renderer.on_picture = self.playback.decoder.on_frame = wake
 
     def close(self) -> None:
         """End workers and threads, keeping what was learned. Blocks for a few seconds at most. May be called twice."""

@@ -5,7 +5,7 @@ Every command is recorded in `commands`; those that only change what is shown ar
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -276,6 +276,9 @@ class FakeSession:
     def poll(self) -> bool:
         """Nothing happens by itself here."""
         return False
+
+    def wake_by(self, wake: Callable[[], None]) -> None:
+        """Pictures are there at once."""
 
     def close(self) -> None:
         """Remember that the window asked."""

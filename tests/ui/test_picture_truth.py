@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import re
 import threading
-import time
 from collections.abc import Callable, Iterator
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,19 +15,15 @@ from pyglet.window import key
 import app.playback.ahead
 import app.playback.frame_decoder
 from app.session import commands as c
-from app.session.session import Session
-from app.session.settings import Settings
 from engine.clip_files.clip_state import ClipState
-from tests.app.fakes import N_ANCHORS, make_fake, write_capture
-from tests.app.inline_worker import InlineWorker
+from tests.app.fakes import N_ANCHORS, write_capture
 from tests.ui.pilot import Pilot
+from tests.ui.real_session import WAIT_S, draw_until, hud, make_session, poll
 from ui.panels.hud import legend_rows
 from ui.shell.screenshot import read_window
-from ui.viewport.hud_text import CLOUD, RENDERED, HudText
+from ui.viewport.hud_text import CLOUD, RENDERED
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
-WAIT_S = 300.0
-"""Only a hang takes longer, or the first start, which compiles the kernels."""
 
 
 @pytest.fixture
@@ -45,22 +39,6 @@ def trained(tmp_path: Path) -> tuple[Path, Path]:
     poll(session, lambda: [state.state for state in session.clip_states] == ["trained", "trained"])
     session.close()
     return capture, project
-
-
-def make_session(folder: Path) -> Session:
-    return Session(
-        project_dir=folder / "project",
-        launch=partial(lambda job, project: InlineWorker(job, make_fake)),
-        settings=Settings(folder / "settings.json"),
-        is_preloading=False,
-    )
-
-
-def poll(session: Session, is_done: Callable[[], bool]) -> None:
-    until_s = time.monotonic() + WAIT_S
-    while not is_done():
-        assert time.monotonic() < until_s, f"{session.training} {list(session.notices)}"
-        session.poll()
 
 
 class Reader:
@@ -98,19 +76,6 @@ def window(
     draw_until(pilot, lambda: session.capture is not None, "the capture")
     yield pilot
     reader.may_go_on.set()
-
-
-def draw_until(pilot: Pilot, is_done: Callable[[], bool], what: str) -> None:
-    until_s = time.monotonic() + WAIT_S
-    while not is_done():
-        assert time.monotonic() < until_s, f"{what} did not come: {hud(pilot)} {list(pilot.session.notices)}"
-        pilot.draw()
-
-
-def hud(pilot: Pilot) -> HudText:
-    text = pilot.studio.frame.viewport.hud.text
-    assert text is not None
-    return text
 
 
 def picture(pilot: Pilot) -> np.ndarray:

@@ -9,6 +9,7 @@ import logging
 import signal
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -26,6 +27,7 @@ from ui.style.ui_scale import MIN_UNITS, UiScale
 logger = logging.getLogger(__name__)
 
 TICK_S = 1 / 60
+PICTURE_EVENT = "on_studio_picture"
 DEFAULT_SIZE = (1440, 900)
 """In units of the interface (ui.style.ui_scale)."""
 FRAME_PX, TASK_BAR_PX = 16, 120
@@ -37,6 +39,8 @@ class WindowNeeds(FrameNeeds, Protocol):
     """What a window needs of a session."""
 
     def close(self) -> None: ...
+
+    def wake_by(self, wake: Callable[[], None]) -> None: ...
 
 
 def make_window(width: int, height: int, *, is_visible: bool = True) -> Any:
@@ -139,8 +143,11 @@ class StudioWindow:
             "on_resize": self._resized,
             "on_expose": self._exposed,
             "on_show": self._exposed,
+            PICTURE_EVENT: self._answer_soon,
         }
+        type(self.window).register_event_type(PICTURE_EVENT)
         self.window.push_handlers(**self._handlers)
+        session.wake_by(self._wake)
         self._is_closed = False
         self._is_running = False
         self._is_answer_due = False
@@ -178,6 +185,11 @@ class StudioWindow:
         if self._is_running and not self._is_answer_due:
             self._is_answer_due = True
             pyglet.clock.schedule_once(self._answer, 0.0)
+
+    def _wake(self) -> None:
+        """From any thread: a picture is there, do not wait for the next tick."""
+        if self._is_running:
+            pyglet.app.platform_event_loop.post_event(self.window, PICTURE_EVENT)
 
     def _answer(self, dt_s: float) -> None:
         self._is_answer_due = False

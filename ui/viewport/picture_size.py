@@ -11,7 +11,7 @@ MAX_PICTURE_WIDTH = 960
 """The CPU rasterizer is not asked for more than this; the picture is stretched."""
 MOVING_SHARES = (0.25, 1.0)
 """Smallest and largest share of the full size at which a picture is made while the view moves."""
-MOVING_MS = 25.0
+MOVING_MS = 18.0
 """A picture while the view moves should take about this long; its size follows from the last one's time."""
 SLOW, QUICK = 1.4, 0.5
 """The size changes when a picture took more or less than these shares of MOVING_MS: one that changed with every picture

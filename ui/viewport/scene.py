@@ -150,6 +150,7 @@ class Scene:
         self._anchor_heat = AnchorHeatLayer(ctx)
         self.explaining = ExplainingLayer(ctx)
         self._drawn_key: Hashable = None
+        self._held: Hashable = None
         self._asked_sizes: tuple[tuple[int, int], tuple[int, int]] | None = None
         self._asked_capture: tuple[int, int] | None = None
         self._asked_other: tuple[tuple[int, int], tuple[int, int]] | None = None
@@ -235,6 +236,11 @@ class Scene:
         if base_key is None:
             shown = self._without_render(shown, points_key, captured)
         is_rendered = base_key is not None
+        held = (base_key, view.width, view.height)
+        if self.is_software and view.is_moving and shown.is_on_its_way and is_rendered and held == self._held:
+            # The picture of this view comes in a moment; marks drawn from here would not lie on the one before.
+            self.shown = shown
+            return Composed(self._target.texture, shown)
         gaussians = session.shown_gaussians() if is_rendered else None
         marks_key = self.marks.take(session, view, gaussians)
         heat_key = self._anchor_heat.take(session, view, gaussians)
@@ -243,12 +249,12 @@ class Scene:
         self.shown = shown
         if self.is_software and is_rendered and self._has_no_marks(session, regions):
             # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
-            self._drawn_key = None
+            self._drawn_key = self._held = None
             return Composed(self._picture.texture, shown)
         over_key = (marks_key, regions_key, explaining_key, heat_key, session.overlays.heat_opacity)
         key = (view.key, base_key, points_key, captured_key, over_key)
         if key != self._drawn_key or self._splats.is_order_stale:
-            self._drawn_key = key
+            self._drawn_key, self._held = key, held
             self._draw(view, base_key, points_key, captured_key, session)
         if self._splats.is_order_stale:
             self.shown = shown = replace(shown, is_on_its_way=True)

@@ -95,7 +95,7 @@ def progress_text(status: ResidualStatus) -> str:
     if status.n_done >= status.n_all:
         return f"All {format_count(status.n_all)} pictures of trained clips are measured."
     if status.is_held_back:
-        return f"{done}; the rest follows slowly while a clip trains."
+        return f"{done}; the rest follows slowly for the moment."
     if status.is_measuring and status.eta_s is not None:
         return f"{done}, {duration_text(status.eta_s)} left."
     return f"{done}."

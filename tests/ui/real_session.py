@@ -1,0 +1,51 @@
+"""A real session over a small made capture, whose trainings are made up and over at once; and waiting for a window."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from app.session.session import Session
+from app.session.settings import Settings
+from tests.app.fakes import make_fake
+from tests.app.inline_worker import InlineWorker
+from tests.ui.pilot import Pilot
+from ui.viewport.hud_text import HudText
+
+WAIT_S = 300.0
+"""Only a hang takes longer, or the first start, which compiles the kernels."""
+
+
+def make_session(folder: Path) -> Session:
+    """With a project of its own in a folder; trains in this process."""
+    return Session(
+        project_dir=folder / "project",
+        launch=partial(lambda job, project: InlineWorker(job, make_fake)),
+        settings=Settings(folder / "settings.json"),
+        is_preloading=False,
+    )
+
+
+def poll(session: Session, is_done: Callable[[], bool]) -> None:
+    """Let a session without a window work until something is so."""
+    until_s = time.monotonic() + WAIT_S
+    while not is_done():
+        assert time.monotonic() < until_s, f"{session.training} {list(session.notices)}"
+        session.poll()
+
+
+def hud(pilot: Pilot) -> HudText:
+    """What the window says of its picture."""
+    text = pilot.studio.frame.viewport.hud.text
+    assert text is not None
+    return text
+
+
+def draw_until(pilot: Pilot, is_done: Callable[[], bool], what: str) -> None:
+    """Draw until something is so."""
+    until_s = time.monotonic() + WAIT_S
+    while not is_done():
+        assert time.monotonic() < until_s, f"{what} did not come: {list(pilot.session.notices)}"
+        pilot.draw()
