@@ -54,7 +54,8 @@ from ui.viewport.hud_text import RENDERED  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
 OUT = ROOT / "docs" / "images"
-QUICK_PROJECT = ROOT / "out" / "screenshots" / "project"
+REVIEWED = ROOT / "out" / "screenshots"
+QUICK_PROJECT = REVIEWED / "project"
 SIZE = (1280, 800)
 JPEG_QUALITY = 88
 """A third of the bytes of a PNG, and letters are still sharp."""
@@ -232,6 +233,7 @@ class Screen:
         draw: Brings the window to what is to be seen.
         size, scale, theme: Of the window, units; pixels per unit; "dark" or "light".
         is_empty: Without a project.
+        is_in_documents: Shown in the documents; the others are there to be looked at.
     """
 
     name: str
@@ -240,20 +242,21 @@ class Screen:
     scale: float = 1.0
     theme: str = "dark"
     is_empty: bool = False
+    is_in_documents: bool = True
 
 
 SCREENS = (
     Screen("welcome", draw_welcome, is_empty=True),
     Screen("main", draw_main),
     Screen("training", draw_training),
-    Screen("anchors", draw_anchors),
+    Screen("anchors", draw_anchors, is_in_documents=False),
     Screen("flicker", draw_flicker),
     Screen("modes", draw_modes),
     Screen("palette", draw_palette),
-    Screen("preferences", draw_preferences),
+    Screen("preferences", draw_preferences, is_in_documents=False),
     Screen("light", draw_main, theme="light"),
-    Screen("small", draw_main, size=(900, 600)),
-    Screen("double", draw_main, size=(900, 600), scale=2.0),
+    Screen("small", draw_main, size=(900, 600), is_in_documents=False),
+    Screen("double", draw_main, size=(900, 600), scale=2.0, is_in_documents=False),
 )
 
 
@@ -282,12 +285,13 @@ def write_screens(project: Path, out: Path, names: list[str]) -> None:
                 if screen.is_empty:
                     _fill_recent(stage, project.name, small)
                 screen.draw(stage)
-                n_bytes = stage.write(out / f"{screen.name}.jpg")
+                path = (out if screen.is_in_documents else REVIEWED) / f"{screen.name}.jpg"
+                n_bytes = stage.write(path)
                 if small is None and not screen.is_empty:
                     small = _picture_in(stage)
             finally:
                 stage.close()
-            sys.stdout.write(f"{out / screen.name}.jpg  {n_bytes / 1000:.0f} kB\n")
+            sys.stdout.write(f"{path}  {n_bytes / 1000:.0f} kB\n")
 
 
 def _picture_in(stage: Stage) -> Any:

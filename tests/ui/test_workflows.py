@@ -15,6 +15,7 @@ from pyglet.window import key
 
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
+from app.session.commands import SetClipLength
 from tests.app.fakes import write_capture
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from tests.ui.real_session import draw_until, make_session
@@ -50,7 +51,10 @@ def test_from_a_folder_to_the_cause_of_flicker(
     pilot.key(key.RETURN)
     draw_until(pilot, lambda: session.capture is not None, "the capture")
     pilot.draw(4)
+    session.dispatch(SetClipLength(3))
+    pilot.draw(2)
     assert session.project_status is not None
+    assert session.project_status.n_clips == 2
     keep(pilot, tmp_path, "opened")
 
     # scrub and orbit
@@ -78,22 +82,22 @@ def test_from_a_folder_to_the_cause_of_flicker(
     draw_until(pilot, lambda: all(state.state == "trained" for state in session.clip_states), "every clip")
     keep(pilot, tmp_path, "trained")
 
-    # find flicker: everything is measured, the seam leads to its frame and camera, the map shows the place
+    # find flicker: everything is measured, a boundary is played around, the map shows the place
     def is_measured() -> bool:
         session.residuals.look_at(session.timeline, session.view.look_through)  # as a started program does
         status = session.residual_status
-        return 0 < status.n_all == status.n_done and all(seam.score is not None for seam in status.seams)
+        return 0 < status.n_all == status.n_done
 
     pilot.studio.frame.ui.wanted_panel = RESIDUALS
     draw_until(pilot, is_measured, "figures of every picture")
     assert not session.residual_status.message
     pilot.draw(4)
-    seam = session.residual_status.seams[0]
-    pilot.click(f"residuals.seam{seam.clip_index}")
-    pilot.draw(2)
+    (seam,) = session.residual_status.seams
+    pilot.key(key.DOWN)
+    assert session.timeline.frame_index == seam.frame_index
+    pilot.key(key.SLASH)
     assert session.timeline.around is not None
-    assert session.view.look_through == seam.worst_camera
-    pilot.key(key.SPACE)
+    assert session.timeline.around[0] < seam.frame_index <= session.timeline.around[1]
     pilot.key(key.SLASH)
     pilot.key(key.K)
     assert not session.timeline.is_playing
@@ -101,10 +105,13 @@ def test_from_a_folder_to_the_cause_of_flicker(
     cells = pilot.rects["residuals.matrix"]
     n_cameras = len(session.rig)
     frame_index, camera_index = seam.frame_index, n_cameras - 1
-    pilot.tap(
+    pilot.move(
         cells.x0 + cells.width * (frame_index + 0.5) / n_frames,
         cells.y0 + cells.height * (camera_index + 0.5) / n_cameras,
     )
+    pilot.press()
+    pilot.release()
+    pilot.draw(2)
     assert (session.timeline.frame_index, session.view.look_through) == (frame_index, camera_index)
     pilot.key(key._7)
     heat = pilot.studio.frame.viewport.active.heat

@@ -181,13 +181,13 @@ class Frame:
         self._visible_panels: set[str] = set()
         self._shown_before: set[str] = set()
         self._panels: tuple[tuple[str, Callable[[FrameNeeds, Dispatch, UiState], None], bool], ...] = (
-            (VIEWPORT, self.viewport.draw, False),
             (CAPTURE, self.capture.draw, True),
             (TRAINING, draw_training, True),
             (REGIONS, draw_regions, True),
             (RESIDUALS, self.residuals.draw, True),
             (TIMELINE, draw_timeline, True),
             (LOG, self.log.draw, True),
+            (VIEWPORT, self.viewport.draw, False),  # last: it shows what the others have just changed
         )
 
     # ---- the redraw plan -------------------------------------------------------------------------------------
