@@ -110,7 +110,7 @@ class Matrix:
         """Lines between clips, as long as there is room between them."""
         if len(clips) > area.width / 6:
             return
-        line = theme.u32(theme.faded(theme.PLAYHEAD, 0.35))
+        line = theme.u32(theme.faded(theme.ON_PICTURE.playhead, 0.35))
         for clip in clips[1:]:
             draw.add_line_v(area.x0 + area.width * clip.start / max(n_frames, 1), area.y0, area.y1, line, 1)
 
@@ -141,7 +141,7 @@ def _draw_playhead(
     frame_index, camera_index = at
     x0 = area.x0 + area.width * frame_index / max(n_frames, 1)
     x1 = max(area.x0 + area.width * (frame_index + 1) / max(n_frames, 1), x0 + 2)
-    draw.add_rect(ImVec2(x0, area.y0), ImVec2(x1, area.y1), theme.u32(theme.PLAYHEAD))
+    draw.add_rect(ImVec2(x0, area.y0), ImVec2(x1, area.y1), theme.u32(theme.ON_PICTURE.playhead))
     if camera_index is not None:
         y = area.y0 + camera_index * row_height
-        draw.add_rect(ImVec2(area.x0, y), ImVec2(area.x1, y + row_height), theme.u32(theme.SKY))
+        draw.add_rect(ImVec2(area.x0, y), ImVec2(area.x1, y + row_height), theme.u32(theme.ON_PICTURE.sky))
