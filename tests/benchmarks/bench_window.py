@@ -45,6 +45,8 @@ SIZE = (1280, 720)
 PARTS = ("orbit", "scrub", "play", "answers")
 MADE = (50_000, 200_000)
 PLAY_S = 6.0
+SETTLE_S = 0.2
+"""Long enough to load a clip, too short for frames to be made ahead."""
 
 
 # ---- hands ---------------------------------------------------------------------------------------------------
@@ -134,19 +136,28 @@ def measure_orbit(desk: Desk, title: str, seconds: float, targets: tuple[str, st
 
 
 def measure_scrub(desk: Desk) -> list[str]:
-    """Every frame once in a leaping order, then again."""
-    desk.key("Home")
-    time.sleep(1.0)
-    n = desk.state["n_frames"]
-    stride = next(s for s in (7, 11, 13) if n % s)
-    order = [(5 + stride * i) % n for i in range(n)]
+    """Frames in a leaping order, then again: inside of a clip that is loaded, and over all clips."""
+    n, n_clips = desk.state["n_frames"], max(len(desk.state["clips"]), 1)
+    length = -(-n // n_clips)
+    begin = length * (n_clips // 2)
+    inside = leaping(list(range(begin + 1, min(begin + length, n))))
     began_s = time.monotonic()
     lines = []
-    for title, target in (("cold", "60 at p95 (sample)"), ("warm", "20 at p95 (sample)")):
-        sent = scrub(desk, order, 0.25)
-        time.sleep(1.0)
-        lines.append(row(f"scrub {title}", image_times_ms(sent, desk.log_lines()).get("scrub", []), target=target))
+    for where, order, before in (("in a clip", inside, begin), ("all clips", leaping(list(range(n))), 0)):
+        scrub(desk, [before], 0.25)
+        time.sleep(SETTLE_S)
+        for title, target in (("cold", "60 at p95 (sample)"), ("warm", "20 at p95 (sample)")):
+            sent = scrub(desk, order, 0.25)
+            time.sleep(1.0)
+            images = image_times_ms(sent, desk.log_lines()).get("scrub", [])
+            lines.append(row(f"scrub {where}, {title}", images, target=target if where == "in a clip" else ""))
     return [*lines, *slow_turns(desk.log_lines(), began_s)]
+
+
+def leaping(frames: list[int]) -> list[int]:
+    """The same frames, none beside the one before."""
+    stride = next(s for s in (7, 11, 13) if len(frames) % s)
+    return [frames[(5 + stride * i) % len(frames)] for i in range(len(frames))]
 
 
 def measure_play(desk: Desk) -> list[str]:
