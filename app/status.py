@@ -432,7 +432,7 @@ class ResidualStatus:
         is_held_out: Of each camera.
         n_done, n_all: Pictures that are measured, and all of trained clips.
         is_measuring: Whether more are being measured now.
-        is_held_back: Whether that goes on slowly only, because a clip trains.
+        is_held_back: Whether that goes on slowly only, because a clip trains or the user looks around.
         rate: Pictures per second; 0 when unknown.
         eta_s: Seconds until all are measured; None when unknown.
         message: What went wrong, in sentences; empty when nothing did.

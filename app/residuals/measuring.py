@@ -22,7 +22,7 @@ from app.status import CELL_COLUMNS, ResidualStatus
 from app.training.rate import Rate
 from engine.parallel import n_cores
 
-SHARE_WHILE_TRAINING = 0.05
+SHARE_WHILE_BUSY = 0.05
 """Of one core's time, while a clip trains on every core: training takes at most that much longer, whatever
 the scheduler makes of it, and the order in which things are measured shows seams long before everything is."""
 N_CORES_ENOUGH = 3
@@ -56,7 +56,7 @@ class Measuring:
         self._process: Measurer | None = None
         self._look: Look | None = None
         self._told: tuple[Look, float] | None = None
-        self._is_training = False
+        self._is_busy = False
         self._is_given_up = False
         self._changed_s = self._status_s = 0.0
         self._rate = Rate(RATE_TIME_CONSTANT_S)
@@ -80,15 +80,15 @@ class Measuring:
         if clip is not None:
             self._look = Look(clip.clip_index, camera_index)
 
-    def poll(self, *, is_training: bool) -> bool:
+    def poll(self, *, is_busy: bool) -> bool:
         """Take in what was read and measured, and start what is missing. Whether the status has changed.
 
         Args:
-            is_training: Whether a clip trains now.
+            is_busy: Whether a clip trains now, or the user looks around: cores are needed for that.
         """
         if self._opened is None:
             return False
-        self._is_training = is_training
+        self._is_busy = is_busy
         self._take_catalog()
         self._take_kept()
         self._take_measured()
@@ -226,7 +226,7 @@ class Measuring:
 
     @property
     def _share(self) -> float:
-        return SHARE_WHILE_TRAINING if self._is_training and n_cores() < N_CORES_ENOUGH else 1.0
+        return SHARE_WHILE_BUSY if self._is_busy and n_cores() < N_CORES_ENOUGH else 1.0
 
     @property
     def _is_held_back(self) -> bool:

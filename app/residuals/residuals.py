@@ -64,9 +64,9 @@ class Residuals:
         """What is measured."""
         return self.measuring.status
 
-    def poll(self, *, is_training: bool) -> bool:
+    def poll(self, *, is_busy: bool) -> bool:
         """Take in what threads and the process have finished. Whether something visible changed."""
-        has_changed = self.measuring.poll(is_training=is_training)
+        has_changed = self.measuring.poll(is_busy=is_busy)
         seen = self._finished
         has_changed |= seen != self._seen
         self._seen = seen

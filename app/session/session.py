@@ -8,7 +8,6 @@ handed.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -32,6 +31,7 @@ from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.residuals.residuals import Residuals
 from app.session import commands
+from app.session.attention import Attention
 from app.session.clip_versions import Versions
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
@@ -68,9 +68,6 @@ from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import EngineError
-
-ATTENDED_S = 2.0
-"""For so long after the view or the playhead has moved, cores are for what is shown."""
 
 
 class Session:
@@ -138,8 +135,7 @@ class Session:
         self.opener = ProjectOpener(
             self._jobs, self.notices, self._take_opened, project_dir=project_dir, open_path=opener
         )
-        self._looked_at: object = None
-        self._looked_s = -ATTENDED_S
+        self._attention = Attention()
         self._seen = self._news_key()
         self.recent.look()
         if is_preloading:  # while others import, starting a thread makes the window wait
@@ -377,13 +373,10 @@ class Session:
         self._release_snapshot()
         has_changed |= bool(events) | self.marking.poll()
         is_training = self.live_training.is_busy and self.training.state != "paused"
-        looked_at = (self.view.look_key, self.timeline.frame_index)
-        if looked_at != self._looked_at:
-            self._looked_at, self._looked_s = looked_at, time.monotonic()
-        is_attended = time.monotonic() - self._looked_s < ATTENDED_S
+        is_attended = self._attention.follow((self.view.look_key, self.timeline.frame_index))
         if self._is_preloading:
             self.residuals.look_at(self.timeline, self.view.look_through)
-        has_changed |= self.residuals.poll(is_training=is_training or is_attended)
+        has_changed |= self.residuals.poll(is_busy=is_training or is_attended)
         self._tell_failures()
         self.playback.work_ahead(self.timeline, is_busy=self.live_training.is_busy)
         seen = self._news_key()

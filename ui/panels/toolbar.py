@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from imgui_bundle import ImVec2, ImVec4, imgui
+from imgui_bundle import ImVec2, imgui
 
 from app.playback.views import COUNTS
 from app.session.commands import LookThrough, ShowViews, ToggleOverlay
@@ -16,8 +16,7 @@ from ui.panels.mode_box import draw_mode_box
 from ui.panels.navigation import ViewPopup
 from ui.panels.regions import begin_choosing
 from ui.panels.state import Dispatch, UiState
-from ui.panels.widgets import box_flags
-from ui.style import theme
+from ui.panels.widgets import box_flags, segment
 from ui.style.theme import Icon
 
 TOOLBAR_HEIGHT = 38.0
@@ -77,7 +76,7 @@ def draw_toolbar(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, popup: 
     popup.draw_button(session, dispatch, ui)
     imgui.same_line(0, GAP)
     imgui.begin_disabled(not session.regions.can_mark)
-    if _segment(f"{Icon.REGION}  Mark" if is_wordy else Icon.REGION, ui.regions.is_active):
+    if segment(f"{Icon.REGION}  Mark" if is_wordy else Icon.REGION, ui.regions.is_active):
         if ui.regions.is_active:
             ui.regions.leave()
         else:
@@ -103,7 +102,7 @@ def _draw_layouts(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState, n_butt
         imgui.set_item_tooltip("One, two or four views (V)")
         return
     for n in COUNTS:
-        if _segment(f"{n}##views", shown == n, width):
+        if segment(f"{n}##views", shown == n, width):
             dispatch(ShowViews(n))
         ui.mark(f"viewport.views{n}")
         imgui.set_item_tooltip(f"{n} view{'s' if n > 1 else ''} (V)")
@@ -141,14 +140,3 @@ def _draw_overlay_menu(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -
     imgui.separator()
     imgui.text_disabled("Tab hides or shows cameras and anchors")
     imgui.end_popup()
-
-
-def _segment(label: str, is_on: bool, width: float = 0.0) -> bool:
-    if is_on:
-        imgui.push_style_color(imgui.Col_.button, ImVec4(*theme.faded(theme.SKY, 0.9)))
-        imgui.push_style_color(imgui.Col_.button_hovered, ImVec4(*theme.SKY))
-        imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_ON_ACCENT))
-    is_clicked = imgui.button(f"{label}##segment", ImVec2(width, 0))
-    if is_on:
-        imgui.pop_style_color(3)
-    return is_clicked

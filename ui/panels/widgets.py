@@ -97,3 +97,15 @@ def box_flags(width: float) -> int:
     """Of a box of choices in a row of them: all choices at once, and no arrow where its word needs the room."""
     flags = int(imgui.ComboFlags_.height_largest)
     return flags if width >= LEAST_WITH_ARROW else flags | int(imgui.ComboFlags_.no_arrow_button)
+
+
+def segment(label: str, is_on: bool, width: float = 0.0) -> bool:
+    """One of several buttons side by side, of which some are on. width: Units; that of its words when 0."""
+    if is_on:
+        imgui.push_style_color(imgui.Col_.button, ImVec4(*theme.faded(theme.SKY, 0.9)))
+        imgui.push_style_color(imgui.Col_.button_hovered, ImVec4(*theme.SKY))
+        imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_ON_ACCENT))
+    is_clicked = imgui.button(f"{label}##segment", ImVec2(width, 0))
+    if is_on:
+        imgui.pop_style_color(3)
+    return is_clicked

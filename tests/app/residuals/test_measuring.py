@@ -65,9 +65,9 @@ def launched() -> Launched:
     return Launched()
 
 
-def poll(opened: Opened, n_times: int = 3, *, is_training: bool = False) -> ResidualStatus:
+def poll(opened: Opened, n_times: int = 3, *, is_busy: bool = False) -> ResidualStatus:
     for _ in range(n_times):
-        opened.residuals.poll(is_training=is_training)
+        opened.residuals.poll(is_busy=is_busy)
     return opened.residuals.status
 
 
@@ -141,11 +141,11 @@ def test_while_a_clip_trains_it_is_held_back_where_training_has_every_core(open_
     opened.residuals.look_at(opened.timeline, None)
     monkeypatch.setattr(measuring, "n_cores", lambda: 2)
     assert not poll(opened).is_held_back
-    assert poll(opened, is_training=True).is_held_back
+    assert poll(opened, is_busy=True).is_held_back
     assert not poll(opened).is_held_back
-    assert launched.all[0].heard == [SetShare(measuring.SHARE_WHILE_TRAINING), SetShare(1.0)]
+    assert launched.all[0].heard == [SetShare(measuring.SHARE_WHILE_BUSY), SetShare(1.0)]
     monkeypatch.setattr(measuring, "n_cores", lambda: 8)
-    assert not poll(opened, is_training=True).is_held_back
+    assert not poll(opened, is_busy=True).is_held_back
 
 
 def test_kept_figures_are_there_without_measuring(open_residuals, launched, project):

@@ -123,6 +123,8 @@ def test_a_disk_that_refuses_costs_no_more_than_the_memory(tmp_path: Path) -> No
     memory = WindowMemory(tmp_path / "file" / "window.json")
     memory.keep_view("/project", {})
     memory.save()
+    assert not memory.path.exists()
+    assert "/project" in memory.views
 
 
 def test_saving_soon_waits_for_no_disk_and_loses_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,7 +23,7 @@ from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.thumbnails import ThumbnailNeeds, Thumbnails
 from ui.panels.timeline.columns import shown_ratio
 from ui.panels.timeline.seam_lane import ratio_text, seam_color
-from ui.panels.widgets import elided, text_wrapped_dim
+from ui.panels.widgets import elided, segment, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.theme import Icon
@@ -174,14 +174,8 @@ class ResidualsPanel:
         for index, column in enumerate(CELL_COLUMNS):
             if index:
                 imgui.same_line(0, 2)
-            is_on = column == self.column
-            if is_on:
-                imgui.push_style_color(imgui.Col_.button, ImVec4(*theme.faded(theme.SKY, 0.9)))
-                imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_ON_ACCENT))
-            if imgui.button(COLUMN_WORDS[column]):
+            if segment(COLUMN_WORDS[column], column == self.column):
                 self.column = column
-            if is_on:
-                imgui.pop_style_color(2)
             ui.mark(f"residuals.column.{column}")
             imgui.set_item_tooltip(COLUMN_MEANINGS[column])
 
