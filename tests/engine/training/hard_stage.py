@@ -17,7 +17,7 @@ import numpy as np
 from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture
 from engine.synthetic import textures
-from engine.synthetic.scene import looking_at
+from engine.synthetic.rigs import looking_at
 
 WIDTH, HEIGHT, FOCAL = 96, 72, 100.0
 N_CAMERAS = 9
