@@ -215,7 +215,7 @@ def test_half_a_dome_looks_at_its_middle_from_all_sides_and_from_above() -> None
     assert np.abs(directions[:, :2].mean(0)).max() < 0.05
     nearest = np.degrees(np.arccos(np.sort(np.clip(directions @ directions.T, -1, 1), axis=1)[:, -2]))
     assert 15 < nearest.min() < nearest.max() < 45  # spread evenly
-    assert directions[:, 2].max() > 0.9
+    assert directions[:, 2].max() > 0.85
 
 
 def test_a_scene_of_another_rig_is_written_as_a_capture(tmp_path: Path) -> None:
