@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from av.video.reformatter import VideoReformatter
 from PIL import Image
 
 from engine.byte_cache import ByteCache
@@ -22,11 +23,14 @@ from engine.capture.media import (
     IMAGE_FAULTS,
     IMAGE_KINDS,
     VIDEO_FAULTS,
+    VideoHeader,
     open_video,
     opened_video,
     set_pixel_limit,
     shown_pts,
 )
+from engine.capture.orientation import turn_of_frame
+from engine.capture.video_colors import rgb_picture
 from engine.errors import CaptureError
 from engine.storage.files import open_regular
 
@@ -102,17 +106,26 @@ def read_image(path: Path) -> np.ndarray:
 
 
 class VideoFrames:
-    """One video file, decoded forward from the nearest key frame. Owns one open container and its position."""
+    """One video file, decoded forward from the nearest key frame. Owns one open container and its position.
 
-    def __init__(self, path: Path, n_frames: int) -> None:
+    Args:
+        path: The file.
+        n_frames: Number of frames, as its header says.
+        is_turned: Whether pictures are turned as the file says; otherwise they come as they are stored.
+    """
+
+    def __init__(self, path: Path, n_frames: int, *, is_turned: bool = True) -> None:
         self.path = path
         self._n_frames = n_frames
+        self._is_turned = is_turned
+        self._reformatter = VideoReformatter()
         self._lock = threading.Lock()
         self._container: Any = None
         self._decoder: Iterator[Any] = iter(())
         self._pts: list[int] = []  # presentation times of all frames, sorted: position in it = frame index
         self._key_indices: list[int] = []  # frame indices at which decoding can start
         self._next_index = 0  # frame index that the decoder delivers next
+        self._has_sought = self._has_overshot = False  # since it was opened; in the last read
 
     @property
     def n_frames(self) -> int:
@@ -145,20 +158,36 @@ class VideoFrames:
             if self._container is None:
                 self._open()
             if self._must_seek(frame_index):
-                self._seek(frame_index)
-            for frame in self._decoder:
-                index = bisect_left(self._pts, frame.pts) if frame.pts is not None else self._next_index
-                self._next_index = index + 1
-                if index < frame_index:
-                    continue
-                if index > frame_index or frame.is_corrupt:
-                    break
-                return frame.to_ndarray(format="rgb24")
+                self._seek(self._key_before(frame_index))
+            frame = self._decoded(frame_index)
+            n_back = MAX_FORWARD_DECODE
+            while frame is None and self._has_overshot:  # seeking in a stream without an index is a guess
+                self._seek(frame_index - n_back)
+                frame = self._decoded(frame_index)
+                n_back *= 4
+            if frame is not None:
+                picture = rgb_picture(frame, self._reformatter)
+                return turn_of_frame(frame).upright(picture) if self._is_turned else picture
         except (*VIDEO_FAULTS, OSError, ValueError) as error:  # ValueError: a pixel format that cannot be converted
             self._close()
             raise self._damaged(frame_index, getattr(error, "strerror", None) or "damaged") from error
         self._close()
         raise self._damaged(frame_index, "its data ends or is damaged there")
+
+    def _decoded(self, frame_index: int) -> Any:
+        """Decode forward to a frame; None where it does not come. `_has_overshot`: as decoding began behind it."""
+        self._has_overshot = False
+        is_first = self._has_sought
+        for frame in self._decoder:
+            index = bisect_left(self._pts, frame.pts) if frame.pts is not None else self._next_index
+            self._next_index = index + 1
+            if index < frame_index:
+                is_first = False
+                continue
+            self._has_overshot = index > frame_index and is_first
+            return None if index > frame_index or frame.is_corrupt else frame
+        self._has_overshot = is_first
+        return None
 
     def _damaged(self, frame_index: int, reason: str) -> CaptureError:
         return CaptureError(
@@ -174,7 +203,7 @@ class VideoFrames:
         stream = self._container.streams.video[0]
         set_pixel_limit(stream)
         self._decoder = self._container.decode(stream)
-        self._next_index = 0
+        self._next_index, self._has_sought = 0, False
 
     def _read_index(self) -> None:
         """Collect frame times; packets are read, not decoded. Needed because frame times need not be even."""
@@ -196,15 +225,27 @@ class VideoFrames:
 
     def _must_seek(self, frame_index: int) -> bool:
         ahead = frame_index - self._next_index
-        if ahead < 0:
-            return True
-        key_before = self._key_indices[max(bisect_left(self._key_indices, frame_index + 1) - 1, 0)]
-        return key_before > self._next_index or ahead > MAX_FORWARD_DECODE
+        return ahead < 0 or self._key_before(frame_index) > self._next_index or ahead > MAX_FORWARD_DECODE
+
+    def _key_before(self, frame_index: int) -> int:
+        """Frame index of the last key frame up to here."""
+        return self._key_indices[max(bisect_left(self._key_indices, frame_index + 1) - 1, 0)]
 
     def _seek(self, frame_index: int) -> None:
+        """Go on decoding at this frame or before it; from the beginning where there is nothing to seek by."""
+        if frame_index <= 0:
+            self._close()
+            self._open()
+            return
         stream = self._container.streams.video[0]
         self._container.seek(self._pts[frame_index], stream=stream, backward=True)
         self._decoder = self._container.decode(stream)
+        self._has_sought = True
+
+
+def is_turned_as_calibrated(header: VideoHeader, calibrated: tuple[int, int]) -> bool:
+    """Whether pictures of a video are to be turned as it says: unless only as stored they have the calibrated size."""
+    return header.size == calibrated or header.stored_size != calibrated
 
 
 class IndexedFrames:

@@ -18,7 +18,7 @@ from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture
 from engine.capture.format_result import Layout
 from engine.synthetic import textures
-from engine.synthetic.scene import looking_at
+from engine.synthetic.rigs import looking_at
 
 WIDTH, HEIGHT, FOCAL = 96, 72, 100.0
 N_CAMERAS = 9
