@@ -13,19 +13,24 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from av.video.reformatter import VideoReformatter
 from PIL import Image
 
 from engine.byte_cache import ByteCache
+from engine.capture.camera_optics import CameraOptics
 from engine.capture.limits import MAX_PIXELS
 from engine.capture.media import (
     IMAGE_FAULTS,
     IMAGE_KINDS,
     VIDEO_FAULTS,
+    VideoHeader,
     open_video,
     opened_video,
     set_pixel_limit,
     shown_pts,
 )
+from engine.capture.orientation import turn_of_frame
+from engine.capture.video_colors import rgb_picture
 from engine.errors import CaptureError
 from engine.storage.files import open_regular
 
@@ -101,17 +106,26 @@ def read_image(path: Path) -> np.ndarray:
 
 
 class VideoFrames:
-    """One video file, decoded forward from the nearest key frame. Owns one open container and its position."""
+    """One video file, decoded forward from the nearest key frame. Owns one open container and its position.
 
-    def __init__(self, path: Path, n_frames: int) -> None:
+    Args:
+        path: The file.
+        n_frames: Number of frames, as its header says.
+        is_turned: Whether pictures are turned as the file says; otherwise they come as they are stored.
+    """
+
+    def __init__(self, path: Path, n_frames: int, *, is_turned: bool = True) -> None:
         self.path = path
         self._n_frames = n_frames
+        self._is_turned = is_turned
+        self._reformatter = VideoReformatter()
         self._lock = threading.Lock()
         self._container: Any = None
         self._decoder: Iterator[Any] = iter(())
         self._pts: list[int] = []  # presentation times of all frames, sorted: position in it = frame index
         self._key_indices: list[int] = []  # frame indices at which decoding can start
         self._next_index = 0  # frame index that the decoder delivers next
+        self._has_sought = self._has_overshot = False  # since it was opened; in the last read
 
     @property
     def n_frames(self) -> int:
@@ -144,20 +158,36 @@ class VideoFrames:
             if self._container is None:
                 self._open()
             if self._must_seek(frame_index):
-                self._seek(frame_index)
-            for frame in self._decoder:
-                index = bisect_left(self._pts, frame.pts) if frame.pts is not None else self._next_index
-                self._next_index = index + 1
-                if index < frame_index:
-                    continue
-                if index > frame_index or frame.is_corrupt:
-                    break
-                return frame.to_ndarray(format="rgb24")
+                self._seek(self._key_before(frame_index))
+            frame = self._decoded(frame_index)
+            n_back = MAX_FORWARD_DECODE
+            while frame is None and self._has_overshot:  # seeking in a stream without an index is a guess
+                self._seek(frame_index - n_back)
+                frame = self._decoded(frame_index)
+                n_back *= 4
+            if frame is not None:
+                picture = rgb_picture(frame, self._reformatter)
+                return turn_of_frame(frame).upright(picture) if self._is_turned else picture
         except (*VIDEO_FAULTS, OSError, ValueError) as error:  # ValueError: a pixel format that cannot be converted
             self._close()
             raise self._damaged(frame_index, getattr(error, "strerror", None) or "damaged") from error
         self._close()
         raise self._damaged(frame_index, "its data ends or is damaged there")
+
+    def _decoded(self, frame_index: int) -> Any:
+        """Decode forward to a frame; None where it does not come. `_has_overshot`: as decoding began behind it."""
+        self._has_overshot = False
+        is_first = self._has_sought
+        for frame in self._decoder:
+            index = bisect_left(self._pts, frame.pts) if frame.pts is not None else self._next_index
+            self._next_index = index + 1
+            if index < frame_index:
+                is_first = False
+                continue
+            self._has_overshot = index > frame_index and is_first
+            return None if index > frame_index or frame.is_corrupt else frame
+        self._has_overshot = is_first
+        return None
 
     def _damaged(self, frame_index: int, reason: str) -> CaptureError:
         return CaptureError(
@@ -173,7 +203,7 @@ class VideoFrames:
         stream = self._container.streams.video[0]
         set_pixel_limit(stream)
         self._decoder = self._container.decode(stream)
-        self._next_index = 0
+        self._next_index, self._has_sought = 0, False
 
     def _read_index(self) -> None:
         """Collect frame times; packets are read, not decoded. Needed because frame times need not be even."""
@@ -195,32 +225,76 @@ class VideoFrames:
 
     def _must_seek(self, frame_index: int) -> bool:
         ahead = frame_index - self._next_index
-        if ahead < 0:
-            return True
-        key_before = self._key_indices[max(bisect_left(self._key_indices, frame_index + 1) - 1, 0)]
-        return key_before > self._next_index or ahead > MAX_FORWARD_DECODE
+        return ahead < 0 or self._key_before(frame_index) > self._next_index or ahead > MAX_FORWARD_DECODE
+
+    def _key_before(self, frame_index: int) -> int:
+        """Frame index of the last key frame up to here."""
+        return self._key_indices[max(bisect_left(self._key_indices, frame_index + 1) - 1, 0)]
 
     def _seek(self, frame_index: int) -> None:
+        """Go on decoding at this frame or before it; from the beginning where there is nothing to seek by."""
+        if frame_index <= 0:
+            self._close()
+            self._open()
+            return
         stream = self._container.streams.video[0]
         self._container.seek(self._pts[frame_index], stream=stream, backward=True)
         self._decoder = self._container.decode(stream)
+        self._has_sought = True
+
+
+def is_turned_as_calibrated(header: VideoHeader, calibrated: tuple[int, int]) -> bool:
+    """Whether pictures of a video are to be turned as it says: unless only as stored they have the calibrated size."""
+    return header.size == calibrated or header.stored_size != calibrated
+
+
+class IndexedFrames:
+    """Frames of another source under other numbers: some of them, some twice. Owns nothing but the numbers."""
+
+    def __init__(self, source: FrameSource, frame_indices: Sequence[int] | np.ndarray) -> None:
+        self.source = source
+        self.path = source.path
+        self.frame_indices = np.asarray(frame_indices, dtype=np.int64)  # of the source, by number here
+
+    @property
+    def n_frames(self) -> int:
+        """How many numbers there are."""
+        return len(self.frame_indices)
+
+    def read(self, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
+        """Decode these frames, each [H, W, 3] uint8 RGB. Raises CaptureError for unreadable data."""
+        return self.source.read([int(self.frame_indices[frame_index]) for frame_index in frame_indices])
+
+    def close(self) -> None:
+        """Let go of the source's open files."""
+        self.source.close()
 
 
 class FrameStore:
-    """Sources of all cameras, the working size of each, and the cache. What Capture.frame asks."""
+    """Sources of all cameras, how their pictures are brought to the working size, and the cache.
 
-    def __init__(
-        self,
-        sources: Sequence[FrameSource],
-        *,
-        native_sizes: np.ndarray,
-        working_sizes: np.ndarray,
-        cache_bytes: int,
-    ) -> None:
+    What Capture.frame asks.
+
+    Args:
+        sources: One per camera.
+        optics: Of each camera, from a stored frame to a picture.
+        cache_bytes: Bound on pictures kept.
+    """
+
+    def __init__(self, sources: Sequence[FrameSource], optics: Sequence[CameraOptics], *, cache_bytes: int) -> None:
         self.sources = tuple(sources)
-        self.native_sizes = np.asarray(native_sizes)
-        self.working_sizes = np.asarray(working_sizes)
+        self.optics = tuple(optics)
         self.cache: ByteCache[tuple[int, int], np.ndarray] = ByteCache(cache_bytes)
+        self._valid: dict[int, np.ndarray | None] = {}
+
+    def valid(self, camera_index: int) -> np.ndarray | None:
+        """Pixels that a camera sees. [H, W] bool, read-only, or None where it sees all."""
+        if camera_index not in self._valid:
+            valid = self.optics[camera_index].valid()
+            if valid is not None:
+                valid.flags.writeable = False
+            self._valid[camera_index] = valid
+        return self._valid[camera_index]
 
     def frames(self, camera_index: int, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
         """Frames of one camera at the working size, each a read-only [H, W, 3] uint8.
@@ -243,30 +317,15 @@ class FrameStore:
         self.cache.clear()
 
     def _decode(self, camera_index: int, frame_index: int) -> np.ndarray:
-        source = self.sources[camera_index]
-        native = next(iter(source.read([frame_index])))
-        width, height = (int(value) for value in self.native_sizes[camera_index])
-        if native.shape[:2] != (height, width):
+        source, optics = self.sources[camera_index], self.optics[camera_index]
+        stored = next(iter(source.read([frame_index])))
+        width, height = optics.stored_size
+        if stored.shape[:2] != (height, width):
             raise CaptureError(
-                f"Frame {frame_index} is {native.shape[1]}x{native.shape[0]}, the calibration says {width}x{height}.",
+                f"Frame {frame_index} is {stored.shape[1]}x{stored.shape[0]}, the calibration says {width}x{height}.",
                 hint="Export all frames at the calibrated size.",
                 path=source.path,
             )
-        frame = resize_area(native, self.working_sizes[camera_index])
+        frame = optics.picture(stored)
         frame.flags.writeable = False  # shared between all callers through the cache
         return frame
-
-
-def resize_area(image: np.ndarray, size: np.ndarray | tuple[int, int]) -> np.ndarray:
-    """Resample with a box filter: each new pixel is the mean of the area it covers.
-
-    Args:
-        image: [H, W, 3] uint8
-        size: New width and height.
-    Returns:
-        [new H, new W, 3] uint8; an own copy, also where the size stays.
-    """
-    width, height = int(size[0]), int(size[1])
-    if image.shape[:2] == (height, width):
-        return np.array(image)
-    return np.array(Image.fromarray(image).resize((width, height), Image.Resampling.BOX))

@@ -18,9 +18,11 @@ from typing import Any
 
 import av
 import av.error
+import numpy as np
 from PIL import Image
 
 from engine.capture.limits import MAX_PIXELS
+from engine.capture.orientation import UPRIGHT, Turn, may_be_turned, turn_of_frame
 from engine.errors import CaptureError
 from engine.storage.files import check_regular, open_regular
 
@@ -145,15 +147,22 @@ class VideoHeader:
 
     Attributes:
         n_frames: Frames shown.
-        size: Width and height.
+        stored_size: Width and height as stored.
         rate: Frames per second; 0 when the container does not say.
         n_bytes: Size of the file.
+        turn: How its pictures are to be turned for display.
     """
 
     n_frames: int
-    size: tuple[int, int]
+    stored_size: tuple[int, int]
     rate: float
     n_bytes: int
+    turn: Turn = UPRIGHT
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the pictures turned upright."""
+        return self.turn.size(self.stored_size)
 
 
 def read_video_header(path: Path) -> VideoHeader:
@@ -177,10 +186,11 @@ def read_video_header(path: Path) -> VideoHeader:
                 raise CaptureError("The video is of a kind that is not known.", hint=again, path=path)
             size = (stream.codec_context.width, stream.codec_context.height)
             rate = float(stream.average_rate or 0)
+            turn = _read_turn(path, container.format.name)
             entries = [entry for entry in stream.index_entries if not entry.is_discard]
             if len(entries) != stream.frames or not entries:  # the index lists key frames only, or frames not shown
                 n_shown = sum(shown_pts(packet) is not None for packet in container.demux(stream))
-                return VideoHeader(n_shown, size, rate, n_bytes)
+                return VideoHeader(n_shown, size, rate, n_bytes, turn)
             n_whole = sum(entry.pos + entry.size <= n_bytes for entry in entries)
     except FileNotFoundError as error:
         raise CaptureError(
@@ -202,7 +212,52 @@ def read_video_header(path: Path) -> VideoHeader:
             hint=again,
             path=path,
         )
-    return VideoHeader(len(entries), size, rate, n_bytes)
+    return VideoHeader(len(entries), size, rate, n_bytes, turn)
+
+
+def _read_turn(path: Path, container_kind: str) -> Turn:
+    """How a video is to be turned. Only where its container may say so is a picture decoded, which is what tells."""
+    is_mp4 = "mp4" in container_kind
+    if not (is_mp4 and may_be_turned(path)) and "matroska" not in container_kind:
+        return UPRIGHT
+    try:
+        with opened_video(path) as container:
+            stream = container.streams.video[0]
+            set_pixel_limit(stream)
+            frame = next(container.decode(stream), None)
+            return UPRIGHT if frame is None else turn_of_frame(frame)
+    except VIDEO_FAULTS:  # said where the frame is asked for
+        return UPRIGHT
+
+
+def read_frame_times(path: Path) -> np.ndarray:
+    """When each frame of a video is shown, in seconds of its container, rising. Reads through the file. [T] float64
+
+    Raises:
+        CaptureError: The file is missing or not a video, or frames have no times of their own.
+    """
+    try:
+        with opened_video(path) as container:
+            stream = container.streams.video[0]
+            found = [pts for packet in container.demux(stream) if (pts := shown_pts(packet)) is not None]
+            seconds = float(stream.time_base or 0)
+    except FileNotFoundError as error:
+        raise unreadable(error, "The video", path) from error
+    except (*VIDEO_FAULTS, IndexError) as error:
+        reason = getattr(error, "strerror", None) or "damaged"
+        raise CaptureError(
+            f"The video cannot be read ({reason}).", hint="Copy or export it again.", path=path
+        ) from error
+    except OSError as error:
+        raise unreadable(error, "The video", path) from error
+    times_s = np.sort(np.array(found, dtype=np.float64)) * seconds
+    if len(times_s) == 0 or (np.diff(times_s) <= 0).any():
+        raise CaptureError(
+            "The frames of the video have no times of their own.",
+            hint="Copy it into an mp4 file, or give the times of its frames.",
+            path=path,
+        )
+    return times_s
 
 
 def shown_pts(packet: Any) -> int | None:

@@ -28,8 +28,8 @@ from engine.capture.format_checks import (
     shortened,
     size_problem,
 )
-from engine.capture.format_result import CameraEntry, Layout
-from engine.capture.frames import VideoFrames
+from engine.capture.format_result import MATCH, CameraEntry, Layout, Probe
+from engine.capture.frames import VideoFrames, is_turned_as_calibrated
 from engine.capture.media import VideoHeader, read_video_header
 from engine.capture.places import place_in
 from engine.errors import CaptureError
@@ -64,12 +64,12 @@ class _Reading:
     looks: dict[str, Future[tuple[Path, VideoHeader]]] = field(default_factory=dict)
 
 
-def probe(folder: Path) -> str | None:
-    """None when the folder looks like this layout, otherwise why not."""
+def probe(folder: Path) -> Probe:
+    """Whether the folder looks like this layout."""
     path = folder / CAMERAS_FILE
     if path.is_file():
-        return None
-    return f"{CAMERAS_FILE} is not a file" if path.exists() else f"no {CAMERAS_FILE}"
+        return MATCH
+    return Probe(False, lacks=f"{CAMERAS_FILE} is not a file" if path.exists() else f"no {CAMERAS_FILE}")
 
 
 def read(folder: Path, *, follow_links: bool = False) -> Layout:
@@ -121,18 +121,26 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
         n_frames=cameras[0].source.n_frames,
         fps=float(document["fps"]),
         default_holdout=holdout,
-        warnings=tuple(_warnings(document, reading.headers)),
+        warnings=tuple(_warnings(document, reading.headers, {camera.name: camera.image_size for camera in cameras})),
     )
 
 
-def _warnings(document: dict[str, Any], headers: dict[str, VideoHeader]) -> list[str]:
-    """Odd but usable: a length that is not stated, rates of videos that are missing or others."""
+def _warnings(
+    document: dict[str, Any], headers: dict[str, VideoHeader], sizes: dict[str, tuple[int, int]]
+) -> list[str]:
+    """Odd but usable: a length that is not stated, turned videos, rates of videos that are missing or others."""
     fps, warnings = document["fps"], []
     if document.get("n_frames") is None:
         n_frames = next(iter(headers.values())).n_frames
         warnings.append(
             f"{CAMERAS_FILE} does not say n_frames; the {n_frames} frames of the videos are taken. Add it, so that "
             "videos cut short alike are noticed."
+        )
+    lying = [name for name, header in headers.items() if not is_turned_as_calibrated(header, sizes[name])]
+    if lying:
+        warnings.append(
+            f"These videos ask to be turned for display: {shortened(lying)}. Only as they are stored they have the "
+            "size of their calibration, so they are not turned."
         )
     unstated = [name for name, header in headers.items() if header.rate <= 0]
     if unstated:
@@ -179,17 +187,18 @@ def _read_camera(index: int, row: Any, reading: _Reading) -> CameraEntry | None:
         )
     else:
         found += check_pose(name, world_to_camera, path)
-    header, place = None, reading.folder
+    header, place, is_turned = None, reading.folder, True
     try:
         place, header = reading.looks[row["file"]].result()
-        found += check_image_size(name, header.size, size, place)
+        is_turned = is_turned_as_calibrated(header, size)
+        found += check_image_size(name, header.size if is_turned else header.stored_size, size, place)
     except CaptureError as error:
         found.append(CaptureError(f'Camera "{name}": {error.message}', hint=error.hint, path=error.path))
     reading.problems += found
     if K is None or world_to_camera is None or header is None:
         return None
     reading.headers[name] = header
-    return CameraEntry(name, K, world_to_camera, size, VideoFrames(place, header.n_frames))
+    return CameraEntry(name, K, world_to_camera, size, VideoFrames(place, header.n_frames, is_turned=is_turned))
 
 
 def _check_counts(cameras: list[CameraEntry], n_listed: Any, path: Path) -> list[CaptureError]:
