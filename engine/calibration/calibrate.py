@@ -16,6 +16,7 @@ import numpy as np
 from engine.calibration.calibrated import CalibratedRig, Calibration, MissingCamera
 from engine.calibration.options import CalibrationOptions
 from engine.calibration.videos import find_videos
+from engine.camera.lens import Lens
 from engine.camera.rig import CameraRig
 from engine.children.running import STALL_S, child_folder, run_child
 from engine.errors import CaptureError, PreparationError
@@ -110,8 +111,7 @@ def _read_result(path: Path, folder: Path) -> Calibration:
         )
         found = CalibratedRig(
             rig=rig,
-            lens=document["lens"],
-            lens_params=arrays["lens_params"],
+            lenses=tuple(Lens(document["lens_model"], tuple(row)) for row in arrays["lens_params"].tolist()),
             points=arrays["points"],
             point_errors_px=arrays["point_errors_px"],
             camera_errors_px=arrays["camera_errors_px"],

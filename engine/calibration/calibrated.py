@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from engine.camera.lens import Lens
 from engine.camera.rig import CameraRig
 
 
@@ -16,8 +17,7 @@ class CalibratedRig:
     Attributes:
         rig: At the size of the videos' frames; its pictures are still as the lenses made them. World: z up, the floor
             or the middle of what the cameras see at 0.
-        lens: "simple", "opencv" or "fisheye".
-        lens_params: Numbers of OpenCV's lens of that kind: k1; k1 k2 p1 p2; k1 k2 k3 k4. [C, n]
+        lenses: One per camera.
         points: What was seen by several cameras. [P, 3]
         point_errors_px: Mean distance of each point's sightings from where it lands. [P]
         camera_errors_px: Median distance, per camera. [C]
@@ -27,8 +27,7 @@ class CalibratedRig:
     """
 
     rig: CameraRig
-    lens: str
-    lens_params: np.ndarray
+    lenses: tuple[Lens, ...]
     points: np.ndarray
     point_errors_px: np.ndarray
     camera_errors_px: np.ndarray

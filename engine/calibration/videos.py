@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from engine.capture.folder_contents import folder_contents
+from engine.capture.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, folders_in, listed
 from engine.capture.format_checks import raise_problems
 from engine.capture.frames import FrameSource, ImageFrames, VideoFrames
 from engine.capture.media import read_image_header, read_video_header
 from engine.errors import CaptureError
 
-VIDEO_SUFFIXES = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm", ".mts", ".ts", ".mpg")
-IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")
 MIN_CAMERAS = 3
 """Two cameras see a scene, but focal lengths and what lies far apart cannot be told from two alone."""
 UNSTATED_FPS = 30.0
@@ -37,12 +35,6 @@ class PlainVideo:
     fps: float
 
 
-def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
-    """A key that sorts names as people count: cam2 before cam10."""
-    parts = re.split(r"(\d+)", name.casefold())
-    return tuple((0, int(part)) if part.isdecimal() else (1, part) for part in parts if part)
-
-
 def find_videos(folder: Path) -> list[PlainVideo]:
     """The cameras of a folder in natural order: its video files, or folders of images where it has no videos.
 
@@ -54,9 +46,8 @@ def find_videos(folder: Path) -> list[PlainVideo]:
         what = "This is a file; name the folder of the videos." if folder.exists() else "There is no such folder."
         raise CaptureError(what, hint="Check the path.", path=folder)
     try:
-        entries = sorted(folder.iterdir(), key=lambda entry: (natural_key(entry.name), entry.name))
-        videos = [entry for entry in entries if entry.suffix.lower() in VIDEO_SUFFIXES and entry.is_file()]
-        folders = {} if videos else _image_folders(entries)
+        videos = [folder / name for name in listed(folder, VIDEO_SUFFIXES)]
+        folders = {} if videos else _image_folders(folder)
     except OSError as error:
         raise CaptureError(
             f"The folder cannot be read ({error.strerror}).", hint="Check that you may read it.", path=folder
@@ -99,15 +90,11 @@ def _video(path: Path) -> PlainVideo:
     return PlainVideo(path.stem, VideoFrames(path, header.n_frames), header.size, header.rate)
 
 
-def _image_folders(entries: list[Path]) -> dict[Path, list[Path]]:
+def _image_folders(folder: Path) -> dict[Path, list[Path]]:
     """Folders with their images in natural order; folders without images are left out."""
-    found = {}
-    for entry in entries:
-        if entry.is_dir():
-            images = [image for image in entry.iterdir() if image.suffix.lower() in IMAGE_SUFFIXES]
-            if images:
-                found[entry] = sorted(images, key=lambda image: (natural_key(image.name), image.name))
-    return found
+    inside = [folder / name for name in folders_in(folder)]
+    found = {path: [path / name for name in listed(path, IMAGE_SUFFIXES)] for path in inside}
+    return {path: images for path, images in found.items() if images}
 
 
 def _images(path: Path, files: list[Path]) -> PlainVideo:
