@@ -7,8 +7,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from engine.capture.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, folders_in, images_in, listed
 from engine.capture.format_checks import shortened
+from engine.capture.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, folders_in, images_in, listed
 from engine.capture.places import place_in
 from engine.errors import CaptureError
 from engine.text import shown

@@ -18,8 +18,8 @@ from engine.capture.assembling import DescribedCamera, assemble
 from engine.capture.findings import Findings
 from engine.capture.format_checks import is_name, parse_size, size_problem
 from engine.capture.format_result import MATCH, Layout, Probe
-from engine.capture.frame_search import FrameSearch
 from engine.capture.frame_files import natural_key
+from engine.capture.frame_search import FrameSearch
 from engine.capture.opencv_numbers import lens_of, pose_of, shifted
 from engine.capture.opencv_yaml import Value, number, read_opencv_yaml
 from engine.errors import CaptureError

@@ -133,7 +133,9 @@ def _read_toml(path: Path) -> dict[str, Any]:
     except OSError as error:
         text = f"The file cannot be read ({error.strerror})."
         raise CaptureError(text, hint="Check that you may read it.", path=path) from error
-    if max(data.count(b"["), data.count(b"{"), data.count(b".")) > 200_000 or b"[" * MAX_DEPTH in data.replace(b" ", b""):
+    if max(data.count(b"["), data.count(b"{"), data.count(b".")) > 200_000 or b"[" * MAX_DEPTH in data.replace(
+        b" ", b""
+    ):
         raise CaptureError("The file nests lists too deep.", hint=hint, path=path)
     try:
         return tomllib.loads(data.decode("utf-8"))
