@@ -47,14 +47,14 @@ class FrameSearch:
             self._places += [(name, prefix + name, False) for name in below if prefix + name not in self._directories]
             self._places += [(os.path.splitext(name)[0], prefix + name, True) for name in names]
 
-    def files(self, names: Sequence[str]) -> Files:
-        """Frames of the camera that goes by these names, the likeliest first.
+    def find(self, names: Sequence[str]) -> Files | None:
+        """Frames of the camera that goes by these names, the likeliest first; None where there are none.
 
         A name fits as it is written; where none does, also when only case, separators and leading zeros differ and no
         other place fits too.
 
         Raises:
-            CaptureError: There are none, or several fit equally well; or a link leads out of the folder.
+            CaptureError: Several fit equally well, a folder is empty, or a link leads out of the folder.
         """
         for name in names:
             for known, place, is_video in self._places:
@@ -68,6 +68,13 @@ class FrameSearch:
                 raise CaptureError(f"Its frames may be {several}.", hint=hint, path=self._named_in)
             if alike:
                 return self._at(alike[0][1], is_video=alike[0][2])
+        return None
+
+    def files(self, names: Sequence[str]) -> Files:
+        """Likewise; also raises where there are none, and says what there is."""
+        found = self.find(names)
+        if found is not None:
+            return found
         where = " or ".join(f"{directory}/" if directory else "the folder" for directory in self._directories)
         there = shortened([place for _, place, _ in self._places])
         raise CaptureError(
@@ -83,15 +90,17 @@ class FrameSearch:
             None where there are none, and what is wrong with them, "" where nothing is.
         """
         try:
-            found = self.files(names)
-        except CaptureError:
+            found = self.find(names)
+        except CaptureError as error:
+            return None, error.message[0].lower() + error.message[1:].rstrip(".")
+        if found is None:
             return None, ""
         if isinstance(found, Path) or isinstance(frames, Path):
             return found, ""
         by_name = {path.stem: path for path in found}
         lacking = [path.stem for path in frames if path.stem not in by_name]
         if lacking:
-            return None, f"no mask of {len(lacking)} of {len(frames)} frames, such as {shown(lacking[0])}"
+            return None, f"there is no mask of {len(lacking)} of {len(frames)} frames, such as {shown(lacking[0])}"
         return [by_name[path.stem] for path in frames], ""
 
     def _at(self, place: str, *, is_video: bool) -> Files:

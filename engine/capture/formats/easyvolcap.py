@@ -66,7 +66,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
             if camera is not None:
                 masks, fault = mask_search.masks([name], camera.files)
                 cameras.append(replace(camera, masks=masks))
-                warnings += [f'Masks of camera "{name}" are not used: there is {fault}.'] if fault else []
+                warnings += [f'Masks of camera "{name}" are not used: {fault}.'] if fault else []
     return assemble(folder, FORMAT, cameras, problems=findings.problems, warnings=warnings, said_in=folder / INTRI)
 
 

@@ -157,8 +157,7 @@ def _frame(row: int, entry: object, common: dict[str, Any], table: str, path: Pa
 
 
 def _is_number(value: object) -> bool:
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    return is_number and abs(value) < 1e12  # NaN compares false
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e12  # NaN compares false
 
 
 def _check_times(groups: Sequence[FrameGroup], place: _Place) -> bool:
