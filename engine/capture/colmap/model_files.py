@@ -77,7 +77,8 @@ class ColmapModel:
 def has_model(folder: Path) -> bool:
     """Whether cameras and images of a model are there, by their names."""
     return any(
-        (folder / f"cameras{suffix}").is_file() and (folder / f"images{suffix}").is_file() for suffix in (".bin", ".txt")
+        (folder / f"cameras{suffix}").is_file() and (folder / f"images{suffix}").is_file()
+        for suffix in (".bin", ".txt")
     )
 
 
