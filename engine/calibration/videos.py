@@ -67,7 +67,7 @@ def find_videos(folder: Path) -> list[PlainVideo]:
     raise_problems(problems, folder)
     if len(found) < MIN_CAMERAS:
         raise CaptureError(
-            f"{len(found)} cameras were found; at least {MIN_CAMERAS} are needed. In it: {folder_contents(folder)}.",
+            f"{len(found)} camera{' was' if len(found) == 1 else 's were'} found; at least {MIN_CAMERAS} are needed. In it: {folder_contents(folder)}.",
             hint="Put one video file per camera into one folder, or one folder of images per camera.",
             path=folder,
         )
