@@ -1,0 +1,82 @@
+"""Recording: what one camera recorded, as far as finding its offset needs it: pictures, their times, the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from engine.capture.capture import Capture
+from engine.capture.clock import ClockedFrames
+from engine.capture.frames import FrameSource, VideoFrames
+from engine.capture.media import VideoHeader, read_frame_times, read_video_header
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One camera.
+
+    Attributes:
+        name: What it is called.
+        source: Its pictures; undistorted and of the size of the rig where a rig is given along with it.
+        times_s: When each picture is shown, in seconds from the first. [T] float64
+        video: The file with sound and tags; None for images.
+        start_s: When the first picture is shown, in seconds of that file.
+    """
+
+    name: str
+    source: FrameSource
+    times_s: np.ndarray
+    video: Path | None = None
+    start_s: float = 0.0
+
+
+class CapturePictures:
+    """The pictures of one camera of a capture, undistorted and at working size, as a source."""
+
+    def __init__(self, capture: Capture, camera_index: int) -> None:
+        self.path = capture.path
+        self.n_frames = capture.n_frames
+        self._capture, self._camera_index = capture, camera_index
+
+    def read(self, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
+        """Pictures, each [H, W, 3] uint8 RGB. Raises CaptureError for unreadable data."""
+        for frame_index in frame_indices:
+            yield self._capture.frame(self._camera_index, frame_index)
+
+    def close(self) -> None:
+        """The capture keeps its own files."""
+
+
+def recordings_of(capture: Capture) -> list[Recording]:
+    """The cameras of a capture, by its own clock: what is found is what is left after its offsets were applied."""
+    times_s = np.arange(capture.n_frames) / capture.fps
+    recordings = []
+    for camera_index, name in enumerate(capture.rig.names):
+        source, first = capture.store.sources[camera_index], 0
+        if isinstance(source, ClockedFrames):
+            source, first = source.source, int(source.frame_indices[0])
+        video = source.path if isinstance(source, VideoFrames) else None
+        start_s = first / capture.fps
+        if video is not None:
+            start_s = float(read_frame_times(video)[first])
+        recordings.append(Recording(name, CapturePictures(capture, camera_index), times_s, video, start_s))
+    return recordings
+
+
+def recordings_in_videos(videos: Sequence[Path], names: Sequence[str] | None = None) -> list[Recording]:
+    """Plain videos without calibration, one per camera.
+
+    Raises:
+        CaptureError: A file is missing or not a video.
+    """
+    recordings = []
+    for row, path in enumerate(videos):
+        header: VideoHeader = read_video_header(path)
+        times_s = read_frame_times(path)
+        name = path.stem if names is None else names[row]
+        source = VideoFrames(path, header.n_frames)
+        recordings.append(Recording(name, source, times_s - times_s[0], path, float(times_s[0])))
+    return recordings
