@@ -9,24 +9,26 @@ import hashlib
 import logging
 import os
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from engine.camera.rig import CameraRig
+from engine.capture.camera_optics import CameraOptics
 from engine.capture.folder_contents import MAX_LOOKED_AT, folder_contents
 from engine.capture.format_checks import raise_problems
-from engine.capture.format_result import Layout
-from engine.capture.formats import panoptic, sample
-from engine.capture.frames import FrameStore
+from engine.capture.format_result import Layout, Probe
+from engine.capture.formats import capture_json, panoptic, sample
+from engine.capture.frames import FrameStore, IndexedFrames
 from engine.capture.rig_checks import check_rig, rig_extent, rig_warnings
+from engine.capture.undistortion import Undistortion
 from engine.errors import CaptureError
 
 logger = logging.getLogger(__name__)
 
-FORMATS = (sample, panoptic)
+FORMATS = (capture_json, sample, panoptic)
 """Readers in the order they are tried. Each has FORMAT, LAYOUT, probe(folder) and read(folder, follow_links=...)."""
 DEFAULT_CACHE_BYTES = 512 << 20
 """Decoded frames kept in memory."""
@@ -39,11 +41,11 @@ class Capture:
     Attributes:
         path: The folder.
         format: Name of the reader that understood it.
-        rig: Cameras at the working size, so that `rig.Ks` fits what `frame` returns.
+        rig: Pinhole cameras at the working size, so that `rig.Ks` fits what `frame` returns.
         n_frames: Frames of every camera.
         fps: Frames per second.
         scale: Requested working size divided by stored size.
-        native_rig: Cameras at the size of the stored frames.
+        native_rig: The same at the size of the stored frames.
         default_holdout: Names of cameras that the capture sets aside for evaluation. May be empty.
         warnings: Plain sentences about what was odd but usable.
         fingerprint: Short hash of format, cameras, sizes and length; the same wherever the folder lies and whatever
@@ -62,6 +64,7 @@ class Capture:
     warnings: tuple[str, ...]
     fingerprint: str
     store: FrameStore = field(repr=False)
+    layout: Layout = field(repr=False)
     follow_links: bool = False
 
     def frame(self, camera_index: int, frame_index: int) -> np.ndarray:
@@ -91,6 +94,17 @@ class Capture:
         for row, frame in enumerate(self.store.frames(camera_index, frame_indices)):
             frames[row] = frame
         return frames
+
+    def valid(self, camera_index: int) -> np.ndarray | None:
+        """Pixels that a camera sees, the same in all of its frames; the others are black or its border, drawn out.
+
+        Returns:
+            [H, W] bool, read-only; None where it sees all.
+        Raises:
+            IndexError: No such camera.
+        """
+        self._check(camera_index, ())
+        return self.store.valid(camera_index)
 
     def camera_indices(self, names: Sequence[str]) -> list[int]:
         """Rows of the rig for these camera names, in the order given.
@@ -129,7 +143,7 @@ def open_capture(
     """Open a capture folder of any known layout.
 
     Args:
-        path: The folder that holds cameras.json or train_meta.json.
+        path: The capture folder.
         scale: Working size divided by stored size, in (0, 1]; frames are area-filtered, K scales by the actual
             ratio of the rounded sizes.
         cache_bytes: Bound on decoded frames kept in memory.
@@ -138,6 +152,8 @@ def open_capture(
         CaptureError: The folder does not hold a capture, or one that cannot be used; lists every problem found.
     """
     folder = Path(path)
+    if not 0.0 < scale <= 1.0:
+        raise CaptureError(f"The scale is {scale:g}.", hint="Give a number above 0 and up to 1.", path=path)
     try:
         layout = _read_layout(folder, follow_links=follow_links)
     except OSError as error:  # rights, a drive that went away, a path too long
@@ -149,13 +165,8 @@ def open_capture(
     native_rig = layout.rig()
     extent = rig_extent(native_rig)
     raise_problems(check_rig(native_rig, extent, folder), folder)
-    rig = native_rig.resized(working_sizes(native_rig.image_sizes, scale, folder))
-    store = FrameStore(
-        [camera.source for camera in layout.cameras],
-        native_sizes=native_rig.image_sizes,
-        working_sizes=rig.image_sizes,
-        cache_bytes=cache_bytes,
-    )
+    rig, optics = _working_rig(layout, native_rig, scale, folder)
+    store = FrameStore([camera.source for camera in layout.cameras], optics, cache_bytes=cache_bytes)
     logger.info("opened %s: %d cameras, %d frames (%s)", folder, len(rig), layout.n_frames, layout.format)
     return Capture(
         path=folder,
@@ -169,21 +180,43 @@ def open_capture(
         warnings=(*layout.warnings, *rig_warnings(native_rig, extent)),
         fingerprint=fingerprint(layout),
         store=store,
+        layout=layout,
         follow_links=follow_links,
     )
 
 
-def working_sizes(native_sizes: np.ndarray, scale: float, path: Path | None = None) -> np.ndarray:
-    """Whole-pixel sizes for a scale. native_sizes and result are [C, 2] width and height.
+def _working_rig(
+    layout: Layout, native_rig: CameraRig, scale: float, folder: Path
+) -> tuple[CameraRig, list[CameraOptics]]:
+    """The cameras at the working size, all of one size, and how the pictures of each get there.
+
+    Where frames differ in size, each camera's longer side is brought to that of the smallest, and what is then still
+    missing at the right and lower border is not valid.
+    """
+    longest = native_rig.image_sizes.max(axis=1)
+    inner_sizes = working_sizes(native_rig.image_sizes, scale * longest.min() / longest, folder)
+    inner = native_rig.resized(inner_sizes)
+    picture_size = (int(inner_sizes[:, 0].max()), int(inner_sizes[:, 1].max()))
+    optics = []
+    for row, entry in enumerate(layout.cameras):
+        inner_size = (int(inner_sizes[row, 0]), int(inner_sizes[row, 1]))
+        undistortion = None
+        if not entry.lens.is_pinhole:
+            undistortion = Undistortion(entry.lens, entry.K, entry.image_size, inner.Ks[row], inner_size)
+        optics.append(CameraOptics(entry.image_size, inner_size, picture_size, undistortion, entry.color_matrix))
+    return replace(inner, image_sizes=np.tile(np.array(picture_size, np.int64), (len(inner), 1))), optics
+
+
+def working_sizes(native_sizes: np.ndarray, scales: np.ndarray, path: Path | None = None) -> np.ndarray:
+    """Whole-pixel sizes for scales. native_sizes and result are [C, 2] width and height, scales [C].
 
     Raises:
-        CaptureError: scale is not in (0, 1] or leaves an image without pixels.
+        CaptureError: A scale leaves an image without pixels.
     """
-    if not 0.0 < scale <= 1.0:
-        raise CaptureError(f"The scale is {scale:g}.", hint="Give a number above 0 and up to 1.", path=path)
-    sizes = np.floor(np.asarray(native_sizes) * scale + 0.5).astype(np.int64)
+    sizes = np.floor(np.asarray(native_sizes) * np.asarray(scales)[:, None] + 0.5).astype(np.int64)
     if (sizes < 1).any():
-        raise CaptureError(f"A scale of {scale:g} leaves no pixels.", hint="Give a larger scale.", path=path)
+        scale = f"{np.max(scales):g}"
+        raise CaptureError(f"A scale of {scale} leaves no pixels.", hint="Give a larger scale.", path=path)
     return sizes
 
 
@@ -195,6 +228,13 @@ def fingerprint(layout: Layout) -> str:
     digest.update(repr(header).encode())
     for array in (rig.world_to_camera, rig.Ks, rig.image_sizes):
         digest.update(np.ascontiguousarray(array).tobytes())
+    for camera in layout.cameras:  # nothing of ordinary cameras, whose fingerprint is as it was before these were read
+        if not camera.lens.is_pinhole:
+            digest.update(repr((camera.name, camera.lens, camera.K.tolist())).encode())
+        if camera.color_matrix is not None:
+            digest.update(repr((camera.name, camera.color_matrix.tolist())).encode())
+        if isinstance(camera.source, IndexedFrames):
+            digest.update(camera.source.frame_indices.tobytes())
     return digest.hexdigest()[:16]
 
 
@@ -205,33 +245,37 @@ def _read_layout(folder: Path, *, follow_links: bool) -> Layout:
         raise CaptureError(
             "This is a file; a capture is a folder.", hint=f"Open {folder.absolute().parent} instead.", path=folder
         )
-    reasons = []
-    for reader in FORMATS:
-        reason = reader.probe(folder)
-        if reason is None:
+    probes = [(reader, reader.probe(folder)) for reader in FORMATS]
+    for reader, probe in probes:
+        if probe.is_match:
             return reader.read(folder, follow_links=follow_links)
-        reasons.append(reason)
-    raise _not_a_capture(folder, reasons)
+    raise _not_a_capture(folder, [probe for _, probe in probes])
 
 
-def _not_a_capture(folder: Path, reasons: Sequence[str]) -> CaptureError:
+def _not_a_capture(folder: Path, probes: Sequence[Probe]) -> CaptureError:
     """What was seen in the folder, what can be read, and what to do."""
     with os.scandir(folder) as entries:
         inside = sorted(entry.name for entry in islice(entries, MAX_LOOKED_AT) if _is_capture(entry))
+    close = [probe for probe in probes if probe.seen]
+    if close:
+        found = "; ".join(f"there is {probe.seen}, but {probe.lacks}" for probe in close)
+        hint = " Or: ".join(dict.fromkeys(probe.hint for probe in close if probe.hint))
+    else:
+        found, hint = "nothing of a known layout was recognised", ""
     if inside:
         hint = f"Open {inside[0]} inside it, which is one."
-    else:
-        layouts = ", or ".join(reader.LAYOUT for reader in FORMATS)
-        hint = f"A capture holds {layouts}. For other recordings write cameras.json, see docs/capture_formats.md."
+    elif not hint:
+        hint = (
+            "docs/capture_formats.md lists the layouts that are read. Videos of cameras without calibration: "
+            "clipgstream calibrate FOLDER. Anything else: write capture.json."
+        )
     return CaptureError(
-        f"This folder is not a capture ({'; '.join(reasons)}). In it: {folder_contents(folder)}.",
-        hint=hint,
-        path=folder,
+        f"This folder is not a capture ({found}). In it: {folder_contents(folder)}.", hint=hint, path=folder
     )
 
 
 def _is_capture(entry: os.DirEntry[str]) -> bool:
     try:
-        return entry.is_dir() and any(reader.probe(Path(entry.path)) is None for reader in FORMATS)
+        return entry.is_dir() and any(reader.probe(Path(entry.path)).is_match for reader in FORMATS)
     except OSError:  # a link to itself, a folder that may not be looked into
         return False

@@ -3,11 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from engine.camera.lens import PINHOLE, Lens
 from engine.camera.rig import CameraRig
 from engine.capture.frames import FrameSource
+from engine.capture.undistortion import undistorted_K
+
+
+@dataclass(frozen=True, slots=True)
+class Probe:
+    """What a reader makes of a folder at a glance.
+
+    Attributes:
+        is_match: Whether `read` is worth calling.
+        seen: What of the layout is there, as "poses_bounds.npy"; empty where nothing of it was recognised.
+        lacks: Why that is not enough, as a part of a sentence: "no cameras.json".
+        hint: What to do about it; empty where nothing was recognised.
+    """
+
+    is_match: bool
+    seen: str = ""
+    lacks: str = ""
+    hint: str = ""
+
+
+MATCH = Probe(True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,10 +39,13 @@ class CameraEntry:
 
     Attributes:
         name: As the capture calls it.
-        K: Intrinsics in pixels at `image_size`. [3, 3] float64
+        K: Intrinsics in pixels at `image_size`, pixel centres at +0.5. [3, 3] float64
         world_to_camera: Rigid map, OpenCV axes. [4, 4] float64
         image_size: Width and height of the stored frames.
         source: Where its frames come from.
+        lens: How its lens bends rays.
+        masks: Where masks of what moves come from, one per frame, bright where something moves; None without.
+        color_matrix: Applied to display-encoded RGB, new = matrix @ old; None leaves colours as they are. [3, 3]
     """
 
     name: str
@@ -27,6 +53,9 @@ class CameraEntry:
     world_to_camera: np.ndarray
     image_size: tuple[int, int]
     source: FrameSource
+    lens: Lens = PINHOLE
+    masks: FrameSource | None = None
+    color_matrix: np.ndarray | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +69,8 @@ class Layout:
         fps: Frames per second.
         default_holdout: Names of the cameras that the capture itself sets aside for evaluation. May be empty.
         warnings: Plain sentences about what was found odd but usable.
+        points: File with a point cloud that came along, in the cameras' world; None without.
+        fisheye_fov_deg: Horizontal view that fisheye pictures are brought to; None takes the usual one.
     """
 
     format: str
@@ -48,12 +79,15 @@ class Layout:
     fps: float
     default_holdout: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    points: Path | None = None
+    fisheye_fov_deg: float | None = None
 
     def rig(self) -> CameraRig:
-        """The cameras at the size of the stored frames."""
+        """The pinhole cameras that the stored frames are brought to, at the size of the stored frames."""
+        Ks = [undistorted_K(entry.K, entry.lens, entry.image_size, self.fisheye_fov_deg) for entry in self.cameras]
         return CameraRig(
             names=tuple(camera.name for camera in self.cameras),
             world_to_camera=np.stack([camera.world_to_camera for camera in self.cameras]),
-            Ks=np.stack([camera.K for camera in self.cameras]),
+            Ks=np.stack(Ks),
             image_sizes=np.array([camera.image_size for camera in self.cameras], dtype=np.int64),
         )

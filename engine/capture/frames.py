@@ -17,6 +17,7 @@ from av.video.reformatter import VideoReformatter
 from PIL import Image
 
 from engine.byte_cache import ByteCache
+from engine.capture.camera_optics import CameraOptics
 from engine.capture.limits import MAX_PIXELS
 from engine.capture.media import (
     IMAGE_FAULTS,
@@ -247,21 +248,53 @@ def is_turned_as_calibrated(header: VideoHeader, calibrated: tuple[int, int]) ->
     return header.size == calibrated or header.stored_size != calibrated
 
 
-class FrameStore:
-    """Sources of all cameras, the working size of each, and the cache. What Capture.frame asks."""
+class IndexedFrames:
+    """Frames of another source under other numbers: some of them, some twice. Owns nothing but the numbers."""
 
-    def __init__(
-        self,
-        sources: Sequence[FrameSource],
-        *,
-        native_sizes: np.ndarray,
-        working_sizes: np.ndarray,
-        cache_bytes: int,
-    ) -> None:
+    def __init__(self, source: FrameSource, frame_indices: Sequence[int] | np.ndarray) -> None:
+        self.source = source
+        self.path = source.path
+        self.frame_indices = np.asarray(frame_indices, dtype=np.int64)  # of the source, by number here
+
+    @property
+    def n_frames(self) -> int:
+        """How many numbers there are."""
+        return len(self.frame_indices)
+
+    def read(self, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
+        """Decode these frames, each [H, W, 3] uint8 RGB. Raises CaptureError for unreadable data."""
+        return self.source.read([int(self.frame_indices[frame_index]) for frame_index in frame_indices])
+
+    def close(self) -> None:
+        """Let go of the source's open files."""
+        self.source.close()
+
+
+class FrameStore:
+    """Sources of all cameras, how their pictures are brought to the working size, and the cache.
+
+    What Capture.frame asks.
+
+    Args:
+        sources: One per camera.
+        optics: Of each camera, from a stored frame to a picture.
+        cache_bytes: Bound on pictures kept.
+    """
+
+    def __init__(self, sources: Sequence[FrameSource], optics: Sequence[CameraOptics], *, cache_bytes: int) -> None:
         self.sources = tuple(sources)
-        self.native_sizes = np.asarray(native_sizes)
-        self.working_sizes = np.asarray(working_sizes)
+        self.optics = tuple(optics)
         self.cache: ByteCache[tuple[int, int], np.ndarray] = ByteCache(cache_bytes)
+        self._valid: dict[int, np.ndarray | None] = {}
+
+    def valid(self, camera_index: int) -> np.ndarray | None:
+        """Pixels that a camera sees. [H, W] bool, read-only, or None where it sees all."""
+        if camera_index not in self._valid:
+            valid = self.optics[camera_index].valid()
+            if valid is not None:
+                valid.flags.writeable = False
+            self._valid[camera_index] = valid
+        return self._valid[camera_index]
 
     def frames(self, camera_index: int, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
         """Frames of one camera at the working size, each a read-only [H, W, 3] uint8.
@@ -284,30 +317,15 @@ class FrameStore:
         self.cache.clear()
 
     def _decode(self, camera_index: int, frame_index: int) -> np.ndarray:
-        source = self.sources[camera_index]
-        native = next(iter(source.read([frame_index])))
-        width, height = (int(value) for value in self.native_sizes[camera_index])
-        if native.shape[:2] != (height, width):
+        source, optics = self.sources[camera_index], self.optics[camera_index]
+        stored = next(iter(source.read([frame_index])))
+        width, height = optics.stored_size
+        if stored.shape[:2] != (height, width):
             raise CaptureError(
-                f"Frame {frame_index} is {native.shape[1]}x{native.shape[0]}, the calibration says {width}x{height}.",
+                f"Frame {frame_index} is {stored.shape[1]}x{stored.shape[0]}, the calibration says {width}x{height}.",
                 hint="Export all frames at the calibrated size.",
                 path=source.path,
             )
-        frame = resize_area(native, self.working_sizes[camera_index])
+        frame = optics.picture(stored)
         frame.flags.writeable = False  # shared between all callers through the cache
         return frame
-
-
-def resize_area(image: np.ndarray, size: np.ndarray | tuple[int, int]) -> np.ndarray:
-    """Resample with a box filter: each new pixel is the mean of the area it covers.
-
-    Args:
-        image: [H, W, 3] uint8
-        size: New width and height.
-    Returns:
-        [new H, new W, 3] uint8; an own copy, also where the size stays.
-    """
-    width, height = int(size[0]), int(size[1])
-    if image.shape[:2] == (height, width):
-        return np.array(image)
-    return np.array(Image.fromarray(image).resize((width, height), Image.Resampling.BOX))

@@ -15,6 +15,7 @@ from engine.cloud.stereo.consistency import check_depths
 from engine.cloud.stereo.smoothing import smooth_inverse_depth
 from engine.cloud.stereo.sweep import matching_costs
 from engine.images.image_filters import dilate
+from engine.images.remap import remap
 
 _SIZE_PX = 16
 
@@ -32,6 +33,7 @@ def warm_up() -> None:
     motion_mask(frames[0], background.image)
     motion_mask(background.image, frames[0].astype(np.float32))
     dilate(~background.is_stable, 1)
+    remap(frames[0], np.zeros((4, 4, 2), np.float32), _SIZE_PX, (_SIZE_PX, _SIZE_PX), 1)
 
     planes = np.linspace(0.2, 1.0, 4, dtype=np.float32)
     greys = frames[:2].mean(-1).astype(np.float32)

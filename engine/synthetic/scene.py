@@ -13,6 +13,7 @@ import numpy as np
 from engine.camera.rig import CameraRig
 from engine.synthetic import meshes, textures
 from engine.synthetic.meshes import Mesh
+from engine.synthetic.rigs import make_rig
 from engine.synthetic.textures import Texture
 
 ROOM_SIZE = (6.0, 6.0, 2.8)
@@ -24,12 +25,6 @@ LIGHT_RADIUS = 0.45
 SAMPLE_CAMERAS = 20
 """18 degrees apart: with 12 (30 degrees) a third of the floor finds no match and depth is off by 28 cm at the third
 quartile; with 20 by 10 cm."""
-RING_RADIUS = 2.7
-"""Distance of the cameras from the middle of the room."""
-RING_HEIGHTS = (1.05, 1.85)
-"""Neighbouring cameras alternate between these."""
-FOCUS = np.array([0.0, 0.0, 0.62])
-"""What the cameras look at, give or take some centimetres."""
 DEGREES_PER_CLIP_BALL = 84.0
 """Way of the ball round the room in one clip: a chord of 1.2 units, a third of a view."""
 DEGREES_PER_CLIP_SCULPTURE = 80.0
@@ -93,6 +88,7 @@ def make_scene(
     n_frames: int = 30,
     clip_length: int = 10,
     fps: float = 30.0,
+    rig: CameraRig | None = None,
 ) -> SyntheticScene:
     """The sample scene at any size and length.
 
@@ -102,12 +98,15 @@ def make_scene(
         n_frames: Length of the capture.
         clip_length: Frames per clip.
         fps: Frames per second.
+        rig: Cameras of another kind (engine.synthetic.rigs), in place of `size` and `n_cameras`.
     Raises:
         ValueError: A number is below 1.
     """
     if min(*size, n_cameras, n_frames, clip_length) < 1:
         raise ValueError("size, n_cameras, n_frames and clip_length must be at least 1")
-    return SyntheticScene(make_parts(clip_length), make_rig(n_cameras, size), n_frames, clip_length, fps)
+    return SyntheticScene(
+        make_parts(clip_length), make_rig(n_cameras, size) if rig is None else rig, n_frames, clip_length, fps
+    )
 
 
 def make_parts(clip_length: int) -> tuple[Part, ...]:
@@ -137,49 +136,6 @@ def make_parts(clip_length: int) -> tuple[Part, ...]:
             still(placed(0.75, -0.7, 0.24, turn_deg=-20), from_frame=clip_length),
         ),
     )
-
-
-def make_rig(n_cameras: int, size: tuple[int, int]) -> CameraRig:
-    """Cameras on a ring at two heights, looking inwards; no two have the same intrinsics.
-
-    Args:
-        n_cameras: Spread evenly round the room.
-        size: Image width and height.
-    """
-    width, height = size
-    generator = np.random.default_rng(20)
-    poses, Ks = [], []
-    for i in range(n_cameras):
-        azimuth = 2 * np.pi * (i + 0.5) / n_cameras
-        center = np.array([*(RING_RADIUS * np.array([np.cos(azimuth), np.sin(azimuth)])), RING_HEIGHTS[i % 2]])
-        target = FOCUS + generator.uniform(-0.06, 0.06, 3)
-        poses.append(looking_at(center, target, roll_deg=float(generator.uniform(-1.5, 1.5))))
-        focal = width * generator.uniform(0.745, 0.825)  # 62 to 68 degrees across
-        offset = generator.uniform(-0.018, 0.018, 2) * width  # up to 5.8 px at 320
-        fx, fy = focal, focal * generator.uniform(0.996, 1.004)
-        Ks.append([[fx, 0.0, width / 2 + offset[0]], [0.0, fy, height / 2 + offset[1]], [0.0, 0.0, 1.0]])
-    return CameraRig(
-        names=tuple(f"cam{i:02d}" for i in range(n_cameras)),
-        world_to_camera=np.round(np.stack(poses), 12),
-        Ks=np.round(np.array(Ks), 6),
-        image_sizes=np.tile(np.array(size, dtype=np.int64), (n_cameras, 1)),
-    )
-
-
-def looking_at(center: np.ndarray, target: np.ndarray, *, roll_deg: float = 0.0) -> np.ndarray:
-    """world_to_camera of a camera at `center` that looks at `target` with z up. [4, 4], OpenCV axes"""
-    forward = (target - center) / np.linalg.norm(target - center)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    down = np.cross(forward, right)
-    roll = np.radians(roll_deg)
-    rotation = np.stack(
-        [np.cos(roll) * right + np.sin(roll) * down, np.cos(roll) * down - np.sin(roll) * right, forward]
-    )
-    world_to_camera = np.eye(4)
-    world_to_camera[:3, :3] = rotation
-    world_to_camera[:3, 3] = -rotation @ center
-    return world_to_camera
 
 
 def placed(x: float, y: float, z: float, *, turn_deg: float = 0.0) -> np.ndarray:

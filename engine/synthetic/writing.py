@@ -61,17 +61,29 @@ def write_capture(
         ValueError: A number is below 1.
     """
     scene = make_scene(size=size, n_cameras=n_cameras, n_frames=n_frames, clip_length=clip_length, fps=fps)
+    write_scene(out_dir, scene, supersampling=supersampling, truth_dir=truth_dir, report=report)
+    return scene
+
+
+def write_scene(
+    out_dir: Path | str,
+    scene: SyntheticScene,
+    *,
+    supersampling: int = 3,
+    truth_dir: Path | str | None = None,
+    report: Callable[[str], None] = logger.info,
+) -> None:
+    """Render any scene and write it as a capture in the `sample` layout. Arguments as in `write_capture`."""
     out = Path(out_dir)
     out.mkdir(parents=True, exist_ok=True)
     for camera_index, name in enumerate(scene.rig.names):
         camera = SceneCamera(scene, camera_index, supersampling=supersampling)
         path = out / f"{name}.mp4"
-        write_video(path, (camera.image(frame_index) for frame_index in range(n_frames)), fps=fps)
+        write_video(path, (camera.image(frame_index) for frame_index in range(scene.n_frames)), fps=scene.fps)
         if truth_dir is not None:
             write_truth(scene, camera_index, Path(truth_dir) / name)
-        report(f"{name}: {n_frames} frames, {path.stat().st_size / 1000:.0f} kB")
+        report(f"{name}: {scene.n_frames} frames, {path.stat().st_size / 1000:.0f} kB")
     write_json(out / "cameras.json", cameras_document(scene))
-    return scene
 
 
 def cameras_document(scene: SyntheticScene) -> dict[str, Any]:

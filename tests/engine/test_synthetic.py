@@ -10,8 +10,9 @@ import pytest
 
 from engine.capture.capture import open_capture
 from engine.synthetic import meshes, textures
+from engine.synthetic.rigs import FOCUS, forward_facing_rig, half_dome_rig
 from engine.synthetic.scene import SyntheticScene, make_scene
-from engine.synthetic.writing import cameras_document, to_yuv444, write_capture
+from engine.synthetic.writing import cameras_document, to_yuv444, write_capture, write_scene
 
 pytest.importorskip("open3d", reason="the ray caster needs Open3D and its system libraries", exc_type=ImportError)
 
@@ -196,3 +197,30 @@ def test_shipped_sample_is_what_the_generator_makes() -> None:
     assert sum(path.stat().st_size for path in SAMPLE.iterdir()) < 6_000_000
     frame = SceneCamera(SHIPPED, 3).image(12)
     assert psnr(capture.frame(3, 12), frame) > 42  # 44 to 46 on the machine that made it
+
+
+@pytest.mark.parametrize("n_cameras", [8, 13, 20])
+def test_a_forward_facing_rig_looks_one_way_from_in_front_of_what_it_sees(n_cameras: int) -> None:
+    rig = forward_facing_rig(n_cameras, (64, 48))
+    assert len(rig) == len(np.unique(rig.centers.round(6), axis=0)) == n_cameras
+    assert np.ptp(rig.centers[:, 1]) < 1e-9
+    assert (rig.forwards[:, 1] > 0.85).all()  # at most 32 degrees from straight ahead
+    assert (rig.focus_point()[1] - rig.centers[:, 1] > 3).all()
+
+
+def test_half_a_dome_looks_at_its_middle_from_all_sides_and_from_above() -> None:
+    rig = half_dome_rig(24, (64, 48))
+    directions = (rig.centers - FOCUS) / np.linalg.norm(rig.centers - FOCUS, axis=1, keepdims=True)
+    assert np.degrees(np.arccos((directions * -rig.forwards).sum(1))).max() < 4
+    assert np.abs(directions[:, :2].mean(0)).max() < 0.05
+    nearest = np.degrees(np.arccos(np.sort(np.clip(directions @ directions.T, -1, 1), axis=1)[:, -2]))
+    assert 15 < nearest.min() < nearest.max() < 45  # spread evenly
+    assert directions[:, 2].max() > 0.85
+
+
+def test_a_scene_of_another_rig_is_written_as_a_capture(tmp_path: Path) -> None:
+    scene = make_scene(n_frames=1, rig=forward_facing_rig(4, (32, 24)))
+    write_scene(tmp_path, scene, supersampling=1)
+    capture = open_capture(tmp_path)
+    assert capture.n_frames == 1
+    assert np.allclose(capture.rig.centers, scene.rig.centers)

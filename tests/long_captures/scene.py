@@ -7,16 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from engine.camera.rig import CameraRig
-from engine.synthetic.scene import (
-    FOCUS,
-    RING_HEIGHTS,
-    RING_RADIUS,
-    SyntheticScene,
-    looking_at,
-    make_parts,
-    placed,
-    still,
-)
+from engine.synthetic.rigs import FOCUS, RING_HEIGHTS, RING_RADIUS, looking_at
+from engine.synthetic.scene import SyntheticScene, make_parts, placed, still
 from engine.synthetic.textures import Texture
 
 MOTION_FRAMES = 18

@@ -28,7 +28,7 @@ from engine.capture.format_checks import (
     shortened,
     size_problem,
 )
-from engine.capture.format_result import CameraEntry, Layout
+from engine.capture.format_result import MATCH, CameraEntry, Layout, Probe
 from engine.capture.frames import ImageFrames
 from engine.capture.limits import MAX_CAMERA_ID
 from engine.capture.media import ImageHeader, read_image_header
@@ -56,11 +56,11 @@ class _MetaCamera:
     is_test: bool
 
 
-def probe(folder: Path) -> str | None:
-    """None when the folder looks like this layout, otherwise why not."""
+def probe(folder: Path) -> Probe:
+    """Whether the folder looks like this layout."""
     if any((folder / name).is_file() for name in META_FILES):
-        return None
-    return "no train_meta.json or test_meta.json"
+        return MATCH
+    return Probe(False, lacks="no train_meta.json or test_meta.json")
 
 
 def read(folder: Path, *, follow_links: bool = False) -> Layout:

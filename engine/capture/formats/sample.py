@@ -28,7 +28,7 @@ from engine.capture.format_checks import (
     shortened,
     size_problem,
 )
-from engine.capture.format_result import CameraEntry, Layout
+from engine.capture.format_result import MATCH, CameraEntry, Layout, Probe
 from engine.capture.frames import VideoFrames, is_turned_as_calibrated
 from engine.capture.media import VideoHeader, read_video_header
 from engine.capture.places import place_in
@@ -64,12 +64,12 @@ class _Reading:
     looks: dict[str, Future[tuple[Path, VideoHeader]]] = field(default_factory=dict)
 
 
-def probe(folder: Path) -> str | None:
-    """None when the folder looks like this layout, otherwise why not."""
+def probe(folder: Path) -> Probe:
+    """Whether the folder looks like this layout."""
     path = folder / CAMERAS_FILE
     if path.is_file():
-        return None
-    return f"{CAMERAS_FILE} is not a file" if path.exists() else f"no {CAMERAS_FILE}"
+        return MATCH
+    return Probe(False, lacks=f"{CAMERAS_FILE} is not a file" if path.exists() else f"no {CAMERAS_FILE}")
 
 
 def read(folder: Path, *, follow_links: bool = False) -> Layout:

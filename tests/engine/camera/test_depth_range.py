@@ -13,7 +13,7 @@ from engine.camera.depth_range import (
     near_plane,
 )
 from engine.camera.projection import unproject
-from engine.synthetic.scene import make_rig
+from engine.synthetic.rigs import make_rig
 
 RIG = make_rig(6, (80, 60))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from engine.camera.projection import is_in_picture, pixel_rays, project, projection_matrices, unproject
-from engine.synthetic.scene import make_rig
+from engine.synthetic.rigs import make_rig
 
 RIG = make_rig(3, (8, 6))
 

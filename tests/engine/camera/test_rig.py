@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from engine.camera.rig import CameraRig
-from engine.synthetic.scene import FOCUS, looking_at, make_rig
+from engine.synthetic.rigs import FOCUS, looking_at, make_rig
 
 
 def project(K: np.ndarray, world_to_camera: np.ndarray, point: np.ndarray) -> np.ndarray:

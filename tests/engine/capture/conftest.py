@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from engine.synthetic.scene import make_rig
+from engine.synthetic.rigs import make_rig
 from engine.synthetic.writing import write_video
 
 SIZE = (48, 32)

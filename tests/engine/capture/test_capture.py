@@ -111,7 +111,7 @@ def test_an_impossible_scale_is_refused(make_sample: MakeCapture, scale: float) 
 
 
 def test_working_sizes_round_half_up() -> None:
-    assert working_sizes(np.array([[5, 3]]), 0.5).tolist() == [[3, 2]]
+    assert working_sizes(np.array([[5, 3]]), np.array([0.5])).tolist() == [[3, 2]]
 
 
 def test_fingerprint_ignores_place_and_scale_and_sees_the_calibration(make_sample: MakeCapture, tmp_path: Path) -> None:

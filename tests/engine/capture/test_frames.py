@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.capture.frames import VideoFrames, resize_area
+from engine.capture.camera_optics import resize_area
+from engine.capture.frames import VideoFrames
 from engine.capture.media import read_video_header
 
 

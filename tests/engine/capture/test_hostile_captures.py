@@ -386,7 +386,7 @@ def test_a_folder_of_another_kind_is_described(tmp_path: Path) -> None:
     (tmp_path / "images").mkdir()
     message = refusal(tmp_path)
     assert "In it: 2 videos, 1 TOML file, 1 other file and 1 folder." in message
-    assert "cameras.json and one video per camera" in message
+    assert "clipgstream calibrate" in message
     assert "sample layout" not in message
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from engine.camera.rig import CameraRig
 from engine.capture.rig_checks import check_rig, rig_extent, rig_warnings
-from engine.synthetic.scene import make_rig
+from engine.synthetic.rigs import make_rig
 
 RIG = make_rig(8, (80, 60))
 

@@ -16,8 +16,9 @@ import numpy as np
 
 from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture
+from engine.capture.format_result import Layout
 from engine.synthetic import textures
-from engine.synthetic.scene import looking_at
+from engine.synthetic.rigs import looking_at
 
 WIDTH, HEIGHT, FOCAL = 96, 72, 100.0
 N_CAMERAS = 9
@@ -101,6 +102,7 @@ class HardScene:
             warnings=(),
             fingerprint=f"{self.name}-{self.n_frames}",
             store=_Pixels(pixels),  # type: ignore[arg-type]
+            layout=Layout("made in memory", (), self.n_frames, 10.0),
         )
 
     def video(self, camera: int) -> np.ndarray:
@@ -166,6 +168,9 @@ class _Pixels:
 
     def frames(self, camera_index: int, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
         yield from self._pixels[camera_index, list(frame_indices)]
+
+    def valid(self, camera_index: int) -> None:
+        """All pixels are."""
 
     def close(self) -> None:
         pass

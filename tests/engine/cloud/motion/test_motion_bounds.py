@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from engine.cloud.motion.moving_cloud import hull_votes, motion_bounds
-from engine.synthetic.scene import make_rig
+from engine.synthetic.rigs import make_rig
 
 
 @pytest.mark.parametrize(

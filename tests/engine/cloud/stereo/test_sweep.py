@@ -13,7 +13,7 @@ from engine.cloud.stereo.sweep import (
     preferred_angle_deg,
     relative_homography,
 )
-from engine.synthetic.scene import make_rig
+from engine.synthetic.rigs import make_rig
 
 
 def cone_rig(angle_deg: float, n_cameras: int = 8) -> CameraRig:

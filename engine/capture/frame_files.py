@@ -1,0 +1,92 @@
+"""Where the frames of cameras lie: images of a folder or a pattern in natural order, videos by the name of a camera."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from engine.capture.places import place_in
+from engine.errors import CaptureError
+from engine.text import shown
+
+IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")
+VIDEO_SUFFIXES = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm", ".mts", ".ts", ".mpg")
+_NUMBER = re.compile(r"(\d+)")
+
+
+def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
+    """Key that sorts names as people count: cam2 before cam10."""
+    parts = _NUMBER.split(name)
+    return tuple((1, int(part), part) if row % 2 else (0, 0, part) for row, part in enumerate(parts))
+
+
+def listed(folder: Path, suffixes: Sequence[str]) -> list[str]:
+    """Names of files in a folder that end so, whatever their case, in natural order; hidden ones are left out.
+
+    Raises:
+        OSError: The folder cannot be read.
+    """
+    with os.scandir(folder) as entries:
+        names = [entry.name for entry in entries if not entry.name.startswith(".")]
+    return sorted((name for name in names if os.path.splitext(name)[1].lower() in suffixes), key=natural_key)
+
+
+def folders_in(folder: Path) -> list[str]:
+    """Names of folders in a folder, in natural order; hidden ones are left out. Raises OSError."""
+    with os.scandir(folder) as entries:
+        names = [entry.name for entry in entries if not entry.name.startswith(".") and _is_folder(entry)]
+    return sorted(names, key=natural_key)
+
+
+def image_files(folder: Path, files: str | Sequence[str], *, follow_links: bool, named_in: Path) -> list[Path]:
+    """Image files that a capture names: a list, or a pattern whose last part has stars.
+
+    Args:
+        folder: The capture folder.
+        files: "images/cam00/*.png", or names relative to the folder.
+        follow_links, named_in: See `place_in`.
+    Raises:
+        CaptureError: Nothing matches, or a name leads out of the folder.
+    """
+    if not isinstance(files, str):
+        return [place_in(folder, name, follow_links=follow_links, named_in=named_in) for name in files]
+    directory, _, pattern = files.rpartition("/")
+    hint = "Name a folder of images with a pattern, such as images/cam00/*.png."
+    if not pattern or "*" in directory:
+        raise CaptureError(f"{shown(files)} is not a pattern of file names.", hint=hint, path=named_in)
+    inside = folder if not directory else place_in(folder, directory, follow_links=follow_links, named_in=named_in)
+    try:
+        names = [name for name in listed(inside, IMAGE_SUFFIXES) if fnmatchcase(name, pattern)]
+    except OSError as error:
+        text = f"The folder of {shown(files)} cannot be read ({error.strerror})."
+        raise CaptureError(text, hint="Check that it is there and that you may read it.", path=inside) from error
+    if not names:
+        raise CaptureError(f"No image fits {shown(files)}.", hint=hint, path=inside)
+    return images_in(folder, directory, names, follow_links=follow_links, named_in=named_in)
+
+
+def images_in(folder: Path, directory: str, names: Sequence[str], *, follow_links: bool, named_in: Path) -> list[Path]:
+    """Paths of files in one folder below the capture's, of which only links are looked at one by one.
+
+    Raises:
+        CaptureError: A link leads out of the capture folder.
+    """
+    inside = folder / directory if directory else folder
+    if not follow_links:
+        place_in(folder, f"{directory}/{names[0]}" if directory else names[0], follow_links=False, named_in=named_in)
+        with os.scandir(inside) as entries:
+            links = {entry.name for entry in entries if entry.is_symlink()}
+        for name in names:
+            if name in links:
+                place_in(folder, f"{directory}/{name}" if directory else name, follow_links=False, named_in=named_in)
+    return [inside / name for name in names]
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:  # a link to itself
+        return False

@@ -1,0 +1,1 @@
+"""One writer per layout on disk, each the other way round of its reader."""

@@ -1,0 +1,147 @@
+"""Writes capture.json: any capture in our own words, and corrections to it, the only thing ever written into one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from engine.capture.format_checks import read_json_object
+from engine.capture.format_result import CameraEntry, Layout
+from engine.capture.formats.capture_json import FILE, SCHEMA
+from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames
+from engine.errors import CaptureError
+from engine.storage.files import checked_path
+from engine.storage.json_files import json_text
+
+
+@dataclass(frozen=True, slots=True)
+class Corrections:
+    """What a user, or a check that the user agreed to, changes about a capture.
+
+    Attributes:
+        is_excluded: By camera name.
+        offset_frames: By camera name; replaces what was there.
+        holdout: Names of cameras kept out of training; None leaves them.
+        masks: By camera name: a pattern or video relative to the folder.
+        world_scale, up: See `CaptureDocument`; None leaves them.
+        fps: None leaves it.
+    """
+
+    is_excluded: Mapping[str, bool] = field(default_factory=dict)
+    offset_frames: Mapping[str, float] = field(default_factory=dict)
+    holdout: Sequence[str] | None = None
+    masks: Mapping[str, str] = field(default_factory=dict)
+    world_scale: float | None = None
+    up: tuple[float, float, float] | None = None
+    fps: float | None = None
+
+
+def capture_document(layout: Layout, folder: Path) -> dict[str, Any]:
+    """The content of capture.json for a layout.
+
+    Args:
+        folder: Where the file shall lie: files are named relative to it, those outside of it by their absolute path.
+    """
+    document: dict[str, Any] = {"schema": SCHEMA, "fps": layout.fps, "pixel_center": 0.5}
+    if layout.default_holdout:
+        document["holdout"] = list(layout.default_holdout)
+    if layout.points is not None:
+        document["points"] = _named(layout.points, folder)
+    if layout.fisheye_fov_deg is not None:
+        document["fisheye_fov_deg"] = layout.fisheye_fov_deg
+    document["cameras"] = [_camera(entry, folder) for entry in layout.cameras]
+    return document
+
+
+def write_capture_json(folder: Path, document: Mapping[str, Any]) -> Path:
+    """Write capture.json into a folder, replacing the file at once. Returns its path.
+
+    Raises:
+        DiskError: The folder cannot be written.
+    """
+    path = folder / FILE
+    with checked_path(path, what="The description of the capture") as partial:
+        partial.write_text(json_text(document, indent=1) + "\n", encoding="utf-8")
+    return path
+
+
+def write_corrections(layout: Layout, folder: Path, corrections: Corrections, *, target: Path | None = None) -> Path:
+    """Correct a capture: its capture.json with these changes, or a new one. Returns its path.
+
+    Args:
+        layout: The capture as it was read.
+        folder: Of the capture.
+        target: Folder to write to; None takes the capture's own. In another one, files are named by absolute paths,
+            and it opens with follow_links only.
+    Raises:
+        CaptureError: A camera is unknown, or the capture.json that is there cannot be read.
+        DiskError: The folder cannot be written.
+    """
+    place = folder if target is None else target
+    has_own = (folder / FILE).is_file() and place == folder
+    document = read_json_object(folder / FILE) if has_own else capture_document(layout, place)
+    rows = {row["name"]: row for row in document["cameras"]}
+    named = {*corrections.is_excluded, *corrections.offset_frames, *corrections.masks, *(corrections.holdout or ())}
+    unknown = sorted(named - set(rows))
+    if unknown:
+        raise CaptureError(
+            f"The capture has no camera called {', '.join(unknown)}.",
+            hint=f"Its cameras are {', '.join(rows)}.",
+            path=folder,
+        )
+    for key, values in (
+        ("is_excluded", corrections.is_excluded),
+        ("offset_frames", corrections.offset_frames),
+        ("masks", corrections.masks),
+    ):
+        for name, value in values.items():
+            rows[name][key] = value
+    for key in ("holdout", "world_scale", "up", "fps"):
+        value = getattr(corrections, key)
+        if value is not None:
+            document[key] = list(value) if isinstance(value, Sequence) else value
+    return write_capture_json(place, document)
+
+
+def _camera(entry: CameraEntry, folder: Path) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "name": entry.name,
+        "width": entry.image_size[0],
+        "height": entry.image_size[1],
+        "K": entry.K.tolist(),
+        "world_to_camera": entry.world_to_camera.tolist(),
+    }
+    if not entry.lens.is_pinhole:
+        row["lens"] = {"model": entry.lens.model, "params": list(entry.lens.params)}
+    source, offset = _unmoved(entry.source)
+    if isinstance(source, ImageFrames):
+        row["images"] = [_named(path, folder) for path in source.files]
+    else:
+        row["video"] = _named(source.path, folder)
+    if offset:
+        row["offset_frames"] = offset
+    if entry.masks is not None:
+        masks, _ = _unmoved(entry.masks)
+        is_images = isinstance(masks, ImageFrames)
+        row["masks"] = [_named(path, folder) for path in masks.files] if is_images else _named(masks.path, folder)
+    if entry.color_matrix is not None:
+        row["color_matrix"] = np.asarray(entry.color_matrix).tolist()
+    return row
+
+
+def _unmoved(source: FrameSource) -> tuple[FrameSource, int]:
+    """The source behind another numbering, and by how many frames it was moved."""
+    if isinstance(source, IndexedFrames):
+        return source.source, int(source.frame_indices[0])
+    return source, 0
+
+
+def _named(path: Path, folder: Path) -> str:
+    absolute, root = os.path.abspath(path), os.path.abspath(folder)
+    inside = os.path.commonpath((absolute, root)) == root
+    return Path(os.path.relpath(absolute, root)).as_posix() if inside else absolute
