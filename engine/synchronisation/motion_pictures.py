@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage, sparse
 
-from engine.capture.frames import FrameSource, resize_area
+from engine.capture.camera_optics import resize_area
+from engine.capture.frames import FrameSource
 from engine.synchronisation.recording import Recording
 
 WIDTH = 320

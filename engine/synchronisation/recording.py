@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from engine.capture.capture import Capture
-from engine.capture.clock import ClockedFrames
-from engine.capture.frames import FrameSource, VideoFrames
+from engine.capture.frames import FrameSource, IndexedFrames, VideoFrames
 from engine.capture.media import VideoHeader, read_frame_times, read_video_header
 
 
@@ -56,7 +55,7 @@ def recordings_of(capture: Capture) -> list[Recording]:
     recordings = []
     for camera_index, name in enumerate(capture.rig.names):
         source, first = capture.store.sources[camera_index], 0
-        if isinstance(source, ClockedFrames):
+        if isinstance(source, IndexedFrames):
             source, first = source.source, int(source.frame_indices[0])
         video = source.path if isinstance(source, VideoFrames) else None
         start_s = first / capture.fps
