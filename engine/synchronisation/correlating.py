@@ -20,12 +20,19 @@ class PairCurve:
         second: Row of the other.
         offsets_frames: Offset of the second minus that of the first, rising by 1. [L] float64
         scores: Correlation, -1..1. [L] float64
+        overlaps: Share of the shorter signal that is compared. [L] float64
     """
 
     first: int
     second: int
     offsets_frames: np.ndarray
     scores: np.ndarray
+    overlaps: np.ndarray
+
+
+def overlaps(n_first: int, n_second: int, lags: np.ndarray) -> np.ndarray:
+    """Share of the shorter of two signals that is left to compare at these lags. [L] float64"""
+    return (np.minimum(n_first, n_second - lags) - np.maximum(0, -lags)) / min(n_first, n_second)
 
 
 def correlate(first: np.ndarray, second: np.ndarray, max_lag: int) -> tuple[np.ndarray, np.ndarray]:

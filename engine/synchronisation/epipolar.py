@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from engine.camera.rig import CameraRig
-from engine.synchronisation.correlating import PairCurve, correlate
+from engine.synchronisation.correlating import PairCurve, correlate, overlaps
 from engine.synchronisation.epipolar_profiles import plane_bins, profile
 from engine.synchronisation.motion_pictures import MotionPictures
 
@@ -58,15 +58,16 @@ def epipolar_curves(
     for done, (first, second) in enumerate(pairs):
         bins = plane_bins(rig, first, second)
         if bins is not None:
-            total, lags = None, np.zeros(0)
+            total, lags, lengths = None, np.zeros(0), (0, 0)
             for channel in ("changes", "presence"):
                 one = _signal(profile(getattr(motions[first], channel), bins[0], bins[2]))
                 other = _signal(profile(getattr(motions[second], channel), bins[1], bins[2]))
                 lags, scores = correlate(one, other, max_lag)
+                lengths = (len(one), len(other))
                 total = scores if total is None else total + scores
             if total is not None and len(lags):
                 offsets = lags + starts_frames[second] - starts_frames[first]
-                curves.append(PairCurve(first, second, offsets, total / 2))
+                curves.append(PairCurve(first, second, offsets, total / 2, overlaps(*lengths, lags)))
         after_pair(done + 1, len(pairs))
     return curves
 

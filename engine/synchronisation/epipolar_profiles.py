@@ -67,4 +67,4 @@ def profile(motion: sparse.csr_matrix, bins: np.ndarray, n_bins: int) -> np.ndar
     """Motion [T, H * W] summed over each plane. [T, B] float64"""
     rows = np.flatnonzero(bins >= 0)
     to_bins = sparse.csr_matrix((np.ones(len(rows), np.float32), (rows, bins[rows])), shape=(len(bins), n_bins))
-    return np.asarray((motion @ to_bins).todense(), dtype=np.float64)
+    return sparse.csr_matrix(motion @ to_bins).toarray().astype(np.float64)

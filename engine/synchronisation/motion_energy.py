@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import ndimage
 
-from engine.synchronisation.correlating import PairCurve, correlate
+from engine.synchronisation.correlating import PairCurve, correlate, overlaps
 from engine.synchronisation.motion_pictures import MotionPictures
 
 SLOW_S = 1.0
@@ -29,7 +29,7 @@ def motion_curves(
             if one.any() and other.any():
                 lags, scores = correlate(one, other, max_lag)
                 offsets = lags + starts_frames[second] - starts_frames[first]
-                curves.append(PairCurve(first, second, offsets, scores))
+                curves.append(PairCurve(first, second, offsets, scores, overlaps(len(one), len(other), lags)))
     return curves
 
 

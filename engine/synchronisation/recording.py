@@ -10,7 +10,7 @@ import numpy as np
 
 from engine.capture.capture import Capture
 from engine.capture.frames import FrameSource, IndexedFrames, VideoFrames
-from engine.capture.media import VideoHeader, read_frame_times, read_video_header
+from engine.capture.media import read_frame_times, read_video_header
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +23,7 @@ class Recording:
         times_s: When each picture is shown, in seconds from the first. [T] float64
         video: The file with sound and tags; None for images.
         start_s: When the first picture is shown, in seconds of that file.
+        skipped_s: How long after the first picture in the file that is.
     """
 
     name: str
@@ -30,6 +31,7 @@ class Recording:
     times_s: np.ndarray
     video: Path | None = None
     start_s: float = 0.0
+    skipped_s: float = 0.0
 
 
 class CapturePictures:
@@ -50,18 +52,24 @@ class CapturePictures:
 
 
 def recordings_of(capture: Capture) -> list[Recording]:
-    """The cameras of a capture, by its own clock: what is found is what is left after its offsets were applied."""
+    """The cameras of a capture, by its own clock: what is found is what is left after its offsets were applied.
+
+    Raises:
+        CaptureError: A video cannot be read.
+    """
     times_s = np.arange(capture.n_frames) / capture.fps
     recordings = []
     for camera_index, name in enumerate(capture.rig.names):
         source, first = capture.store.sources[camera_index], 0
         if isinstance(source, IndexedFrames):
             source, first = source.source, int(source.frame_indices[0])
-        video = source.path if isinstance(source, VideoFrames) else None
-        start_s = first / capture.fps
-        if video is not None:
-            start_s = float(read_frame_times(video)[first])
-        recordings.append(Recording(name, CapturePictures(capture, camera_index), times_s, video, start_s))
+        pictures = CapturePictures(capture, camera_index)
+        if isinstance(source, VideoFrames):
+            own_s = read_frame_times(source.path)
+            start_s, skipped_s = float(own_s[first]), float(own_s[first] - own_s[0])
+            recordings.append(Recording(name, pictures, times_s, source.path, start_s, skipped_s))
+        else:
+            recordings.append(Recording(name, pictures, times_s))
     return recordings
 
 
@@ -73,7 +81,7 @@ def recordings_in_videos(videos: Sequence[Path], names: Sequence[str] | None = N
     """
     recordings = []
     for row, path in enumerate(videos):
-        header: VideoHeader = read_video_header(path)
+        header = read_video_header(path)
         times_s = read_frame_times(path)
         name = path.stem if names is None else names[row]
         source = VideoFrames(path, header.n_frames)

@@ -21,6 +21,8 @@ MIN_PROMINENCE = 0.04
 ELSEWHERE_FRAMES = 2.5
 NEAR_FRAMES = 1.6
 """Tops of curves this near to the common answer are measurements; others are errors of their pair."""
+CLOSE_SECOND = 0.8
+"""A top near the common answer counts as what a pair says if it is as high as this share of its highest."""
 MAX_SWEEPS = 30
 OUTLIER_SIGMAS = 2.5
 MIN_SIGMA_FRAMES = 0.02
@@ -54,9 +56,7 @@ def solve_curves(n_cameras: int, curves: Sequence[PairCurve]) -> Solution:
     groups = _groups(n_cameras, [(curve.first, curve.second) for curve in telling])
     whole = _climb(n_cameras, telling, groups)
     pairs = [
-        pair
-        for curve in telling
-        if (pair := _top_near(curve, whole[curve.second] - whole[curve.first])) is not None
+        pair for curve in telling if (pair := _top_near(curve, whole[curve.second] - whole[curve.first])) is not None
     ]
     return solve_pairs(n_cameras, pairs)
 
@@ -146,7 +146,7 @@ def _climb(n_cameras: int, curves: list[PairCurve], groups: np.ndarray) -> np.nd
             for curve in mine:
                 is_second = curve.second == camera
                 relative = candidates - offsets[curve.first] if is_second else offsets[curve.second] - candidates
-                evidence = np.arctanh(np.clip(curve.scores, 0, 0.98)) ** 2
+                evidence = np.arctanh(np.clip(curve.scores, 0, 0.98)) ** 2 * curve.overlaps
                 total += np.interp(relative, curve.offsets_frames, evidence, left=0, right=0)
             best = candidates[int(np.argmax(total))]
             if total.max() > total[len(total) // 2] + 1e-9:
@@ -157,12 +157,15 @@ def _climb(n_cameras: int, curves: list[PairCurve], groups: np.ndarray) -> np.nd
 
 
 def _top_near(curve: PairCurve, expected: float) -> PairOffset | None:
-    """The top of a curve: the one near the expected offset, else the highest, which is then an error of this pair."""
+    """What a pair says: the top of its curve near the expected offset if that is about the highest; else the highest,
+    which is then an error of this pair."""
     near = np.flatnonzero(np.abs(curve.offsets_frames - expected) <= NEAR_FRAMES)
     inner = near[(near > 0) & (near < len(curve.scores) - 1)]
     is_top = [curve.scores[row] >= max(curve.scores[row - 1], curve.scores[row + 1]) for row in inner]
     tops = inner[np.array(is_top, dtype=bool)]
-    row = int(tops[np.argmax(curve.scores[tops])] if len(tops) else np.argmax(curve.scores))
+    row = int(np.argmax(curve.scores))
+    if len(tops) and curve.scores[tops].max() >= CLOSE_SECOND * curve.scores[row]:
+        row = int(tops[np.argmax(curve.scores[tops])])
     if not 0 < row < len(curve.scores) - 1 or curve.scores[row] < MIN_SCORE / 2:
         return None
     before, top, after = np.arctanh(np.clip(curve.scores[row - 1 : row + 2], -0.98, 0.98))
