@@ -7,7 +7,6 @@ moment, as far as that is known, which tells parts of a frame.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -136,11 +135,3 @@ def _visual(source: SourceName, solution: Solution, n_curves: int, own_sigma: fl
         note=note,
     )
 
-
-def added_to(found: Synchronisation, present_frames: np.ndarray) -> Synchronisation:
-    """Offsets of cameras when those they were measured with, [C], are counted in."""
-    cameras = tuple(
-        replace(camera, offset_frames=camera.offset_frames + float(present))
-        for camera, present in zip(found.cameras, present_frames, strict=True)
-    )
-    return replace(found, cameras=cameras)

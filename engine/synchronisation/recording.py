@@ -87,3 +87,11 @@ def recordings_in_videos(videos: Sequence[Path], names: Sequence[str] | None = N
         source = VideoFrames(path, header.n_frames)
         recordings.append(Recording(name, source, times_s - times_s[0], path, float(times_s[0])))
     return recordings
+
+
+def videos_without_calibration(folder: Path) -> list[Path]:
+    """The videos of a folder that is no capture of any known layout, in natural order; none where it is one."""
+    if not folder.is_dir() or is_capture(folder):
+        return []
+    names = [name for name in listed(folder, VIDEO_SUFFIXES) if not name.startswith(".")]
+    return [folder / name for name in names] if len(names) > 1 else []
