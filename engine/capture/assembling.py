@@ -86,6 +86,7 @@ def assemble(
     fps: float | None = None,
     default_holdout: Sequence[str] = (),
     points: Path | None = None,
+    points_to_world: np.ndarray | None = None,
     fisheye_fov_deg: float | None = None,
     problems: Sequence[CaptureError] = (),
     warnings: Sequence[str] = (),
@@ -99,7 +100,7 @@ def assemble(
         cameras: In the order in which the capture shall have them.
         fps: Frames per second; None takes that of the videos.
         default_holdout: Names of cameras that the capture sets aside; unknown ones are a problem.
-        points: A point cloud that came along.
+        points, points_to_world: See `Layout`.
         fisheye_fov_deg: See `Layout`.
         problems: What the reader found already; they are reported with the others.
         warnings: What the reader found odd but usable.
@@ -166,6 +167,7 @@ def assemble(
         default_holdout=tuple(dict.fromkeys(default_holdout)),
         warnings=tuple(said),
         points=points,
+        points_to_world=points_to_world,
         fisheye_fov_deg=fisheye_fov_deg,
     )
 

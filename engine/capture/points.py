@@ -8,13 +8,14 @@ import zipfile
 import zlib
 from array import array
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
 from engine.capture.colmap.model_files import BinaryReader, damaged, lines_of, unreadable
+from engine.capture.format_result import Layout
 from engine.capture.limits import MAX_POSITION
 from engine.capture.places import place_in
 from engine.capture.ply import check_n_points, read_ply
@@ -54,6 +55,19 @@ def points_that_came(folder: Path, names: Sequence[str], *, follow_links: bool) 
         except CaptureError:  # a link that leads out of the capture: as if it were not there
             continue
     return None
+
+
+def points_of(layout: Layout) -> CapturePoints | None:
+    """The cloud that came with a capture, in the world of its cameras; None where none came.
+
+    Raises:
+        CaptureError: As of `read_points`.
+    """
+    if layout.points is None:
+        return None
+    cloud = read_points(layout.points)
+    matrix = layout.points_to_world
+    return cloud if matrix is None else replace(cloud, points=cloud.points @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 def read_points(path: Path) -> CapturePoints:
