@@ -18,7 +18,7 @@ from engine.capture.colmap.model_files import BinaryReader, damaged, lines_of, u
 from engine.capture.format_result import Layout
 from engine.capture.limits import MAX_POSITION
 from engine.capture.places import place_in
-from engine.capture.ply import check_n_points, read_ply
+from engine.capture.ply import as_bytes, check_n_points, read_ply
 from engine.errors import CaptureError
 from engine.storage.files import open_regular
 from engine.storage.npy_files import NpyError, parse_npy
@@ -34,8 +34,8 @@ class CapturePoints:
     """A point cloud. A value.
 
     Attributes:
-        points: [P, 3] float64, in the world of the file.
-        colors: Display colours 0..1, None where the file has none. [P, 3] float32
+        points: [P, 3] float32 or float64, in the world of the file.
+        colors: Display colours, None where the file has none. [P, 3] uint8
         n_dropped: Points of the file that are left out: NaN, infinite, or farther away than anything may be.
     """
 
@@ -87,10 +87,10 @@ def read_points(path: Path) -> CapturePoints:
             points, colors = reader(file, path)
     except OSError as error:
         raise unreadable(path, error) from error
+    is_good = np.ones(len(points), bool)
     with np.errstate(invalid="ignore"):
-        is_good = (np.abs(points) <= MAX_POSITION).all(axis=1)
-    if colors is not None:
-        is_good &= np.isfinite(colors).all(axis=1)
+        for column in points.T:
+            is_good &= np.abs(column) <= MAX_POSITION
     n_dropped = int(len(points) - is_good.sum())
     if n_dropped:
         points, colors = points[is_good], None if colors is None else colors[is_good]
@@ -107,25 +107,28 @@ def _read_binary(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray]:
         points[row], colors[row] = values[:3], values[3:]
         reader.skip(8 * n_track)
     reader.end()
-    return points, colors.astype(np.float32) / 255.0
+    return points, colors
 
 
 def _read_text(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray]:
-    values = array("d")
+    values, colors = array("d"), bytearray()
     for line in lines_of(file, path):
         words = line.split(None, 7)
         if not words:
             continue
-        row = len(values) // 6
+        row = len(values) // 3
         check_n_points(row + 1, path)
         try:
-            values.extend([float(word) for word in words[1:7]])
+            position = [float(word) for word in words[1:4]]
+            color = [min(max(int(word), 0), 255) for word in words[4:7]]
         except ValueError as error:
             raise damaged(path, f"point number {row} has something else than numbers") from error
-        if len(values) != 6 * (row + 1):
+        if len(color) != 3:
             raise damaged(path, f"point number {row} has no position and colour")
-    rows = np.array(values).reshape(-1, 6)
-    return rows[:, :3], _display(rows[:, 3:])
+        values.extend(position)
+        colors.extend(color)
+    points = np.frombuffer(values, np.float64) if values else np.zeros(0)
+    return points.reshape(-1, 3), np.frombuffer(colors, np.uint8).reshape(-1, 3)
 
 
 def _read_npz(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray | None]:
@@ -149,15 +152,12 @@ def _read_npz(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray | None
     if values.ndim != 2 or values.shape[1] < 3:
         raise damaged(path, f"its array has shape {values.shape}, not points by coordinates")
     check_n_points(len(values), path)
-    colors = _display(values[:, 3:6]) if values.shape[1] >= 6 else None
+    colors = None
+    if values.shape[1] >= 6:
+        colors = values[:, 3:6]
+        is_share = len(colors) == 0 or not np.nanmax(colors, initial=0.0) > 1.0
+        colors = as_bytes(colors * 255.0 if is_share else colors)
     return values[:, :3].astype(np.float64), colors
-
-
-def _display(colors: np.ndarray) -> np.ndarray:
-    """Colours in 0..255 or 0..1 as 0..1. [P, 3] float32"""
-    with np.errstate(invalid="ignore"):
-        is_bytes = len(colors) > 0 and float(np.nanmax(colors, initial=0.0)) > 1.0
-    return (colors / 255.0 if is_bytes else colors).astype(np.float32)
 
 
 def said_of(points: CapturePoints, path: Path) -> Iterable[str]:

@@ -45,7 +45,5 @@ def write_colmap_points(folder: Path, cloud: CapturePoints, *, is_binary: bool) 
 
 
 def _bytes(cloud: CapturePoints) -> np.ndarray:
-    """Colours 0..255, grey where there are none. [P, 3] uint8"""
-    if cloud.colors is None:
-        return np.full((len(cloud.points), 3), 128, np.uint8)
-    return np.floor(np.clip(cloud.colors, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    """Colours, grey where there are none. [P, 3] uint8"""
+    return np.full((len(cloud.points), 3), 128, np.uint8) if cloud.colors is None else cloud.colors

@@ -129,7 +129,7 @@ def test_a_damaged_frame_leaves_nothing_behind(tmp_path: Path, frames: str) -> N
     if frames == "none":
         convert(layout, tmp_path / "new", "colmap", frames="none")
         return
-    with pytest.raises(CaptureError, match="000001.png"):
+    with pytest.raises(CaptureError, match=r"000001\.png"):
         convert(layout, tmp_path / "new", "colmap", frames=frames)  # type: ignore[arg-type]
     assert [path.name for path in tmp_path.iterdir()] == ["old"]
 
