@@ -115,7 +115,7 @@ def unreadable(path: Path, error: OSError) -> CaptureError:
 def pose_of(quaternion: np.ndarray, translation: np.ndarray) -> np.ndarray:
     """World to camera [4, 4] of a quaternion w x y z, made unit where it almost is, and a translation.
 
-    One that is far from unit keeps its length, and what comes of it is no rotation: the checks of poses see that.
+    One that is far from unit keeps its length, and what comes of it fails the check of poses.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         length = float(np.sqrt((quaternion**2).sum()))

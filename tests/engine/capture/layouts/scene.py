@@ -124,8 +124,8 @@ def make_scene(
 
 
 def make_points() -> np.ndarray:
-    """Points in front of every camera of the ring. [N, 3]"""
-    return np.random.default_rng(3).uniform(-0.5, 0.5, (20, 3)) + np.array([0.0, 0.0, 0.6])
+    """Points in front of every camera of the ring, also far from the middle of the picture. [N, 3]"""
+    return np.random.default_rng(3).uniform(-1.0, 1.0, (40, 3)) + np.array([0.0, 0.0, 0.6])
 
 
 def check_reads_as(
