@@ -24,6 +24,7 @@ from app.project.recents import RecentProject, project_name
 from engine.capture.capture import Capture, open_capture
 from engine.errors import CaptureError, ProjectError
 
+
 @dataclass(frozen=True, slots=True)
 class Opened:
     """A capture and its project, or a choice between its projects.
@@ -58,6 +59,7 @@ def open_for_window(
     follow_links: bool = False,
     is_asking: bool = False,
     answers: OpeningAnswers | None = None,
+    known: Capture | None = None,
 ) -> Opened:
     """Open a capture folder or a project folder.
 
@@ -73,13 +75,14 @@ def open_for_window(
         follow_links: Whether the user allows the capture's files to lie outside of its folder; noted in the project.
         is_asking: Only look at the capture where a project would have to be made.
         answers: What a new project begins with; None takes the scale and what the capture suggests.
+        known: The capture where it was opened already.
     Raises:
         CaptureError, ProjectError: It cannot be opened.
     """
     context.report(0.0, path.name)
     if is_project(path):
         return _open_project(path, current, context, follow_links=follow_links)
-    capture = open_capture(path, scale=1.0 if scale is None else scale, follow_links=follow_links)
+    capture = known or open_capture(path, scale=1.0 if scale is None else scale, follow_links=follow_links)
     if answers is not None:
         capture = capture.resized(answers.scale, answers.frames)
     elif scale is None:

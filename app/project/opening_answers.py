@@ -1,4 +1,4 @@
-"""OpeningAnswers: what a user decides about a capture before a project is made of it, and good answers to begin with."""
+"""OpeningAnswers: what a user decides about a capture before a project is made of it, and what is offered."""
 
 from __future__ import annotations
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.project.opening_answers import OpeningAnswers
+
 
 @dataclass(frozen=True, slots=True)
 class OpenCapture:
@@ -21,6 +23,10 @@ class OpenCapture:
     """Start another project, whatever there is."""
     follow_links: bool = False
     """Whether the user allows the capture's files to lie outside of its folder; noted in its project."""
+    is_asking: bool = False
+    """Report what it is, and ask what a project of it begins with, where there is none; or why it does not open."""
+    answers: OpeningAnswers | None = None
+    """What a new project begins with; None takes what suits."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -109,7 +109,7 @@ class OpenFolderDialog:
         answer, self._native = self._native.result(), None
         if answer:
             self._start = Path(answer)
-            dispatch(OpenCapture(Path(answer)))
+            dispatch(OpenCapture(Path(answer), is_asking=True))
 
     def _draw_box(self, dispatch: Dispatch, ui: UiState) -> None:
         imgui.text_disabled("Folder with the cameras and their videos or pictures, or of a project")
@@ -139,7 +139,7 @@ class OpenFolderDialog:
         imgui.end_disabled()
         if (is_clicked or is_entered) and folder is not None and is_folder:
             self._start = folder
-            dispatch(OpenCapture(folder))
+            dispatch(OpenCapture(folder, is_asking=True))
             imgui.close_current_popup()
         elif imgui.is_key_pressed(imgui.Key.escape, False):
             imgui.close_current_popup()

@@ -52,6 +52,7 @@ from ui.shell.imgui_backend import ImGuiBackend
 from ui.shell.layout import hold_sizes, is_laid_out, lay_out
 from ui.shell.layouts import Layouts
 from ui.shell.menu_bar import MenuNeeds, draw_menu_bar
+from ui.shell.opening_dialog import HasOpening, OpeningDialog
 from ui.shell.palette import Palette
 from ui.shell.palette_entries import PaletteNeeds
 from ui.shell.preferences import PreferencesDialog
@@ -90,6 +91,7 @@ class FrameNeeds(
     PaletteNeeds,
     StatusNeeds,
     QuestionNeeds,
+    HasOpening,
     RememberNeeds,
     NoticesNeeds,
     LogNeeds,
@@ -161,6 +163,7 @@ class Frame:
         self.log = LogPanel()
         self.dialog = OpenFolderDialog()
         self.questions = QuestionDialogs()
+        self.opening = OpeningDialog(lambda: ImageTexture(ctx))
         self.palette = Palette()
         self.preferences = PreferencesDialog()
         self.layouts = Layouts()
@@ -319,6 +322,7 @@ class Frame:
         self._guard("Layouts", lambda: self.layouts.draw(ui))
         self._guard("Preferences", lambda: self.preferences.draw(ui))
         self._guard("Palette", lambda: self.palette.draw(session, dispatch, ui))
+        self._guard("Opening", lambda: self.opening.draw(session, dispatch, ui))
         self._guard("Question", lambda: self.questions.draw(session, dispatch, ui))
         size = imgui.get_main_viewport().size
         whole = Rect(0.0, 0.0, size.x, size.y - STATUS_BAR_HEIGHT)
@@ -338,7 +342,8 @@ class Frame:
         """Open a capture or project folder, or the folder of a file that was dropped."""
         from app.session.commands import OpenCapture  # here to keep the module's imports about drawing
 
-        self.dispatch(OpenCapture(path if path.is_dir() or not path.exists() else path.parent))
+        folder = path if path.is_dir() or not path.exists() else path.parent
+        self.dispatch(OpenCapture(folder, is_asking=True))
 
     def _draw_panel(self, title: str, draw_panel: Callable[..., None], has_padding: bool) -> None:
         is_wanted = title == self.ui.wanted_panel
@@ -397,5 +402,6 @@ class Frame:
         """Release GL objects and ImGui. The GL context must still be current."""
         self.viewport.release()
         self.capture.release()
+        self.opening.release()
         self.residuals.release()
         self.backend.close()
