@@ -40,9 +40,7 @@ def write_calibrated(calibration: Calibration, videos: Path, out: Path) -> bool:
         CameraEntry(name, rig.Ks[row], rig.world_to_camera[row], used[row].size, used[row].source, found.lenses[row])
         for row, name in enumerate(rig.names)
     ]
-    layout = Layout(
-        format=FILE, cameras=tuple(entries), n_frames=common_length(used), fps=common_rate(used)
-    )
+    layout = Layout(format=FILE, cameras=tuple(entries), n_frames=common_length(used), fps=common_rate(used))
     out.mkdir(parents=True, exist_ok=True)
     document = capture_document(layout, out)
     document["up"] = [0.0, 0.0, 1.0]

@@ -180,7 +180,8 @@ def refusal_of(path: Path, error: EngineError) -> RefusedFolder:
     problems: Sequence[EngineError] = error.problems if isinstance(error, CaptureError) else ()
     several = tuple(problem.told_apart() for problem in problems) if len(problems) > 1 else ()
     videos = () if several else tuple(videos_in(path))
-    message, hint = (error.message, error.hint) if error.path is None else error.told_apart()
+    is_all = several or error.path in (None, path)  # else the place is said, too
+    message, hint = (error.message, error.hint) if is_all else error.told_apart()
     return RefusedFolder(path, message, hint, several, videos if len(videos) >= LEAST_VIDEOS else ())
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.calibration.job import CalibrationRequest
 from app.project.opening_answers import OpeningAnswers
 
 
@@ -301,6 +302,25 @@ class DismissNotice:
     index: int
 
 
+@dataclass(frozen=True, slots=True)
+class LookAtVideos:
+    """Show which cameras are in a folder of plain videos, to calibrate them."""
+
+    folder: Path
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrateVideos:
+    """Find the cameras of the folder that is shown, and write capture.json."""
+
+    request: CalibrationRequest
+
+
+@dataclass(frozen=True, slots=True)
+class StopCalibration:
+    """End the calibration that runs; nothing is written."""
+
+
 EditCommand = MarkRegion | RemoveRegion | UndoMark | RedoMark
 """What changes the project's content, and can be taken back."""
 
@@ -321,6 +341,9 @@ QueueCommand = (
 )
 """What is trained when, how it is shown meanwhile, and which version of it counts."""
 
+CalibrationCommand = LookAtVideos | CalibrateVideos | StopCalibration
+"""From plain videos to a capture."""
+
 Command = (
     OpenCapture
     | OpenProject
@@ -338,6 +361,7 @@ Command = (
     | ShowHeat
     | SettingCommand
     | EditCommand
+    | CalibrationCommand
     | HomeView
     | SetFrameMemory
     | SetCompareWith

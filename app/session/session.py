@@ -33,6 +33,7 @@ from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.residuals.residuals import Residuals
 from app.session import commands
 from app.session.attention import Attention
+from app.session.calibrating import Calibrating
 from app.session.capture_opening import CaptureOpening
 from app.session.clip_versions import Versions
 from app.session.following import follow_training
@@ -84,6 +85,7 @@ class Session:
         log: What program and training have said.
         question: What the user has to answer; None while there is nothing to ask.
         opening: What is asked about a capture that has no project yet.
+        calibrating: Plain videos on their way to a capture.
         recent: What was opened lately.
         notices: What the user has to know.
 
@@ -122,6 +124,7 @@ class Session:
         self._settings = settings = Settings() if settings is None else settings
         self.opening = CaptureOpening(can_measure=is_preloading)
         self._is_new_asked = False
+        self.calibrating = Calibrating()
         self.live_training = LiveTraining(
             self._jobs,
             self.notices,
@@ -235,6 +238,14 @@ class Session:
             case commands.CloseQuestion():
                 self.question = None
                 self.opening.close_page()
+                self.calibrating.close_page()
+            case commands.LookAtVideos(folder=folder):
+                self.opening.close_page()
+                self.calibrating.look(folder)
+            case commands.CalibrateVideos(request=request):
+                self.calibrating.start(request)
+            case commands.StopCalibration():
+                self.calibrating.stop()
             case commands.TrainNextClip():
                 self.question = None
                 live.train_next()
@@ -333,6 +344,7 @@ class Session:
             self._settings.set_last_answers(answers_to_keep(command.answers, known))
         self._is_new_asked = command.is_new_project
         self.opening.close_page()
+        self.calibrating.close_page()
         return known
 
     def _take_opened(self, found: Opened) -> None:
@@ -391,7 +403,7 @@ class Session:
         """Take in what threads and workers finished. Whether something visible changed."""
         has_changed = self._jobs.poll()
         self.recent.poll()
-        has_changed |= self.opening.poll()
+        has_changed |= self.opening.poll() | self.calibrating.poll()
         events = self.live_training.poll()
         if any(isinstance(event, ENDINGS) for event in events):
             self._keep_recent()
@@ -417,7 +429,15 @@ class Session:
         seen = (self.versions.worker.newest, self.log.worker.newest)
         looked = tuple(None if found is None else found[0] for found in seen)
         finished = self.playback.finished, self.live_training.finished, self.recent.pictures.revision
-        return *finished, *self.opening.finished, looked, jobs, self.notices.revision, self.recent.missing
+        return (
+            *finished,
+            *self.opening.finished,
+            *self.calibrating.finished,
+            looked,
+            jobs,
+            self.notices.revision,
+            self.recent.missing,
+        )
 
     def _release_snapshot(self) -> None:
         """Give a snapshot back once it was read, or where nobody looks at its clip."""
@@ -476,6 +496,7 @@ class Session:
             self.project.close()
         self.recent.close()
         self.opening.close()
+        self.calibrating.close()
         self.residuals.close()
         self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)
         self.playback.close()

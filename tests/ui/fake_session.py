@@ -25,6 +25,7 @@ from app.project.recents import RecentProject
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands
+from app.session.calibration_page import CalibrationPage
 from app.session.marking import after_marking
 from app.session.notices import Notices
 from app.session.questions import OpeningPage, Question, RetrainQuestion
@@ -121,6 +122,14 @@ class FakeOpening:
         return "Fewer than two cameras are left for training." if n_left < 2 else ""
 
 
+@dataclass
+class FakeCalibrating:
+    """What the dialog reads of Calibrating."""
+
+    page: CalibrationPage | None = None
+    progress: JobStatus | None = None
+
+
 class FakeSession:
     """See the module docstring. `has_capture=False` starts empty."""
 
@@ -139,6 +148,7 @@ class FakeSession:
         self.project_status: ProjectStatus | None = None
         self.question: Question | None = None
         self.opening = FakeOpening()
+        self.calibrating = FakeCalibrating()
         self.queue = QueueStatus()
         self.usage = UsageStatus(window_mb=412.0, window_cores=0.1, n_cores=2)
         self.versions: dict[int, tuple[VersionStatus, ...]] = {}

@@ -47,7 +47,8 @@ from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.panel import draw_timeline
 from ui.panels.training import draw_training
 from ui.panels.viewport import ViewportNeeds, ViewportPanel
-from ui.shell.dialogs import OpenFolderDialog, draw_help
+from ui.shell.calibration_dialog import CalibrationDialog, HasCalibrating
+from ui.shell.dialogs import CALIBRATE, OPEN, OpenFolderDialog, draw_help
 from ui.shell.imgui_backend import ImGuiBackend
 from ui.shell.layout import hold_sizes, is_laid_out, lay_out
 from ui.shell.layouts import Layouts
@@ -92,6 +93,7 @@ class FrameNeeds(
     StatusNeeds,
     QuestionNeeds,
     HasOpening,
+    HasCalibrating,
     RememberNeeds,
     NoticesNeeds,
     LogNeeds,
@@ -163,6 +165,7 @@ class Frame:
         self.log = LogPanel()
         self.dialog = OpenFolderDialog()
         self.questions = QuestionDialogs()
+        self.calibration = CalibrationDialog()
         self.opening = OpeningDialog(lambda: ImageTexture(ctx))
         self.palette = Palette()
         self.preferences = PreferencesDialog()
@@ -314,15 +317,16 @@ class Frame:
             if title == VIEWPORT or not ui.is_picture_only:
                 self._draw_panel(title, draw_panel, has_padding)
         hold_sizes(self._dock_ids)
-        if ui.is_open_requested:
-            ui.is_open_requested = False
-            self.dialog.open()
+        if ui.is_open_requested or ui.wishes.is_calibration:
+            self.dialog.open(purpose=CALIBRATE if ui.wishes.is_calibration else OPEN)
+            ui.is_open_requested = ui.wishes.is_calibration = False
         self._guard("Open dialog", lambda: self.dialog.draw(dispatch, ui))
         self._guard("Help", lambda: draw_help(ui))
         self._guard("Layouts", lambda: self.layouts.draw(ui))
         self._guard("Preferences", lambda: self.preferences.draw(ui))
         self._guard("Palette", lambda: self.palette.draw(session, dispatch, ui))
         self._guard("Opening", lambda: self.opening.draw(session, dispatch, ui))
+        self._guard("Calibration", lambda: self.calibration.draw(session, dispatch, ui))
         self._guard("Question", lambda: self.questions.draw(session, dispatch, ui))
         size = imgui.get_main_viewport().size
         whole = Rect(0.0, 0.0, size.x, size.y - STATUS_BAR_HEIGHT)

@@ -93,8 +93,10 @@ class AnswersForm:
         self._last = _whole_number("##last", self._last, self._first, last)
         ui.mark("opening.last")
         n_frames = self._last - self._first + 1
-        all_of_them = f"of {format_count(report.n_frames)}, " if n_frames != report.n_frames else "all, "
-        _said(f"{format_count(n_frames)} {all_of_them}{n_frames / max(report.fps, 1e-6):.1f} s")
+        many = f"all {format_count(n_frames)}"
+        if n_frames != report.n_frames:
+            many = f"{format_count(n_frames)} of {format_count(report.n_frames)}"
+        _said(f"{many}, {n_frames / max(report.fps, 1e-6):.1f} s")
         _label("Picture size")
         imgui.set_next_item_width(FIELD_WIDTH)
         is_changed, percent = imgui.input_float("##scale", self._percent, 0.0, 0.0, "%.4g %%")

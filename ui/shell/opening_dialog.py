@@ -12,12 +12,12 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.playback.arrays import Picture
 from app.project.capture_report import CaptureReport, RefusedFolder
-from app.session.commands import CloseQuestion, OpenCapture
+from app.session.commands import CloseQuestion, LookAtVideos, OpenCapture
 from app.session.questions import OpeningPage
 from ui.gl import ImageTexture
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.thumbnails import crop_to
-from ui.panels.widgets import elided, elided_path, pop_bold, primary_button, push_bold, text_wrapped_dim
+from ui.panels.widgets import elided, elided_path, pop_bold, primary_button, push_bold, text_wrapped, text_wrapped_dim
 from ui.shell.opening_answers_form import AnswersForm, ForecastNeeds
 from ui.style import theme
 from ui.style.theme import Icon
@@ -27,8 +27,10 @@ SIZE = (1080.0, 690.0)
 REFUSED_SIZE = (700.0, 420.0)
 FORM_WIDTH = 410.0
 BUTTON = ImVec2(150, 34)
-PICTURE = (124.0, 78.0)
+LEAST_PICTURE_WIDTH, PICTURE_SHAPE = 120.0, 0.62
+"""Of the small pictures: units, and height by width."""
 WORD_WIDTH = 92.0
+MAX_NAMED = 4
 
 
 class OpeningNeeds(ForecastNeeds, Protocol):
@@ -127,7 +129,7 @@ class OpeningDialog:
         is_possible = not opening.problem(answers)
         is_copied = imgui.button(f"{Icon.COPY}  Copy the report", ImVec2(0, BUTTON.y))
         ui.mark("opening.copy")
-        if is_copied:
+        if is_copied and not is_agreed:
             imgui.set_clipboard_text(page.report.text)
         imgui.same_line(imgui.get_window_width() - 2 * BUTTON.x - 22)
         if imgui.button("Cancel", BUTTON):
@@ -137,8 +139,9 @@ class OpeningDialog:
         imgui.begin_disabled(not is_possible)
         is_clicked = primary_button("Open", BUTTON, ui)
         ui.mark("opening.accept")
+        imgui.set_item_default_focus()
         imgui.end_disabled()
-        if is_possible and (is_clicked or (is_agreed and not is_copied)):
+        if is_possible and (is_clicked or is_agreed):
             return OpenCapture(
                 page.report.path,
                 is_new_project=page.is_new_project,
@@ -157,25 +160,28 @@ class OpeningDialog:
         for name, words in report.rows:
             imgui.text_disabled(name)
             imgui.same_line(WORD_WIDTH)
-            _wrapped(words)
+            text_wrapped(words)
         for sentence in report.warnings:
             imgui.text_colored(ImVec4(*theme.ORANGE), Icon.WARNING)
             imgui.same_line()
-            _wrapped(sentence)
+            text_wrapped(sentence)
         imgui.spacing()
         self._draw_pictures(report, pictures, ui)
 
     def _draw_pictures(self, report: CaptureReport, pictures: Mapping[int, Picture], ui: UiState) -> None:
         """What each camera took first, side by side."""
         spacing = 8.0
-        n_columns = max(int((imgui.get_content_region_avail().x + spacing) / (PICTURE[0] + spacing)), 1)
+        room = imgui.get_content_region_avail().x - 4
+        n_columns = max(int((room + spacing) / (LEAST_PICTURE_WIDTH + spacing)), 1)
+        width = (room - (n_columns - 1) * spacing) / n_columns
+        height = width * PICTURE_SHAPE
         draw, start = imgui.get_window_draw_list(), imgui.get_cursor_screen_pos()
         answers = self._form.answers
         line = imgui.get_text_line_height() + 4
         for row, camera in enumerate(report.cameras):
-            x = start.x + (row % n_columns) * (PICTURE[0] + spacing)
-            y = start.y + (row // n_columns) * (PICTURE[1] + line + spacing)
-            box = Rect(x, y, x + PICTURE[0], y + PICTURE[1])
+            x = start.x + (row % n_columns) * (width + spacing)
+            y = start.y + (row // n_columns) * (height + line + spacing)
+            box = Rect(x, y, x + width, y + height)
             texture = self._texture(row, pictures)
             if texture is None:
                 draw.add_rect_filled(box.low, box.high, theme.u32(theme.BACKDROP), 3)
@@ -189,9 +195,9 @@ class OpeningDialog:
                 draw.add_rect(box.low, box.high, theme.u32(theme.HELD_OUT), 3.0, 2.0)
             color = theme.u32(theme.HELD_OUT if is_out else theme.TEXT_DIM)
             words = f"{camera.name}, held out" if is_out else camera.name
-            draw.add_text(ImVec2(x, box.y1 + 2), color, elided(words, PICTURE[0]))
+            draw.add_text(ImVec2(x, box.y1 + 2), color, elided(words, width))
         n_rows = -(-len(report.cameras) // n_columns)
-        imgui.dummy(ImVec2(1, n_rows * (PICTURE[1] + line + spacing)))
+        imgui.dummy(ImVec2(1, n_rows * (height + line + spacing)))
         if len(self._textures) < len(report.cameras):
             ui.redraw_within(0.2)
 
@@ -203,7 +209,7 @@ class OpeningDialog:
         return self._textures.get(row)
 
 
-def _draw_refused(found: RefusedFolder, ui: UiState, *, is_agreed: bool) -> CloseQuestion | None:
+def _draw_refused(found: RefusedFolder, ui: UiState, *, is_agreed: bool) -> CloseQuestion | LookAtVideos | None:
     width = imgui.get_content_region_avail().x
     if imgui.begin_child("why", ImVec2(0, -(BUTTON.y + 18)), imgui.ChildFlags_.nav_flattened):
         push_bold(ui, ui.fonts.body_size + 2)
@@ -213,31 +219,44 @@ def _draw_refused(found: RefusedFolder, ui: UiState, *, is_agreed: bool) -> Clos
         imgui.spacing()
         imgui.text_colored(ImVec4(*theme.ORANGE), Icon.WARNING)
         imgui.same_line()
-        _wrapped(found.message)
+        text_wrapped(found.message)
         if found.hint:
             text_wrapped_dim(found.hint)
         imgui.spacing()
+        if found.videos:
+            names = ", ".join(video.name for video in found.videos[:MAX_NAMED])
+            more = ", ..." if len(found.videos) > MAX_NAMED else ""
+            text_wrapped(
+                f"There are {len(found.videos)} videos in it ({names}{more}). If each is of one camera of the same "
+                "scene, where the cameras stood can be found from the pictures: calibrate them."
+            )
         for message, hint in found.problems:
             imgui.bullet()
-            _wrapped(message)
+            text_wrapped(message)
             if hint:
                 text_wrapped_dim(hint)
     imgui.end_child()
     imgui.separator()
     is_copied = imgui.button(f"{Icon.COPY}  Copy", ImVec2(0, BUTTON.y))
     ui.mark("refused.copy")
-    if is_copied:
+    if is_copied and not is_agreed:
         imgui.set_clipboard_text(found.text)
-    imgui.same_line(imgui.get_window_width() - BUTTON.x - 14)
-    is_closed = primary_button("Close", BUTTON, ui)
+    n_buttons = 2 if found.videos else 1
+    imgui.same_line(imgui.get_window_width() - n_buttons * (BUTTON.x + 8) - 6)
+    if not found.videos:
+        is_closed = primary_button("Close", BUTTON, ui)
+        ui.mark("refused.close")
+        imgui.set_item_default_focus()
+        return CloseQuestion() if is_closed or is_agreed else None
+    is_closed = imgui.button("Close", BUTTON)
     ui.mark("refused.close")
-    return CloseQuestion() if is_closed or (is_agreed and not is_copied) else None
-
-
-def _wrapped(text: str) -> None:
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text(text)
-    imgui.pop_text_wrap_pos()
+    imgui.same_line()
+    is_chosen = primary_button("Calibrate ...", BUTTON, ui)
+    ui.mark("refused.calibrate")
+    imgui.set_item_default_focus()
+    if is_closed:
+        return CloseQuestion()
+    return LookAtVideos(found.path) if is_chosen or is_agreed else None
 
 
 def _is_enter_pressed() -> bool:

@@ -39,6 +39,10 @@ def _open(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_open_requested = True
 
 
+def _calibrate(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.wishes.is_calibration = True
+
+
 def _palette(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.wishes.is_palette = True
 
@@ -105,6 +109,7 @@ _THEMES: dict[str, Any] = _ALWAYS | {"menu": "View/Theme"}
 
 ACTIONS = (
     Action("window.open", "Open a capture or project folder", WINDOW, _open, keys=("Ctrl+O",), **_FILE),
+    Action("window.calibrate", "Calibrate plain videos ...", WINDOW, _calibrate, **_FILE),
     Action("window.palette", "Find an action by its name", WINDOW, _palette, keys=("Ctrl+K", "Ctrl+P"), **_ALWAYS),
     Action("window.preferences", "Preferences", WINDOW, _preferences(), keys=("Ctrl+,",), **_FILE),
     Action("window.keys", "Change keys", WINDOW, _preferences("Keys"), **_FILE),
