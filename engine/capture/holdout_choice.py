@@ -9,7 +9,7 @@ from engine.camera.rig import CameraRig
 LEAST_CAMERAS = 6
 """Rigs of fewer cameras need all of them for training."""
 CAMERAS_PER_HELD_OUT = 12
-N_NEIGHBOURS = 3
+N_NEIGHBOURS = 4
 
 
 def suggested_holdout(rig: CameraRig) -> tuple[str, ...]:
