@@ -265,7 +265,7 @@ class FakeSession:
         self.commands.append(command)
         match command:
             case commands.OpenCapture(path=path):
-                self.question = None
+                self.question = self.opening.page = self.opening.refused = self.calibrating.page = None
                 self._open(replace(FakeCapture(make_rig()), path=Path(path)))
             case commands.SetFrame():
                 self.timeline.seek(command.frame_index)
@@ -302,7 +302,9 @@ class FakeSession:
                 if self.clip_states[clip_index].state == "trained":
                     self.question = RetrainQuestion(clip_index, False, "", 29.7, (), None, True, None, None)
             case commands.CloseQuestion() | commands.OpenProject() | commands.TrainClip(is_confirmed=True):
-                self.question = None
+                self.question = self.opening.page = self.opening.refused = self.calibrating.page = None
+            case commands.LookAtVideos():
+                self.opening.page = self.opening.refused = None
             case commands.DismissNotice():
                 self.notices.dismiss(command.index)
 
