@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from engine.calibration.cameras import Cameras, lens_jacobian, plane_jacobian, rotation_of, safe_depth, skew, distort
+from engine.calibration.cameras import Cameras, distort, lens_jacobian, plane_jacobian, rotation_of, safe_depth, skew
 
 MIN_SCALE_PX = 0.25
 """No key point is found more exactly than this."""

@@ -80,7 +80,10 @@ def distort(lens: str, plane: np.ndarray, params: np.ndarray) -> np.ndarray:
     k1, k2, p1, p2 = params.T
     radial = 1 + k1 * squares + k2 * squares**2
     return np.stack(
-        [x * radial + 2 * p1 * x * y + p2 * (squares + 2 * x * x), y * radial + p1 * (squares + 2 * y * y) + 2 * p2 * x * y],
+        [
+            x * radial + 2 * p1 * x * y + p2 * (squares + 2 * x * x),
+            y * radial + p1 * (squares + 2 * y * y) + 2 * p2 * x * y,
+        ],
         axis=-1,
     )
 

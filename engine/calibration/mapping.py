@@ -113,9 +113,7 @@ def _estimate(reconstruction: Any, lens: str) -> FirstEstimate:
 def _camera(pycolmap: Any, size: np.ndarray, lens: str) -> Any:
     width, height = (int(side) for side in size)
     focal = (FISHEYE_FOCAL_PER_SIDE if lens == "fisheye" else FOCAL_PER_SIDE) * max(width, height)
-    return pycolmap.Camera(
-        model=MODELS[lens], width=width, height=height, params=[focal, width / 2, height / 2, 0.0]
-    )
+    return pycolmap.Camera(model=MODELS[lens], width=width, height=height, params=[focal, width / 2, height / 2, 0.0])
 
 
 def _name(row: int) -> str:

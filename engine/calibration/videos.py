@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from engine.capture.folder_contents import folder_contents
-from engine.capture.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, folders_in, listed
 from engine.capture.format_checks import raise_problems
+from engine.capture.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, folders_in, listed
 from engine.capture.frames import FrameSource, ImageFrames, VideoFrames
 from engine.capture.media import read_image_header, read_video_header
 from engine.errors import CaptureError

@@ -67,7 +67,13 @@ def _is_alive(pid: int) -> bool:
 
 
 def run_child(
-    module: str, job: Path, result: Path, *, what: str, alive: Callable[[], None] = lambda: None, stall_s: float = STALL_S
+    module: str,
+    job: Path,
+    result: Path,
+    *,
+    what: str,
+    alive: Callable[[], None] = lambda: None,
+    stall_s: float = STALL_S,
 ) -> tuple[str, bool]:
     """Run `python -m module JOB RESULT BEAT` and wait for its end.
 
