@@ -341,6 +341,23 @@ QueueCommand = (
 )
 """What is trained when, how it is shown meanwhile, and which version of it counts."""
 
+
+@dataclass(frozen=True, slots=True)
+class SynchroniseCameras:
+    """Measure how far the cameras of the open capture are ahead of each other."""
+
+
+@dataclass(frozen=True, slots=True)
+class ApplyOffsets:
+    """Write a capture with the offsets that were measured."""
+
+    target: Path
+    """The capture's own folder, or another one."""
+
+
+SynchronisationCommand = SynchroniseCameras | ApplyOffsets
+"""Cameras that are ahead of others."""
+
 CalibrationCommand = LookAtVideos | CalibrateVideos | StopCalibration
 """From plain videos to a capture."""
 
@@ -362,6 +379,7 @@ Command = (
     | SettingCommand
     | EditCommand
     | CalibrationCommand
+    | SynchronisationCommand
     | HomeView
     | SetFrameMemory
     | SetCompareWith

@@ -46,6 +46,7 @@ from app.session.queue_commands import QueueCommands
 from app.session.recent_projects import RecentProjects
 from app.session.setting_changes import changed_settings
 from app.session.settings import Settings
+from app.session.synchronising import Synchronising
 from app.status import (
     CAPTURED,
     COMPARE_MODES,
@@ -86,6 +87,7 @@ class Session:
         question: What the user has to answer; None while there is nothing to ask.
         opening: What is asked about a capture that has no project yet.
         calibrating: Plain videos on their way to a capture.
+        synchronising: How far the cameras of the open capture are ahead of each other.
         recent: What was opened lately.
         notices: What the user has to know.
 
@@ -124,7 +126,7 @@ class Session:
         self._settings = settings = Settings() if settings is None else settings
         self.opening = CaptureOpening(can_measure=is_preloading)
         self._is_new_asked = False
-        self.calibrating = Calibrating()
+        self.calibrating, self.synchronising = Calibrating(), Synchronising()
         self.live_training = LiveTraining(
             self._jobs,
             self.notices,
@@ -239,6 +241,11 @@ class Session:
                 self.question = None
                 self.opening.close_page()
                 self.calibrating.close_page()
+                self.synchronising.close_page()
+            case commands.SynchroniseCameras():
+                self.synchronising.measure(self.opened)
+            case commands.ApplyOffsets(target=target):
+                self.synchronising.apply(target)
             case commands.LookAtVideos(folder=folder):
                 self.opening.close_page()
                 self.calibrating.look(folder)
@@ -345,6 +352,7 @@ class Session:
         self._is_new_asked = command.is_new_project
         self.opening.close_page()
         self.calibrating.close_page()
+        self.synchronising.close_page()
         return known
 
     def _take_opened(self, found: Opened) -> None:
@@ -403,7 +411,7 @@ class Session:
         """Take in what threads and workers finished. Whether something visible changed."""
         has_changed = self._jobs.poll()
         self.recent.poll()
-        has_changed |= self.opening.poll() | self.calibrating.poll()
+        has_changed |= self.opening.poll() | self.calibrating.poll() | self.synchronising.poll()
         events = self.live_training.poll()
         if any(isinstance(event, ENDINGS) for event in events):
             self._keep_recent()
@@ -433,6 +441,7 @@ class Session:
             *finished,
             *self.opening.finished,
             *self.calibrating.finished,
+            *self.synchronising.finished,
             looked,
             jobs,
             self.notices.revision,
@@ -497,6 +506,7 @@ class Session:
         self.recent.close()
         self.opening.close()
         self.calibrating.close()
+        self.synchronising.close()
         self.residuals.close()
         self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)
         self.playback.close()
@@ -620,6 +630,7 @@ _TITLES: dict[type, str] = {
     commands.SetClipLength: "The clip length cannot be changed",
     commands.SetTrainSetting: "The setting cannot be changed",
     commands.SetPreset: "The preset cannot be taken",
+    commands.SynchroniseCameras: "The cameras cannot be synchronised",
     commands.MarkRegion: "The region cannot be marked",
     commands.RemoveRegion: "The region cannot be removed",
     commands.UndoMark: "The last mark cannot be taken back",

@@ -29,6 +29,7 @@ from app.session.calibration_page import CalibrationPage
 from app.session.marking import after_marking
 from app.session.notices import Notices
 from app.session.questions import OpeningPage, Question, RetrainQuestion
+from app.session.synchronisation_page import SynchronisationPage
 from app.status import (
     CELL_RANGES,
     ClipStatus,
@@ -130,6 +131,14 @@ class FakeCalibrating:
     progress: JobStatus | None = None
 
 
+@dataclass
+class FakeSynchronising:
+    """What the dialog reads of Synchronising."""
+
+    page: SynchronisationPage | None = None
+    progress: JobStatus | None = None
+
+
 class FakeSession:
     """See the module docstring. `has_capture=False` starts empty."""
 
@@ -149,6 +158,7 @@ class FakeSession:
         self.question: Question | None = None
         self.opening = FakeOpening()
         self.calibrating = FakeCalibrating()
+        self.synchronising = FakeSynchronising()
         self.queue = QueueStatus()
         self.usage = UsageStatus(window_mb=412.0, window_cores=0.1, n_cores=2)
         self.versions: dict[int, tuple[VersionStatus, ...]] = {}
@@ -265,7 +275,8 @@ class FakeSession:
         self.commands.append(command)
         match command:
             case commands.OpenCapture(path=path):
-                self.question = self.opening.page = self.opening.refused = self.calibrating.page = None
+                self.question = self.opening.page = self.opening.refused = None
+                self.calibrating.page = self.synchronising.page = None
                 self._open(replace(FakeCapture(make_rig()), path=Path(path)))
             case commands.SetFrame():
                 self.timeline.seek(command.frame_index)
@@ -302,7 +313,8 @@ class FakeSession:
                 if self.clip_states[clip_index].state == "trained":
                     self.question = RetrainQuestion(clip_index, False, "", 29.7, (), None, True, None, None)
             case commands.CloseQuestion() | commands.OpenProject() | commands.TrainClip(is_confirmed=True):
-                self.question = self.opening.page = self.opening.refused = self.calibrating.page = None
+                self.question = self.opening.page = self.opening.refused = None
+                self.calibrating.page = self.synchronising.page = None
             case commands.LookAtVideos():
                 self.opening.page = self.opening.refused = None
             case commands.DismissNotice():

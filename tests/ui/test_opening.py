@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,16 @@ from app.playback.arrays import Picture
 from app.project.capture_report import CaptureReport, RefusedFolder, ReportedCamera
 from app.project.opening_answers import OpeningAnswers
 from app.session.calibration_page import CalibrationPage, CalibrationResult, VideoFacts
-from app.session.commands import CalibrateVideos, CloseQuestion, LookAtVideos, OpenCapture, StopCalibration
+from app.session.commands import (
+    ApplyOffsets,
+    CalibrateVideos,
+    CloseQuestion,
+    LookAtVideos,
+    OpenCapture,
+    StopCalibration,
+)
 from app.session.questions import OpeningPage
+from app.session.synchronisation_page import OffsetRow, SynchronisationPage
 from app.status import JobStatus, OpeningForecast
 from engine.calibration.options import CalibrationOptions, KnownDistance
 from tests.ui.fake_session import FakeSession, make_rig
@@ -175,7 +184,9 @@ def test_why_a_folder_does_not_open_is_shown_and_videos_can_be_calibrated(open_p
     assert len(session.notices) == 0
 
 
-VIDEOS = tuple(VideoFacts(name, (640, 480), n_frames, 30.0) for name, n_frames in zip("abcd", (30, 30, 31, 30), strict=True))
+VIDEOS = tuple(
+    VideoFacts(name, (640, 480), n_frames, 30.0) for name, n_frames in zip("abcd", (30, 30, 31, 30), strict=True)
+)
 
 
 def show(pilot: Pilot, page: CalibrationPage | None, progress: JobStatus | None = None) -> None:
@@ -237,3 +248,30 @@ def test_the_first_screen_leads_to_calibration(
     pilot.key(key.RETURN)
     assert pilot.sent(LookAtVideos) == [LookAtVideos(tmp_path)]
     assert pilot.sent(OpenCapture) == []
+
+
+def test_offsets_are_shown_and_corrected_by_keyboard(pilot: Pilot) -> None:
+    folder = Path("/captures/100% kitchen")
+    sure = OffsetRow("50%s", 2.0, 0.05, 0.97, "audio", is_sure=True)
+    unknown = OffsetRow("b##c", None, np.inf, 0.0, "", is_sure=False)
+    page = SynchronisationPage(folder, target=folder)
+    pilot.session.synchronising.page, pilot.session.synchronising.progress = page, JobStatus("Synchronising", 0.2, "so")
+    pilot.draw(4)
+    pilot.key(key.RETURN)
+    assert pilot.sent(CloseQuestion) == []
+    pilot.session.synchronising.page = replace(
+        page, state="done", rows=(sure, unknown), notes=("audio: 100%",), disagreements=("They differ.",)
+    )
+    pilot.draw(3)
+    pilot.key(key.RETURN)
+    assert pilot.sent(ApplyOffsets) == [ApplyOffsets(folder)]
+    pilot.session.synchronising.page = replace(page, state="written", rows=(sure,), written=folder)
+    pilot.draw(3)
+    pilot.key(key.RETURN)
+    assert pilot.sent(OpenCapture) == [OpenCapture(folder, is_asking=True)]
+    pilot.session.synchronising.page = replace(page, state="done", rows=(replace(sure, is_sure=False),))
+    pilot.draw(3)
+    assert "synchronisation.apply" not in pilot.rects
+    pilot.key(key.ESCAPE)
+    assert pilot.sent(CloseQuestion) == [CloseQuestion()]
+    assert len(pilot.session.notices) == 0

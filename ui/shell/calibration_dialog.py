@@ -17,6 +17,7 @@ from app.status import JobStatus
 from engine.calibration.options import LENSES, UPS, CalibrationOptions, KnownDistance
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, elided_path, pop_bold, primary_button, push_bold, text_wrapped, text_wrapped_dim
+from ui.shell.modal import Modal
 from ui.style import theme
 from ui.style.theme import Icon
 
@@ -55,7 +56,7 @@ class CalibrationDialog:
 
     def __init__(self) -> None:
         self._folder: Path | None = None
-        self._is_up = False
+        self._modal = Modal()
         self._lens, self._up = "simple", "floor"
         self._is_shared = self._is_replacing = self._has_distance = False
         self._pair, self._metres = (0, 1), 1.0
@@ -64,37 +65,25 @@ class CalibrationDialog:
     def draw(self, session: HasCalibrating, dispatch: Dispatch, ui: UiState) -> None:
         """Draw the dialog while there is a folder to be calibrated."""
         page = session.calibrating.page
-        is_new, self._is_up = page is not None and not self._is_up, page is not None
-        if page is None:
+        keys = self._modal.begin(None if page is None else TITLE, TITLE, SIZE)
+        if keys is None or page is None:
+            return
+        if not keys.is_up:
+            dispatch(CloseQuestion())
             return
         if page.folder != self._folder:
             self._folder, self._out, self._pair = page.folder, str(page.folder), (0, 1)
             self._is_replacing = self._has_distance = False
-        if is_new:
-            imgui.open_popup(TITLE)
-        viewport = imgui.get_main_viewport()
-        imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.always, ImVec2(0.5, 0.5))
-        width, height = min(SIZE[0], viewport.work_size.x - 24), min(SIZE[1], viewport.work_size.y - 24)
-        imgui.set_next_window_size(ImVec2(width, height))
-        flags = imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize
-        is_open, is_kept = imgui.begin_popup_modal(TITLE, True, flags)
-        if not is_open:
-            if not is_new:  # closed by its cross
-                dispatch(CloseQuestion())
-            return
-        is_free = not is_new and not imgui.get_io().want_text_input  # else keys belong to what is typed
-        is_agreed = is_free and imgui.is_key_pressed(imgui.Key.enter, False)
-        is_left = is_free and imgui.is_key_pressed(imgui.Key.escape, False)
         answer: Command | None = None
-        if not is_kept:
+        if keys.is_closed:
             answer = CloseQuestion()
         elif page.state == "running":
-            answer = self._draw_running(page, session.calibrating.progress, ui, is_left=is_left)
+            answer = self._draw_running(page, session.calibrating.progress, ui, is_left=keys.is_left)
         elif page.state == "done" and page.result is not None:
-            answer = _draw_result(page, page.result, ui, is_agreed=is_agreed)
+            answer = _draw_result(page, page.result, ui, is_agreed=keys.is_agreed)
         else:
-            answer = self._draw_questions(page, ui, is_agreed=is_agreed)
-        if answer is None and is_left and page.state != "running":
+            answer = self._draw_questions(page, ui, is_agreed=keys.is_agreed)
+        if answer is None and keys.is_left and page.state != "running":
             answer = CloseQuestion()
         if isinstance(answer, CloseQuestion | OpenCapture):
             imgui.close_current_popup()

@@ -62,6 +62,7 @@ from ui.shell.redraw import FRAMES_AFTER_INPUT, RedrawPlan
 from ui.shell.remembering import Remembering, RememberNeeds
 from ui.shell.status_bar import HEIGHT as STATUS_BAR_HEIGHT
 from ui.shell.status_bar import StatusNeeds, draw_status_bar
+from ui.shell.synchronisation_dialog import HasSynchronising, SynchronisationDialog
 from ui.style import theme
 from ui.style.fonts import load_fonts
 from ui.style.theme_in_use import ThemeInUse
@@ -94,6 +95,7 @@ class FrameNeeds(
     QuestionNeeds,
     HasOpening,
     HasCalibrating,
+    HasSynchronising,
     RememberNeeds,
     NoticesNeeds,
     LogNeeds,
@@ -166,6 +168,7 @@ class Frame:
         self.dialog = OpenFolderDialog()
         self.questions = QuestionDialogs()
         self.calibration = CalibrationDialog()
+        self.synchronisation = SynchronisationDialog()
         self.opening = OpeningDialog(lambda: ImageTexture(ctx))
         self.palette = Palette()
         self.preferences = PreferencesDialog()
@@ -326,6 +329,7 @@ class Frame:
         self._guard("Preferences", lambda: self.preferences.draw(ui))
         self._guard("Palette", lambda: self.palette.draw(session, dispatch, ui))
         self._guard("Opening", lambda: self.opening.draw(session, dispatch, ui))
+        self._guard("Synchronisation", lambda: self.synchronisation.draw(session, dispatch, ui))
         self._guard("Calibration", lambda: self.calibration.draw(session, dispatch, ui))
         self._guard("Question", lambda: self.questions.draw(session, dispatch, ui))
         size = imgui.get_main_viewport().size

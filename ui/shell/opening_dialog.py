@@ -18,6 +18,7 @@ from ui.gl import ImageTexture
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.thumbnails import crop_to
 from ui.panels.widgets import elided, elided_path, pop_bold, primary_button, push_bold, text_wrapped, text_wrapped_dim
+from ui.shell.modal import Modal
 from ui.shell.opening_answers_form import AnswersForm, ForecastNeeds
 from ui.style import theme
 from ui.style.theme import Icon
@@ -65,6 +66,7 @@ class OpeningDialog:
         self._textures: dict[int, ImageTexture] = {}
         self._shown: OpeningPage | RefusedFolder | None = None
         self._form = AnswersForm()
+        self._modal = Modal()
 
     def release(self) -> None:
         """Free the pictures."""
@@ -80,30 +82,18 @@ class OpeningDialog:
         if is_new:
             self.release()
         self._shown = shown
-        if shown is None:
+        is_page = isinstance(shown, OpeningPage)
+        keys = self._modal.begin(shown, OPEN if is_page else REFUSED, SIZE if is_page else REFUSED_SIZE)
+        if keys is None or shown is None:
             return
-        title = OPEN if isinstance(shown, OpeningPage) else REFUSED
-        if is_new:
-            imgui.open_popup(title)
-        viewport = imgui.get_main_viewport()
-        size = SIZE if isinstance(shown, OpeningPage) else REFUSED_SIZE
-        width, height = min(size[0], viewport.work_size.x - 24), min(size[1], viewport.work_size.y - 24)
-        imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.always, ImVec2(0.5, 0.5))
-        imgui.set_next_window_size(ImVec2(width, height))
-        flags = imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize
-        is_open, is_kept = imgui.begin_popup_modal(title, True, flags)
-        if not is_open:
-            if not is_new:  # closed by its cross
-                dispatch(CloseQuestion())
+        if not keys.is_up:
+            dispatch(CloseQuestion())
             return
-        is_typing = imgui.get_io().want_text_input  # Enter ends what is typed, and does not answer yet
-        is_agreed = not is_new and not is_typing and _is_enter_pressed()
-        is_left = not is_kept or (not is_new and not is_typing and imgui.is_key_pressed(imgui.Key.escape, False))
         if isinstance(shown, OpeningPage):
-            answer = self._draw_page(shown, opening, ui, is_agreed=is_agreed)
+            answer = self._draw_page(shown, opening, ui, is_agreed=keys.is_agreed)
         else:
-            answer = _draw_refused(shown, ui, is_agreed=is_agreed)
-        if answer is None and is_left:
+            answer = _draw_refused(shown, ui, is_agreed=keys.is_agreed)
+        if answer is None and (keys.is_left or keys.is_closed):
             answer = CloseQuestion()
         if answer is not None:
             imgui.close_current_popup()
@@ -257,7 +247,3 @@ def _draw_refused(found: RefusedFolder, ui: UiState, *, is_agreed: bool) -> Clos
     if is_closed:
         return CloseQuestion()
     return LookAtVideos(found.path) if is_chosen or is_agreed else None
-
-
-def _is_enter_pressed() -> bool:
-    return imgui.is_key_pressed(imgui.Key.enter, False) or imgui.is_key_pressed(imgui.Key.keypad_enter, False)
