@@ -12,7 +12,7 @@ from engine.capture.capture import open_capture
 from engine.errors import PreparationError
 
 
-def forecast(folder, answers, step_s=0.01):
+def forecast(folder, answers, step_s: float | None = 0.01):
     return forecast_opening(open_capture(folder), answers, step_time=lambda sizes, phase: step_s, place=Path("/"))
 
 

@@ -14,7 +14,7 @@ from app.calibration.job import CalibrationRequest
 from app.session.calibration_page import CalibrationPage, CalibrationResult, VideoFacts
 from app.session.commands import CalibrateVideos, CloseQuestion, Command, OpenCapture, StopCalibration
 from app.status import JobStatus
-from engine.calibration.options import LENSES, UPS, CalibrationOptions, KnownDistance
+from engine.calibration.options import LENSES, UPS, CalibrationOptions, KnownDistance, Lens, Up
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, elided_path, pop_bold, primary_button, push_bold, text_wrapped, text_wrapped_dim
 from ui.shell.modal import Modal
@@ -26,8 +26,8 @@ SIZE = (860.0, 620.0)
 BUTTON = ImVec2(190, 34)
 LABEL_WIDTH = 150.0
 FIELD_WIDTH = 330.0
-LENS_WORDS = {"simple": "Ordinary", "opencv": "Wide or cheap", "fisheye": "Fisheye"}
-UP_WORDS = {"floor": "The floor", "cameras": "The cameras"}
+LENS_WORDS: dict[Lens, str] = {"simple": "Ordinary", "opencv": "Wide or cheap", "fisheye": "Fisheye"}
+UP_WORDS: dict[Up, str] = {"floor": "The floor", "cameras": "The cameras"}
 ABOUT = (
     "Where the cameras stand and what their lenses do is found from the pictures alone. The cameras must not move, and "
     "neighbours have to see much of the same."
@@ -57,7 +57,8 @@ class CalibrationDialog:
     def __init__(self) -> None:
         self._folder: Path | None = None
         self._modal = Modal()
-        self._lens, self._up = "simple", "floor"
+        self._lens: Lens = "simple"
+        self._up: Up = "floor"
         self._is_shared = self._is_replacing = self._has_distance = False
         self._pair, self._metres = (0, 1), 1.0
         self._out = ""

@@ -121,5 +121,7 @@ def test_why_it_failed_is_shown_beside_the_options(make_session, videos, monkeyp
         session.dispatch(c.CalibrateVideos(CalibrationRequest(videos)))
         assert session.calibrating.page.failure is None
         poll_until(session, lambda: session.calibrating.page.failure is not None)
-        assert expected in session.calibrating.page.failure.text
+        failure = session.calibrating.page.failure
+        assert failure is not None
+        assert expected in failure.text
         assert session.calibrating.page.cameras
