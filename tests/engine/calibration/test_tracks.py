@@ -52,7 +52,7 @@ def test_epipolar_lines_tell_apart_what_looks_alike() -> None:
 
 
 def test_a_wrong_match_costs_a_sighting_and_not_the_track() -> None:
-    seen, lists, numbers = made_key_points(n_looks=1000)
+    seen, lists, _ = made_key_points(n_looks=1000)
     matches = match_all(lists)
     generator = np.random.default_rng(1)
     spoilt = {pair: rows.copy() for pair, rows in matches.items()}
