@@ -1,4 +1,4 @@
-"""clipgstream synchronise: how far each camera is ahead, and by which evidence; writes it into capture.json on request."""
+"""clipgstream synchronise: how far each camera is ahead and what says so; writes it into capture.json on request."""
 
 from __future__ import annotations
 
@@ -28,7 +28,10 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("path", type=path_argument, help="capture, or folder of plain videos without calibration")
     command.add_argument("--apply", action="store_true", help="write the offsets into capture.json")
     command.add_argument(
-        "--out", type=path_argument, metavar="FOLDER", help="with --apply: write capture.json there, not into the capture"
+        "--out",
+        type=path_argument,
+        metavar="FOLDER",
+        help="with --apply: write capture.json there, not into the capture",
     )
     command.add_argument(
         "--max-offset", type=float, default=1.0, metavar="SECONDS", help="how far to look in pictures (1 second)"

@@ -62,7 +62,7 @@ def forecast_opening(capture: Capture, answers: OpeningAnswers, *, step_time: St
 
 
 def free_mb(place: Path) -> float | None:
-    """Room on the disk of a folder that need not exist yet, 10^6 bytes; None where nobody says."""
+    """Room on the disk of a folder that need not exist yet, 10^6 bytes; None where it is unknown."""
     for folder in (place, *place.parents):
         with suppress(OSError):
             return shutil.disk_usage(folder).free / 1e6

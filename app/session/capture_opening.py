@@ -132,7 +132,7 @@ class CaptureOpening:
         return self._last, is_final
 
     def problem(self, answers: OpeningAnswers) -> str:
-        """Why there can be no project with these answers; empty where there can."""
+        """What keeps these answers from making a project; empty where nothing does."""
         if self.page is None:
             return ""
         n_cameras = len(self.page.report.cameras)

@@ -85,7 +85,13 @@ def solve(
             break
         expect = Expectations(principal=0.02 if number else 0.0, is_shared=is_shared)
         cameras, points = adjust(
-            cameras, tracks.points, tracks.seen, middles=middles, widths=widths, expect=expect, n_iterations=N_ITERATIONS
+            cameras,
+            tracks.points,
+            tracks.seen,
+            middles=middles,
+            widths=widths,
+            expect=expect,
+            n_iterations=N_ITERATIONS,
         )
         tracks = cleaned(cameras, points, tracks.seen, reach_px)
         progress((number + 1) / len(stages))

@@ -134,4 +134,3 @@ def _visual(source: SourceName, solution: Solution, n_curves: int, own_sigma: fl
         agreements=solution.agreements,
         note=note,
     )
-

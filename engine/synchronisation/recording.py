@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.capture.capture import Capture
+from engine.capture.capture import FORMATS, Capture
+from engine.capture.frame_files import VIDEO_SUFFIXES, listed
 from engine.capture.frames import FrameSource, IndexedFrames, VideoFrames
 from engine.capture.media import read_frame_times, read_video_header
 
@@ -90,8 +91,12 @@ def recordings_in_videos(videos: Sequence[Path], names: Sequence[str] | None = N
 
 
 def videos_without_calibration(folder: Path) -> list[Path]:
-    """The videos of a folder that is no capture of any known layout, in natural order; none where it is one."""
-    if not folder.is_dir() or is_capture(folder):
+    """The videos of a folder that is not a capture of any known layout, in natural order; none where it is one.
+
+    Raises:
+        OSError: The folder cannot be read.
+    """
+    if not folder.is_dir() or any(reader.probe(folder).is_match for reader in FORMATS):
         return []
-    names = [name for name in listed(folder, VIDEO_SUFFIXES) if not name.startswith(".")]
+    names = listed(folder, VIDEO_SUFFIXES)
     return [folder / name for name in names] if len(names) > 1 else []

@@ -51,7 +51,7 @@ class Modal:
         is_open, is_kept = imgui.begin_popup_modal(title, True, flags)
         if not is_open:
             return None if is_new else ModalKeys(is_closed=True, is_up=False)
-        # the key that led here is still pressed in the first frame; Enter ends what is typed, and is no answer then
+        # the key that led here is still pressed in the first frame; while typing, Enter only ends the text
         is_free = not is_new and not imgui.get_io().want_text_input
         is_enter = imgui.is_key_pressed(imgui.Key.enter, False) or imgui.is_key_pressed(imgui.Key.keypad_enter, False)
         is_escape = imgui.is_key_pressed(imgui.Key.escape, False)

@@ -1,4 +1,4 @@
-"""What a user is told of a folder before anything is made of it."""
+"""What a user is told of a folder before a project is made."""
 
 from __future__ import annotations
 
