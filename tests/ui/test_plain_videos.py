@@ -1,4 +1,4 @@
-"""A folder of plain videos goes from the first screen to a trained clip, by keyboard alone, in a real session and window.
+"""A folder of plain videos goes from the first screen to a trained clip, by keyboard, in a real session and window.
 
 The calibration itself is made up: it writes the cameras as they are known, and has tests of its own.
 """
