@@ -240,7 +240,7 @@ def draw_opening(stage: Stage) -> None:
 
 def draw_calibration(stage: Stage) -> None:
     """The cameras of a folder of plain videos, and how they are to be calibrated."""
-    cameras = tuple(VideoFacts(f"gopro {row + 1}", (1920, 1080), 1800 + row % 3, 60.0) for row in range(12))
+    cameras = tuple(VideoFacts(f"camera {row + 1}", (1920, 1080), 1800 + row % 3, 60.0) for row in range(12))
     stage.session.calibrating.page = CalibrationPage(CAPTURES / "garden", "asking", cameras)
     stage.studio.settle(4)
     stage.pilot.click("calibration.distance")
