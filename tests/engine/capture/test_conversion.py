@@ -19,6 +19,7 @@ from tests.engine.capture.layouts import written_capture_json, written_colmap
 from tests.engine.capture.layouts.scene import check_reads_as, make_points, make_scene
 from tests.engine.capture.layouts.written_colmap import write_model
 
+
 @pytest.mark.parametrize("frames", ["link", "copy", "png"])
 @pytest.mark.parametrize("source", ["videos", "folders"])
 @pytest.mark.parametrize("target", TARGETS)
