@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 from bisect import bisect_left
+from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -34,6 +35,10 @@ from engine.capture.video_colors import rgb_picture
 from engine.errors import CaptureError
 from engine.storage.files import open_regular
 
+MAX_DECODER_BYTES = 384 << 20
+"""What all open videos of a capture may hold in decoded frames that others refer to."""
+DECODER_BYTES_PER_PIXEL = 24
+"""Sixteen frames of one and a half bytes: what H.264 may refer to."""
 MAX_FORWARD_DECODE = 64
 """Frames decoded forward before a seek is considered cheaper even inside one group of pictures."""
 
@@ -290,6 +295,8 @@ class FrameStore:
         self.optics = tuple(optics)
         self.cache: ByteCache[tuple[int, int], np.ndarray] = ByteCache(cache_bytes)
         self._valid: dict[int, np.ndarray | None] = {}
+        self._open: OrderedDict[int, int] = OrderedDict()  # bytes that decoders hold by camera, used longest ago first
+        self._open_lock = threading.Lock()
 
     def valid(self, camera_index: int) -> np.ndarray | None:
         """Pixels that a camera sees. [H, W] bool, read-only, or None where it sees all."""
@@ -318,11 +325,26 @@ class FrameStore:
         """Close files and forget cached frames."""
         for source in self.sources:
             source.close()
+        with self._open_lock:
+            self._open.clear()
         self.cache.clear()
+
+    def _close_others(self, camera_index: int) -> None:
+        """Close files that were used longest ago where decoders would hold too much: all cameras are often asked."""
+        width, height = self.optics[camera_index].stored_size
+        with self._open_lock:
+            self._open[camera_index] = width * height * DECODER_BYTES_PER_PIXEL
+            self._open.move_to_end(camera_index)
+            closing = []
+            while len(self._open) > 1 and sum(self._open.values()) > MAX_DECODER_BYTES:
+                closing.append(self._open.popitem(last=False)[0])
+        for other in closing:
+            self.sources[other].close()
 
     def _decode(self, camera_index: int, frame_index: int) -> np.ndarray:
         source, optics = self.sources[camera_index], self.optics[camera_index]
         stored = next(iter(source.read([frame_index])))
+        self._close_others(camera_index)
         width, height = optics.stored_size
         if stored.shape[:2] != (height, width):
             raise CaptureError(
