@@ -6,6 +6,7 @@ lens numbers shared among cameras or not. Levenberg-Marquardt with the points el
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,8 @@ from engine.calibration.cameras import Cameras, distort, lens_jacobian, plane_ja
 
 MIN_SCALE_PX = 0.25
 """No key point is found more exactly than this."""
+POINTS_AT_ONCE = 1000
+"""Points that are eliminated together; bounds memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +32,7 @@ class Expectations:
         is_shared: Whether all cameras have one focal length, principal point and lens.
     """
 
-    principal: float = 0.02
+    principal: float = 0.01
     focal: float = 0.5
     aspect: float = 0.003
     lens: float = 0.2
@@ -97,17 +100,13 @@ def adjust(
         weights = 1.0 / (1.0 + (lengths / scale) ** 2)
         J_cameras, J_points = _jacobians(cameras, points, seen)
         root = np.sqrt(weights)[:, None]
-        A, B = _block_rows(J_cameras * root[..., None], seen.cameras, n_cameras), J_points * root[..., None]
-        target = (residuals * root).reshape(-1)
+        A, B, target = J_cameras * root[..., None], J_points * root[..., None], residuals * root
         expected = _expected(cameras, start_focals, middles, n_params)
-        H_cameras = (A.T @ A).tocsr() + sparse.diags((scale**2 * stiffness).reshape(-1))
-        g_cameras = A.T @ target + (scale**2 * stiffness * expected).reshape(-1)
-        W = (A.T @ _block_rows(B, seen.points, len(points))).tocsr()
-        V = _sums(np.einsum("nki,nkj->nij", B, B).reshape(-1, 9), seen.points, len(points)).reshape(-1, 3, 3)
-        g_points = _sums(np.einsum("nki,nk->ni", B, residuals * root), seen.points, len(points))
+        system = _System(A, B, target, seen, n_cameras, len(points), share)
+        system.expect(scale**2 * stiffness, expected)
         before = _cost(residuals, expected, stiffness, scale)
         for _ in range(6):
-            step = _step(H_cameras, g_cameras, W, V, g_points, share, damping)
+            step = system.step(damping)
             moved = _moved(cameras, step[0].reshape(n_cameras, n_params))
             moved_points = points - step[1]
             new_residuals = _residuals(moved, moved_points, seen)
@@ -189,33 +188,71 @@ def _jacobians(cameras: Cameras, points: np.ndarray, seen: Observations) -> tupl
     return J, by_inside @ rotations
 
 
-def _block_rows(blocks: np.ndarray, columns: np.ndarray, n_columns: int) -> sparse.csr_matrix:
-    """One block [2, K] per row of blocks, at the block column named. [2 N, K n_columns]"""
-    n, height, width = blocks.shape
-    matrix = sparse.bsr_matrix((blocks, columns, np.arange(n + 1)), shape=(n * height, n_columns * width))
-    return matrix.tocsr()
-
-
 def _sums(values: np.ndarray, groups: np.ndarray, n_groups: int) -> np.ndarray:
     """Sums of values [N, K] over their groups. [n_groups, K]"""
     return np.stack([np.bincount(groups, column, minlength=n_groups) for column in values.T], axis=-1)
 
 
-def _step(H, g_cameras, W, V, g_points, share, damping: float) -> tuple[np.ndarray, np.ndarray]:
-    """What to take from the numbers of the cameras and from the points."""
-    n_points = len(V)
-    diagonal = np.einsum("mii->mi", V)
-    damped = V + damping * np.einsum("mi,ij->mij", np.maximum(diagonal, 1e-9), np.eye(3))
-    inverse = np.linalg.inv(damped)
-    V_inverse = sparse.bsr_matrix((inverse, np.arange(n_points), np.arange(n_points + 1))).tocsr()
-    weighted = W @ V_inverse
-    reduced = (share.T @ (H - weighted @ W.T) @ share).toarray()
-    full = (share.T @ H @ share).diagonal()
-    right = share.T @ (g_cameras - weighted @ g_points.reshape(-1))
-    reduced[np.diag_indices_from(reduced)] += damping * np.maximum(full, 1e-9) + 1e-12
-    cameras_step = share @ np.linalg.lstsq(reduced, right, rcond=1e-14)[0]
-    points_step = np.einsum("mij,mj->mi", inverse, g_points - (W.T @ cameras_step).reshape(-1, 3))
-    return cameras_step, points_step
+class _System:
+    """The normal equations of one iteration, by blocks: cameras [C P], points [M, 3], and what joins them.
+
+    Args:
+        A, B: Derivatives of weighted residuals by cameras and points. [N, 2, P], [N, 2, 3]
+        target: Weighted residuals. [N, 2]
+        seen: Of which each camera sees a point at most once.
+        share: Maps what is sought to all numbers of all cameras.
+    """
+
+    def __init__(self, A, B, target, seen: Observations, n_cameras: int, n_points: int, share) -> None:
+        n_params = A.shape[2]
+        self._seen, self._share, self._size = seen, share, n_cameras * n_params
+        self._H, self._g = np.zeros((self._size, self._size)), np.zeros(self._size)
+        for camera in range(n_cameras):
+            rows = np.flatnonzero(seen.cameras == camera)
+            place = slice(camera * n_params, (camera + 1) * n_params)
+            of_camera = A[rows].reshape(-1, n_params)
+            self._H[place, place] = of_camera.T @ of_camera
+            self._g[place] = of_camera.T @ target[rows].reshape(-1)
+        self._V = _sums(np.einsum("nki,nkj->nij", B, B).reshape(-1, 9), seen.points, n_points).reshape(-1, 3, 3)
+        self._g_points = _sums(np.einsum("nki,nk->ni", B, target), seen.points, n_points)
+        self._joints = np.einsum("nki,nkj->nij", A, B)
+        self._order = np.argsort(seen.points, kind="stable")
+        self._ends = np.searchsorted(seen.points[self._order], np.arange(n_points + 1))
+
+    def expect(self, stiffness: np.ndarray, expected: np.ndarray) -> None:
+        """Add what is expected of cameras: both [C, P]."""
+        self._H[np.diag_indices(self._size)] += stiffness.reshape(-1)
+        self._g += (stiffness * expected).reshape(-1)
+
+    def step(self, damping: float) -> tuple[np.ndarray, np.ndarray]:
+        """What to take from the numbers of the cameras [C P] and from the points [M, 3]."""
+        diagonal = np.maximum(np.einsum("mii->mi", self._V), 1e-9)
+        inverse = np.linalg.inv(self._V + damping * diagonal[:, :, None] * np.eye(3))
+        H, g = self._H.copy(), self._g.copy()
+        for first, W in self._chunks():
+            m = W.shape[1]
+            weighted = np.einsum("cmi,mij->cmj", W, inverse[first : first + m]).reshape(self._size, -1)
+            H -= weighted @ W.reshape(self._size, -1).T
+            g -= weighted @ self._g_points[first : first + m].reshape(-1)
+        reduced = self._share.T @ (self._share.T @ H.T).T
+        size = 1 / np.sqrt(np.maximum((self._share.T @ (self._share.T @ self._H).T).diagonal(), 1e-12))
+        scaled = reduced * size[:, None] * size + max(damping, 1e-9) * np.eye(len(size))
+        sought = size * np.linalg.solve(scaled, size * (self._share.T @ g))
+        cameras_step = self._share @ sought
+        points_right = self._g_points.copy()
+        for first, W in self._chunks():
+            points_right[first : first + W.shape[1]] -= np.tensordot(cameras_step, W, axes=1)
+        return cameras_step, np.einsum("mij,mj->mi", inverse, points_right)
+
+    def _chunks(self) -> Iterator[tuple[int, np.ndarray]]:
+        """First point, and what joins some points to all cameras: [C P, m, 3]."""
+        n_params = self._joints.shape[1]
+        for first in range(0, len(self._V), POINTS_AT_ONCE):
+            last = min(first + POINTS_AT_ONCE, len(self._V))
+            rows = self._order[self._ends[first] : self._ends[last]]
+            W = np.zeros((self._size // n_params, last - first, n_params, 3))
+            W[self._seen.cameras[rows], self._seen.points[rows] - first] = self._joints[rows]
+            yield first, np.ascontiguousarray(W.transpose(0, 2, 1, 3)).reshape(self._size, last - first, 3)
 
 
 def _moved(cameras: Cameras, step: np.ndarray) -> Cameras:

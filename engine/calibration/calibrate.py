@@ -1,4 +1,4 @@
-"""From a folder of plain videos to calibrated cameras. The work is done by a child process: see engine.calibration.child.
+"""From a folder of plain videos to calibrated cameras, by a child process: see engine.calibration.child.
 
 Nothing is written but temporary files, and the folder of videos is only read.
 """

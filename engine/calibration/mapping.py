@@ -17,6 +17,10 @@ FOCAL_PER_SIDE = 0.85
 """Focal length to begin with, per longer side of the picture: a view of 61 degrees."""
 FISHEYE_FOCAL_PER_SIDE = 0.5
 MIN_CAMERAS = 3
+MIN_MATCHES = 15
+"""Of two cameras; fewer say nothing about them."""
+MAX_TRIALS = 2000
+"""Of a motion that matches fit: enough for a quarter of right ones."""
 MODELS = {"simple": "SIMPLE_RADIAL", "opencv": "SIMPLE_RADIAL", "fisheye": "SIMPLE_RADIAL_FISHEYE"}
 """COLMAP's names of the lenses of first estimates, which have one number at most."""
 
@@ -55,12 +59,15 @@ def verified_matches(
             tables.write_keypoints(image, points.pixels.astype(np.float32))
             ids.append(image)
         for (a, b), rows in matches.items():
-            if len(rows):
+            if len(rows) >= MIN_MATCHES:
                 tables.write_matches(ids[a], ids[b], rows.astype(np.uint32))
     pairs = folder / "pairs.txt"
-    pairs.write_text("".join(f"{_name(a)} {_name(b)}\n" for a, b in matches))
+    pairs.write_text(
+        "".join(f"{_name(a)} {_name(b)}\n" for (a, b), rows in matches.items() if len(rows) >= MIN_MATCHES)
+    )
     options = pycolmap.TwoViewGeometryOptions()
     options.ransac.random_seed = SEED
+    options.ransac.max_num_trials = MAX_TRIALS
     options.ransac.max_error = max(2.0, float(sizes.max()) / 320)
     pycolmap.verify_matches(folder / "database.db", pairs, options)
     with pycolmap.Database.open(folder / "database.db") as tables:

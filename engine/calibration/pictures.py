@@ -49,7 +49,7 @@ class CameraPictures:
 
 def chosen_frames(n_frames: int, n: int) -> list[int]:
     """At most n frame indices, spread evenly."""
-    return sorted({int(round(value)) for value in np.linspace(0, n_frames - 1, min(n, n_frames))})
+    return sorted({round(value) for value in np.linspace(0, n_frames - 1, min(n, n_frames))})
 
 
 def matching_size(size: tuple[int, int]) -> tuple[int, int]:

@@ -72,6 +72,9 @@ def solve(
     per_640 = float(np.median(sizes[rows].max(1))) / 640
     stages = [(reach, False) for reach in FIRST_REACHES] + [(reach, True) for reach in LAST_REACHES]
     tracks = Tracks.none()
+    is_shared = is_shared and len(np.unique(sizes[rows], axis=0)) == 1  # at other sizes lenses are others
+    if is_shared:
+        cameras = _with_one_lens(cameras)
     for number, (reach, is_last) in enumerate(stages):
         reach_px = max(reach * per_640, MIN_REACH_PX)
         if is_last:
@@ -83,7 +86,7 @@ def solve(
         tracks = build_tracks(fitting_matches(found, chosen, cameras, reach_px), chosen, cameras, reach_px)
         if len(tracks.points) < len(rows):
             break
-        expect = Expectations(principal=0.02 if number else 0.0, is_shared=is_shared)
+        expect = Expectations(is_shared=is_shared) if number else Expectations(principal=0.0, is_shared=is_shared)
         cameras, points = adjust(
             cameras,
             tracks.points,
@@ -106,6 +109,17 @@ def _with_lens(cameras: Cameras, lens: str) -> Cameras:
     n_both = min(params.shape[1], cameras.lens_params.shape[1])
     params[:, :n_both] = cameras.lens_params[:, :n_both]
     return replace(cameras, lens=lens, lens_params=params)
+
+
+def _with_one_lens(cameras: Cameras) -> Cameras:
+    """The same cameras, each with the lens in the middle of all."""
+    n = len(cameras)
+    return replace(
+        cameras,
+        focals=np.full(n, np.median(cameras.focals)),
+        principal=np.tile(np.median(cameras.principal, axis=0), (n, 1)),
+        lens_params=np.tile(np.median(cameras.lens_params, axis=0), (n, 1)),
+    )
 
 
 def _angle_deg(cameras: Cameras, pair: Pair) -> float:

@@ -66,8 +66,9 @@ def find_videos(folder: Path) -> list[PlainVideo]:
         problems.append(CaptureError(text, hint="Keep one file per camera.", path=folder))
     raise_problems(problems, folder)
     if len(found) < MIN_CAMERAS:
+        words = "1 camera was" if len(found) == 1 else f"{len(found)} cameras were"
         raise CaptureError(
-            f"{len(found)} cameras were found; at least {MIN_CAMERAS} are needed. In it: {folder_contents(folder)}.",
+            f"{words} found; at least {MIN_CAMERAS} are needed. In it: {folder_contents(folder)}.",
             hint="Put one video file per camera into one folder, or one folder of images per camera.",
             path=folder,
         )

@@ -89,7 +89,8 @@ def run_child(
     """
     root = str(Path(engine.__file__).resolve().parents[1])
     paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    # one thread per matrix product: children spread their work themselves, and sums keep their order on any machine
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(paths)}
     beat, said = job.with_name("beat"), job.with_name("said.txt")
     command = [sys.executable, "-m", module, str(job), str(result), str(beat)]
     with said.open("wb") as errors:

@@ -1,0 +1,173 @@
+"""The job of a calibration: what it writes, what it refuses, how it is cancelled. The calibration itself is made up."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.background.jobs import Jobs
+from app.calibration import job
+from app.calibration.job import CalibrationRequest, TimeLeft, calibration_work, run_calibration
+from app.calibration.report import report_lines
+from app.cli.cli import main
+from engine.assets import asset_path
+from engine.calibration.calibrated import CalibratedRig, Calibration, MissingCamera
+from engine.camera.lens import Lens
+from engine.capture.capture import open_capture
+from engine.errors import CaptureError
+from engine.progress import Progress
+
+NAMES = ("cam00", "cam01", "cam02", "cam03")
+
+
+@pytest.fixture
+def videos(tmp_path: Path) -> Path:
+    """Four videos of the sample without their cameras."""
+    folder = tmp_path / "my videos"
+    folder.mkdir()
+    for name in NAMES:
+        shutil.copy(asset_path("sample") / f"{name}.mp4", folder)
+    return folder
+
+
+@pytest.fixture
+def made_up(monkeypatch) -> Calibration:
+    """In place of a calibration: the sample's cameras, one of them missing."""
+    rig = open_capture(asset_path("sample")).native_rig.subset([0, 1, 2])
+    lenses = (Lens("opencv", (-0.1,)),) * 3
+    found = CalibratedRig(
+        rig,
+        lenses,
+        np.zeros((5, 3)),
+        np.full(5, 0.3),
+        np.array([0.3, 0.4, 2.5]),
+        np.array([400, 300, 12]),
+        False,
+        "floor",
+    )
+    missing = MissingCamera("cam03", "it has at most 4 matches with another camera (cam02); 30 are needed", "cam02", 4)
+    calibration = Calibration(found, (missing,))
+
+    def calibrate(folder, options, *, report, alive):
+        report(Progress("Matching", 0.5, ""))
+        alive()
+        return calibration
+
+    monkeypatch.setattr(job, "calibrate", calibrate)
+    return calibration
+
+
+def test_capture_json_lies_with_the_videos_and_opens(videos: Path, made_up: Calibration) -> None:
+    outcome = run_calibration(CalibrationRequest(videos), report=lambda _: None)
+    assert outcome.capture == videos
+    assert not outcome.needs_links
+    capture = open_capture(videos)
+    assert capture.rig.names == NAMES[:3]
+    assert capture.n_frames == 30
+    np.testing.assert_allclose(capture.rig.world_to_camera, made_up.found.rig.world_to_camera)
+    assert capture.frame(0, 3).shape == (240, 320, 3)
+
+
+def test_another_folder_names_the_videos_where_they_lie(videos: Path, made_up: Calibration, tmp_path: Path) -> None:
+    outcome = run_calibration(CalibrationRequest(videos, tmp_path / "out"), report=lambda _: None)
+    assert outcome.needs_links
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["capture.json"]
+    assert len(open_capture(tmp_path / "out", follow_links=True).rig) == 3
+    with pytest.raises(CaptureError, match="not inside its folder"):
+        open_capture(tmp_path / "out")
+
+
+def test_what_is_there_is_replaced_only_when_asked(videos: Path, made_up: Calibration) -> None:
+    (videos / "capture.json").write_text("{}")
+    with pytest.raises(CaptureError, match="already"):
+        run_calibration(CalibrationRequest(videos), report=lambda _: None)
+    assert (videos / "capture.json").read_text() == "{}"
+    run_calibration(CalibrationRequest(videos, is_replacing=True), report=lambda _: None)
+    assert len(open_capture(videos).rig) == 3
+
+
+def test_the_report_says_what_is_missing_why_and_what_helps(made_up: Calibration) -> None:
+    lines = report_lines(made_up)
+    assert lines[0].startswith("3 of 4 cameras were found, from 5 points")
+    text = "\n".join(lines)
+    assert "cam03: not found: it has at most 4 matches" in text
+    assert "What helps:" in text
+    assert "fits badly and sees few points" in text
+    assert "one unit is not one metre" in text
+
+
+def test_a_job_hands_over_its_outcome_and_tells_how_far_it_is(videos: Path, made_up: Calibration) -> None:
+    jobs, done, errors = Jobs(), [], []
+    started = jobs.start("Calibrating", calibration_work(CalibrationRequest(videos)), done.append, errors.append)
+    started.join(10)
+    assert started.context.status.done == 0.5
+    assert started.context.status.message.startswith("Matching")
+    jobs.poll()
+    assert not errors
+    assert done[0].capture == videos
+
+
+def test_a_cancelled_job_writes_nothing(videos: Path, monkeypatch) -> None:
+    def calibrate(folder, options, *, report, alive):
+        while True:
+            alive()
+            time.sleep(0.005)
+
+    monkeypatch.setattr(job, "calibrate", calibrate)
+    jobs, done, errors = Jobs(), [], []
+    started = jobs.start("Calibrating", calibration_work(CalibrationRequest(videos)), done.append, errors.append)
+    started.context.cancel()
+    started.join(10)
+    jobs.poll()
+    assert not started.is_running
+    assert not done
+    assert not errors
+    assert not (videos / "capture.json").exists()
+
+
+def test_time_left_follows_from_the_share_that_is_done() -> None:
+    now = [0.0]
+    left = TimeLeft(lambda: now[0])
+    now[0] = 30.0
+    assert left.text(0.01) == ""
+    assert left.text(0.25) == "about 1:30 left"
+    assert left.text(1.0) == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--distance", "cam00", "cam99", "2"], "no camera 'cam99'"),
+        (["--distance", "cam00", "cam00", "2"], "from cam00 to cam00 is 2 m"),
+        (["--distance", "cam00", "cam01", "far"], "not a number of metres"),
+        (["--distance", "cam00", "cam01", "-1"], "is -1 m"),
+        (["--lens", "round"], "invalid choice"),
+    ],
+)
+def test_bad_input_ends_with_2_and_one_line(videos: Path, capsys, arguments: list[str], said: str) -> None:
+    assert main(["calibrate", str(videos), *arguments]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+
+
+def test_folders_that_are_none_or_have_too_few_videos_are_refused(tmp_path: Path, capsys) -> None:
+    assert main(["calibrate", str(tmp_path / "gone")]) == 2
+    assert "no such folder" in capsys.readouterr().err
+    shutil.copy(asset_path("sample") / "cam00.mp4", tmp_path / "cam00.mp4")
+    assert main(["calibrate", str(tmp_path)]) == 2
+    assert "1 camera was found; at least 3 are needed" in capsys.readouterr().err
+    (tmp_path / "cam01.mp4").write_bytes(b"no video")
+    assert main(["calibrate", str(tmp_path)]) == 2
+    assert "cam01.mp4" in capsys.readouterr().err
+
+
+def test_the_command_says_what_was_found_and_where(videos: Path, made_up: Calibration, capsys) -> None:
+    assert main(["calibrate", str(videos), "--quiet"]) == 0
+    said = capsys.readouterr().out
+    assert "3 of 4 cameras were found" in said
+    assert "The capture is" in said
