@@ -22,8 +22,12 @@ from engine.capture.format_checks import raise_problems
 from engine.capture.format_result import Layout, Probe
 from engine.capture.formats import (
     capture_json,
+    colmap,
+    colmap_frames,
     easyvolcap,
     immersive,
+    multipleview,
+    n3dv,
     panoptic,
     panoptic_studio,
     sample,
@@ -42,12 +46,16 @@ FORMATS = (
     capture_json,
     sample,
     panoptic,
+    panoptic_studio,
     easyvolcap,
     toml_cameras,
-    transforms_json,
     immersive,
-    panoptic_studio,
     technicolor,
+    transforms_json,
+    multipleview,
+    n3dv,
+    colmap_frames,
+    colmap,
 )
 """Readers in the order they are tried. Each has FORMAT, LAYOUT, probe(folder) and read(folder, follow_links=...)."""
 DEFAULT_CACHE_BYTES = 512 << 20

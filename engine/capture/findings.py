@@ -1,4 +1,4 @@
-"""What a reader finds wrong, collected: all problems of a capture are told in one message."""
+"""Collected problems of a capture, so that one message tells all of them."""
 
 from __future__ import annotations
 

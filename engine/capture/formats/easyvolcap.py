@@ -89,7 +89,7 @@ class _Table:
         """A matrix [rows, cols] of this shape; None where it is not there.
 
         Raises:
-            CaptureError: It is no matrix, or one of another shape.
+            CaptureError: It is not a matrix, or has another shape.
         """
         value = self.entries.get(key)
         if value is None:

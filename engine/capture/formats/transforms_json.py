@@ -217,7 +217,7 @@ def _world_to_camera(camera_to_world: np.ndarray, place: _Place) -> np.ndarray:
         text = "Its transform_matrix has NaN, infinity or a last row that is not 0 0 0 1."
         raise CaptureError(text, hint="Export the cameras again.", path=place.path)
     inverse = np.eye(4)
-    inverse[:3, :3] = rotation.T  # of what is no rotation, check_pose tells
+    inverse[:3, :3] = rotation.T  # check_pose tells when it is not a rotation
     with np.errstate(over="ignore", invalid="ignore"):
         inverse[:3, 3] = -rotation.T @ pose[:3, 3]
     return inverse
