@@ -211,11 +211,11 @@ def _described(
 
 
 def _world_to_camera(camera_to_world: np.ndarray, place: _Place) -> np.ndarray:
-    pose = camera_to_world @ FLIP
-    rotation = pose[:3, :3]
-    if not np.isfinite(pose).all() or not np.array_equal(pose[3], [0.0, 0.0, 0.0, 1.0]):
+    if not np.isfinite(camera_to_world).all() or not np.array_equal(camera_to_world[3], [0.0, 0.0, 0.0, 1.0]):
         text = "Its transform_matrix has NaN, infinity or a last row that is not 0 0 0 1."
         raise CaptureError(text, hint="Export the cameras again.", path=place.path)
+    pose = camera_to_world @ FLIP
+    rotation = pose[:3, :3]
     inverse = np.eye(4)
     inverse[:3, :3] = rotation.T  # check_pose tells when it is not a rotation
     with np.errstate(over="ignore", invalid="ignore"):
