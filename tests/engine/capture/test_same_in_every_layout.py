@@ -104,7 +104,9 @@ def sample(tmp_path_factory: pytest.TempPathFactory) -> CopiedScene:
     )
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
+@pytest.mark.parametrize(
+    "layout", [pytest.param(name, marks=[pytest.mark.slow] * (name == "colmap_frames")) for name in LAYOUTS]
+)
 def test_the_sample_is_the_same_in_every_layout(tmp_path: Path, sample: CopiedScene, layout: str) -> None:
     write, names = LAYOUTS[layout]
     write(tmp_path, sample if names is None else replace(sample, names=names))
