@@ -294,7 +294,7 @@ class ClipPreparation:
         return key_of_corrected(self._capture, self._camera_indices, self._config)
 
     def _static_cloud(self, backgrounds: Backgrounds, keep: Keep) -> StaticCloud:
-        cloud = static_cloud(backgrounds, self._rig, self._config, self._report, keep)
+        cloud = static_cloud(backgrounds, self._rig, self._config, self._report, keep, self._capture.layout)
         if len(cloud.points) == 0:
             raise PreparationError(
                 "No static point was found by any two cameras.",

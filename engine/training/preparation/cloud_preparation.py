@@ -18,14 +18,18 @@ import numpy as np
 
 from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture
+from engine.capture.format_result import Layout
+from engine.capture.points import points_of
 from engine.cloud.background.background import estimate_background
 from engine.cloud.background.exposure import Exposure
 from engine.cloud.background.masks import motion_mask
 from engine.cloud.background.recheck import recheck_background
 from engine.cloud.keeping import Arrays, Keep, do_now
 from engine.cloud.motion.moving_cloud import MovingCloud, build_moving_cloud, motion_bounds
+from engine.cloud.stereo.given_points import true_points
 from engine.cloud.stereo.sparse import triangulate
 from engine.cloud.stereo.static_cloud import StaticCloud, build_static_cloud
+from engine.errors import CaptureError
 from engine.parallel import map_ordered
 from engine.progress import Progress, ReportProgress
 from engine.storage.array_files import ArraysError, read_arrays, write_arrays
@@ -104,11 +108,16 @@ def static_cloud(
     config: TrainConfig,
     report: ReportProgress,
     keep: Keep = do_now,
+    layout: Layout | None = None,
 ) -> StaticCloud:
-    """Dense points of what stands still, with white balance gains."""
+    """Dense points of what stands still, with white balance gains.
+
+    Args:
+        layout: Of the capture, whose own point cloud is used where it is true.
+    """
 
     def build() -> Arrays:
-        cloud = _build_static_cloud(backgrounds, rig, config, report, keep)
+        cloud = _build_static_cloud(backgrounds, rig, config, report, keep, layout)
         return {name: np.asarray(getattr(cloud, name)) for name in ("points", "colors", "gains", "spacing")}
 
     arrays = keep("static cloud", build)
@@ -116,7 +125,12 @@ def static_cloud(
 
 
 def _build_static_cloud(
-    backgrounds: Backgrounds, rig: CameraRig, config: TrainConfig, report: ReportProgress, keep: Keep
+    backgrounds: Backgrounds,
+    rig: CameraRig,
+    config: TrainConfig,
+    report: ReportProgress,
+    keep: Keep,
+    layout: Layout | None,
 ) -> StaticCloud:
 
     def say(line: str) -> None:
@@ -129,6 +143,9 @@ def _build_static_cloud(
         return {"points": triangulate(backgrounds.images, rig, report=say, alive=alive).points}
 
     sparse_points = keep("sparse points", find_sparse)["points"]
+    if layout is not None and layout.points is not None:
+        given = keep("given points", lambda: {"points": _given_points(layout, backgrounds, rig, say)})["points"]
+        sparse_points = np.concatenate([sparse_points, given])
     return build_static_cloud(
         backgrounds.images,
         backgrounds.is_stable,
@@ -139,6 +156,21 @@ def _build_static_cloud(
         report=say,
         keep=keep,
     )
+
+
+def _given_points(layout: Layout, backgrounds: Backgrounds, rig: CameraRig, say: Callable[[str], None]) -> np.ndarray:
+    """The points of the cloud that came with a capture in which its cameras agree; none where they do not. [P, 3]"""
+    try:
+        cloud = points_of(layout)
+    except CaptureError as error:
+        say(f"The point cloud that came along is not used. {error}")
+        return np.zeros((0, 3))
+    if cloud is None:
+        return np.zeros((0, 3))
+    found = true_points(cloud.points, backgrounds.images, backgrounds.is_stable, rig)
+    numbers = f"neighbouring cameras agree in {found.share:.0%} of its {found.n_seen} points that they see"
+    say(f"The point cloud that came along is {'used' if found.is_used else 'not used'}: {numbers}")
+    return found.points
 
 
 def correct_backgrounds(
