@@ -33,12 +33,14 @@ from engine.capture.frames import ImageFrames
 from engine.capture.limits import MAX_CAMERA_ID
 from engine.capture.media import ImageHeader, read_image_header
 from engine.capture.places import place_in
+from engine.capture.points import points_that_came
 from engine.errors import CaptureError
 
 FORMAT = "panoptic"
 LAYOUT = "train_meta.json, test_meta.json and images below ims/ (CMU Panoptic, as for Dynamic 3D Gaussians)"
 """The layout in words."""
 FPS = 30.0
+POINTS = "init_pt_cld.npz"
 META_FILES = ("train_meta.json", "test_meta.json")
 KEYS = ("w", "h", "k", "w2c", "fn", "cam_id")
 
@@ -94,6 +96,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
         fps=FPS,
         default_holdout=tuple(str(camera.camera_id) for camera in cameras if camera.is_test),
         warnings=tuple(warnings),
+        points=points_that_came(folder, (POINTS,), follow_links=follow_links),
     )
 
 
