@@ -20,7 +20,7 @@ INNER_FOLDERS = ("images", "")
 Files = Path | Sequence[Path]
 """A video, or one image per frame."""
 MAX_DIGITS = 300
-"""Of a number in a name: longer ones are no file names, and Python refuses to count so far."""
+"""Of a number in a name: no file name has longer ones, and Python refuses to count so far."""
 _NUMBER = re.compile(r"(\d+)")
 _SEPARATORS = re.compile(r"[\s_.\-]+")
 _ZEROS = re.compile(r"(?<!\d)0+(?=\d)")

@@ -2,7 +2,7 @@
 
 Each case writes one layout of the shared scene and changes one thing in one of its tables. Counted as faults: an
 exception that is not an EngineError, a warning of numpy, a hang, a file opened outside of the capture, cameras that
-are no cameras, and memory above twice the file beside what any opening takes.
+no program could use, and memory above twice the file beside what any opening takes.
 
     python -m tests.faults.fuzz_layouts --cases 2000 --seed 1
 """

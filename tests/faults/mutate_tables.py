@@ -42,7 +42,7 @@ FRAME_SUFFIXES = (".mp4", ".png", ".jpg")
 
 
 def tables_of(folder: Path) -> list[Path]:
-    """Every file of a capture that is no picture and no video."""
+    """Every file of a capture that is neither a picture nor a video."""
     return sorted(path for path in folder.rglob("*") if path.is_file() and path.suffix not in FRAME_SUFFIXES)
 
 
