@@ -1,0 +1,94 @@
+"""What modules share that `engine.features.child.run_child` starts, and the SIFT features that all of them need.
+
+Imported by child processes only: pycolmap must stay out of the program's own.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import threading
+import time
+import zlib  # noqa: F401  must be loaded before pycolmap, whose own zlib symbols otherwise replace it
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from engine.kernels.parent import end_with_parent
+
+MAX_FEATURES = 2048
+MAX_SIDE_PX = 1280
+"""Larger pictures are matched smaller: SIFT on full HD takes minutes, and its users need no more."""
+
+
+def run_as_child(work: Callable[[dict[str, np.ndarray], Path], dict[str, np.ndarray]]) -> None:
+    """The main of a child: read the job, answer it by `work(arrays, empty folder)`, write the answer."""
+    job, result, beat = (Path(argument) for argument in sys.argv[1:4])
+    threading.Thread(target=_beat, args=(beat,), daemon=True).start()
+    end_with_parent(lambda: shutil.rmtree(job.parent, ignore_errors=True))
+    with np.load(job) as found:
+        arrays = dict(found)
+    folder = job.with_name("colmap")
+    shutil.rmtree(folder, ignore_errors=True)  # of an attempt before
+    folder.mkdir()
+    answer = work(arrays, folder)
+    partial = result.with_name("partial.npz")
+    np.savez(partial, allow_pickle=False, **answer)
+    partial.replace(result)
+
+
+def extract_features(folder: Path, images: np.ndarray, max_features: int = MAX_FEATURES) -> tuple[Path, list[str]]:
+    """Write pictures into folder/images and their SIFT features into a database. Returns it and the pictures' names.
+
+    Args:
+        images: [C, H, W, 3] uint8
+    """
+    import pycolmap
+
+    pycolmap.set_random_seed(0)
+    names = [f"{i:04d}.png" for i in range(len(images))]
+    pictures, database = folder / "images", folder / "database.db"
+    pictures.mkdir()
+    for name, image in zip(names, images, strict=True):
+        Image.fromarray(image).save(pictures / name, compress_level=1)
+    reader = pycolmap.ImageReaderOptions(camera_model="PINHOLE")
+    # images first: extraction alone would number them in the order in which its threads finish
+    pycolmap.Database.open(database).close()
+    pycolmap.import_images(database, pictures, pycolmap.CameraMode.PER_IMAGE, image_names=names, options=reader)
+    extraction = pycolmap.FeatureExtractionOptions()
+    extraction.sift.max_num_features = max_features
+    extraction.max_image_size = MAX_SIDE_PX
+    pycolmap.extract_features(
+        database,
+        pictures,
+        image_names=names,
+        camera_mode=pycolmap.CameraMode.PER_IMAGE,
+        reader_options=reader,
+        extraction_options=extraction,
+        device=pycolmap.Device.cpu,
+    )
+    return database, names
+
+
+def steady_verification() -> Any:
+    """Options of the geometric verification: else the outcome depends on which thread takes which pair."""
+    import pycolmap
+
+    verification = pycolmap.TwoViewGeometryOptions()
+    verification.ransac.random_seed = 0
+    return verification
+
+
+def _beat(path: Path) -> None:
+    """Touch a file for as long as this process works, so that the parent can tell work from standing still."""
+    worked_s = 0.0
+    while True:
+        time.sleep(1.0)
+        if (now_s := time.process_time()) > worked_s + 0.005:
+            worked_s = now_s
+            with suppress(OSError):
+                path.touch()
