@@ -41,11 +41,15 @@ def run_as_child(work: Callable[[dict[str, np.ndarray], Path], dict[str, np.ndar
     partial.replace(result)
 
 
-def extract_features(folder: Path, images: np.ndarray, max_features: int = MAX_FEATURES) -> tuple[Path, list[str]]:
+def extract_features(
+    folder: Path, images: np.ndarray, max_features: int = MAX_FEATURES, least_contrast: float | None = None
+) -> tuple[Path, list[str]]:
     """Write pictures into folder/images and their SIFT features into a database. Returns it and the pictures' names.
 
     Args:
         images: [C, H, W, 3] uint8
+        max_features: Of each picture, those with the largest extent.
+        least_contrast: SIFT's peak threshold; None takes COLMAP's.
     """
     import pycolmap
 
@@ -62,6 +66,8 @@ def extract_features(folder: Path, images: np.ndarray, max_features: int = MAX_F
     extraction = pycolmap.FeatureExtractionOptions()
     extraction.sift.max_num_features = max_features
     extraction.max_image_size = MAX_SIDE_PX
+    if least_contrast is not None:
+        extraction.sift.peak_threshold = least_contrast
     pycolmap.extract_features(
         database,
         pictures,

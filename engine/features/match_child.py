@@ -11,12 +11,15 @@ import numpy as np
 
 from engine.features.child_side import extract_features, run_as_child, steady_verification
 
+LEAST_CONTRAST = 0.002
+"""A third of COLMAP's: plain walls have faint features only, and wrong matches are sorted out later."""
+
 
 def match_folder(arrays: dict[str, np.ndarray], folder: Path) -> dict[str, np.ndarray]:
     """Key points of all pictures, and which of them each pair shares, verified without any calibration."""
     import pycolmap
 
-    database, names = extract_features(folder, arrays["images"], int(arrays["max_features"]))
+    database, names = extract_features(folder, arrays["images"], int(arrays["max_features"]), LEAST_CONTRAST)
     listed = folder / "pairs.txt"
     listed.write_text("".join(f"{names[a]} {names[b]}\n" for a, b in arrays["pairs"]))
     pairing = pycolmap.ImportedPairingOptions()
