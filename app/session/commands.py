@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from engine.capture.writers.capture_json import Corrections
+
 
 @dataclass(frozen=True, slots=True)
 class OpenCapture:
@@ -295,6 +297,34 @@ class DismissNotice:
     index: int
 
 
+@dataclass(frozen=True, slots=True)
+class ExamineCapture:
+    """Let the capture doctor look at the open capture."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopExamining:
+    """Let it stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class CorrectCapture:
+    """Write corrections into the capture's capture.json and open it as a new project.
+
+    Attributes:
+        corrections: What to change.
+        words: The same for the question that is asked before, as "Exclude cam07".
+        is_confirmed: It was asked and answered.
+    """
+
+    corrections: Corrections
+    words: str
+    is_confirmed: bool = False
+
+
+DoctorCommand = ExamineCapture | StopExamining | CorrectCapture
+"""What the capture doctor does."""
+
 EditCommand = MarkRegion | RemoveRegion | UndoMark | RedoMark
 """What changes the project's content, and can be taken back."""
 
@@ -342,4 +372,5 @@ Command = (
     | CloseQuestion
     | ForgetRecent
     | DismissNotice
+    | DoctorCommand
 )

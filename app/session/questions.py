@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from app.project.clip_catalog import ClipCatalog
 from app.project.recents import RecentProject
+from engine.capture.writers.capture_json import Corrections
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +88,26 @@ class OwnSetting:
     help_text: str = ""
 
 
-Question = RetrainQuestion | SettingsQuestion | ProjectQuestion
+@dataclass(frozen=True, slots=True)
+class CorrectionQuestion:
+    """Are corrections to be written into the capture, although the open project will not fit it then?
+
+    Attributes:
+        capture: Folder of the capture, which gets a capture.json.
+        words: What is corrected, as "Exclude cam07".
+        corrections: The same for the file.
+        project: Folder of the project that is open.
+        has_progress: Whether something was learned in it.
+    """
+
+    capture: str
+    words: str
+    corrections: Corrections
+    project: str
+    has_progress: bool
+
+
+Question = RetrainQuestion | SettingsQuestion | ProjectQuestion | CorrectionQuestion
 
 
 def retrain_question(catalog: ClipCatalog, clip_index: int) -> RetrainQuestion:

@@ -32,7 +32,9 @@ from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.residuals.residuals import Residuals
 from app.session import commands
 from app.session.attention import Attention
+from app.session.capture_doctor import CaptureDoctor
 from app.session.clip_versions import Versions
+from app.session.doctor_status import DoctorStatus
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
@@ -82,6 +84,7 @@ class Session:
         log: What program and training have said.
         question: What the user has to answer; None while there is nothing to ask.
         recent: What was opened lately.
+        doctor: What is wrong with the open capture, and what helps.
         notices: What the user has to know.
 
     Args:
@@ -135,6 +138,7 @@ class Session:
         self.opener = ProjectOpener(
             self._jobs, self.notices, self._take_opened, project_dir=project_dir, open_path=opener
         )
+        self.doctor = CaptureDoctor(self._jobs, self.notices, self.dispatch)
         self._attention = Attention()
         self._seen = self._news_key()
         self.recent.look()
@@ -192,6 +196,11 @@ class Session:
     def residual_status(self) -> ResidualStatus:
         """What is measured of every picture."""
         return self.residuals.status
+
+    @property
+    def doctor_status(self) -> DoctorStatus:
+        """What the capture doctor found, or how far it is."""
+        return self.doctor.status
 
     @property
     def jobs(self) -> list[JobStatus]:
@@ -283,6 +292,14 @@ class Session:
                 self.playback.favour(self.views.active_index)
             case commands.DismissNotice(index=index):
                 self.notices.dismiss(index)
+            case commands.ExamineCapture():
+                self.doctor.examine()
+            case commands.StopExamining():
+                self.doctor.stop()
+            case commands.CorrectCapture(corrections=corrections, words=words, is_confirmed=is_confirmed):
+                self.question = None if is_confirmed else self.doctor.question(corrections, words)
+                if is_confirmed:
+                    self.doctor.correct(corrections)
             case _ if isinstance(command, commands.EditCommand):
                 self.marking.apply(command)
             case _:
@@ -329,6 +346,7 @@ class Session:
         self.live_training.open(opened, found.catalog)
         self.versions.open(opened)
         self._open_residuals(opened)
+        self.doctor.open(opened)
         self.views.look_at(opened.rig)
         self.bookmarks = Bookmarks()
         self._keep_recent()
@@ -392,7 +410,7 @@ class Session:
         seen = (self.versions.worker.newest, self.log.worker.newest)
         looked = tuple(None if found is None else found[0] for found in seen)
         finished = self.playback.finished, self.live_training.finished, self.recent.pictures.revision
-        return *finished, looked, jobs, self.notices.revision, self.recent.missing
+        return *finished, looked, jobs, self.notices.revision, self.recent.missing, self.doctor.finished
 
     def _release_snapshot(self) -> None:
         """Give a snapshot back once it was read, or where nobody looks at its clip."""
@@ -451,6 +469,7 @@ class Session:
             self.project.close()
         self.recent.close()
         self.residuals.close()
+        self.doctor.close()
         self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)
         self.playback.close()
         self.versions.close()
@@ -577,4 +596,5 @@ _TITLES: dict[type, str] = {
     commands.RemoveRegion: "The region cannot be removed",
     commands.UndoMark: "The last mark cannot be taken back",
     commands.RedoMark: "The mark cannot be made again",
+    commands.CorrectCapture: "The capture cannot be corrected",
 }

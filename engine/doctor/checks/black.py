@@ -15,19 +15,24 @@ NEARLY_ALL = 98.0
 """Percent of the picture."""
 
 
+def empty_pictures(gray: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which pictures [T, h, w] uint8 are black, and which are white. [T] bool each"""
+    flat = gray.reshape(len(gray), -1)
+    is_black = np.percentile(flat, NEARLY_ALL, axis=1) < DARK
+    return is_black, np.percentile(flat, 100.0 - NEARLY_ALL, axis=1) > BRIGHT
+
+
 def check_black(look: Look) -> list[Finding]:
     """Empty pictures of each camera."""
     found = []
     for name, camera in zip(look.names, look.cameras, strict=True):
         if camera is None:
             continue
-        flat = camera.gray.reshape(len(camera.gray), -1)
-        is_black = np.percentile(flat, NEARLY_ALL, axis=1) < DARK
-        is_white = np.percentile(flat, 100.0 - NEARLY_ALL, axis=1) > BRIGHT
+        is_black, is_white = empty_pictures(camera.gray)
         for is_empty, word in ((is_black, "black"), (is_white, "white")):
             if is_empty.any():
                 frames = [frame for frame, is_bad in zip(look.frames, is_empty, strict=True) if is_bad]
-                found.append(_finding(name, frames, len(flat), word))
+                found.append(_finding(name, frames, len(camera.gray), word))
     return found
 
 

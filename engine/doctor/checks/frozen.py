@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from engine.capture.writers.capture_json import Corrections
+from engine.doctor.checks.black import empty_pictures
 from engine.doctor.finding import Finding, PictureEvidence
 from engine.doctor.looking import Look
 from engine.doctor.words import spans
@@ -44,7 +45,8 @@ def check_frozen(look: Look) -> list[Finding]:
     if not can_tell.any():
         return []
     ratios = moved / np.maximum(usual[:, None], 1e-9)
-    is_still = (ratios < STILL_SHARE) & can_tell[:, None]
+    is_empty = np.stack([np.logical_or(*empty_pictures(c.gray))[1:][is_next] for c in look.cameras if c is not None])
+    is_still = (ratios < STILL_SHARE) & can_tell[:, None] & ~is_empty  # which another check tells
     n_telling = int(can_tell.sum())
     is_everywhere = is_still.sum(0) >= max(MANY * n_telling, 2)
     found = _repeated(look, later[is_everywhere], n_telling) if is_everywhere.any() else []
