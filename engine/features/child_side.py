@@ -6,19 +6,15 @@ Imported by child processes only: pycolmap must stay out of the program's own.
 from __future__ import annotations
 
 import shutil
-import sys
-import threading
-import time
 import zlib  # noqa: F401  must be loaded before pycolmap, whose own zlib symbols otherwise replace it
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from PIL import Image
 
-from engine.kernels.parent import end_with_parent
+from engine.children.child import serve
 
 MAX_FEATURES = 2048
 MAX_SIDE_PX = 1280
@@ -27,18 +23,19 @@ MAX_SIDE_PX = 1280
 
 def run_as_child(work: Callable[[dict[str, np.ndarray], Path], dict[str, np.ndarray]]) -> None:
     """The main of a child: read the job, answer it by `work(arrays, empty folder)`, write the answer."""
-    job, result, beat = (Path(argument) for argument in sys.argv[1:4])
-    threading.Thread(target=_beat, args=(beat,), daemon=True).start()
-    end_with_parent(lambda: shutil.rmtree(job.parent, ignore_errors=True))
-    with np.load(job) as found:
-        arrays = dict(found)
-    folder = job.with_name("colmap")
-    shutil.rmtree(folder, ignore_errors=True)  # of an attempt before
-    folder.mkdir()
-    answer = work(arrays, folder)
-    partial = result.with_name("partial.npz")
-    np.savez(partial, allow_pickle=False, **answer)
-    partial.replace(result)
+
+    def main(job: Path, result: Path) -> None:
+        with np.load(job) as found:
+            arrays = dict(found)
+        folder = job.with_name("colmap")
+        shutil.rmtree(folder, ignore_errors=True)  # of an attempt before
+        folder.mkdir()
+        answer = work(arrays, folder)
+        partial = result.with_name("partial.npz")
+        np.savez(partial, allow_pickle=False, **answer)
+        partial.replace(result)
+
+    serve(main)
 
 
 def extract_features(
@@ -87,14 +84,3 @@ def steady_verification() -> Any:
     verification = pycolmap.TwoViewGeometryOptions()
     verification.ransac.random_seed = 0
     return verification
-
-
-def _beat(path: Path) -> None:
-    """Touch a file for as long as this process works, so that the parent can tell work from standing still."""
-    worked_s = 0.0
-    while True:
-        time.sleep(1.0)
-        if (now_s := time.process_time()) > worked_s + 0.005:
-            worked_s = now_s
-            with suppress(OSError):
-                path.touch()

@@ -66,7 +66,7 @@ def match_pairs(
     """
     listed = np.array(pairs, dtype=np.int64).reshape(-1, 2)
     arrays = {"images": images, "pairs": listed, "max_features": np.array(max_features)}
-    answer = run_child("engine.features.match_child", arrays, alive=alive)
+    answer = run_child("engine.features.match_child", arrays, what="the matching process", alive=alive)
     ends = np.cumsum(answer["counts"])
     found = []
     for (first, second), start, end in zip(listed.tolist(), ends - answer["counts"], ends, strict=True):

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.camera.rig import CameraRig
-from engine.features.child import STALL_S, ChildFailed, run_child
+from engine.children.running import STALL_S
+from engine.features.child import ChildFailed, run_child
 
 MAX_CAMERAS = 48
 """Of more cameras so many are matched, spread over all: every pair of them is, and depth ranges need no more."""
@@ -58,7 +59,13 @@ def triangulate(
     rows = np.unique(np.linspace(0, len(rig) - 1, min(len(rig), MAX_CAMERAS)).round().astype(int))
     job = {"images": images[rows], "Ks": rig.Ks[rows], "world_to_camera": rig.world_to_camera[rows]}
     try:
-        found = run_child("engine.cloud.stereo.sparse_child", job, alive=alive, stall_s=stall_s)
+        found = run_child(
+            "engine.cloud.stereo.sparse_child",
+            job,
+            what="the triangulation process",
+            alive=alive,
+            stall_s=stall_s,
+        )
     except ChildFailed as error:
         report(f"Sparse points: none, {error}; depth ranges come from a coarse sweep instead")
         return SparsePoints.none()

@@ -14,6 +14,7 @@ import pytest
 
 from engine.camera.rig import CameraRig
 from engine.cloud.stereo.sparse import triangulate
+from engine.children import running
 from engine.features import child as child_process
 
 
@@ -57,7 +58,7 @@ def test_a_child_that_stands_still_is_ended_and_tried_again(monkeypatch, scratch
     pictures, rig = wall_views()
     lines: list[str] = []
     started = []
-    monkeypatch.setattr(child_process.subprocess, "Popen", _sleeping_child(started))
+    monkeypatch.setattr(running.subprocess, "Popen", _sleeping_child(started))
     found = triangulate(pictures, rig, report=lines.append, stall_s=0.5)
     assert len(found.points) == 0
     assert len(started) == child_process.N_ATTEMPTS
@@ -82,7 +83,7 @@ def test_a_slow_child_is_waited_for(scratch) -> None:
 def test_whoever_is_interrupted_leaves_no_child_and_no_folder(monkeypatch, scratch) -> None:
     pictures, rig = wall_views()
     started = []
-    monkeypatch.setattr(child_process.subprocess, "Popen", _sleeping_child(started))
+    monkeypatch.setattr(running.subprocess, "Popen", _sleeping_child(started))
 
     def stop() -> None:
         raise KeyboardInterrupt
@@ -113,7 +114,7 @@ def test_folders_of_killed_processes_are_removed_and_those_of_living_ones_stay(s
     for folder in (dead, living):
         folder.mkdir()
         (folder / "job.npz").touch()
-    child_process.remove_leftovers()
+    running.remove_leftovers(child_process.FOLDER_PREFIX)
     assert [folder.name for folder in scratch.iterdir()] == [living.name]
 
 
