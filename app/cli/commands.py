@@ -62,6 +62,11 @@ COMMANDS = {
         "describe a capture and how exposure changes in it, or what the trained clips of a project weigh",
         "app.cli.inspect_command",
     ),
+    "synchronise": Command(
+        "find how far each camera of a capture is ahead of the others, and correct it on request",
+        "app.cli.synchronise_command",
+        "Nothing was changed.",
+    ),
     "gate": Command("say what is static in a project and why, and overrule it", "app.cli.gate_command"),
     "doctor": Command(
         "look at this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.doctor_command"
