@@ -44,7 +44,7 @@ def add_correction_arguments(command: argparse.ArgumentParser) -> None:
         help="masks of what moves: a pattern as masks/cam00/*.png, or a video",
     )
     group.add_argument("--apply", action="store_true", help="do what the doctor is sure of, notes left out")
-    group.add_argument("--to", metavar="FOLDER", type=path_argument, help="write capture.json there instead")
+    group.add_argument("--out", metavar="FOLDER", type=path_argument, help="write capture.json there instead")
 
 
 def asked_corrections(options: argparse.Namespace) -> Corrections | None:

@@ -45,7 +45,7 @@ def _inspect_capture(options: argparse.Namespace) -> int:
     try:
         corrections = asked_corrections(options)
         if corrections is not None:
-            return _say_written(options, write_asked(capture, corrections, options.to))
+            return _say_written(options, write_asked(capture, corrections, options.out))
         return _describe(options, capture)
     finally:
         capture.close()
@@ -91,7 +91,7 @@ def _doctor(options: argparse.Namespace, capture: Capture) -> dict[str, Any]:
             if not options.json:
                 print("Nothing that is certain enough is to be corrected.")
         else:
-            _say_written(options, write_asked(capture, corrections, options.to))
+            _say_written(options, write_asked(capture, corrections, options.out))
     exposure = exposure_document(diagnosis.exposure)
     return {"exposure": exposure, "doctor": diagnosis_document(diagnosis, capture.rig.names)}
 

@@ -17,6 +17,7 @@ from engine.doctor.checks.frame_counts import check_readable
 from engine.doctor.checks.frozen import check_frozen
 from engine.doctor.checks.holdout import check_holdout
 from engine.doctor.checks.movement import check_movement
+from engine.doctor.checks.synchronisation import check_synchronisation
 from engine.doctor.epipolar import PairError, pair_errors
 from engine.doctor.finding import Finding, in_order
 from engine.doctor.looking import Look, look_at
@@ -26,9 +27,17 @@ from engine.features.child import ChildFailed
 from engine.features.matching import match_pairs
 from engine.progress import Progress, ReportProgress
 
-STAGES = {"look": (0.0, 0.4), "movement": (0.4, 0.55), "match": (0.55, 0.9), "calibration": (0.9, 1.0)}
+STAGES = {
+    "look": (0.0, 0.3),
+    "movement": (0.3, 0.4),
+    "time": (0.4, 0.6),
+    "match": (0.6, 0.92),
+    "calibration": (0.92, 1.0),
+}
 """Where each stage begins and ends in the whole, by what they take on two cores."""
 STAGE = "Capture doctor"
+N_TIME_STAGES = 5
+"""Of engine.synchronisation."""
 USUAL_MATCH_S = 0.25
 """Of one pair, for the progress of a child process that tells none."""
 
@@ -88,6 +97,8 @@ def examine(
         *check_movement(look, lambda done: tell_movement(done, "looking for cameras that move")),
         *check_exposure(survey),
     ]
+    if not look.unreadable and len(capture.rig) > 1:
+        findings += check_synchronisation(capture, _in_turn(part("time")))
     found, errors, n_features = _compare(look, part("match"), part("calibration"))
     findings += found
     doubtful = {
@@ -107,6 +118,19 @@ def examine(
         n_pictures=len(look.frames) * (len(capture.rig) - len(look.unreadable)),
         seconds=clock() - began_s,
     )
+
+
+def _in_turn(tell: Callable[[float, str], None]) -> ReportProgress:
+    """Progress of stages that follow each other as one that never goes back."""
+    begun: list[str] = []
+
+    def report(progress: Progress) -> None:
+        if progress.stage not in begun:
+            begun.append(progress.stage)
+        done = min((len(begun) - 1 + progress.done) / N_TIME_STAGES, 1.0)
+        tell(done, f"looking whether cameras are in step: {progress.stage}")
+
+    return report
 
 
 def _compare(
