@@ -109,6 +109,19 @@ def matches_of(camera: int, pairs: Sequence[PairMatches], left_out: Collection[i
     return CameraMatches(camera, np.concatenate(here), np.concatenate(there), np.concatenate(partners))
 
 
+def median_px(rig: CameraRig, matches: CameraMatches) -> float:
+    """By how much the matches of a camera usually miss, px; NaN without any."""
+    return float(np.median(np.abs(_errors(rig, matches, np.zeros(7), 1.0)))) if len(matches) else float("nan")
+
+
+def _errors(rig: CameraRig, matches: CameraMatches, change: np.ndarray, extent: float) -> np.ndarray:
+    """Signed errors after a change. [M]"""
+    rows, of_match = np.unique(matches.partners, return_inverse=True)
+    K, pose = changed(rig, matches.camera, change, extent)
+    F = fundamental_matrices(K, pose, rig.Ks[rows], rig.world_to_camera[rows])
+    return sampson_px(F[of_match], matches.pixels, matches.other_pixels)
+
+
 def refit(rig: CameraRig, matches: CameraMatches, extent: float) -> Refit:
     """Find the change of a camera that fits its matches best.
 
@@ -116,13 +129,9 @@ def refit(rig: CameraRig, matches: CameraMatches, extent: float) -> Refit:
         rig: At the size of the matched pictures.
         extent: Largest distance between two cameras.
     """
-    rows, of_match = np.unique(matches.partners, return_inverse=True)
-    other_Ks, other_poses = rig.Ks[rows], rig.world_to_camera[rows]
 
     def errors(change: np.ndarray) -> np.ndarray:
-        K, pose = changed(rig, matches.camera, change, extent)
-        F = fundamental_matrices(K, pose, other_Ks, other_poses)
-        return sampson_px(F[of_match], matches.pixels, matches.other_pixels)
+        return _errors(rig, matches, change, extent)
 
     before = errors(np.zeros(7))
     cost = _cost(before)
@@ -157,7 +166,7 @@ def refit(rig: CameraRig, matches: CameraMatches, extent: float) -> Refit:
         before_px=float(np.median(np.abs(before))) if len(matches) else float("nan"),
         after_px=float(np.median(np.abs(after))) if len(matches) else float("nan"),
         n_matches=len(matches),
-        n_partners=len(rows),
+        n_partners=len(np.unique(matches.partners)),
     )
 
 

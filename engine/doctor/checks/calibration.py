@@ -15,7 +15,7 @@ from engine.capture.rig_checks import rig_extent
 from engine.capture.writers.capture_json import Corrections
 from engine.doctor.epipolar import PairError, fundamental_matrices, pair_errors, sampson_px
 from engine.doctor.finding import Finding, PairEvidence, Point
-from engine.doctor.refit import NOISE_PX, Refit, matches_of, refit
+from engine.doctor.refit import NOISE_PX, Refit, matches_of, median_px, refit
 from engine.doctor.words import listed
 from engine.features.matching import PairMatches
 
@@ -88,24 +88,21 @@ def find_suspects(
     """Cameras that are wrong, the most harmful first, each as a change that makes it fit."""
     extent = rig_extent(rig)
     suspects: list[Refit] = []
-    n_most = max(len(rig) // 2, 1)
     fits: dict[int, Refit] = {}
-    stale = set(range(len(rig)))
-    while len(suspects) < n_most:
+    while len(suspects) < max(len(rig) // 2, 1):
         left_out = {fit.camera for fit in suspects}
-        for camera in sorted(stale - left_out):
-            fits[camera] = refit(rig, matches_of(camera, pairs, left_out), extent)
-            tell(len(fits) / (len(rig) + 1))
-        open_fits = [fit for camera, fit in fits.items() if camera not in left_out]
-        medians = [fit.before_px for fit in open_fits if fit.n_matches >= MIN_MATCHES]
-        usual = max(float(np.median(medians)) if medians else 0.0, NOISE_PX / 2)
-        wrong = [fit for fit in open_fits if _is_wrong(fit, usual) and _disagrees(fit, rig, pairs, usual, left_out)]
+        own = {row: matches_of(row, pairs, left_out) for row in range(len(rig)) if row not in left_out}
+        missed = {row: median_px(rig, one) for row, one in own.items() if len(one) >= MIN_MATCHES}
+        least = _least_px(max(float(np.median(list(missed.values()))) if missed else 0.0, NOISE_PX / 2))
+        doubtful = [row for row, px in missed.items() if px >= least and _disagrees(row, rig, pairs, least, left_out)]
+        for done, row in enumerate(doubtful):
+            if row not in fits or fits[row].n_matches != len(own[row]):  # a partner was left out since
+                fits[row] = refit(rig, own[row], extent)
+            tell((len(suspects) + (done + 1) / len(doubtful)) / (len(suspects) + 2))
+        wrong = [fits[row] for row in doubtful if _is_helped(fits[row])]
         if not wrong:
             break
-        worst = max(wrong, key=lambda fit: (fit.cost - fit.cost_left) / fit.n_matches)
-        suspects.append(worst)
-        # only its partners are judged anew
-        stale = {p.first if p.second == worst.camera else p.second for p in pairs if worst.camera in (p.first, p.second)}
+        suspects.append(max(wrong, key=lambda fit: (fit.cost - fit.cost_left) / fit.n_matches))
     return suspects
 
 
@@ -114,20 +111,16 @@ def _least_px(usual_px: float) -> float:
 
 
 def _disagrees(
-    fit: Refit, rig: CameraRig, pairs: Sequence[PairMatches], usual_px: float, left_out: Collection[int]
+    camera: int, rig: CameraRig, pairs: Sequence[PairMatches], least_px: float, left_out: Collection[int]
 ) -> bool:
     """Whether the camera misses most of its partners: a partner that is wrong itself explains one of them only."""
-    camera = fit.camera
-    own = [pair for pair in pairs if camera in (pair.first, pair.second) and not {pair.first, pair.second} & set(left_out)]
+    own = [p for p in pairs if camera in (p.first, p.second) and not {p.first, p.second} & set(left_out)]
     medians = [error.median_px for error in pair_errors(rig, own) if error.n_matches >= MIN_OF_PAIR]
-    return sum(median > _least_px(usual_px) for median in medians) >= max(MOST_PARTNERS * len(medians), 2)
+    return sum(median > least_px for median in medians) >= max(MOST_PARTNERS * len(medians), 2)
 
 
-def _is_wrong(fit: Refit, usual_px: float) -> bool:
-    if fit.n_matches < MIN_MATCHES or fit.n_partners < 2:
-        return False
-    if fit.before_px < _least_px(usual_px):
-        return False
+def _is_helped(fit: Refit) -> bool:
+    """Whether a change of the camera explains what it misses."""
     return fit.cost - fit.cost_left > LEAST_HELP * fit.cost and fit.after_px < 0.6 * fit.before_px
 
 

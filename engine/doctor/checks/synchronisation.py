@@ -9,10 +9,12 @@ from engine.errors import CaptureError
 from engine.progress import ReportProgress
 from engine.synchronisation.applying import corrections_for
 from engine.synchronisation.estimating import synchronise
-from engine.synchronisation.synchronisation import CameraOffset, Synchronisation
+from engine.synchronisation.synchronisation import CameraOffset, SourceName, Synchronisation
 
 LEAST_FRAMES = 0.5
 """A camera is shifted by whole frames: what rounds to none is not worth it."""
+STRONG: set[SourceName] = {"timecode", "audio", "epipolar"}
+"""Sources whose disagreement means something; how much moves differs between views."""
 UNSURE = 0.4
 """Less likely offsets are not told."""
 
@@ -68,6 +70,7 @@ def offset_findings(capture: Capture, found: Synchronisation) -> list[Finding]:
     findings += [
         Finding("synchronisation", "note", (found.cameras[one.camera_index].name,), (), one.text, 0.5, "Look at both.")
         for one in found.disagreements
+        if {one.source, one.other} <= STRONG
     ]
     return findings
 
