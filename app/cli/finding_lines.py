@@ -37,7 +37,9 @@ def diagnosis_lines(diagnosis: Diagnosis, names: Sequence[str], *, path: str) ->
     if known:
         worst, name = max(known)
         middle = sorted(px for px, _ in known)[len(known) // 2]
-        fits = f"; calibration: cameras usually miss their neighbours' lines by {middle:.2f} px, {name} by {worst:.2f} px"
+        fits = (
+            f"; calibration: cameras usually miss their neighbours' lines by {middle:.2f} px, {name} by {worst:.2f} px"
+        )
     return [printable(f"{head} ({looked}{fits})."), *lines]
 
 

@@ -157,9 +157,7 @@ class CaptureDoctor:
 def _examine(capture: Capture, context: JobContext) -> Diagnosis:
     from engine.doctor.doctor import examine
 
-    own = open_capture(
-        capture.path, scale=capture.scale, cache_bytes=CACHE_BYTES, follow_links=capture.follow_links
-    )
+    own = open_capture(capture.path, scale=capture.scale, cache_bytes=CACHE_BYTES, follow_links=capture.follow_links)
 
     def report(progress: Progress) -> None:
         context.report(progress.done, progress.message)

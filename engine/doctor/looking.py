@@ -1,4 +1,4 @@
-"""What the checks look at: pictures of every camera, decoded once and in order of time, made small where that will do."""
+"""What the checks look at: pictures of every camera, decoded once in order of time, made small where that will do."""
 
 from __future__ import annotations
 

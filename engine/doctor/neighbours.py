@@ -12,11 +12,16 @@ WIDEST_DEG = 75.0
 """Surfaces look different from farther apart; features do not match then."""
 
 
-def angles_deg(rig: CameraRig) -> np.ndarray:
-    """Angle between every two cameras as seen from what the rig looks at; 180 where they look apart. [C, C]"""
+def apart_deg(rig: CameraRig) -> np.ndarray:
+    """Angle between the places of every two cameras as seen from what the rig looks at. [C, C]"""
     rays = rig.centers - rig.focus_point()
     rays = rays / np.maximum(np.linalg.norm(rays, axis=1, keepdims=True), 1e-12)
-    apart = np.degrees(np.arccos(np.clip(rays @ rays.T, -1.0, 1.0)))
+    return np.degrees(np.arccos(np.clip(rays @ rays.T, -1.0, 1.0)))
+
+
+def angles_deg(rig: CameraRig) -> np.ndarray:
+    """Angle between every two cameras as seen from what the rig looks at; 180 where they look apart. [C, C]"""
+    apart = apart_deg(rig)
     turned = np.degrees(np.arccos(np.clip(rig.forwards @ rig.forwards.T, -1.0, 1.0)))
     return np.where(turned > 90.0, 180.0, apart)
 

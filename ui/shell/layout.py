@@ -22,7 +22,7 @@ WIDE_UNITS = 1240.0
 
 
 def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
-    """Capture left, training, regions and residuals right, timeline, log and capture doctor below, the picture in the rest.
+    """Capture left, training, regions and residuals right, timeline, log and doctor below, the picture in the rest.
 
     Args:
         name: One of LAYOUTS; others are laid out as the first.

@@ -67,7 +67,9 @@ def check_calibration(
             f"{listed(unknown)} {'shares' if len(unknown) == 1 else 'share'} fewer than {MIN_MATCHES} features with "
             "the cameras beside, too few to check the calibration."
         )
-        advice = "Look at their pictures: plain walls and cameras far apart give few features, which need not be a fault."
+        advice = (
+            "Look at their pictures: plain walls and cameras far apart give few features, which need not be a fault."
+        )
         findings.append(Finding("few features", "note", tuple(unknown), (), text, 1.0, advice))
     return findings
 

@@ -12,7 +12,7 @@ import numpy as np
 from engine.camera.rig import CameraRig
 from engine.capture.writers.capture_json import Corrections
 from engine.doctor.finding import Finding
-from engine.doctor.neighbours import angles_deg
+from engine.doctor.neighbours import angles_deg, apart_deg
 from engine.doctor.words import counted, listed
 
 N_NEAR = 6
@@ -45,7 +45,7 @@ def good_holdout(rig: CameraRig, doubtful: Collection[int] = ()) -> list[int]:
     n_wanted = max(round(len(rig) / ONE_IN), 1)
     if len(rig) < FEWEST:
         return []
-    gaps, angles = widest_gaps_deg(rig), angles_deg(rig)
+    gaps, angles, apart = widest_gaps_deg(rig), angles_deg(rig), apart_deg(rig)
     candidates = [row for row in range(len(rig)) if gaps[row] <= WIDEST_GAP_DEG and row not in doubtful]
     if not candidates:
         return []
@@ -53,7 +53,7 @@ def good_holdout(rig: CameraRig, doubtful: Collection[int] = ()) -> list[int]:
     chosen = [min(candidates, key=lambda row: (round(float(gaps[row])), round(float(off_diagonal[row].min()), 1), row))]
     while len(chosen) < min(n_wanted, len(candidates)):
         left = [row for row in candidates if row not in chosen]
-        chosen.append(max(left, key=lambda row: (round(float(angles[row, chosen].min()), 2), -row)))
+        chosen.append(max(left, key=lambda row: (round(float(apart[row, chosen].min()), 2), -row)))
     return sorted(chosen)
 
 

@@ -44,7 +44,8 @@ def look_of(films: list[np.ndarray]) -> Look:
     frames, spread = frames_to_look_at(n_frames, len(films))
     assert frames == tuple(range(n_frames))
     cameras = tuple(
-        CameraLook(one, one[list(spread)], np.ones((len(spread), 3)), np.repeat(one[0][:, :, None], 3, 2)) for one in films
+        CameraLook(one, one[list(spread)], np.ones((len(spread), 3)), np.repeat(one[0][:, :, None], 3, 2))
+        for one in films
     )
     return Look(_Capture(make_rig(len(films), (128, 96))), frames, spread, cameras, {})  # type: ignore[arg-type]
 

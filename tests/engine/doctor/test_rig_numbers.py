@@ -73,7 +73,7 @@ def test_a_camera_that_looks_away_is_little_covered() -> None:
     poses[3, :3] = np.diag([-1.0, 1.0, -1.0]) @ poses[3, :3]
     away = replace(rig, world_to_camera=poses)
     coverage = measure_coverage(away)
-    assert coverage.shares[3] < 0.2 < 0.6 < np.delete(coverage.shares, 3).min()
+    assert coverage.shares[3] < 0.5 < 0.6 < np.delete(coverage.shares, 3).min()
     assert "cam03" in {name for finding in check_coverage(away, coverage) for name in finding.cameras}
 
 

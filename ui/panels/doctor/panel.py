@@ -113,7 +113,9 @@ class DoctorPanel:
             words = f"{100 * status.done:.0f} %, {status.message}{left}"
             imgui.progress_bar(status.done, ImVec2(-1, 0), " ")
             low = imgui.get_item_rect_min()
-            imgui.get_window_draw_list().add_text(ImVec2(low.x + 10, low.y + 5), imgui.get_color_u32(imgui.Col_.text), words)
+            imgui.get_window_draw_list().add_text(
+                ImVec2(low.x + 10, low.y + 5), imgui.get_color_u32(imgui.Col_.text), words
+            )
             return
         label = f"{Icon.EYE}  Examine" if status.diagnosis is None else f"{Icon.EYE}  Examine again"
         if primary_button(label, ImVec2(160, 0), ui):
