@@ -25,8 +25,9 @@ LEAST_PX, LEAST_TIMES = 0.6, 2.5
 """A wrong camera misses its neighbours' lines by more than this, and by so many times what is usual in the rig."""
 LEAST_HELP = 0.35
 """Share of its cost that a change has to take away."""
-BAD_RIG_PX = 1.5
-"""A rig whose pairs usually miss each other by more fits its pictures badly as a whole."""
+BAD_RIG_PX, MIN_PAIRS = 1.5, 3
+"""A rig whose pairs usually miss each other by more, in pictures up to 640 px wide, fits its pictures badly as a whole;
+fewer pairs than that with MIN_MATCHES do not tell."""
 MIN_OF_PAIR = 8
 """Matches of a pair with fewer are not counted as agreeing or disagreeing."""
 MOST_PARTNERS = 0.6
@@ -58,8 +59,10 @@ def check_calibration(
     usual = usual_px(errors, [fit.camera for fit in suspects])
     for fit in suspects:
         findings.append(_finding(rig, pairs, errors, fit, usual, frame, is_doubtful=is_many))
-    whole = usual_px(errors, [])
-    if (np.isfinite(whole) and whole > BAD_RIG_PX) or is_many:
+    telling = [error for error in errors if error.n_matches >= MIN_MATCHES]
+    whole = usual_px(telling, [])
+    limit = BAD_RIG_PX * max(float(rig.image_sizes[:, 0].max()) / 640.0, 1.0)
+    if (len(telling) >= MIN_PAIRS and whole > limit) or is_many:
         findings.append(_bad_rig(rig, pairs, errors, whole, frame))
     unknown = [name for row, name in enumerate(rig.names) if len(matches_of(row, pairs)) < MIN_MATCHES]
     if unknown:

@@ -17,6 +17,8 @@ N_OTHERS = 2
 DEPTHS = (0.6, 0.8, 1.0, 1.3, 1.7)
 """At which places are looked at, as shares of the distance to what the rig looks at."""
 GRID = 9
+MAX_OTHERS = 40
+"""Of more cameras so many nearest ones are asked whether they see a place."""
 LOW_SHARE = 0.5
 """Share of a picture that others ought to see."""
 WIDE_DEG = 32.0
@@ -41,6 +43,8 @@ def measure_coverage(rig: CameraRig) -> Coverage:
     projections = projection_matrices(rig)
     distances = np.linalg.norm(rig.focus_point() - rig.centers, axis=1)
     shares = np.ones(len(rig))
+    angles = angles_deg(rig)
+    np.fill_diagonal(angles, np.inf)
     for camera in range(len(rig)):
         width, height = (int(value) for value in rig.image_sizes[camera])
         rays = pixel_rays(rig.Ks[camera], width, height)
@@ -50,13 +54,10 @@ def measure_coverage(rig: CameraRig) -> Coverage:
         places = np.concatenate([chosen * depth * distances[camera] for depth in DEPTHS])
         places = to_world(places, rig.world_to_camera[camera])
         n_seeing = np.zeros(len(places), dtype=np.int64)
-        for other in range(len(rig)):
-            if other != camera:
-                size = (int(value) for value in rig.image_sizes[other])
-                n_seeing += is_in_picture(*project(places, projections[other]), *size)
+        for other in np.argsort(angles[camera], kind="stable")[: min(MAX_OTHERS, len(rig) - 1)]:
+            size = (int(value) for value in rig.image_sizes[other])
+            n_seeing += is_in_picture(*project(places, projections[other]), *size)
         shares[camera] = float((n_seeing >= min(N_OTHERS, len(rig) - 1)).mean())
-    angles = angles_deg(rig)
-    np.fill_diagonal(angles, np.inf)
     return Coverage(shares, angles.min(1) if len(rig) > 1 else np.full(1, np.inf))
 
 

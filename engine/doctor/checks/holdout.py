@@ -20,6 +20,7 @@ WIDEST_GAP_DEG = 215.0
 """Between neighbours in turn, around a camera: more means that it has none on one side."""
 ONE_IN = 10
 """So many cameras for each one held out."""
+MOST = 6
 FEWEST = 6
 """With fewer cameras all are needed for training."""
 
@@ -42,7 +43,7 @@ def good_holdout(rig: CameraRig, doubtful: Collection[int] = ()) -> list[int]:
 
     doubtful: Cameras that something is wrong with.
     """
-    n_wanted = max(round(len(rig) / ONE_IN), 1)
+    n_wanted = min(max(round(len(rig) / ONE_IN), 1), MOST)
     if len(rig) < FEWEST:
         return []
     gaps, angles, apart = widest_gaps_deg(rig), angles_deg(rig), apart_deg(rig)

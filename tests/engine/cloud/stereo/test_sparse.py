@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from engine.camera.rig import CameraRig
-from engine.cloud.stereo.sparse import triangulate
 from engine.children import running
+from engine.cloud.stereo.sparse import triangulate
 from engine.features import child as child_process
 
 
