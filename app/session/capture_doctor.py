@@ -1,6 +1,6 @@
-"""CaptureDoctor: examines the open capture on a thread, keeps what was found, and writes corrections.
+"""CaptureDoctor: has the open capture examined in a process, keeps what was found, and writes corrections.
 
-It opens the capture once more, so that what the window decodes while somebody scrubs is not in its way.
+The process opens the capture once more, so that what the window decodes while somebody scrubs is not in its way.
 """
 
 from __future__ import annotations
@@ -13,22 +13,20 @@ from typing import TYPE_CHECKING
 
 from app.background.jobs import Job, JobContext, Jobs
 from app.background.latest import LatestWorker
-from app.background.priority import lower_thread
 from app.project.opened_project import OpenedProject
 from app.session.commands import OpenCapture
 from app.session.doctor_status import DoctorStatus
+from app.session.examining_process import examine_apart
 from app.session.notices import Notices
 from app.session.questions import CorrectionQuestion
-from engine.capture.capture import Capture, open_capture
+from engine.capture.capture import Capture
 from engine.capture.writers.capture_json import Corrections, write_corrections
 from engine.doctor.finding import Finding
-from engine.progress import Progress
+from engine.progress import ReportProgress
 
 if TYPE_CHECKING:  # loading what examines takes a second: that is left to the thread
     from engine.doctor.doctor import Diagnosis
 
-CACHE_BYTES = 32 << 20
-"""Each picture is looked at once."""
 NAME = "Capture doctor"
 
 
@@ -38,10 +36,14 @@ class CaptureDoctor:
     Args:
         jobs, notices: Of the session.
         reopen: Takes the command that opens a corrected capture.
+
+    Attributes:
+        run: Examines a capture, on a thread that may wait; tests bring their own.
     """
 
     def __init__(self, jobs: Jobs, notices: Notices, reopen: Callable[[OpenCapture], None]) -> None:
         self._jobs, self._notices, self._reopen = jobs, notices, reopen
+        self.run: Callable[[Capture, ReportProgress], Diagnosis] = examine_apart
         self._status = DoctorStatus()
         self._opened: OpenedProject | None = None
         self._job: Job | None = None
@@ -57,10 +59,10 @@ class CaptureDoctor:
     @property
     def status(self) -> DoctorStatus:
         """As of now."""
-        if self._status.diagnosis is None and (newest := self._quick.newest) is not None:
-            if newest[0] == self._n_opened and self._status.findings != newest[1]:
-                revision = self._status.revision + 1
-                self._status = replace(self._status, findings=newest[1], revision=revision)
+        newest = self._quick.newest
+        is_newer = newest is not None and newest[0] == self._n_opened and newest[1] != self._status.findings
+        if newest is not None and is_newer and self._status.diagnosis is None:
+            self._status = replace(self._status, findings=newest[1], revision=self._status.revision + 1)
         if self._job is None:
             return self._status
         seen = self._job.context.status
@@ -99,8 +101,7 @@ class CaptureDoctor:
         self._began_s = time.monotonic()
 
         def work(context: JobContext) -> Diagnosis:
-            lower_thread()
-            return _examine(capture, context)
+            return self.run(capture, lambda progress: context.report(progress.done, progress.message))
 
         def done(diagnosis: Diagnosis) -> None:
             if job is self._job:
@@ -152,17 +153,3 @@ class CaptureDoctor:
             self._notices.add_failure("The correction cannot be written", error)
 
         self._jobs.start("Correcting the capture", work, done, failed)
-
-
-def _examine(capture: Capture, context: JobContext) -> Diagnosis:
-    from engine.doctor.doctor import examine
-
-    own = open_capture(capture.path, scale=capture.scale, cache_bytes=CACHE_BYTES, follow_links=capture.follow_links)
-
-    def report(progress: Progress) -> None:
-        context.report(progress.done, progress.message)
-
-    try:
-        return examine(own, report=report)
-    finally:
-        own.close()

@@ -1,4 +1,4 @@
-"""The session's side of the capture doctor: quick findings, examining in the background, correcting after a question."""
+"""The session's side of the capture doctor: examining in the background, correcting after a question."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from app.session.questions import CorrectionQuestion
 from app.session.session import Session
 from app.session.settings import Settings
 from engine.capture.writers.capture_json import Corrections
-from engine.doctor import doctor as doctor_module
 from engine.doctor.doctor import Diagnosis
 from engine.doctor.finding import Finding
 from engine.errors import CaptureError
@@ -32,7 +31,7 @@ def poll(session: Session, is_done) -> None:
 
 
 @pytest.fixture
-def session(capture_folder, tmp_path, monkeypatch):
+def session(capture_folder, tmp_path):
     capture = tmp_path / "capture"
     shutil.copytree(capture_folder, capture)
     found = Session(settings=Settings(tmp_path / "settings.json"), project_dir=tmp_path / "p", is_preloading=False)
@@ -42,14 +41,14 @@ def session(capture_folder, tmp_path, monkeypatch):
     found.close()
 
 
-def made_up(capture, *, report, **_) -> Diagnosis:
+def made_up(capture, report) -> Diagnosis:
     for step in range(5):
         report(Progress("Capture doctor", step / 5, "looking"))
     return Diagnosis((FOUND,), np.zeros(len(capture.rig)), (), np.zeros(len(capture.rig)), None, 7, 0.1)  # type: ignore[arg-type]
 
 
-def test_a_capture_is_examined_in_the_background(session, monkeypatch) -> None:
-    monkeypatch.setattr(doctor_module, "examine", made_up)
+def test_a_capture_is_examined_in_the_background(session) -> None:
+    session.doctor.run = made_up
     assert session.doctor_status.state == "idle"
     session.dispatch(commands.ExamineCapture())
     session.dispatch(commands.ExamineCapture())  # at it already
@@ -58,10 +57,10 @@ def test_a_capture_is_examined_in_the_background(session, monkeypatch) -> None:
     assert session.doctor_status.diagnosis.n_pictures == 7
 
 
-def test_examining_can_be_stopped_and_a_failure_is_told(session, monkeypatch) -> None:
+def test_examining_can_be_stopped_and_a_failure_is_told(session) -> None:
     has_ended = []
 
-    def endless(capture, *, report, **_):
+    def endless(capture, report):
         try:
             while True:
                 report(Progress("Capture doctor", 0.3, "looking"))
@@ -69,7 +68,7 @@ def test_examining_can_be_stopped_and_a_failure_is_told(session, monkeypatch) ->
         finally:
             has_ended.append(True)
 
-    monkeypatch.setattr(doctor_module, "examine", endless)
+    session.doctor.run = endless
     session.dispatch(commands.ExamineCapture())
     poll(session, lambda: session.doctor_status.done > 0.2)
     assert session.doctor_status.state == "running"
@@ -78,10 +77,10 @@ def test_examining_can_be_stopped_and_a_failure_is_told(session, monkeypatch) ->
     assert session.doctor_status.state == "idle"
     poll(session, lambda: bool(has_ended))
 
-    def failing(capture, **_):
+    def failing(capture, report):
         raise CaptureError("The disk went away.")
 
-    monkeypatch.setattr(doctor_module, "examine", failing)
+    session.doctor.run = failing
     session.dispatch(commands.ExamineCapture())
     poll(session, lambda: any("cannot be examined" in notice.title for notice in session.notices))
     assert session.doctor_status.state == "idle"
@@ -102,3 +101,19 @@ def test_a_correction_is_asked_about_then_written_and_opened_as_a_new_project(se
     assert name not in session.rig.names
     written = json.loads((capture / "capture.json").read_text())
     assert [camera["name"] for camera in written["cameras"] if camera.get("is_excluded")] == [name]
+
+
+@pytest.mark.slow
+def test_a_process_of_its_own_examines_and_says_what_is_wrong(session) -> None:
+    seen = []
+    session.dispatch(commands.ExamineCapture())
+    poll(session, lambda: seen.append(session.doctor_status.done) or session.doctor_status.state == "done")
+    assert seen == sorted(seen)
+    assert session.doctor_status.diagnosis.n_pictures == session.capture.n_frames * len(session.rig)
+
+
+def test_a_process_that_cannot_read_the_capture_says_why(session, tmp_path) -> None:
+    shutil.rmtree(session.capture.path)
+    session.dispatch(commands.ExamineCapture())
+    poll(session, lambda: any("cannot be examined" in notice.title for notice in session.notices))
+    assert session.doctor_status.state == "idle"

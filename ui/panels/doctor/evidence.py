@@ -90,7 +90,7 @@ class Evidence:
         self._pictures.draw(session, camera, frame, rect, ui)
         draw = imgui.get_window_draw_list()
         if imgui.is_item_hovered() or imgui.is_item_focused():
-            draw.add_rect(rect.low, rect.high, theme.u32(theme.SKY), 3, 0, 2)
+            draw.add_rect(rect.low, rect.high, theme.u32(theme.SKY), 3, thickness=2)
         imgui.text_disabled("")
         draw.add_text(ImVec2(rect.x0, rect.y1 + 3), theme.u32(theme.TEXT_DIM), elided(caption, shown))
         imgui.end_group()

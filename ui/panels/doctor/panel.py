@@ -27,6 +27,8 @@ from ui.style.theme import Icon
 WIDE = 720.0
 """In a panel at least so wide the list, the pictures and the map stand side by side."""
 REFRESH_S = 0.25
+PROGRESS = 180.0
+"""Width of the bar."""
 SHARES = (0.34, 0.38)
 """Of the width that the list and the pictures have."""
 LOW, WORDS = 250.0, 28.0
@@ -111,11 +113,10 @@ class DoctorPanel:
             imgui.same_line()
             left = "" if status.eta_s is None else f", {duration_text(status.eta_s)} left"
             words = f"{100 * status.done:.0f} %, {status.message}{left}"
-            imgui.progress_bar(status.done, ImVec2(-1, 0), " ")
-            low = imgui.get_item_rect_min()
-            imgui.get_window_draw_list().add_text(
-                ImVec2(low.x + 10, low.y + 5), imgui.get_color_u32(imgui.Col_.text), words
-            )
+            imgui.progress_bar(status.done, ImVec2(PROGRESS, 0), "")
+            imgui.same_line()
+            imgui.align_text_to_frame_padding()
+            imgui.text(words)
             return
         label = f"{Icon.EYE}  Examine" if status.diagnosis is None else f"{Icon.EYE}  Examine again"
         if primary_button(label, ImVec2(160, 0), ui):
