@@ -33,6 +33,10 @@ THREADS = 4
 """Videos and images looked at side by side: FFmpeg works, or waits for the disk, without the interpreter."""
 ASPECT_TOLERANCE = 0.01
 """Share by which the sides of frames and calibration may differ in proportion where one is a smaller copy."""
+MAX_LENS = 1e6
+"""Largest parameter of a lens; those of the worst calibrations are in the hundreds."""
+MIN_LENS_RADIUS = 0.01
+"""Half a degree off the axis: a lens that folds back before shows nothing."""
 DEFAULT_FPS = 30.0
 """Where nothing says how fast a capture was recorded, as with images."""
 CLOCK_TOLERANCE = 0.02
@@ -94,6 +98,7 @@ def assemble(
     fps: float | None = None,
     default_holdout: Sequence[str] = (),
     points: Path | None = None,
+    points_to_world: np.ndarray | None = None,
     fisheye_fov_deg: float | None = None,
     problems: Sequence[CaptureError] = (),
     warnings: Sequence[str] = (),
@@ -107,7 +112,7 @@ def assemble(
         cameras: In the order in which the capture shall have them.
         fps: Frames per second; None takes that of the videos.
         default_holdout: Names of cameras that the capture sets aside; unknown ones are a problem.
-        points: A point cloud that came along.
+        points, points_to_world: See `Layout`.
         fisheye_fov_deg: See `Layout`.
         problems: What the reader found already; they are reported with the others.
         warnings: What the reader found odd but usable.
@@ -185,6 +190,7 @@ def assemble(
         default_holdout=tuple(dict.fromkeys(default_holdout)),
         warnings=tuple(said),
         points=points,
+        points_to_world=points_to_world,
         fisheye_fov_deg=fisheye_fov_deg,
     )
 
@@ -196,6 +202,9 @@ def _check_numbers(camera: DescribedCamera, size: tuple[int, int]) -> list[Captu
         hint = "Export the calibration again."
         text = f'Camera "{camera.name}" has NaN or infinity in the parameters of its lens.'
         found.append(CaptureError(text, hint=hint, path=camera.said_in))
+    elif np.abs(camera.lens.params).max(initial=0.0) > MAX_LENS or camera.lens.max_radius() < MIN_LENS_RADIUS:
+        text = f'The lens of camera "{camera.name}" bends all rays back on themselves.'
+        found.append(CaptureError(text, hint="Calibrate again, with fewer parameters.", path=camera.said_in))
     if camera.color_matrix is not None and not np.isfinite(camera.color_matrix).all():
         text = f'Camera "{camera.name}" has NaN or infinity in its colour matrix.'
         found.append(CaptureError(text, hint="Correct it or take it out.", path=camera.said_in))
