@@ -46,6 +46,7 @@ def run_child(
             np.savez(job, allow_pickle=False, **arrays)
         except OSError as error:
             raise disk_error(error, what=WHAT, path=job) from error
+        reason = ""
         for _ in range(N_ATTEMPTS):
             reason, is_final = run_once(module, job, result, what=what, alive=alive, stall_s=stall_s)
             if not reason:

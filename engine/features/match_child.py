@@ -32,7 +32,8 @@ def match_folder(arrays: dict[str, np.ndarray], folder: Path) -> dict[str, np.nd
     )
     pixels, rows, counts = [], [], []
     with pycolmap.Database.open(database) as tables:
-        ids = [tables.read_image_with_name(name).image_id for name in names]
+        id_of = {image.name: image.image_id for image in tables.read_all_images()}
+        ids = [id_of[name] for name in names]
         key_points = [np.asarray(tables.read_keypoints(image_id))[:, :2] for image_id in ids]
         for a, b in arrays["pairs"]:
             found = tables.read_two_view_geometry(ids[a], ids[b]).inlier_matches

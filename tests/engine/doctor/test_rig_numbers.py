@@ -45,7 +45,7 @@ def test_cameras_inside_a_wall_are_held_out_not_those_at_its_edge() -> None:
     assert advice.cameras == (rig.names[0],)
     assert advice.fix is not None
     assert advice.fix.holdout == tuple(rig.names[row] for row in chosen)
-    assert check_holdout(rig, advice.fix.holdout) == []
+    assert check_holdout(rig, tuple(advice.fix.holdout or ())) == []
 
 
 def test_held_out_cameras_of_a_ring_are_spread_and_never_doubtful() -> None:

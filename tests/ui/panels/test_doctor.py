@@ -32,7 +32,7 @@ def findings(names: tuple[str, ...]) -> tuple[Finding, ...]:
         Finding(
             "frozen", "warning", (names[3],), (5,), "It stands still.", 0.7, "", None, (PictureEvidence(names[3], 5),)
         ),
-        Finding("hold out", "note", holdout.holdout or (), (), "Good to hold out.", 0.8, "", holdout),
+        Finding("hold out", "note", (names[4], names[6]), (), "Good to hold out.", 0.8, "", holdout),
     )
 
 
