@@ -196,12 +196,12 @@ def _cancelled(ui: UiState) -> bool:
 
 def correction_texts(question: CorrectionQuestion) -> list[str]:
     """What the dialog says before a capture is corrected, paragraph by paragraph."""
-    kept = "What it has learned stays there" if question.has_progress else "Nothing is learned in it yet"
+    kept = " with what it has learned" if question.has_progress else ""
     return [
         f"{question.words}: this is written to capture.json in {question.capture}. No other file of the capture "
         "changes; deleting or editing that file takes it back.",
-        f"The open project was made from the capture as it is now and will not fit it any more. {kept}, in "
-        f"{question.project}. The corrected capture is opened as a new project.",
+        f"The open project was made from the capture as it is now and will not fit it any more. It stays "
+        f"in {question.project}{kept}. The corrected capture is opened as a new project.",
     ]
 
 

@@ -59,7 +59,7 @@ def good_holdout(rig: CameraRig, doubtful: Collection[int] = ()) -> list[int]:
 
 
 def check_holdout(rig: CameraRig, holdout: Sequence[str], doubtful: Collection[int] = ()) -> list[Finding]:
-    """Suggest cameras where the capture names none, and say which of those it names are no good measure."""
+    """Suggest cameras where the capture names none, and say which of those it names are a poor measure."""
     rows = good_holdout(rig, doubtful)
     better = tuple(rig.names[row] for row in rows)
     if not holdout:
