@@ -96,7 +96,7 @@ class Capture:
         return frames
 
     def valid(self, camera_index: int) -> np.ndarray | None:
-        """Pixels that a camera sees, the same in all of its frames; the others are black or its border, drawn out.
+        """Pixels that a camera sees, the same in all of its frames; the others are black.
 
         Returns:
             [H, W] bool, read-only; None where it sees all.
@@ -105,6 +105,20 @@ class Capture:
         """
         self._check(camera_index, ())
         return self.store.valid(camera_index)
+
+    def valid_of(self, camera_indices: Sequence[int]) -> np.ndarray | None:
+        """`valid` of several cameras. [C, H, W] bool, or None where all of them see all."""
+        found = [self.valid(camera) for camera in camera_indices]
+        if all(valid is None for valid in found):
+            return None
+        width, height = self.picture_size
+        return np.stack([np.ones((height, width), bool) if valid is None else valid for valid in found])
+
+    @property
+    def picture_size(self) -> tuple[int, int]:
+        """Width and height of every picture."""
+        width, height = self.rig.image_sizes[0]
+        return int(width), int(height)
 
     def camera_indices(self, names: Sequence[str]) -> list[int]:
         """Rows of the rig for these camera names, in the order given.

@@ -57,6 +57,7 @@ def triangulate(
     images: np.ndarray,
     rig: CameraRig,
     *,
+    is_valid: np.ndarray | None = None,
     report: Callable[[str], None],
     alive: Callable[[], None] = lambda: None,
     stall_s: float = STALL_S,
@@ -66,6 +67,7 @@ def triangulate(
     Args:
         images: One picture per camera. [C, H, W, 3] uint8
         rig: At the size of the images.
+        is_valid: Pixels that the cameras see, None for all; features near others are edges of nothing. [C, H, W] bool
         report: Gets one line with the count, or with the reason why there are no points.
         alive: Called several times a second; what it raises ends the child.
         stall_s: Seconds without any work of the child after which it is taken for hung.
@@ -84,7 +86,8 @@ def triangulate(
         job, result = folder / "job.npz", folder / "result.npz"
         try:
             rows = np.unique(np.linspace(0, len(rig) - 1, min(len(rig), MAX_CAMERAS)).round().astype(int))
-            np.savez(job, images=images[rows], Ks=rig.Ks[rows], world_to_camera=rig.world_to_camera[rows])
+            masks = {} if is_valid is None else {"is_valid": is_valid[rows]}
+            np.savez(job, images=images[rows], Ks=rig.Ks[rows], world_to_camera=rig.world_to_camera[rows], **masks)
         except OSError as error:
             raise disk_error(error, what="The pictures for matching", path=job) from error
         reason, is_final = "", False

@@ -17,29 +17,33 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from engine.images.image_filters import erode
 from engine.kernels.parent import end_with_parent
 
 MAX_FEATURES = 2048
 MAX_SIDE_PX = 1280
 """Larger pictures are matched smaller: SIFT on full HD takes minutes, and depth ranges need no more."""
 MAX_ERROR_PX = 2.0
+MASK_MARGIN_PX = 6
+"""Features so near to pixels that the camera does not see may be the edge between both."""
 
 
 def main(job: Path, result: Path) -> None:
     """Read the job's arrays, triangulate, write points, colors, errors and n_features."""
     with np.load(job) as arrays:
         images, Ks, poses = arrays["images"], arrays["Ks"], arrays["world_to_camera"]
+        is_valid = arrays["is_valid"] if "is_valid" in arrays else None
     folder = job.with_name("colmap")
     shutil.rmtree(folder, ignore_errors=True)  # of an attempt before
     folder.mkdir()
-    points, colors, errors, n_features = triangulate_folder(folder, images, Ks, poses)
+    points, colors, errors, n_features = triangulate_folder(folder, images, Ks, poses, is_valid)
     partial = result.with_name("partial.npz")
     np.savez(partial, points=points, colors=colors, errors=errors, n_features=n_features)
     partial.replace(result)
 
 
 def triangulate_folder(
-    folder: Path, images: np.ndarray, Ks: np.ndarray, poses: np.ndarray
+    folder: Path, images: np.ndarray, Ks: np.ndarray, poses: np.ndarray, is_valid: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """Extract, match and triangulate in an empty folder.
 
@@ -56,6 +60,13 @@ def triangulate_folder(
     for name, image in zip(names, images, strict=True):
         Image.fromarray(image).save(pictures / name, compress_level=1)
     reader = pycolmap.ImageReaderOptions(camera_model="PINHOLE")
+    if is_valid is not None:
+        masks = folder / "masks"
+        masks.mkdir()
+        for name, valid in zip(names, is_valid, strict=True):
+            inside = erode(valid, MASK_MARGIN_PX).astype(np.uint8) * 255
+            Image.fromarray(inside).save(masks / f"{name}.png", compress_level=1)
+        reader.mask_path = masks
     # images first: extraction alone would number them in the order in which its threads finish
     pycolmap.Database.open(database).close()
     pycolmap.import_images(database, pictures, pycolmap.CameraMode.PER_IMAGE, image_names=names, options=reader)

@@ -44,7 +44,11 @@ def looks_still(
     last = clip.n_frames - 1
     instants = dict.fromkeys((last // 2, last, 0))  # each once; most motion shows in the first picture or two
     return not any(
-        motion_mask(_seen(capture.frame(camera, clip.start + instant), background, config), background).any()
+        motion_mask(
+            _seen(capture.frame(camera, clip.start + instant), background, config),
+            background,
+            is_valid=capture.valid(camera),
+        ).any()
         for instant in instants
         for camera, background in zip(camera_indices, backgrounds.images, strict=True)
     )

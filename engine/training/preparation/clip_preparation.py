@@ -211,7 +211,8 @@ class ClipPreparation:
         Raises:
             DiskError: The disk refused.
         """
-        backgrounds = shown_elsewhere(backgrounds, self._render_static(model, gains))
+        is_valid = self._capture.valid_of(self._camera_indices)
+        backgrounds = shown_elsewhere(backgrounds, self._render_static(model, gains), is_valid)
         key = self._key_of_corrected()
         kept = read_backgrounds(self._prep_dir, key)
         if kept is None or not kept.equals(backgrounds):
@@ -274,7 +275,7 @@ class ClipPreparation:
         keep = self._keep_after(model, gains, estimated)
         backgrounds = self._corrected(estimated, model, gains, pictures, keep)
         seen = seen_still(backgrounds, pictures, motion_masks(pictures, backgrounds, None, self._report))
-        return shown_elsewhere(seen, self._render_static(model, gains))
+        return shown_elsewhere(seen, self._render_static(model, gains), pictures.is_valid)
 
     def _corrected(
         self,
@@ -294,7 +295,8 @@ class ClipPreparation:
         return key_of_corrected(self._capture, self._camera_indices, self._config)
 
     def _static_cloud(self, backgrounds: Backgrounds, keep: Keep) -> StaticCloud:
-        cloud = static_cloud(backgrounds, self._rig, self._config, self._report, keep)
+        is_valid = self._capture.valid_of(self._camera_indices)
+        cloud = static_cloud(backgrounds, self._rig, is_valid, self._config, self._report, keep)
         if len(cloud.points) == 0:
             raise PreparationError(
                 "No static point was found by any two cameras.",

@@ -77,7 +77,8 @@ def estimate_backgrounds(
 
     def estimate(camera: int, exposure: Exposure | None) -> Arrays:
         pictures = capture.frames_of(camera, frames)
-        background = estimate_background(pictures if exposure is None else exposure.applied_to(pictures))
+        pictures = pictures if exposure is None else exposure.applied_to(pictures)
+        background = estimate_background(pictures, capture.valid(camera))
         return {"image": background.image, "is_stable": np.packbits(background.is_stable, axis=-1)}
 
     images, stable = [], []
@@ -101,14 +102,19 @@ def estimate_backgrounds(
 def static_cloud(
     backgrounds: Backgrounds,
     rig: CameraRig,
+    is_valid: np.ndarray | None,
     config: TrainConfig,
     report: ReportProgress,
     keep: Keep = do_now,
 ) -> StaticCloud:
-    """Dense points of what stands still, with white balance gains."""
+    """Dense points of what stands still, with white balance gains.
+
+    Args:
+        is_valid: Pixels that the cameras see; None for all. [C, H, W] bool
+    """
 
     def build() -> Arrays:
-        cloud = _build_static_cloud(backgrounds, rig, config, report, keep)
+        cloud = _build_static_cloud(backgrounds, rig, is_valid, config, report, keep)
         return {name: np.asarray(getattr(cloud, name)) for name in ("points", "colors", "gains", "spacing")}
 
     arrays = keep("static cloud", build)
@@ -116,7 +122,12 @@ def static_cloud(
 
 
 def _build_static_cloud(
-    backgrounds: Backgrounds, rig: CameraRig, config: TrainConfig, report: ReportProgress, keep: Keep
+    backgrounds: Backgrounds,
+    rig: CameraRig,
+    is_valid: np.ndarray | None,
+    config: TrainConfig,
+    report: ReportProgress,
+    keep: Keep,
 ) -> StaticCloud:
 
     def say(line: str) -> None:
@@ -126,13 +137,14 @@ def _build_static_cloud(
         def alive() -> None:  # whoever wants to stop is heard here
             report(Progress("Building the static cloud", 0.5))
 
-        return {"points": triangulate(backgrounds.images, rig, report=say, alive=alive).points}
+        return {"points": triangulate(backgrounds.images, rig, is_valid=is_valid, report=say, alive=alive).points}
 
     sparse_points = keep("sparse points", find_sparse)["points"]
     return build_static_cloud(
         backgrounds.images,
         backgrounds.is_stable,
         rig,
+        is_valid=is_valid,
         max_points=config.max_static_points,
         sparse_points=sparse_points if len(sparse_points) else None,
         color=config.color,
@@ -161,6 +173,7 @@ def correct_backgrounds(
             backgrounds.is_stable[row],
             render_static(row),
             pictures.of_camera(row),
+            pictures.valid(row),
         )
         return {"image": image}
 
@@ -198,7 +211,9 @@ def motion_masks(
         background = backgrounds.images[row]
         found = [
             motion_mask(
-                pictures.picture(row, frame), background if brightness is None else background * brightness(row, frame)
+                pictures.picture(row, frame),
+                background if brightness is None else background * brightness(row, frame),
+                is_valid=pictures.valid(row),
             )
             for frame in range(n_frames)
         ]
@@ -230,13 +245,18 @@ def seen_still(backgrounds: Backgrounds, pictures: TrainingPictures, masks: np.n
         n_still = is_still.sum(0)[..., None]
         means = np.floor(sums / np.maximum(n_still, 1) + 0.5).astype(np.uint8)
         is_seen = 2 * n_still > n_frames
+        valid = pictures.valid(row)
+        if valid is not None:
+            is_seen &= valid[..., None]
         return np.where(is_seen, means, backgrounds.images[row]), is_seen[..., 0]
 
     images, is_seen = zip(*map_ordered(seen, range(masks.shape[1])), strict=True)
     return Backgrounds(np.stack(images), np.stack(is_seen))
 
 
-def shown_elsewhere(backgrounds: Backgrounds, render_static: Callable[[int], np.ndarray]) -> Backgrounds:
+def shown_elsewhere(
+    backgrounds: Backgrounds, render_static: Callable[[int], np.ndarray], is_valid: np.ndarray | None
+) -> Backgrounds:
     """Backgrounds of a trained clip: where nothing was seen to stand still, what its static anchors show instead.
 
     There a person stood, or a shadow lay, and the anchors may have taken on its darkness: clips that inherit them have
@@ -244,11 +264,14 @@ def shown_elsewhere(backgrounds: Backgrounds, render_static: Callable[[int], np.
 
     Args:
         render_static: Camera row to the static render in that camera's colours. [H, W, 3] float
+        is_valid: Pixels that the cameras see, None for all; the others stay black. [C, H, W] bool
     """
     images = backgrounds.images.copy()
     for row, is_seen in enumerate(backgrounds.is_stable):
         render = render_static(row)
         is_shown = ~is_seen & np.asarray(np.isfinite(render).all(-1))
+        if is_valid is not None:
+            is_shown &= is_valid[row]
         images[row][is_shown] = np.floor(np.clip(render[is_shown], 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
     return Backgrounds(images, backgrounds.is_stable)
 
@@ -283,6 +306,7 @@ def moving_cloud(
         gains,
         bounds_min=lower,
         bounds_max=upper,
+        is_valid=pictures.is_valid,
         max_points=config.max_moving_points,
         voxel_size=voxel_size,
         report=say,
