@@ -107,7 +107,8 @@ def dssim_ms_of(
             mask = None if mask is None else _halve(mask[..., None].astype(np.float32))[..., 0] == 1.0
             similarity = Similarity.of(_mirrored(a), _mirrored(b)) if is_coarsest else Similarity.of(a, b)
         factor = (similarity.ssim if is_coarsest else similarity.structure)[inside, inside]
-        mean = masked_mean(factor, None if mask is None else mask[inside, inside])
+        is_used = mask if mask is None or is_coarsest else mask[inside, inside]
+        mean = masked_mean(factor, is_used)
         if math.isnan(mean):
             return math.nan
         product *= max(mean, 0.0) ** weight

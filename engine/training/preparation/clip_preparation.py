@@ -230,6 +230,7 @@ class ClipPreparation:
             "capture": self._capture.fingerprint,
             "size": [int(side) for side in self._rig.image_sizes[0]],
             "cameras": list(self._rig.names),
+            "has_masks": list(self._capture.has_masks),
             "frames": [self._clip.start, self._clip.n_frames, self._clip.clip_length],
             "config": self._config.difference(),
             "regions": [region.as_dict() for region in self._regions],

@@ -79,6 +79,9 @@ def estimate_backgrounds(
         pictures = capture.frames_of(camera, frames)
         pictures = pictures if exposure is None else exposure.applied_to(pictures)
         background = estimate_background(pictures, capture.valid(camera))
+        masks = [mask for frame in frames if (mask := capture.moving_mask(camera, frame)) is not None]
+        if masks:  # who stands still for most of the time looks like background, but a mask tells
+            background.is_stable[2 * np.sum(masks, axis=0) > len(masks)] = False
         return {"image": background.image, "is_stable": np.packbits(background.is_stable, axis=-1)}
 
     images, stable = [], []
@@ -210,10 +213,12 @@ def motion_masks(
     def find(row: int) -> Arrays:
         background = backgrounds.images[row]
         found = [
-            motion_mask(
+            moving_pixels(
                 pictures.picture(row, frame),
                 background if brightness is None else background * brightness(row, frame),
-                is_valid=pictures.valid(row),
+                pictures.capture,
+                pictures.camera_indices[row],
+                pictures.clip.start + frame,
             )
             for frame in range(n_frames)
         ]
@@ -225,6 +230,23 @@ def motion_masks(
         report(Progress("Finding what moves", (row + 1) / n_cameras))
     report(Progress("Finding what moves", 1.0, f"{100 * masks.mean():.1f} % of pixels move"))
     return masks
+
+
+def moving_pixels(
+    picture: np.ndarray, background: np.ndarray, capture: Capture, camera_index: int, frame_index: int
+) -> np.ndarray:
+    """What moves in one picture: what differs from the background, and what a mask of the capture says. [H, W] bool
+
+    Both together: masks are mostly of people and things, without the shadows that go with them.
+
+    Args:
+        picture: In the exposure of the background. [H, W, 3] uint8
+        background: [H, W, 3] uint8 or float 0..255
+        camera_index, frame_index: Of the picture, in the numbering of the capture.
+    """
+    found = motion_mask(picture, background, is_valid=capture.valid(camera_index))
+    masked = capture.moving_mask(camera_index, frame_index)
+    return found if masked is None else found | masked
 
 
 def seen_still(backgrounds: Backgrounds, pictures: TrainingPictures, masks: np.ndarray) -> Backgrounds:
@@ -317,7 +339,8 @@ def moving_cloud(
 def key_of_corrected(capture: Capture, camera_indices: Sequence[int], config: TrainConfig) -> dict:
     """What corrected backgrounds belong to, as `write_backgrounds` keeps it beside them."""
     rig = capture.rig.subset(list(camera_indices))
-    return {
+    masked = [name for name, has in zip(capture.rig.names, capture.has_masks, strict=True) if has]
+    return ({"masks": masked} if masked else {}) | {
         "capture": capture.fingerprint,
         "cameras": list(rig.names),
         "size": [int(side) for side in rig.image_sizes[0]],
