@@ -26,6 +26,7 @@ from engine.capture.format_checks import (
 from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames, VideoFrames
 from engine.capture.media import read_image_header, read_video_header
+from engine.capture.timed_frames import at_common_moments
 from engine.errors import CaptureError
 
 THREADS = 4
@@ -53,6 +54,8 @@ class DescribedCamera:
         masks: A video or one image per frame, bright where something moves; None without.
         color_matrix: New RGB = matrix @ old, on display-encoded values. [3, 3]
         offset_frames: Its own frame is the capture's frame plus this.
+        frame_times_s: When each of its frames was taken, in seconds of a clock that all cameras share, rising; None
+            where nothing says so. Either all cameras have them or none. [T]
     """
 
     name: str
@@ -65,6 +68,7 @@ class DescribedCamera:
     masks: Path | Sequence[Path] | None = None
     color_matrix: np.ndarray | None = None
     offset_frames: float = 0.0
+    frame_times_s: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,8 +160,13 @@ def assemble(
     raise_problems(found, folder)
     if scaled:
         said.append(f"Frames have another size than their calibration, which is scaled to them: {shortened(scaled)}.")
-    rate = _rate(fps, files, said)
-    entries, n_frames = _on_one_clock(entries, [camera.offset_frames for camera in cameras], said, folder)
+    frame_times_s = [camera.frame_times_s for camera in cameras]
+    if any(times_s is not None for times_s in frame_times_s):
+        entries, n_frames, rate, note = at_common_moments(entries, frame_times_s, fps)
+        said.append(note)
+    else:
+        rate = _rate(fps, files, said)
+        entries, n_frames = _on_one_clock(entries, [camera.offset_frames for camera in cameras], said, folder)
     return Layout(
         format=format_name,
         cameras=tuple(entries),

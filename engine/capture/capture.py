@@ -20,7 +20,21 @@ from engine.capture.camera_optics import CameraOptics
 from engine.capture.folder_contents import MAX_LOOKED_AT, folder_contents
 from engine.capture.format_checks import raise_problems
 from engine.capture.format_result import Layout, Probe
-from engine.capture.formats import capture_json, panoptic, sample
+from engine.capture.formats import (
+    capture_json,
+    colmap,
+    colmap_frames,
+    easyvolcap,
+    immersive,
+    multipleview,
+    n3dv,
+    panoptic,
+    panoptic_studio,
+    sample,
+    technicolor,
+    toml_cameras,
+    transforms_json,
+)
 from engine.capture.frames import FrameStore, IndexedFrames
 from engine.capture.rig_checks import check_rig, rig_extent, rig_warnings
 from engine.capture.undistortion import Undistortion
@@ -29,7 +43,21 @@ from engine.errors import CaptureError
 
 logger = logging.getLogger(__name__)
 
-FORMATS = (capture_json, sample, panoptic)
+FORMATS = (
+    capture_json,
+    sample,
+    panoptic,
+    panoptic_studio,
+    easyvolcap,
+    toml_cameras,
+    immersive,
+    technicolor,
+    transforms_json,
+    multipleview,
+    n3dv,
+    colmap_frames,
+    colmap,
+)
 """Readers in the order they are tried. Each has FORMAT, LAYOUT, probe(folder) and read(folder, follow_links=...)."""
 DEFAULT_CACHE_BYTES = 512 << 20
 """Decoded frames kept in memory."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -26,8 +26,10 @@ from engine.capture.limits import (
 from engine.capture.media import ImageHeader
 from engine.errors import CaptureError
 from engine.storage.files import read_bytes
-from engine.storage.json_files import JsonError, parse_object
+from engine.storage.json_files import JsonError, parse_json, parse_object
 from engine.text import shown
+
+T = TypeVar("T")
 
 ROTATION_TOLERANCE = 1e-3
 """Largest |R R^T - I| entry that counts as a rotation; calibrations printed with four digits reach 3e-4."""
@@ -55,9 +57,22 @@ def read_json_object(path: Path) -> dict[str, Any]:
     Raises:
         CaptureError: The file is missing, not readable, too large, not JSON, or something else than an object.
     """
+    return _parsed(path, parse_object)
+
+
+def read_json_list(path: Path) -> list[Any]:
+    """Likewise, of a file whose top level is a list."""
+    found = _parsed(path, parse_json)
+    if isinstance(found, list):
+        return found
+    hint = "It may be another file of that name; export the capture again."
+    raise CaptureError("The file holds no list of cameras.", hint=hint, path=path)
+
+
+def _parsed(path: Path, parse: Callable[..., T]) -> T:
     try:
         # NaN is let through, so that the camera that has it can be named
-        return parse_object(read_bytes(path, max_bytes=MAX_META_BYTES), is_nan_allowed=True)
+        return parse(read_bytes(path, max_bytes=MAX_META_BYTES), is_nan_allowed=True)
     except FileNotFoundError:
         raise CaptureError("The file is missing.", hint="Put it back or export the capture again.", path=path) from None
     except OSError as error:

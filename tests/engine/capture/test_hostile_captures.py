@@ -381,7 +381,7 @@ def test_a_long_list_of_missing_frames_is_one_sentence(make_panoptic: MakeCaptur
 
 
 def test_a_folder_of_another_kind_is_described(tmp_path: Path) -> None:
-    for name in ("a.mp4", "b.MP4", "camera_array.toml", "poses_bounds.npy"):
+    for name in ("a.mp4", "b.MP4", "settings.toml", "notes.bin"):
         (tmp_path / name).touch()
     (tmp_path / "images").mkdir()
     message = refusal(tmp_path)

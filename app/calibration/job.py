@@ -1,0 +1,119 @@
+"""The job that turns a folder of plain videos into a capture: for the command line and, on a thread, for the window.
+
+A window starts it with Jobs (app.background.jobs):
+
+    jobs.start("Calibrating", calibration_work(request), on_done, on_error)
+
+`on_done` gets a CalibrationOutcome, `on_error` what was raised; the job's status has the share that is done and, as its
+message, the stage with the time that is left. Job.context.cancel() ends the child process within a moment, and then
+nothing is written.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from app.background.jobs import JobCancelled, JobContext
+from app.calibration.report import report_lines
+from app.calibration.written import check_target, write_calibrated
+from engine.calibration.calibrate import calibrate
+from engine.calibration.calibrated import Calibration
+from engine.calibration.options import CalibrationOptions
+from engine.progress import Progress, ReportProgress
+from engine.text import duration_text
+
+MIN_SHARE = 0.05
+"""Before this share is done the time left is not told: it would be a guess."""
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationRequest:
+    """What is asked for.
+
+    Attributes:
+        videos: Folder with one video, or one folder of images, per camera.
+        out: Folder that becomes the capture; None for the folder of the videos. Only capture.json is written.
+        options: Lens, scale, up.
+        is_replacing: Whether a capture.json that is there may be replaced.
+    """
+
+    videos: Path
+    out: Path | None = None
+    options: CalibrationOptions = field(default_factory=CalibrationOptions)
+    is_replacing: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationOutcome:
+    """What came of it.
+
+    Attributes:
+        capture: The folder to open.
+        needs_links: Whether it has to be opened with follow_links, since its videos lie elsewhere.
+        calibration: The figures.
+        lines: The report in sentences, fit to be shown one below another.
+    """
+
+    capture: Path
+    needs_links: bool
+    calibration: Calibration
+    lines: tuple[str, ...]
+
+
+def run_calibration(
+    request: CalibrationRequest, *, report: ReportProgress, alive: Callable[[], None] = lambda: None
+) -> CalibrationOutcome:
+    """Calibrate and write capture.json; on this thread.
+
+    Args:
+        request: What is asked for.
+        report: Told stage, share of the whole and detail.
+        alive: Called several times a second; what it raises ends the work.
+    Raises:
+        CaptureError: Bad input. PreparationError: No cameras could be found. DiskError: It could not be written.
+    """
+    out = request.out or request.videos
+    check_target(out, is_replacing=request.is_replacing)
+    calibration = calibrate(request.videos, request.options, report=report, alive=alive)
+    needs_links = write_calibrated(calibration, request.videos, out)
+    return CalibrationOutcome(out, needs_links, calibration, tuple(report_lines(calibration)))
+
+
+def calibration_work(request: CalibrationRequest) -> Callable[[JobContext], CalibrationOutcome]:
+    """`run_calibration` as the work of a Job."""
+
+    def work(context: JobContext) -> CalibrationOutcome:
+        left = TimeLeft()
+
+        def report(progress: Progress) -> None:
+            context.report(progress.done, " - ".join(filter(None, [progress.stage, left.text(progress.done)])))
+
+        def alive() -> None:
+            if context.is_cancelled:
+                raise JobCancelled
+
+        return run_calibration(request, report=report, alive=alive)
+
+    return work
+
+
+class TimeLeft:
+    """Time left from the share that is done; stages are weighed so that the share rises evenly.
+
+    Args:
+        clock: Seconds; tests bring their own.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._started_s = clock()
+
+    def text(self, done: float) -> str:
+        """As "about 2 min left"; empty at the beginning and at the end."""
+        if not MIN_SHARE <= done < 1.0:
+            return ""
+        left_s = (self._clock() - self._started_s) * (1 - done) / done
+        return f"about {duration_text(left_s)} left"

@@ -1,0 +1,66 @@
+"""The report of a calibration as sentences: how many cameras, how well they fit, what is missing, what helps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from engine.calibration.calibrated import CalibratedRig, Calibration
+from engine.text import printable
+
+GOOD_ERROR_PX = 1.0
+"""Median reprojection error, at a width of 1,000 pixels, up to which nothing is to be done."""
+POOR_SIGHTINGS = 60
+"""Of fewer points a camera's place follows only roughly."""
+WHAT_HELPS = (
+    "What helps: a camera between it and its neighbour, or one of the two moved so that they see more of the same; "
+    "posters, boxes or other objects with fine, irregular patterns where both cameras look; somebody who walks through "
+    "all of the scene while all cameras film; even light; no motion blur. Or go on without it."
+)
+
+
+def report_lines(calibration: Calibration) -> list[str]:
+    """Everything that a user has to know, one sentence or camera per line."""
+    found = calibration.found
+    rig = found.rig
+    n_all = len(rig) + len(calibration.missing)
+    error = float(np.median(found.camera_errors_px))
+    lines = [
+        f"{len(rig)} of {n_all} cameras were found, from {len(found.points):,} points; sightings lie {error:.2f} px "
+        f"from where their points land (median)."
+    ]
+    lines += [_camera_line(found, row) for row in range(len(rig))]
+    lines += [_missing_line(missing.name, missing.reason) for missing in calibration.missing]
+    if calibration.missing:
+        lines.append(WHAT_HELPS)
+    lines += [_scale_line(found), _up_line(found)]
+    return [*lines, *(f"Note: {warning}" for warning in calibration.warnings)]
+
+
+def _camera_line(found: CalibratedRig, row: int) -> str:
+    K, (width, height) = found.rig.Ks[row], found.rig.image_sizes[row]
+    view = np.degrees(2 * np.arctan(width / (2 * K[0, 0])))
+    error, n = found.camera_errors_px[row], found.n_sightings[row]
+    doubts = [
+        *(["fits badly"] if error > GOOD_ERROR_PX * width / 1000 + 0.5 else []),
+        *(["sees few points"] if n < POOR_SIGHTINGS else []),
+    ]
+    lens = found.lenses[row]
+    bend = f"{lens.model} {' '.join(f'{value:+.3f}' for value in lens.params)}"
+    text = f"{width}x{height}, focal length {K[0, 0]:.1f} px ({view:.0f} degrees), {bend}, {n} points, {error:.2f} px"
+    return f"  {printable(found.rig.names[row])}: {text}" + (f" - {' and '.join(doubts)}" if doubts else "")
+
+
+def _missing_line(name: str, reason: str) -> str:
+    return f"  {printable(name)}: not found: {printable(reason)}"
+
+
+def _scale_line(found: CalibratedRig) -> str:
+    if found.is_metric:
+        return "Size: in metres, by the known distance."
+    return "Size: unknown; one unit is not one metre. Give the distance between two cameras to have metres."
+
+
+def _up_line(found: CalibratedRig) -> str:
+    if found.up == "floor":
+        return "Up: away from the floor, the largest level surface that was found below the cameras."
+    return "Up: where most cameras have their upper edge."

@@ -1,0 +1,224 @@
+"""Bundle adjustment: cameras and points together, so that points land where they were seen.
+
+Robust (Cauchy) residuals in pixels, expectations for what pictures say little about (principal point, lens numbers),
+lens numbers shared among cameras or not. Levenberg-Marquardt with the points eliminated; deterministic.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from engine.calibration.cameras import Cameras, distort, lens_jacobian, plane_jacobian, rotation_of, safe_depth, skew
+
+MIN_SCALE_PX = 0.25
+"""No key point is found more exactly than this."""
+
+
+@dataclass(frozen=True, slots=True)
+class Expectations:
+    """Standard deviations of what is expected without pictures.
+
+    Attributes:
+        principal: Of the principal point from the middle, as a share of the picture's width. 0 keeps it there.
+        focal: Of ln(focal length) from that at the start.
+        lens: Of each number of the lens from 0.
+        is_shared: Whether all cameras have one focal length, principal point and lens.
+    """
+
+    principal: float = 0.02
+    focal: float = 0.5
+    lens: float = 0.2
+    is_shared: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Observations:
+    """N sightings of M points.
+
+    Attributes:
+        cameras: Which camera. [N]
+        points: Which point, 0..M-1. [N]
+        pixels: Where. [N, 2]
+    """
+
+    cameras: np.ndarray
+    points: np.ndarray
+    pixels: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.cameras)
+
+    def chosen(self, is_kept: np.ndarray) -> Observations:
+        """Those of a mask, points numbered as before."""
+        return Observations(self.cameras[is_kept], self.points[is_kept], self.pixels[is_kept])
+
+
+def errors_px(cameras: Cameras, points: np.ndarray, seen: Observations) -> np.ndarray:
+    """Distance of each sighting from where its point lands; infinite behind the camera. [N]"""
+    pixels, depths = cameras.pixels(seen.cameras, points[seen.points])
+    return np.where(depths > 1e-9, np.linalg.norm(pixels - seen.pixels, axis=-1), np.inf)
+
+
+def adjust(
+    cameras: Cameras,
+    points: np.ndarray,
+    seen: Observations,
+    *,
+    middles: np.ndarray,
+    widths: np.ndarray,
+    expect: Expectations,
+    n_iterations: int = 30,
+) -> tuple[Cameras, np.ndarray]:
+    """Cameras and points with the least robust error.
+
+    Args:
+        cameras: The start.
+        points: The start. [M, 3]
+        seen: Every point is seen at least twice.
+        middles, widths: Of the pictures, px. [C, 2], [C]
+        expect: What is expected of lenses.
+    Returns:
+        Cameras and points [M, 3].
+    """
+    n_cameras, n_params = len(cameras), 9 + cameras.lens_params.shape[1]
+    share = _sharing(n_cameras, n_params, expect.is_shared)
+    start_focals = np.log(cameras.focals)
+    stiffness = _stiffness(n_params, widths, expect)
+    damping = 1e-4
+    residuals, scale = _residuals(cameras, points, seen), 0.0
+    for _ in range(n_iterations):
+        lengths = np.linalg.norm(residuals, axis=-1)
+        scale = max(1.5 * float(np.median(lengths)), MIN_SCALE_PX)
+        weights = 1.0 / (1.0 + (lengths / scale) ** 2)
+        J_cameras, J_points = _jacobians(cameras, points, seen)
+        root = np.sqrt(weights)[:, None]
+        A, B = _block_rows(J_cameras * root[..., None], seen.cameras, n_cameras), J_points * root[..., None]
+        target = (residuals * root).reshape(-1)
+        expected = _expected(cameras, start_focals, middles, n_params)
+        H_cameras = (A.T @ A).tocsr() + sparse.diags((scale**2 * stiffness).reshape(-1))
+        g_cameras = A.T @ target + (scale**2 * stiffness * expected).reshape(-1)
+        W = (A.T @ _block_rows(B, seen.points, len(points))).tocsr()
+        V = _sums(np.einsum("nki,nkj->nij", B, B).reshape(-1, 9), seen.points, len(points)).reshape(-1, 3, 3)
+        g_points = _sums(np.einsum("nki,nk->ni", B, residuals * root), seen.points, len(points))
+        before = _cost(residuals, expected, stiffness, scale)
+        for _ in range(6):
+            step = _step(H_cameras, g_cameras, W, V, g_points, share, damping)
+            moved = _moved(cameras, step[0].reshape(n_cameras, n_params))
+            moved_points = points - step[1]
+            new_residuals = _residuals(moved, moved_points, seen)
+            after = _cost(new_residuals, _expected(moved, start_focals, middles, n_params), stiffness, scale)
+            if after < before:
+                break
+            damping = min(damping * 10, 1e6)
+        else:
+            break
+        cameras, points, residuals = moved, moved_points, new_residuals
+        damping = max(damping / 5, 1e-9)
+        if before - after < 1e-6 * before:
+            break
+    return cameras, points
+
+
+def _residuals(cameras: Cameras, points: np.ndarray, seen: Observations) -> np.ndarray:
+    pixels, depths = cameras.pixels(seen.cameras, points[seen.points])
+    residuals = np.clip(pixels - seen.pixels, -1e4, 1e4)
+    return np.where((depths > 1e-9)[:, None], residuals, 1e3)
+
+
+def _cost(residuals: np.ndarray, expected: np.ndarray, stiffness: np.ndarray, scale: float) -> float:
+    robust = scale**2 * np.log1p((residuals**2).sum(-1) / scale**2).sum()
+    return float(robust + scale**2 * (stiffness * expected**2).sum())
+
+
+def _stiffness(n_params: int, widths: np.ndarray, expect: Expectations) -> np.ndarray:
+    """One over the square of each expectation's deviation. [C, P]"""
+    stiffness = np.zeros((len(widths), n_params))
+    stiffness[:, 6] = expect.focal**-2
+    stiffness[:, 7:9] = (1.0 / np.maximum(expect.principal * widths, 1e-6) ** 2)[:, None]
+    stiffness[:, 9:] = expect.lens**-2
+    return stiffness
+
+
+def _expected(cameras: Cameras, start_focals: np.ndarray, middles: np.ndarray, n_params: int) -> np.ndarray:
+    """How far each number is from what is expected of it. [C, P]"""
+    off = np.zeros((len(cameras), n_params))
+    off[:, 6] = np.log(cameras.focals) - start_focals
+    off[:, 7:9] = cameras.principal - middles
+    off[:, 9:] = cameras.lens_params
+    return off
+
+
+def _sharing(n_cameras: int, n_params: int, is_shared: bool) -> sparse.csr_matrix:
+    """Maps the numbers that are sought to all numbers of all cameras. [C P, Q]"""
+    if not is_shared:
+        return sparse.csr_matrix(sparse.identity(n_cameras * n_params))
+    n_lens = n_params - 6
+    rows = np.arange(n_cameras * n_params)
+    camera, param = np.divmod(rows, n_params)
+    columns = np.where(param < 6, camera * 6 + param, n_cameras * 6 + param - 6)
+    return sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(rows), n_cameras * 6 + n_lens))
+
+
+def _jacobians(cameras: Cameras, points: np.ndarray, seen: Observations) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of pixels by rotation, translation, ln focal, principal point, lens; and by points."""
+    rows, n_lens = seen.cameras, cameras.lens_params.shape[1]
+    rotations, params = cameras.rotations[rows], cameras.lens_params[rows]
+    turned = np.einsum("nij,nj->ni", rotations, points[seen.points])
+    inside = turned + cameras.translations[rows]
+    depth = safe_depth(inside[:, 2])
+    plane = inside[:, :2] / depth[:, None]
+    to_plane = np.zeros((len(rows), 2, 3))
+    to_plane[:, 0, 0] = to_plane[:, 1, 1] = 1 / depth
+    to_plane[:, :, 2] = -plane / depth[:, None]
+    focals = cameras.focals[rows, None, None]
+    by_inside = focals * plane_jacobian(cameras.lens, plane, params) @ to_plane
+    J = np.zeros((len(rows), 2, 9 + n_lens))
+    J[:, :, :3] = by_inside @ -skew(turned)
+    J[:, :, 3:6] = by_inside
+    J[:, :, 6] = focals[:, 0] * distort(cameras.lens, plane, params)
+    J[:, :, 7:9] = np.eye(2)
+    J[:, :, 9:] = focals * lens_jacobian(cameras.lens, plane, params)
+    return J, by_inside @ rotations
+
+
+def _block_rows(blocks: np.ndarray, columns: np.ndarray, n_columns: int) -> sparse.csr_matrix:
+    """One block [2, K] per row of blocks, at the block column named. [2 N, K n_columns]"""
+    n, height, width = blocks.shape
+    matrix = sparse.bsr_matrix((blocks, columns, np.arange(n + 1)), shape=(n * height, n_columns * width))
+    return matrix.tocsr()
+
+
+def _sums(values: np.ndarray, groups: np.ndarray, n_groups: int) -> np.ndarray:
+    """Sums of values [N, K] over their groups. [n_groups, K]"""
+    return np.stack([np.bincount(groups, column, minlength=n_groups) for column in values.T], axis=-1)
+
+
+def _step(H, g_cameras, W, V, g_points, share, damping: float) -> tuple[np.ndarray, np.ndarray]:
+    """What to take from the numbers of the cameras and from the points."""
+    n_points = len(V)
+    diagonal = np.einsum("mii->mi", V)
+    damped = V + damping * np.einsum("mi,ij->mij", np.maximum(diagonal, 1e-9), np.eye(3))
+    inverse = np.linalg.inv(damped)
+    V_inverse = sparse.bsr_matrix((inverse, np.arange(n_points), np.arange(n_points + 1))).tocsr()
+    weighted = W @ V_inverse
+    reduced = (share.T @ (H - weighted @ W.T) @ share).toarray()
+    full = (share.T @ H @ share).diagonal()
+    right = share.T @ (g_cameras - weighted @ g_points.reshape(-1))
+    reduced[np.diag_indices_from(reduced)] += damping * np.maximum(full, 1e-9) + 1e-12
+    cameras_step = share @ np.linalg.lstsq(reduced, right, rcond=1e-14)[0]
+    points_step = np.einsum("mij,mj->mi", inverse, g_points - (W.T @ cameras_step).reshape(-1, 3))
+    return cameras_step, points_step
+
+
+def _moved(cameras: Cameras, step: np.ndarray) -> Cameras:
+    return replace(
+        cameras,
+        rotations=rotation_of(-step[:, :3]) @ cameras.rotations,
+        translations=cameras.translations - step[:, 3:6],
+        focals=cameras.focals * np.exp(np.clip(-step[:, 6], -0.5, 0.5)),
+        principal=cameras.principal - step[:, 7:9],
+        lens_params=cameras.lens_params - step[:, 9:],
+    )

@@ -1,0 +1,68 @@
+"""What a calibration finds: plain values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from engine.camera.lens import Lens
+from engine.camera.rig import CameraRig
+
+
+@dataclass(frozen=True, slots=True)
+class CalibratedRig:
+    """The cameras that were found.
+
+    Attributes:
+        rig: At the size of the videos' frames; its pictures are still as the lenses made them. World: z up, the floor
+            or the middle of what the cameras see at 0.
+        lenses: One per camera.
+        points: What was seen by several cameras. [P, 3]
+        point_errors_px: Mean distance of each point's sightings from where it lands. [P]
+        camera_errors_px: Median distance, per camera. [C]
+        n_sightings: Points that each camera sees. [C]
+        is_metric: Whether units are metres, by a known distance.
+        up: What the up axis was found from: "floor" or "cameras".
+    """
+
+    rig: CameraRig
+    lenses: tuple[Lens, ...]
+    points: np.ndarray
+    point_errors_px: np.ndarray
+    camera_errors_px: np.ndarray
+    n_sightings: np.ndarray
+    is_metric: bool
+    up: str
+
+
+@dataclass(frozen=True, slots=True)
+class MissingCamera:
+    """A camera whose place was not found.
+
+    Attributes:
+        name: Of its video.
+        reason: Why, with numbers.
+        nearest: The camera it has most matches with; empty where there is none.
+        n_matches: With that camera.
+    """
+
+    name: str
+    reason: str
+    nearest: str = ""
+    n_matches: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """The outcome.
+
+    Attributes:
+        found: The cameras that were found, in natural order.
+        missing: Those that were not.
+        warnings: What is doubtful about it, in sentences.
+    """
+
+    found: CalibratedRig
+    missing: tuple[MissingCamera, ...] = ()
+    warnings: tuple[str, ...] = field(default=())

@@ -1,0 +1,52 @@
+"""What the user may choose about a calibration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Lens = Literal["simple", "opencv", "fisheye"]
+Up = Literal["floor", "cameras"]
+LENSES: dict[str, str] = {
+    "simple": "one number for the bend of straight lines: most lenses",
+    "opencv": "two for the bend and two for a tilted lens: wide or cheap lenses",
+    "fisheye": "very wide lenses such as those of action cameras",
+}
+"""Lens models by name, and what each is for."""
+UPS: dict[str, str] = {
+    "floor": "the largest level surface below the cameras; where there is none, the cameras",
+    "cameras": "the direction in which most cameras have their upper edge",
+}
+"""Ways to find out which way is up."""
+
+
+@dataclass(frozen=True, slots=True)
+class KnownDistance:
+    """How far two cameras stand apart, lens to lens.
+
+    Attributes:
+        first, second: Their names.
+        metres: More than 0.
+    """
+
+    first: str
+    second: str
+    metres: float
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationOptions:
+    """What is asked for.
+
+    Attributes:
+        lens: Name of the lens model, see LENSES.
+        is_lens_shared: Whether all cameras are of one make at one zoom: one focal length and one lens for all.
+        distance: A measured distance that gives the scene its size in metres; without one the cameras stand about 3
+            units from the middle of what they see.
+        up: How the up axis is found, see UPS.
+    """
+
+    lens: Lens = "simple"
+    is_lens_shared: bool = False
+    distance: KnownDistance | None = None
+    up: Up = "floor"

@@ -1,0 +1,121 @@
+"""Finding the frames of a camera by its name, for layouts whose tables name cameras but no files."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from engine.capture.format_checks import shortened
+from engine.capture.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, folders_in, images_in, listed
+from engine.capture.places import place_in
+from engine.errors import CaptureError
+from engine.text import shown
+
+_SEPARATORS = re.compile(r"[\s_.\-]+")
+_ZEROS = re.compile(r"(?<!\d)0+(?=\d)")
+
+Files = Path | Sequence[Path]
+"""A video, or one image per frame."""
+
+
+class FrameSearch:
+    """What lies in the folders where a layout keeps its frames, listed once for all cameras.
+
+    Args:
+        folder: The capture folder.
+        directories: Below it, in the order in which they are looked through; "" is the folder itself.
+        follow_links: Whether files may lie outside of the folder.
+        named_in: The file that names the cameras, for messages.
+    """
+
+    def __init__(self, folder: Path, directories: Sequence[str], *, follow_links: bool, named_in: Path) -> None:
+        self._folder, self._follow_links, self._named_in = folder, follow_links, named_in
+        self._directories = tuple(directories)
+        self._places: list[tuple[str, str, bool]] = []  # name without suffix, place below the folder, is a video
+        for directory in directories:
+            inside = folder / directory if directory else folder
+            try:
+                if directory:
+                    place_in(folder, directory, follow_links=follow_links, named_in=named_in)
+                names = listed(inside, VIDEO_SUFFIXES) if inside.is_dir() else []
+                below = folders_in(inside) if inside.is_dir() else []
+            except OSError:  # not readable: then nothing of it is there
+                continue
+            prefix = f"{directory}/" if directory else ""
+            self._places += [(name, prefix + name, False) for name in below if prefix + name not in self._directories]
+            self._places += [(os.path.splitext(name)[0], prefix + name, True) for name in names]
+
+    def find(self, names: Sequence[str]) -> Files | None:
+        """Frames of the camera that goes by these names, the likeliest first; None where there are none.
+
+        A name fits as it is written; where none does, also when only case, separators and leading zeros differ and no
+        other place fits too.
+
+        Raises:
+            CaptureError: Several fit equally well, a folder is empty, or a link leads out of the folder.
+        """
+        for name in names:
+            for known, place, is_video in self._places:
+                if known == name:
+                    return self._at(place, is_video=is_video)
+        for name in names:
+            alike = [found for found in self._places if _plain(found[0]) == _plain(name)]
+            if len({known for known, _, _ in alike}) > 1:
+                several = shortened([place for _, place, _ in alike])
+                hint = f"Name one of them {shown(name)}."
+                raise CaptureError(f"Its frames may be {several}.", hint=hint, path=self._named_in)
+            if alike:
+                return self._at(alike[0][1], is_video=alike[0][2])
+        return None
+
+    def files(self, names: Sequence[str]) -> Files:
+        """Likewise; also raises where there are none, and says what there is."""
+        found = self.find(names)
+        if found is not None:
+            return found
+        where = " or ".join(f"{directory}/" if directory else "the folder" for directory in self._directories)
+        there = shortened([place for _, place, _ in self._places])
+        raise CaptureError(
+            f"There is no video and no folder of images called {shown(names[0])} in {where}.",
+            hint=f"Name frames as the calibration names cameras; there are {there}." if there else "Add its frames.",
+            path=self._named_in,
+        )
+
+    def masks(self, names: Sequence[str], frames: Files) -> tuple[Files | None, str]:
+        """Masks that fit the frames of a camera: a video, or for each image one of the same name.
+
+        Returns:
+            None where there are none, and what is wrong with them, "" where nothing is.
+        """
+        try:
+            found = self.find(names)
+        except CaptureError as error:
+            return None, error.message[0].lower() + error.message[1:].rstrip(".")
+        if found is None:
+            return None, ""
+        if isinstance(found, Path) or isinstance(frames, Path):
+            return found, ""
+        by_name = {path.stem: path for path in found}
+        lacking = [path.stem for path in frames if path.stem not in by_name]
+        if lacking:
+            return None, f"there is no mask of {len(lacking)} of {len(frames)} frames, such as {shown(lacking[0])}"
+        return [by_name[path.stem] for path in frames], ""
+
+    def _at(self, place: str, *, is_video: bool) -> Files:
+        path = place_in(self._folder, place, follow_links=self._follow_links, named_in=self._named_in)
+        if is_video:
+            return path
+        try:
+            names = listed(path, IMAGE_SUFFIXES)
+        except OSError as error:
+            text = f"The folder of its images cannot be read ({error.strerror})."
+            raise CaptureError(text, hint="Check that you may read it.", path=path) from error
+        if not names:
+            raise CaptureError("Its folder holds no images.", hint="Add its frames.", path=path)
+        return images_in(self._folder, place, names, follow_links=self._follow_links, named_in=self._named_in)
+
+
+def _plain(name: str) -> str:
+    return _ZEROS.sub("", _SEPARATORS.sub("", name).casefold())
