@@ -89,9 +89,10 @@ class ClipPictures:
         self._clips[request.model_key] = trained
 
     def render(self, capture: Capture, request: FrameRequest, camera_index: int, clip_time: float) -> np.ndarray:
-        """A camera's picture of a clip in its own colours, as it is compared: black where the camera sees nothing. [H, W,
-        3] float32 in 0..1
+        """A camera's picture of a clip in its own colours, as it is compared: black where the camera sees nothing.
 
+        Returns:
+            [H, W, 3] float32 in 0..1
         Raises:
             ProjectError: See `trained`.
         """

@@ -58,7 +58,7 @@ def remap(
 
 @njit(nogil=True, error_model="numpy")
 def _lattice_line(lattice, v, line):
-    """Writes the lattice at v of its rows, less half a pixel: as places between middles of pixels. line: [2, columns]"""
+    """Writes the lattice at v of its rows, less half a pixel: places between middles of pixels. line: [2, columns]"""
     row = min(int(v), lattice.shape[0] - 2)
     down = np.float32(v - row)
     for k in range(2):

@@ -87,9 +87,7 @@ def dssim_ms(image: np.ndarray, truth: np.ndarray) -> float:
     return dssim_ms_of(image, truth, Similarity.of(image, truth))
 
 
-def dssim_ms_of(
-    image: np.ndarray, truth: np.ndarray, similarity: Similarity, mask: np.ndarray | None = None
-) -> float:
+def dssim_ms_of(image: np.ndarray, truth: np.ndarray, similarity: Similarity, mask: np.ndarray | None = None) -> float:
     """`dssim_ms` with the maps of the finest scale given.
 
     With a mask: means over its pixels, at each scale over those that are made of its pixels alone (windows look over

@@ -47,9 +47,7 @@ def test_motion_is_found_by_the_noise_of_valid_pixels_and_nowhere_else() -> None
     noisy[40:60, 100:125] += 60
     frame = np.clip(noisy, 0, 255).astype(np.uint8)
     mask = motion_mask(frame, background, is_valid=is_valid)
-    alone = motion_mask(
-        np.ascontiguousarray(frame[:, 100:]), np.ascontiguousarray(background[:, 100:]), threshold=None
-    )
+    alone = motion_mask(np.ascontiguousarray(frame[:, 100:]), np.ascontiguousarray(background[:, 100:]), threshold=None)
     assert not mask[~is_valid].any()
     assert mask[45:55, 104:120].all()
     assert alone.mean() < 0.5

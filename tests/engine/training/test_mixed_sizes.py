@@ -86,7 +86,9 @@ def test_a_source_clip_learns_the_same_with_active_tiles(mixed: Tiny) -> None:
 
 def test_the_black_of_padding_is_not_learned(mixed: Tiny) -> None:
     """Below what a camera sees, the scene goes on, as others know."""
-    trained = TrainedClip(mixed.clips[0], load_clip_model(mixed.reference, None, backend=backend_called()), mixed.reference, None)
+    trained = TrainedClip(
+        mixed.clips[0], load_clip_model(mixed.reference, None, backend=backend_called()), mixed.reference, None
+    )
     for camera in (0, 4):
         valid = mixed.capture.valid(camera)
         assert valid is not None
