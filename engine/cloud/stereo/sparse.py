@@ -86,8 +86,9 @@ def triangulate(
         job, result = folder / "job.npz", folder / "result.npz"
         try:
             rows = np.unique(np.linspace(0, len(rig) - 1, min(len(rig), MAX_CAMERAS)).round().astype(int))
-            masks = {} if is_valid is None else {"is_valid": is_valid[rows]}
-            np.savez(job, images=images[rows], Ks=rig.Ks[rows], world_to_camera=rig.world_to_camera[rows], **masks)
+            seen = np.zeros(0, bool) if is_valid is None else is_valid[rows]  # empty: all of it
+            poses = rig.world_to_camera[rows]
+            np.savez(job, images=images[rows], Ks=rig.Ks[rows], world_to_camera=poses, is_valid=seen)
         except OSError as error:
             raise disk_error(error, what="The pictures for matching", path=job) from error
         reason, is_final = "", False

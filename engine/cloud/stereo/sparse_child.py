@@ -32,7 +32,7 @@ def main(job: Path, result: Path) -> None:
     """Read the job's arrays, triangulate, write points, colors, errors and n_features."""
     with np.load(job) as arrays:
         images, Ks, poses = arrays["images"], arrays["Ks"], arrays["world_to_camera"]
-        is_valid = arrays.get("is_valid")
+        is_valid = arrays["is_valid"] if arrays["is_valid"].size else None
     folder = job.with_name("colmap")
     shutil.rmtree(folder, ignore_errors=True)  # of an attempt before
     folder.mkdir()

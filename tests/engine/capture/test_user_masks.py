@@ -39,7 +39,9 @@ def test_masks_beside_any_layout_are_found_and_said(layout: str, request: pytest
     assert capture.has_masks == tuple(other == name for other in before.rig.names)
     assert capture.moving_mask(0, 2) is None
     for frame in range(4):
-        assert np.array_equal(capture.moving_mask(1, frame), masks[frame])
+        found = capture.moving_mask(1, frame)
+        assert found is not None
+        assert np.array_equal(found, masks[frame])
     assert any("masks of what moves for 1 of" in said and name in said for said in capture.warnings)
 
 
@@ -81,7 +83,9 @@ def test_masks_follow_the_offset_of_their_camera(make_sample: MakeCapture) -> No
     write_corrections(open_capture(folder).layout, folder, Corrections(offset_frames={"cam01": 2.0}))
     capture = open_capture(folder)
     assert capture.n_frames == 4
-    assert np.array_equal(capture.moving_mask(1, 0), masks[2])
+    found = capture.moving_mask(1, 0)
+    assert found is not None
+    assert np.array_equal(found, masks[2])
 
 
 def test_masks_that_do_not_fit_are_left_out_and_said(make_sample: MakeCapture) -> None:
