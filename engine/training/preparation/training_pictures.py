@@ -32,7 +32,8 @@ class TrainingPictures:
         self.capture, self.clip = capture, clip
         self.is_valid = capture.valid_of(self.camera_indices)
         frames = list(clip.frame_indices())
-        self._pixels = [capture.frames_of(camera, frames) for camera in self.camera_indices]
+        # side by side: decoders and lenses work without the interpreter
+        self._pixels = map_ordered(lambda camera: capture.frames_of(camera, frames), self.camera_indices)
 
     def __len__(self) -> int:
         return len(self.camera_indices) * self.clip.n_frames
