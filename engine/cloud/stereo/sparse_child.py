@@ -7,25 +7,18 @@ Never imported by the program: pycolmap must stay out of its processes.
 from __future__ import annotations
 
 import shutil
-import sys
-import threading
-import time
 import zlib  # noqa: F401  must be loaded before pycolmap, whose own zlib symbols otherwise replace it
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
-from engine.images.image_filters import erode
-from engine.kernels.parent import end_with_parent
+from engine.children.child import serve
 
 MAX_FEATURES = 2048
 MAX_SIDE_PX = 1280
 """Larger pictures are matched smaller: SIFT on full HD takes minutes, and depth ranges need no more."""
 MAX_ERROR_PX = 2.0
-MASK_MARGIN_PX = 6
-"""Features so near to pixels that the camera does not see may be the edge between both."""
 
 
 def main(job: Path, result: Path) -> None:
@@ -64,8 +57,7 @@ def triangulate_folder(
         masks = folder / "masks"
         masks.mkdir()
         for name, valid in zip(names, is_valid, strict=True):
-            inside = erode(valid, MASK_MARGIN_PX).astype(np.uint8) * 255
-            Image.fromarray(inside).save(masks / f"{name}.png", compress_level=1)
+            Image.fromarray(valid.astype(np.uint8) * 255).save(masks / f"{name}.png", compress_level=1)
         reader.mask_path = masks
     # images first: extraction alone would number them in the order in which its threads finish
     pycolmap.Database.open(database).close()
@@ -122,18 +114,5 @@ def _known_reconstruction(pycolmap, tables, names: list[str], Ks: np.ndarray, po
     return reconstruction
 
 
-def _beat(path: Path) -> None:
-    """Touch a file for as long as this process works, so that the parent can tell work from standing still."""
-    worked_s = 0.0
-    while True:
-        time.sleep(1.0)
-        if (now_s := time.process_time()) > worked_s + 0.005:
-            worked_s = now_s
-            with suppress(OSError):
-                path.touch()
-
-
 if __name__ == "__main__":
-    threading.Thread(target=_beat, args=(Path(sys.argv[3]),), daemon=True).start()
-    end_with_parent(lambda: shutil.rmtree(Path(sys.argv[1]).parent, ignore_errors=True))
-    main(Path(sys.argv[1]), Path(sys.argv[2]))
+    serve(main)

@@ -227,7 +227,7 @@ class ClipPreparation:
             return None if state is None else state.header.fingerprint
 
         return {
-            "capture": self._capture.fingerprint,
+            "capture": self._capture.part_key,
             "size": [int(side) for side in self._rig.image_sizes[0]],
             "cameras": list(self._rig.names),
             "has_masks": list(self._capture.has_masks),

@@ -341,7 +341,7 @@ def key_of_corrected(capture: Capture, camera_indices: Sequence[int], config: Tr
     rig = capture.rig.subset(list(camera_indices))
     masked = [name for name, has in zip(capture.rig.names, capture.has_masks, strict=True) if has]
     return ({"masks": masked} if masked else {}) | {
-        "capture": capture.fingerprint,
+        "capture": capture.part_key,
         "cameras": list(rig.names),
         "size": [int(side) for side in rig.image_sizes[0]],
         "frames": config.background_frames,
