@@ -23,7 +23,9 @@ class ValidPixels:
     def __init__(self, is_valid: np.ndarray | None, device: torch.device | str) -> None:
         self._is_valid: list[Tensor | None] = []
         self._tiles: list[Tensor | None] = []
+        self._shares: list[float] = []
         for flags in () if is_valid is None else is_valid:
+            self._shares.append(float(flags.mean()))
             if flags.all():
                 self._is_valid.append(None)
                 self._tiles.append(None)
@@ -42,8 +44,7 @@ class ValidPixels:
 
     def share_of(self, camera_row: int) -> float:
         """Share of the pixels that count."""
-        valid = self.of(camera_row)
-        return 1.0 if valid is None else float(valid.double().mean())
+        return self._shares[camera_row] if self._shares else 1.0
 
     def shown(self, camera_row: int, picture: Tensor) -> Tensor:
         """A picture [H, W, 3] as a captured one is: black where nothing counts."""
