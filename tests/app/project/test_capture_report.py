@@ -1,4 +1,4 @@
-"""What a user is told of a folder before a project is made."""
+"""What a user hears about a folder while no project exists yet."""
 
 from __future__ import annotations
 
