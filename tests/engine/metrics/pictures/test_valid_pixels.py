@@ -85,7 +85,7 @@ def test_seams_are_of_valid_pixels() -> None:
     before = np.where(is_valid[..., None], shown + np.float32(0.05), shown)
     maps = seam_maps(shown, before, truth, truth, still, is_valid)
     assert maps.means(maps.change)[0] == pytest.approx(0.05, abs=1e-6)
-    assert maps.means(maps.change)[1] is None  # what is not seen is no moving pixel
+    assert maps.means(maps.change)[1] is None  # what is not seen does not count as moving
     assert maps.static_share == 1.0
     half = seam_maps(shown, before, truth, truth, is_moving, is_valid)
     assert half.static_share == pytest.approx((is_valid & ~is_moving).sum() / is_valid.sum())
