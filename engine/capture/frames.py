@@ -287,11 +287,20 @@ class FrameStore:
     Args:
         sources: One per camera.
         optics: Of each camera, from a stored frame to a picture.
+        masks: Of each camera, masks of what moves or None; none at all by default.
         cache_bytes: Bound on pictures kept.
     """
 
-    def __init__(self, sources: Sequence[FrameSource], optics: Sequence[CameraOptics], *, cache_bytes: int) -> None:
+    def __init__(
+        self,
+        sources: Sequence[FrameSource],
+        optics: Sequence[CameraOptics],
+        *,
+        masks: Sequence[FrameSource | None] = (),
+        cache_bytes: int,
+    ) -> None:
         self.sources = tuple(sources)
+        self.masks = tuple(masks) or (None,) * len(self.sources)
         self.optics = tuple(optics)
         self.cache: ByteCache[tuple[int, int], np.ndarray] = ByteCache(cache_bytes)
         self._valid: dict[int, np.ndarray | None] = {}
@@ -306,6 +315,11 @@ class FrameStore:
                 valid.flags.writeable = False
             self._valid[camera_index] = valid
         return self._valid[camera_index]
+
+    def moving_mask(self, camera_index: int, frame_index: int) -> np.ndarray | None:
+        """What moves in a picture. [H, W] bool, or None where the camera has no masks. Raises CaptureError."""
+        masks = self.masks[camera_index]
+        return None if masks is None else self.optics[camera_index].mask(next(iter(masks.read([frame_index]))))
 
     def frames(self, camera_index: int, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
         """Frames of one camera at the working size, each a read-only [H, W, 3] uint8.
@@ -323,7 +337,7 @@ class FrameStore:
 
     def close(self) -> None:
         """Close files and forget cached frames."""
-        for source in self.sources:
+        for source in (*self.sources, *(masks for masks in self.masks if masks is not None)):
             source.close()
         with self._open_lock:
             self._open.clear()

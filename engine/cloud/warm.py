@@ -33,7 +33,9 @@ def warm_up() -> None:
     motion_mask(frames[0], background.image)
     motion_mask(background.image, frames[0].astype(np.float32))
     dilate(~background.is_stable, 1)
-    remap(frames[0], np.zeros((4, 4, 2), np.float32), _SIZE_PX, (_SIZE_PX, _SIZE_PX), 1)
+    for n_sub in (1, 2):
+        lattice, is_valid = np.zeros((4, 4, 2), np.float32), np.ones((_SIZE_PX, _SIZE_PX), bool)
+        remap(frames[0], lattice, _SIZE_PX, (_SIZE_PX, _SIZE_PX), n_sub, is_valid)
 
     planes = np.linspace(0.2, 1.0, 4, dtype=np.float32)
     greys = frames[:2].mean(-1).astype(np.float32)

@@ -39,7 +39,12 @@ def run_as_child(work: Callable[[dict[str, np.ndarray], Path], dict[str, np.ndar
 
 
 def extract_features(
-    folder: Path, images: np.ndarray, max_features: int = MAX_FEATURES, least_contrast: float | None = None
+    folder: Path,
+    images: np.ndarray,
+    max_features: int = MAX_FEATURES,
+    least_contrast: float | None = None,
+    *,
+    is_valid: np.ndarray | None = None,
 ) -> tuple[Path, list[str]]:
     """Write pictures into folder/images and their SIFT features into a database. Returns it and the pictures' names.
 
@@ -47,6 +52,7 @@ def extract_features(
         images: [C, H, W, 3] uint8
         max_features: Of each picture, those with the largest extent.
         least_contrast: SIFT's peak threshold; None takes COLMAP's.
+        is_valid: Pixels where features may lie; None for all. [C, H, W] bool
     """
     import pycolmap
 
@@ -57,6 +63,12 @@ def extract_features(
     for name, image in zip(names, images, strict=True):
         Image.fromarray(image).save(pictures / name, compress_level=1)
     reader = pycolmap.ImageReaderOptions(camera_model="PINHOLE")
+    if is_valid is not None:
+        masks = folder / "masks"
+        masks.mkdir()
+        for name, valid in zip(names, is_valid, strict=True):
+            Image.fromarray(valid.astype(np.uint8) * 255).save(masks / f"{name}.png", compress_level=1)
+        reader.mask_path = masks
     # images first: extraction alone would number them in the order in which its threads finish
     pycolmap.Database.open(database).close()
     pycolmap.import_images(database, pictures, pycolmap.CameraMode.PER_IMAGE, image_names=names, options=reader)

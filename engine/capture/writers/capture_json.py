@@ -30,6 +30,7 @@ class Corrections:
         masks: By camera name: a pattern or video relative to the folder.
         world_scale, up: See `CaptureDocument`; None leaves them.
         fps: None leaves it.
+        fisheye_fov_deg: Horizontal view that fisheye pictures are brought to, 10 to 150; None leaves it.
     """
 
     is_excluded: Mapping[str, bool] = field(default_factory=dict)
@@ -39,6 +40,7 @@ class Corrections:
     world_scale: float | None = None
     up: tuple[float, float, float] | None = None
     fps: float | None = None
+    fisheye_fov_deg: float | None = None
 
 
 def capture_document(layout: Layout, folder: Path) -> dict[str, Any]:
@@ -103,7 +105,7 @@ def write_corrections(layout: Layout, folder: Path, corrections: Corrections, *,
     ):
         for name, value in values.items():
             rows[name][key] = value
-    for key in ("holdout", "world_scale", "up", "fps"):
+    for key in ("holdout", "world_scale", "up", "fps", "fisheye_fov_deg"):
         value = getattr(corrections, key)
         if value is not None:
             document[key] = list(value) if isinstance(value, Sequence) else value

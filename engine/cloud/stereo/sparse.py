@@ -13,11 +13,14 @@ import numpy as np
 from engine.camera.rig import CameraRig
 from engine.children.running import STALL_S
 from engine.features.child import ChildFailed, run_child
+from engine.images.image_filters import erode
 
 MAX_CAMERAS = 48
 """Of more cameras so many are matched, spread over all: every pair of them is, and depth ranges need no more."""
 MIN_POINTS = 30
 """Fewer points than this are noise."""
+MASK_MARGIN_PX = 6
+"""Features so near to pixels that the camera does not see may be the edge between both."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +41,7 @@ def triangulate(
     images: np.ndarray,
     rig: CameraRig,
     *,
+    is_valid: np.ndarray | None = None,
     report: Callable[[str], None],
     alive: Callable[[], None] = lambda: None,
     stall_s: float = STALL_S,
@@ -47,6 +51,7 @@ def triangulate(
     Args:
         images: One picture per camera. [C, H, W, 3] uint8
         rig: At the size of the images.
+        is_valid: Pixels that the cameras see, None for all; features near others are edges of nothing. [C, H, W] bool
         report: Gets one line with the count, or with the reason why there are no points.
         alive: Called several times a second; what it raises ends the child.
         stall_s: Seconds without any work of the child after which it is taken for hung.
@@ -58,6 +63,8 @@ def triangulate(
     """
     rows = np.unique(np.linspace(0, len(rig) - 1, min(len(rig), MAX_CAMERAS)).round().astype(int))
     job = {"images": images[rows], "Ks": rig.Ks[rows], "world_to_camera": rig.world_to_camera[rows]}
+    if is_valid is not None:
+        job["is_valid"] = np.stack([erode(valid, MASK_MARGIN_PX) for valid in is_valid[rows]])
     try:
         found = run_child(
             "engine.cloud.stereo.sparse_child",

@@ -23,7 +23,7 @@ def triangulate_folder(arrays: dict[str, np.ndarray], folder: Path) -> dict[str,
     """
     import pycolmap
 
-    database, names = extract_features(folder, arrays["images"])
+    database, names = extract_features(folder, arrays["images"], is_valid=arrays.get("is_valid"))
     model = folder / "model"
     model.mkdir()
     with pycolmap.Database.open(database) as tables:

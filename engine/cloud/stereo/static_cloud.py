@@ -46,6 +46,8 @@ MIN_AGREE = 2
 MIN_AGREED_PIXELS = 100
 """With fewer agreed pixels their range says nothing about the rest of the picture."""
 COLOR_DEPTH_TOLERANCE = 0.05
+MIN_VALID_SHARE = 0.99
+"""A working pixel of which less is seen has its colour mixed with black."""
 KEPT_CAMERAS = 8
 """Depth maps that are kept together: some seconds of work, and enough of them for every core."""
 
@@ -91,6 +93,7 @@ def build_static_cloud(
     is_stable: np.ndarray,
     rig: CameraRig,
     *,
+    is_valid: np.ndarray | None = None,
     max_points: int = 25_000,
     sparse_points: np.ndarray | None = None,
     color: str = "auto",
@@ -103,6 +106,8 @@ def build_static_cloud(
         backgrounds: One picture per camera without what moves. [C, H, W, 3] uint8
         is_stable: False where a background cannot be trusted. [C, H, W] bool
         rig: Training cameras only, at the size of the backgrounds.
+        is_valid: Pixels that the cameras see, None for all; the others are not stable and make no points. [C, H, W]
+            bool
         max_points: The spacing grows until no more than this many points remain.
         sparse_points: Triangulated points [P, 3] that set the depth ranges, if there are any.
         color: "auto": gains where the cameras differ by more than the estimate errs. "gain": always. "off": never.
@@ -117,7 +122,11 @@ def build_static_cloud(
         backgrounds, is_stable, rig, sparse_points=sparse_points, report=report, keep=keep
     )
     started = time.perf_counter()
-    tiers = _sample_tiers(maps, _working_pictures(backgrounds, len(maps.depths[0][0])) / first_gains[:, None, None])
+    working_width = len(maps.depths[0][0])
+    is_seen = None if is_valid is None else _working_pictures(is_valid, working_width) > MIN_VALID_SHARE
+    tiers = _sample_tiers(
+        maps, _working_pictures(backgrounds, working_width) / first_gains[:, None, None], is_seen=is_seen
+    )
     shares = [len(tier.points) / maps.depths.size for tier in tiers]
     report(
         f"Depth maps: {shares[0]:.0%} of pixels agreed by 2 or more cameras, {shares[1]:.0%} filled and agreed, "
@@ -326,8 +335,12 @@ def _median_footprint(maps: DepthMaps) -> float:
     return float(np.median(maps.depths / focal))
 
 
-def _sample_tiers(maps: DepthMaps, pictures: np.ndarray) -> list[Samples]:
-    """Oriented coloured points in three tiers of trust: agreed, filled and agreed, filled and uncontradicted."""
+def _sample_tiers(maps: DepthMaps, pictures: np.ndarray, *, is_seen: np.ndarray | None) -> list[Samples]:
+    """Oriented coloured points in three tiers of trust: agreed, filled and agreed, filled and uncontradicted.
+
+    Args:
+        is_seen: Pixels that the cameras see at all; None for all. [C, h, w] bool
+    """
     parts: list[list[Samples]] = [[], [], []]
     for camera, check in enumerate(maps.checks):
         points = unproject(maps.depths[camera], maps.rig.Ks[camera], maps.rig.world_to_camera[camera])
@@ -335,6 +348,8 @@ def _sample_tiers(maps: DepthMaps, pictures: np.ndarray) -> list[Samples]:
         normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)
         agreed, usable = maps.is_agreed[camera], maps.is_usable[camera]
         is_clear = check.n_see_through == 0
+        if is_seen is not None:
+            is_clear = is_clear & is_seen[camera]
         is_filled_agreed = ~agreed & usable & is_clear & (check.n_agree >= MIN_AGREE)
         # behind people who never left nothing was matched, yet leaving those pixels out would leave holes
         tiers = (agreed & (check.n_see_through <= 1), is_filled_agreed, ~agreed & is_clear & ~is_filled_agreed)
