@@ -23,8 +23,7 @@ LIGHT_POSITION = np.array([0.5, -0.7, 2.6])
 LIGHT_RADIUS = 0.45
 """The lamp is a level disc of this radius, which makes shadows soft."""
 SAMPLE_CAMERAS = 20
-"""18 degrees apart: with 12 (30 degrees) a third of the floor finds no match and depth is off by 28 cm at the third
-quartile; with 20 by 10 cm."""
+"""18 degrees apart."""
 SKY_RADIUS = 25.0
 """Distance of the sky outdoors."""
 DEGREES_PER_CLIP_BALL = 84.0

@@ -95,7 +95,7 @@ def estimate_depth_maps(
     started = time.perf_counter()
     scene = _Scene(greys, is_usable, small_rig, sources, near, far)
     swept, depths = scene.completed(inverse)
-    inverse = scene.refined(inverse, depths, keep)
+    inverse = scene.better(scene.refined(inverse, depths, keep), inverse)
     is_agreed, depths = scene.completed(inverse)
     checks = scene.checked(depths, FILLED_TOLERANCE)
     report(
@@ -154,6 +154,17 @@ class _Scene:
             return np.where(is_close, check.depths, 1.0 / filled)
 
         return is_agreed, np.stack(map_ordered(complete, range(len(self.rig))))
+
+    def better(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """The first of two inverse depths [C, h, w], but the second where neighbours agree with that one only.
+
+        On bare walls, where patches match everywhere, smoothed costs of the sweep can be right when no patch is.
+        """
+        is_first, is_second = (
+            np.stack([check.n_agree >= MIN_AGREE for check in self.checked(1.0 / inverse, AGREE_TOLERANCE)])
+            for inverse in (first, second)
+        )
+        return np.where(is_second & ~is_first, second, first)
 
     def refined(self, inverse: np.ndarray, depths: np.ndarray, keep: Keep) -> np.ndarray:
         """Inverse depths [C, h, w] by slanted patches, which begin with those of the sweep and with complete depths."""

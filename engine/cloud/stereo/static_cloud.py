@@ -27,9 +27,9 @@ from engine.images.image_filters import block_mean
 Report = Callable[[str], None]
 
 SPACING_PX = 5.0
-"""Point spacing in full-size pixels at the median depth: 20k points on the 640 x 360 dome (6 cm)."""
+"""Point spacing in full-size pixels at the median depth, unless max_points asks for coarser ones."""
 UNSEEN_SHARE = 0.12
-"""Share of all points that may lie where no camera looks."""
+"""Share of all points that are kept for places where no camera looks."""
 COLOR_DEPTH_TOLERANCE = 0.05
 
 
