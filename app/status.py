@@ -379,6 +379,31 @@ class JobStatus:
     message: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class OpeningForecast:
+    """What training all clips of a capture takes that has no project yet.
+
+    Attributes:
+        n_clips: How many there are.
+        size: Width and height of the pictures.
+        n_pictures: Of all cameras that are trained on, in all frames.
+        reference_s: Training of the first clip, which the others inherit from; None where it is not known.
+        total_s: Training of all; None likewise.
+        memory_mb: Most that a training holds, 10^6 bytes.
+        disk_mb: Of all finished clips, roughly, 10^6 bytes.
+        free_mb: Room on the disk; None where it is not known.
+    """
+
+    n_clips: int
+    size: tuple[int, int]
+    n_pictures: int
+    reference_s: float | None
+    total_s: float | None
+    memory_mb: float | None
+    disk_mb: float
+    free_mb: float | None
+
+
 CELL_COLUMNS = ("psnr", "flip", "E")
 """Figures of single pictures: PSNR in dB, mean FLIP, and mean excess flicker against the frame before in 1/255."""
 CELL_RANGES = {"psnr": (20.0, 40.0), "flip": (0.0, 0.3), "E": (0.0, 2.0)}

@@ -133,10 +133,14 @@ class Jobs:
                     self._on_fault(job.context.status.name, error)
         return bool(finished)
 
-    def close(self, timeout_s: float = 1.0) -> None:
-        """Cancel everything; threads that do not end in time are daemons and end with the program."""
+    def cancel(self) -> None:
+        """Nothing that runs is wanted any more."""
         for job in self._jobs:
             job.context.cancel()
+
+    def close(self, timeout_s: float = 1.0) -> None:
+        """Cancel everything; threads that do not end in time are daemons and end with the program."""
+        self.cancel()
         for job in self._jobs:
             job.join(timeout_s)
         self._jobs = []

@@ -56,6 +56,12 @@ def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, Proj
     scale = options.scale if options.scale is not None else 1.0 if stored is None else stored.scale
     follow_links = options.follow_links or (stored is not None and stored.follow_links)
     capture = open_capture(options.capture, scale=scale, follow_links=follow_links)
+    frames = stored.frames if stored is not None and stored.fingerprint == capture.fingerprint else None
+    if options.frames is not None:
+        chosen = parse_range(options.frames, capture.n_frames, option="--frames", what="frames")
+        frames = (chosen.start, chosen.stop)
+    if frames is not None:
+        capture = capture.resized(scale, frames)
     holdout = None if options.holdout is None else parse_cameras(options.holdout, capture)
     if stored is None:
         settings = default_settings(
@@ -83,6 +89,7 @@ def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, Proj
         )
     place = str(Path(capture.path).resolve())  # the capture may have moved
     changes |= {"overrides": stored.overrides | overrides, "capture": place, "follow_links": follow_links}
+    changes["frames"] = capture.frames
     settings = replace(stored, **changes)
     check_settings(settings, capture)
     return settings, stored, capture
@@ -91,7 +98,7 @@ def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, Proj
 def _check_changes(options: argparse.Namespace, project: Project, settings: ProjectSettings) -> None:
     """See that nothing was learned with other settings."""
     stored = project.settings
-    names = ("scale", "clip_length", "seed", "holdout", "reference_clip", "overrides")
+    names = ("scale", "frames", "clip_length", "seed", "holdout", "reference_clip", "overrides")
     changed = [name for name in names if getattr(settings, name) != getattr(stored, name)]
     if changed and project.has_progress:
         listed = ", ".join(f"{name} {getattr(stored, name)!r}" for name in changed)

@@ -62,6 +62,21 @@ COMMANDS = {
         "describe a capture and how exposure changes in it, or what the trained clips of a project weigh",
         "app.cli.inspect_command",
     ),
+    "calibrate": Command(
+        "find the cameras of a folder of plain videos, and make a capture of it",
+        "app.cli.calibrate_command",
+        "Nothing was written.",
+    ),
+    "synchronise": Command(
+        "find how far each camera of a capture is ahead of the others, and correct it on request",
+        "app.cli.synchronise_command",
+        "Nothing was changed.",
+    ),
+    "convert": Command(
+        "write a capture in another layout: COLMAP, transforms.json or capture.json",
+        "app.cli.convert_command",
+        "Nothing was written.",
+    ),
     "gate": Command("say what is static in a project and why, and overrule it", "app.cli.gate_command"),
     "doctor": Command(
         "look at this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.doctor_command"

@@ -39,6 +39,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--project", type=path_argument, required=True, help="project folder; made when it is not there"
     )
     command.add_argument("--clips", default=":", metavar="A:B", help="clips A up to B, B not included (default: all)")
+    command.add_argument(
+        "--frames", metavar="A:B", help="frames A up to B of the capture, B not included (default: all)"
+    )
     add_follow_links(command)
     add_training_settings(command)
     command.add_argument("--seed", type=int, help="fixes initial values and order of pictures (default: 0)")

@@ -71,11 +71,16 @@ class Clouds:
         path = opened.project.first_cloud_path
         if path.is_file() or not opened.project.is_writable:
             return
-        capture_path, follow_links = opened.capture.path, opened.capture.follow_links
+        capture = opened.capture
 
         def work(context: JobContext) -> Path:
             return make_cloud(
-                capture_path, holdout=opened.holdout, path=path, context=context, follow_links=follow_links
+                capture.path,
+                holdout=opened.holdout,
+                path=path,
+                context=context,
+                frames=capture.frames,
+                follow_links=capture.follow_links,
             )
 
         def failed(error: Exception) -> None:  # the hint stays; training will say what is wrong

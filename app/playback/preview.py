@@ -62,7 +62,13 @@ def picture_hint(capture: Capture, frame_index: int) -> PointArrays:
 
 
 def make_cloud(
-    capture_path: Path, *, holdout: tuple[int, ...], path: Path, context: JobContext, follow_links: bool = False
+    capture_path: Path,
+    *,
+    holdout: tuple[int, ...],
+    path: Path,
+    context: JobContext,
+    frames: tuple[int, int] | None = None,
+    follow_links: bool = False,
 ) -> Path:
     """Build the first cloud in a process and wait for it. To be run on a job's thread.
 
@@ -71,12 +77,15 @@ def make_cloud(
         holdout: Cameras to leave out, as training does.
         path: File for the cloud.
         context: Receives signs of life; cancelling it ends the process.
-        follow_links: As of the capture, see engine.capture.capture.
+        frames, follow_links: As of the capture, see engine.capture.capture.
     Raises:
         PreparationError: There is no cloud; the log says why.
     """
     process = multiprocessing.get_context("spawn").Process(
-        target=write_cloud, args=(str(capture_path), holdout, str(path), follow_links), name="first cloud", daemon=True
+        target=write_cloud,
+        args=(str(capture_path), holdout, str(path), frames, follow_links),
+        name="first cloud",
+        daemon=True,
     )
     with undisturbed():
         process.start()
@@ -93,16 +102,18 @@ def make_cloud(
     return path
 
 
-def write_cloud(capture_path: str, holdout: tuple[int, ...], path: str, follow_links: bool) -> None:
+def write_cloud(
+    capture_path: str, holdout: tuple[int, ...], path: str, frames: tuple[int, int] | None, follow_links: bool
+) -> None:
     """Build and write the first cloud. Runs in the child; its exit code is 1 when there is none."""
     lower_process()
     from engine.cloud.stereo.static_cloud import build_static_cloud
 
     try:
-        capture = open_capture(capture_path, follow_links=follow_links)
+        capture = open_capture(capture_path, frames=frames, follow_links=follow_links)
         widest = int(capture.rig.image_sizes[:, 0].max())
         if widest > CLOUD_WIDTH_PX:
-            capture = open_capture(capture_path, scale=CLOUD_WIDTH_PX / widest, follow_links=follow_links)
+            capture = capture.resized(CLOUD_WIDTH_PX / widest, frames)
         cameras = capture.training_cameras(holdout)
         pictures = np.stack([capture.frame(camera, 0) for camera in cameras])
         cloud = build_static_cloud(

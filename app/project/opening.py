@@ -8,6 +8,7 @@ from pathlib import Path
 
 from app.background.jobs import JobContext
 from app.project.clip_catalog import ClipCatalog
+from app.project.opening_answers import OpeningAnswers, window_scale
 from app.project.project import (
     PROJECT_FILE,
     Project,
@@ -23,20 +24,18 @@ from app.project.recents import RecentProject, project_name
 from engine.capture.capture import Capture, open_capture
 from engine.errors import CaptureError, ProjectError
 
-WINDOW_WIDTH_PX = 960
-"""Wider captures are worked on at a smaller scale unless one is asked for; training on a CPU goes with the pixels."""
-
 
 @dataclass(frozen=True, slots=True)
 class Opened:
     """A capture and its project, or a choice between its projects.
 
     Attributes:
-        project: None where it is the one already open, or one has to be chosen.
+        project: None where it is the one already open, or the user has to be asked.
         catalog: What lies on disk of its clips; None without a project.
         choices: The projects to choose from; empty where there is nothing to choose.
         note: Kind, title, detail and hint of something that the user has to know, or None.
         follow_links: Of a choice: whether the user allows the capture's files to lie outside of its folder.
+        is_asking: There is no project yet, and the user is to see the capture before one is made.
     """
 
     capture: Capture
@@ -45,6 +44,7 @@ class Opened:
     choices: tuple[RecentProject, ...] = ()
     note: tuple[str, str, str, str] | None = None
     follow_links: bool = False
+    is_asking: bool = False
 
 
 def open_for_window(
@@ -57,6 +57,9 @@ def open_for_window(
     recent: Sequence[RecentProject] = (),
     is_new_project: bool = False,
     follow_links: bool = False,
+    is_asking: bool = False,
+    answers: OpeningAnswers | None = None,
+    known: Capture | None = None,
 ) -> Opened:
     """Open a capture folder or a project folder.
 
@@ -70,25 +73,29 @@ def open_for_window(
         recent: Projects opened lately; those of this capture may be opened.
         is_new_project: Start another project, whatever there is.
         follow_links: Whether the user allows the capture's files to lie outside of its folder; noted in the project.
+        is_asking: Only look at the capture where a project would have to be made.
+        answers: What a new project begins with; None takes the scale and what the capture suggests.
+        known: The capture where it was opened already.
     Raises:
         CaptureError, ProjectError: It cannot be opened.
     """
     context.report(0.0, path.name)
     if is_project(path):
         return _open_project(path, current, context, follow_links=follow_links)
-    capture = open_capture(path, scale=1.0 if scale is None else scale, follow_links=follow_links)
-    widest = int(capture.rig.image_sizes[:, 0].max())
-    if scale is None and widest > WINDOW_WIDTH_PX:
-        capture = open_capture(path, scale=WINDOW_WIDTH_PX / widest, follow_links=follow_links)
+    capture = known or open_capture(path, scale=1.0 if scale is None else scale, follow_links=follow_links)
+    if answers is not None:
+        capture = capture.resized(answers.scale, answers.frames)
+    elif scale is None:
+        capture = capture.resized(window_scale(capture))
     context.report(0.3, f"{len(capture.rig)} cameras, {capture.n_frames} frames")
     there = capture if scale is None else None
     if project_dir is not None:
         if (project_dir / PROJECT_FILE).is_file():
             return _open_project(project_dir, current, context, there, follow_links=follow_links)
-        return _make_project(project_dir, capture)
+        return _make_project(project_dir, capture, answers, is_asking=is_asking)
     found = projects_of(capture, recent)
     if is_new_project or not found:
-        return _make_project(new_project_dir(capture), capture)
+        return _make_project(new_project_dir(capture), capture, answers, is_asking=is_asking)
     if len(found) > 1:
         return Opened(capture, choices=tuple(found), follow_links=follow_links)
     opened = _open_project(found[0].folder, current, context, there, follow_links=follow_links)
@@ -98,8 +105,13 @@ def open_for_window(
     return replace(opened, note=("info", "The project of this capture was opened", told, ""))
 
 
-def _make_project(folder: Path, capture: Capture) -> Opened:
-    project = create_project(folder, default_settings(capture))
+def _make_project(folder: Path, capture: Capture, answers: OpeningAnswers | None, *, is_asking: bool) -> Opened:
+    if is_asking:
+        return Opened(capture, follow_links=capture.follow_links, is_asking=True)
+    settings = default_settings(capture)
+    if answers is not None:
+        settings = default_settings(capture, clip_length=answers.clip_length, holdout=answers.holdout)
+    project = create_project(folder, settings)
     return Opened(capture, project, ClipCatalog(project, len(project.clips(capture.n_frames))))
 
 
@@ -116,12 +128,12 @@ def _open_project(
     if capture is None:
         capture = open_capture_of(settings, folder)
     else:
+        check_capture(capture, settings, folder)
         capture = (
             capture
-            if capture.scale == settings.scale
-            else open_capture(capture.path, scale=settings.scale, follow_links=settings.follow_links)
+            if (capture.scale, capture.frames) == (settings.scale, settings.frames)
+            else capture.resized(settings.scale, settings.frames)
         )
-        check_capture(capture, settings, folder)
     if current is not None and current.resolve() == folder.resolve():
         return Opened(capture)
     note = None
@@ -159,7 +171,8 @@ def projects_of(capture: Capture, recent: Sequence[RecentProject] = ()) -> list[
             continue
         if settings.fingerprint == capture.fingerprint:
             n_trained = sum(1 for _ in (folder / "clips").glob("[0-9]*.safetensors"))
-            n_clips = len(settings.clips(capture.n_frames))
+            first, stop = settings.frames or (0, capture.layout.n_frames)
+            n_clips = len(settings.clips(stop - first))
             name = project_name(folder, capture.path)
             opened = next((entry.opened for entry in recent if entry.folder == folder), "")
             found.append(RecentProject(str(folder), str(place), name, n_trained, n_clips, opened))
@@ -192,7 +205,7 @@ def open_capture_of(settings: ProjectSettings, folder: Path) -> Capture:
         )
     capture = open_capture(settings.capture, scale=settings.scale, follow_links=settings.follow_links)
     check_capture(capture, settings, folder)
-    return capture
+    return capture if settings.frames is None else capture.resized(settings.scale, settings.frames)
 
 
 def check_capture(capture: Capture, settings: ProjectSettings, folder: Path) -> None:

@@ -252,6 +252,7 @@ def default_settings(
         overrides=dict(overrides or {}),
         reference_clip=reference_clip,
         follow_links=capture.follow_links,
+        frames=capture.frames,
     )
     check_settings(settings, capture)
     return settings

@@ -56,6 +56,7 @@ class ProjectSettings:
         overrides: Training settings that differ from the defaults.
         reference_clip: Index of the clip that the others inherit from.
         follow_links: Whether the user allowed the capture's files to lie outside of its folder.
+        frames: First frame of the capture that is worked on, and the one after the last; None for all.
     """
 
     capture: Annotated[str, Meta(pattern=r"\A[^\0]*\Z")]
@@ -67,6 +68,7 @@ class ProjectSettings:
     overrides: dict[str, SettingValue] = field(default_factory=dict)
     reference_clip: Annotated[int, Meta(ge=0, lt=2**31)] = 0
     follow_links: bool = False
+    frames: tuple[Annotated[int, Meta(ge=0, lt=2**31)], Annotated[int, Meta(ge=1, lt=2**31)]] | None = None
     schema: int = SCHEMA
 
     def clips(self, n_frames: int) -> list[Clip]:

@@ -201,6 +201,7 @@ class Measuring:
             project=str(opened.project.folder),
             capture=str(capture.path),
             scale=capture.scale,
+            frames=capture.frames,
             follow_links=capture.follow_links,
             trained=tuple(index for index, revision in enumerate(self._revisions) if revision),
             rows=rows,

@@ -17,7 +17,7 @@ class MeasureJob:
 
     Attributes:
         project: Folder.
-        capture, scale, follow_links: How its capture is opened; the project may still name another place.
+        capture, scale, frames, follow_links: How its capture is opened; the project may still name another place.
         trained: Clips that can be measured.
         rows, pairs: What is not known, by frame and camera; pairs by the later frame. [F, C] bool
         is_kept: Whether figures are written into the project.
@@ -28,6 +28,7 @@ class MeasureJob:
     project: str
     capture: str
     scale: float
+    frames: tuple[int, int] | None
     follow_links: bool
     trained: tuple[int, ...]
     rows: np.ndarray

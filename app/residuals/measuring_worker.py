@@ -208,7 +208,13 @@ def measure(job: MeasureJob, talk: Talking) -> None:
         ParentGone: Nobody listens any more.
     """
     project = open_project(Path(job.project), is_writable=False)
-    capture = open_capture(job.capture, scale=job.scale, cache_bytes=CAPTURE_CACHE_BYTES, follow_links=job.follow_links)
+    capture = open_capture(
+        job.capture,
+        scale=job.scale,
+        frames=job.frames,
+        cache_bytes=CAPTURE_CACHE_BYTES,
+        follow_links=job.follow_links,
+    )
     opened = open_trained(project, capture)
     from engine.metrics.clips.evaluate import Evaluation
 

@@ -8,6 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.calibration.job import CalibrationRequest
+from app.project.opening_answers import OpeningAnswers
+
 
 @dataclass(frozen=True, slots=True)
 class OpenCapture:
@@ -21,6 +24,10 @@ class OpenCapture:
     """Start another project, whatever there is."""
     follow_links: bool = False
     """Whether the user allows the capture's files to lie outside of its folder; noted in its project."""
+    is_asking: bool = False
+    """Report what it is, and ask what a project of it begins with, where there is none; or why it does not open."""
+    answers: OpeningAnswers | None = None
+    """What a new project begins with; None takes what suits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -295,6 +302,25 @@ class DismissNotice:
     index: int
 
 
+@dataclass(frozen=True, slots=True)
+class LookAtVideos:
+    """Show which cameras are in a folder of plain videos, to calibrate them."""
+
+    folder: Path
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrateVideos:
+    """Find the cameras of the folder that is shown, and write capture.json."""
+
+    request: CalibrationRequest
+
+
+@dataclass(frozen=True, slots=True)
+class StopCalibration:
+    """End the calibration that runs; nothing is written."""
+
+
 EditCommand = MarkRegion | RemoveRegion | UndoMark | RedoMark
 """What changes the project's content, and can be taken back."""
 
@@ -315,6 +341,26 @@ QueueCommand = (
 )
 """What is trained when, how it is shown meanwhile, and which version of it counts."""
 
+
+@dataclass(frozen=True, slots=True)
+class SynchroniseCameras:
+    """Measure how far the cameras of the open capture are ahead of each other."""
+
+
+@dataclass(frozen=True, slots=True)
+class ApplyOffsets:
+    """Write a capture with the offsets that were measured."""
+
+    target: Path
+    """The capture's own folder, or another one."""
+
+
+SynchronisationCommand = SynchroniseCameras | ApplyOffsets
+"""Cameras that are ahead of others."""
+
+CalibrationCommand = LookAtVideos | CalibrateVideos | StopCalibration
+"""From plain videos to a capture."""
+
 Command = (
     OpenCapture
     | OpenProject
@@ -332,6 +378,8 @@ Command = (
     | ShowHeat
     | SettingCommand
     | EditCommand
+    | CalibrationCommand
+    | SynchronisationCommand
     | HomeView
     | SetFrameMemory
     | SetCompareWith

@@ -10,7 +10,8 @@ from app.project.opening import Opened, open_for_window
 from app.project.recents import RecentProject
 from app.session.commands import OpenCapture, OpenProject
 from app.session.notices import Notice, Notices
-from engine.errors import EngineError
+from engine.capture.capture import Capture
+from engine.errors import CaptureError, EngineError
 from engine.text import printable
 
 
@@ -22,6 +23,7 @@ class ProjectOpener:
         project_dir: Folder for the project of the next capture; the user's data folder when None.
         take: Called by `Jobs.poll` with what was opened.
         open_path: Opens a path on the thread; tests bring their own.
+        refuse: Told the folder that does not open and why, where the user was to be asked about it.
     """
 
     def __init__(
@@ -32,21 +34,29 @@ class ProjectOpener:
         *,
         project_dir: Path | None = None,
         open_path: Callable[..., Opened] = open_for_window,
+        refuse: Callable[[Path, EngineError], None] | None = None,
     ) -> None:
         self.project_dir = project_dir
         self._jobs, self._notices, self._take, self._open_path = jobs, notices, take, open_path
+        self._refuse = refuse
         self._refusals: list[Notice] = []
         self._newest: object | None = None
         """Stands for what was asked for last."""
 
     def open(
-        self, command: OpenCapture | OpenProject, *, current: Path | None, recent: Sequence[RecentProject]
+        self,
+        command: OpenCapture | OpenProject,
+        *,
+        current: Path | None,
+        recent: Sequence[RecentProject],
+        known: Capture | None = None,
     ) -> None:
         """Open something; see app.project.opening for what that means.
 
         Args:
             current: Folder of the project that is open now.
             recent: Projects opened lately; those of the capture may be opened.
+            known: The capture where it was opened already.
         """
         path, recent, project_dir = Path(command.path), tuple(recent), self.project_dir
         asked = command if isinstance(command, OpenCapture) else OpenCapture(path)
@@ -62,17 +72,25 @@ class ProjectOpener:
                 recent=recent,
                 is_new_project=asked.is_new_project,
                 follow_links=asked.follow_links,
+                is_asking=asked.is_asking,
+                answers=asked.answers,
+                known=known,
             )
 
         def take(opened: Opened) -> None:
             if this is self._newest:
                 self._withdraw_refusals()
                 self._take(opened)
-            elif opened.project is not None:  # something else was asked for meanwhile
-                opened.project.close()
+            elif opened.project is not None or opened.is_asking:  # something else was asked for meanwhile
+                if opened.project is not None:
+                    opened.project.close()
                 opened.capture.close()
 
         def failed(error: Exception) -> None:
+            if asked.is_asking and self._refuse is not None and isinstance(error, CaptureError):
+                if this is self._newest:
+                    self._refuse(path, error)
+                return
             notice = self._notices.add_failure(f"{printable(path.name or str(path))} cannot be opened", error)
             if isinstance(error, EngineError):
                 self._refusals.append(notice)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from app.project.capture_report import CaptureReport
 from app.project.clip_catalog import ClipCatalog
+from app.project.opening_answers import OpeningAnswers
 from app.project.recents import RecentProject
 
 
@@ -85,6 +87,23 @@ class OwnSetting:
     value: int | float | str | bool
     choices: tuple[str, ...] = ()
     help_text: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OpeningPage:
+    """A capture without a project, and what the user is asked about it.
+
+    Attributes:
+        report: What it is.
+        answers: What is offered.
+        is_new_project: Whether there are projects of it already, and another one was asked for.
+        follow_links: Whether its files may lie outside of its folder.
+    """
+
+    report: CaptureReport
+    answers: OpeningAnswers
+    is_new_project: bool
+    follow_links: bool
 
 
 Question = RetrainQuestion | SettingsQuestion | ProjectQuestion

@@ -25,6 +25,7 @@ from app.playback.view_modes import CONTENTS, MODES, ShownAs
 from app.playback.views import Views
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
+from app.project.opening_answers import answers_to_keep
 from app.project.project import Project, check_settings
 from app.project.recents import project_name
 from app.residuals.anchor_heat import AnchorHeat
@@ -32,6 +33,8 @@ from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.residuals.residuals import Residuals
 from app.session import commands
 from app.session.attention import Attention
+from app.session.calibrating import Calibrating
+from app.session.capture_opening import CaptureOpening
 from app.session.clip_versions import Versions
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
@@ -43,6 +46,7 @@ from app.session.queue_commands import QueueCommands
 from app.session.recent_projects import RecentProjects
 from app.session.setting_changes import changed_settings
 from app.session.settings import Settings
+from app.session.synchronising import Synchronising
 from app.status import (
     CAPTURED,
     COMPARE_MODES,
@@ -81,6 +85,9 @@ class Session:
         versions: What clips were before they were trained again.
         log: What program and training have said.
         question: What the user has to answer; None while there is nothing to ask.
+        opening: What is asked about a capture that has no project yet.
+        calibrating: Plain videos on their way to a capture.
+        synchronising: How far the cameras of the open capture are ahead of each other.
         recent: What was opened lately.
         notices: What the user has to know.
 
@@ -116,7 +123,10 @@ class Session:
         self.usage = UsageStatus()
         self._launch, self._is_preloading, self._is_closed = launch, is_preloading, False
         self._jobs = Jobs(self._fail)
-        settings = Settings() if settings is None else settings
+        self._settings = settings = Settings() if settings is None else settings
+        self.opening = CaptureOpening(can_measure=is_preloading)
+        self._is_new_asked = False
+        self.calibrating, self.synchronising = Calibrating(), Synchronising()
         self.live_training = LiveTraining(
             self._jobs,
             self.notices,
@@ -133,7 +143,12 @@ class Session:
         self.regions: RegionsStatus = self.marking.status([])
         self.recent = RecentProjects(settings)
         self.opener = ProjectOpener(
-            self._jobs, self.notices, self._take_opened, project_dir=project_dir, open_path=opener
+            self._jobs,
+            self.notices,
+            self._take_opened,
+            project_dir=project_dir,
+            open_path=opener,
+            refuse=self.opening.refuse,
         )
         self._attention = Attention()
         self._seen = self._news_key()
@@ -218,11 +233,26 @@ class Session:
             case commands.OpenCapture() | commands.OpenProject():
                 self.question = None
                 current = None if self.project is None else self.project.folder
-                self.opener.open(command, current=current, recent=self.recent.entries)
+                known = self._take_answers(command) if isinstance(command, commands.OpenCapture) else None
+                self.opener.open(command, current=current, recent=self.recent.entries, known=known)
             case commands.ForgetRecent(folder=folder):
                 self.recent.forget(Path(folder))
             case commands.CloseQuestion():
                 self.question = None
+                self.opening.close_page()
+                self.calibrating.close_page()
+                self.synchronising.close_page()
+            case commands.SynchroniseCameras():
+                self.synchronising.measure(self.opened)
+            case commands.ApplyOffsets(target=target):
+                self.synchronising.apply(target)
+            case commands.LookAtVideos(folder=folder):
+                self.opening.close_page()
+                self.calibrating.look(folder)
+            case commands.CalibrateVideos(request=request):
+                self.calibrating.start(request)
+            case commands.StopCalibration():
+                self.calibrating.stop()
             case commands.TrainNextClip():
                 self.question = None
                 live.train_next()
@@ -314,7 +344,21 @@ class Session:
 
     # ---------------------------------------------------------------- opening
 
+    def _take_answers(self, command: commands.OpenCapture) -> Capture | None:
+        """The user has answered, or asks for something else. The capture where it is open already."""
+        known = None if command.answers is None else self.opening.take(Path(command.path))
+        if known is not None and command.answers is not None:
+            self._settings.set_last_answers(answers_to_keep(command.answers, known))
+        self._is_new_asked = command.is_new_project
+        self.opening.close_page()
+        self.calibrating.close_page()
+        self.synchronising.close_page()
+        return known
+
     def _take_opened(self, found: Opened) -> None:
+        if found.is_asking:
+            self.opening.ask(found.capture, self._settings.last_answers, is_new_project=self._is_new_asked)
+            return
         if found.choices:
             self.question = ProjectQuestion(str(found.capture.path), found.choices, found.follow_links)
             return
@@ -367,6 +411,7 @@ class Session:
         """Take in what threads and workers finished. Whether something visible changed."""
         has_changed = self._jobs.poll()
         self.recent.poll()
+        has_changed |= self.opening.poll() | self.calibrating.poll() | self.synchronising.poll()
         events = self.live_training.poll()
         if any(isinstance(event, ENDINGS) for event in events):
             self._keep_recent()
@@ -392,7 +437,16 @@ class Session:
         seen = (self.versions.worker.newest, self.log.worker.newest)
         looked = tuple(None if found is None else found[0] for found in seen)
         finished = self.playback.finished, self.live_training.finished, self.recent.pictures.revision
-        return *finished, looked, jobs, self.notices.revision, self.recent.missing
+        return (
+            *finished,
+            *self.opening.finished,
+            *self.calibrating.finished,
+            *self.synchronising.finished,
+            looked,
+            jobs,
+            self.notices.revision,
+            self.recent.missing,
+        )
 
     def _release_snapshot(self) -> None:
         """Give a snapshot back once it was read, or where nobody looks at its clip."""
@@ -450,6 +504,9 @@ class Session:
         if self.project is not None:
             self.project.close()
         self.recent.close()
+        self.opening.close()
+        self.calibrating.close()
+        self.synchronising.close()
         self.residuals.close()
         self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)
         self.playback.close()
@@ -573,6 +630,7 @@ _TITLES: dict[type, str] = {
     commands.SetClipLength: "The clip length cannot be changed",
     commands.SetTrainSetting: "The setting cannot be changed",
     commands.SetPreset: "The preset cannot be taken",
+    commands.SynchroniseCameras: "The cameras cannot be synchronised",
     commands.MarkRegion: "The region cannot be marked",
     commands.RemoveRegion: "The region cannot be removed",
     commands.UndoMark: "The last mark cannot be taken back",

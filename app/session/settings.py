@@ -8,6 +8,9 @@ import logging
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
+from app.project.opening_answers import LastAnswers
 from app.project.recents import RecentProject, read_recents, recents_document, with_entry
 from app.training.messages import LIVE_VIEWS
 from engine.storage.json_files import JsonError, read_checked_json, write_checked_json
@@ -24,6 +27,7 @@ class Settings:
     Attributes:
         recent: Projects that were opened lately, newest first.
         live_view: How often the clip that trains is shown anew: "off", "low" or "live".
+        last_answers: What was answered when a capture was opened last.
 
     Args:
         path: The file; the platform's place when None.
@@ -34,6 +38,12 @@ class Settings:
         document = _read(self.path)
         self.recent: list[RecentProject] = read_recents(document)
         self.live_view = found if (found := document.get("live_view")) in LIVE_VIEWS else "live"
+        self.last_answers = _last_answers(document.get("opening"))
+
+    def set_last_answers(self, answers: LastAnswers) -> None:
+        """Keep what was answered when a capture was opened."""
+        self.last_answers = answers
+        self._save()
 
     def add_recent(self, entry: RecentProject) -> None:
         """Put a project first in the list of recent ones."""
@@ -53,11 +63,20 @@ class Settings:
         self._save()
 
     def _save(self) -> None:
-        document = {"schema": 1, "live_view": self.live_view} | recents_document(self.recent)
+        document = {"schema": 1, "live_view": self.live_view}
+        document |= {"opening": msgspec.to_builtins(self.last_answers)} | recents_document(self.recent)
         try:
             write_checked_json(self.path, document)
         except OSError as error:
             logger.warning("preferences could not be saved (%s) - %s", error.strerror, self.path)
+
+
+def _last_answers(found: Any) -> LastAnswers:
+    """The values of a document; the usual ones where they make no sense."""
+    try:
+        return LastAnswers() if found is None else msgspec.convert(found, LastAnswers)
+    except msgspec.ValidationError:
+        return LastAnswers()
 
 
 def _read(path: Path) -> dict[str, Any]:

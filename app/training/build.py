@@ -28,7 +28,7 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
     report(Progress("Starting", 0.0))
     warm_up_reporting(report)
     project = open_project(job.project, is_writable=False)
-    capture = open_capture(Path(job.capture), scale=job.scale, follow_links=job.follow_links)
+    capture = open_capture(Path(job.capture), scale=job.scale, frames=job.frames, follow_links=job.follow_links)
     if capture.fingerprint != project.settings.fingerprint:
         raise ProjectError(
             "The capture is not the one this project was made for.",

@@ -30,6 +30,7 @@ class TrainJob:
         clip_index: The clip to train.
         holdout: Camera indices never trained on.
         follow_links: Whether files of the capture may lie outside of its folder.
+        frames: Of the capture, as in the project.
         is_window_open: Leave a core, or at least right of way, to a window.
         live_view: How often snapshots are written, one of LIVE_VIEWS.
     """
@@ -45,6 +46,7 @@ class TrainJob:
     is_window_open: bool = True
     follow_links: bool = False
     live_view: str = "live"
+    frames: tuple[int, int] | None = None
 
 
 # ---------------------------------------------------------------- commands

@@ -358,6 +358,7 @@ class TrainingService:
             is_window_open=self._is_window_open,
             follow_links=settings.follow_links,
             live_view=self.live_view,
+            frames=settings.frames,
         )
         self._stage, self._step, self._ending = StageReported("", 0.0), None, None
         self._is_ready = self._is_paused = self._is_stopping = False

@@ -24,12 +24,14 @@ class Expectations:
     Attributes:
         principal: Of the principal point from the middle, as a share of the picture's width. 0 keeps it there.
         focal: Of ln(focal length) from that at the start.
+        aspect: Of ln(height divided by width of a pixel) from 0.
         lens: Of each number of the lens from 0.
         is_shared: Whether all cameras have one focal length, principal point and lens.
     """
 
     principal: float = 0.02
     focal: float = 0.5
+    aspect: float = 0.003
     lens: float = 0.2
     is_shared: bool = False
 
@@ -83,7 +85,7 @@ def adjust(
     Returns:
         Cameras and points [M, 3].
     """
-    n_cameras, n_params = len(cameras), 9 + cameras.lens_params.shape[1]
+    n_cameras, n_params = len(cameras), 10 + cameras.lens_params.shape[1]
     share = _sharing(n_cameras, n_params, expect.is_shared)
     start_focals = np.log(cameras.focals)
     stiffness = _stiffness(n_params, widths, expect)
@@ -137,8 +139,9 @@ def _stiffness(n_params: int, widths: np.ndarray, expect: Expectations) -> np.nd
     """One over the square of each expectation's deviation. [C, P]"""
     stiffness = np.zeros((len(widths), n_params))
     stiffness[:, 6] = expect.focal**-2
-    stiffness[:, 7:9] = (1.0 / np.maximum(expect.principal * widths, 1e-6) ** 2)[:, None]
-    stiffness[:, 9:] = expect.lens**-2
+    stiffness[:, 7] = expect.aspect**-2
+    stiffness[:, 8:10] = (1.0 / np.maximum(expect.principal * widths, 1e-6) ** 2)[:, None]
+    stiffness[:, 10:] = expect.lens**-2
     return stiffness
 
 
@@ -146,8 +149,9 @@ def _expected(cameras: Cameras, start_focals: np.ndarray, middles: np.ndarray, n
     """How far each number is from what is expected of it. [C, P]"""
     off = np.zeros((len(cameras), n_params))
     off[:, 6] = np.log(cameras.focals) - start_focals
-    off[:, 7:9] = cameras.principal - middles
-    off[:, 9:] = cameras.lens_params
+    off[:, 7] = np.log(cameras.aspects)
+    off[:, 8:10] = cameras.principal - middles
+    off[:, 10:] = cameras.lens_params
     return off
 
 
@@ -163,7 +167,7 @@ def _sharing(n_cameras: int, n_params: int, is_shared: bool) -> sparse.csr_matri
 
 
 def _jacobians(cameras: Cameras, points: np.ndarray, seen: Observations) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of pixels by rotation, translation, ln focal, principal point, lens; and by points."""
+    """Derivatives of pixels by rotation, translation, ln focal, ln aspect, principal point, lens; and by points."""
     rows, n_lens = seen.cameras, cameras.lens_params.shape[1]
     rotations, params = cameras.rotations[rows], cameras.lens_params[rows]
     turned = np.einsum("nij,nj->ni", rotations, points[seen.points])
@@ -173,14 +177,15 @@ def _jacobians(cameras: Cameras, points: np.ndarray, seen: Observations) -> tupl
     to_plane = np.zeros((len(rows), 2, 3))
     to_plane[:, 0, 0] = to_plane[:, 1, 1] = 1 / depth
     to_plane[:, :, 2] = -plane / depth[:, None]
-    focals = cameras.focals[rows, None, None]
+    focals = cameras.focals_xy[rows, :, None]
     by_inside = focals * plane_jacobian(cameras.lens, plane, params) @ to_plane
-    J = np.zeros((len(rows), 2, 9 + n_lens))
+    J = np.zeros((len(rows), 2, 10 + n_lens))
     J[:, :, :3] = by_inside @ -skew(turned)
     J[:, :, 3:6] = by_inside
-    J[:, :, 6] = focals[:, 0] * distort(cameras.lens, plane, params)
-    J[:, :, 7:9] = np.eye(2)
-    J[:, :, 9:] = focals * lens_jacobian(cameras.lens, plane, params)
+    J[:, :, 6] = focals[..., 0] * distort(cameras.lens, plane, params)
+    J[:, 1, 7] = J[:, 1, 6]
+    J[:, :, 8:10] = np.eye(2)
+    J[:, :, 10:] = focals * lens_jacobian(cameras.lens, plane, params)
     return J, by_inside @ rotations
 
 
@@ -219,6 +224,7 @@ def _moved(cameras: Cameras, step: np.ndarray) -> Cameras:
         rotations=rotation_of(-step[:, :3]) @ cameras.rotations,
         translations=cameras.translations - step[:, 3:6],
         focals=cameras.focals * np.exp(np.clip(-step[:, 6], -0.5, 0.5)),
-        principal=cameras.principal - step[:, 7:9],
-        lens_params=cameras.lens_params - step[:, 9:],
+        aspects=cameras.aspects * np.exp(np.clip(-step[:, 7], -0.1, 0.1)),
+        principal=cameras.principal - step[:, 8:10],
+        lens_params=cameras.lens_params - step[:, 10:],
     )

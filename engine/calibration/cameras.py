@@ -20,7 +20,8 @@ class Cameras:
         lens: One of N_LENS.
         rotations: World to camera. [C, 3, 3]
         translations: [C, 3]
-        focals: One focal length per camera, px. [C]
+        focals: Focal lengths along x, px. [C]
+        aspects: Focal length along y divided by that along x; 1 for nearly all sensors. [C]
         principal: Principal points, px. [C, 2]
         lens_params: [C, N_LENS[lens]]
     """
@@ -29,6 +30,7 @@ class Cameras:
     rotations: np.ndarray
     translations: np.ndarray
     focals: np.ndarray
+    aspects: np.ndarray
     principal: np.ndarray
     lens_params: np.ndarray
 
@@ -40,6 +42,11 @@ class Cameras:
         """Where they stand. [C, 3]"""
         return -np.einsum("cji,cj->ci", self.rotations, self.translations)
 
+    @property
+    def focals_xy(self) -> np.ndarray:
+        """Focal lengths along x and y, px. [C, 2]"""
+        return np.stack([self.focals, self.focals * self.aspects], axis=-1)
+
     def moved(self, scale: float, rotation: np.ndarray, shift: np.ndarray) -> Self:
         """The same cameras in another world: points there are scale * rotation @ point + shift."""
         rotations = self.rotations @ rotation.T
@@ -50,11 +57,11 @@ class Cameras:
         inside = np.einsum("nij,nj->ni", self.rotations[rows], points) + self.translations[rows]
         plane = inside[:, :2] / safe_depth(inside[:, 2:])
         seen = distort(self.lens, plane, self.lens_params[rows])
-        return seen * self.focals[rows, None] + self.principal[rows], inside[:, 2]
+        return seen * self.focals_xy[rows] + self.principal[rows], inside[:, 2]
 
     def plane(self, row: int, pixels: np.ndarray) -> np.ndarray:
         """Pixels [K, 2] of one camera on its plane at depth 1, without distortion. [K, 2]"""
-        seen = (pixels - self.principal[row]) / self.focals[row]
+        seen = (pixels - self.principal[row]) / self.focals_xy[row]
         return undistort(self.lens, seen, np.broadcast_to(self.lens_params[row], (len(seen), N_LENS[self.lens])))
 
 

@@ -104,6 +104,7 @@ def _estimate(reconstruction: Any, lens: str) -> FirstEstimate:
             rotations=np.array([pose.rotation.matrix() for pose in poses]),
             translations=np.array([pose.translation for pose in poses]),
             focals=params[:, 0],
+            aspects=np.ones(len(images)),
             principal=params[:, 1:3],
             lens_params=lens_params,
         ),

@@ -20,6 +20,8 @@ MAX_DISTANCE = 0.8
 """Distance of unit descriptors."""
 TWIN_PX = 3.0
 """Key points that near each other are one place with several directions or sizes: no rivals of each other."""
+N_RIVALS = 6
+"""Best matches that are looked at for one that is not a twin."""
 Pair = tuple[int, int]
 
 
@@ -74,14 +76,24 @@ def match_guided(
         essential = essential_matrix(cameras, *pair)
         found = [np.zeros((0, 2), dtype=np.int64)]
         for rows_a, rows_b in _equal_moments(first, second):
-            off = epipolar_px(cameras, pair, essential, planes[pair[0]][rows_a, None], planes[pair[1]][None, rows_b])
             alike = first.descriptors[rows_a] @ second.descriptors[rows_b].T
-            alike[off > reach_px] = -1.0
+            plane_a, plane_b = homogeneous(planes[pair[0]][rows_a]), homogeneous(planes[pair[1]][rows_b])
+            lines = plane_a @ essential.T
+            slopes_a = (lines[:, :2] ** 2).sum(-1) / cameras.focals[pair[1]] ** 2
+            slopes_b = ((plane_b @ essential)[:, :2] ** 2).sum(-1) / cameras.focals[pair[0]] ** 2
+            products = lines.astype(np.float32) @ plane_b.astype(np.float32).T
+            limits = np.add.outer(slopes_a, slopes_b).astype(np.float32) * np.float32(reach_px**2)
+            alike[products**2 > limits] = -1.0
             chosen = _mutual_best(alike, second.pixels[rows_b], first.pixels[rows_a], GUIDED_RATIO)
             found.append(np.stack([rows_a[chosen[:, 0]], rows_b[chosen[:, 1]]], axis=-1))
         return np.concatenate(found)
 
     return dict(zip(pairs, map_ordered(one, pairs), strict=True))
+
+
+def homogeneous(plane: np.ndarray) -> np.ndarray:
+    """Points [K, 2] with a 1 behind them. [K, 3]"""
+    return np.concatenate([plane, np.ones((len(plane), 1))], axis=1)
 
 
 def essential_matrix(cameras: Cameras, a: int, b: int) -> np.ndarray:
@@ -90,16 +102,14 @@ def essential_matrix(cameras: Cameras, a: int, b: int) -> np.ndarray:
     return skew(cameras.translations[b] - rotation @ cameras.translations[a]) @ rotation
 
 
-def epipolar_px(cameras: Cameras, pair: Pair, essential: np.ndarray, plane_a: np.ndarray, plane_b: np.ndarray):
-    """Sampson distance in pixels of points on the planes of two cameras, [..., 2] that broadcast. [...]"""
-    E = essential
-    ax, ay, bx, by = plane_a[..., 0], plane_a[..., 1], plane_b[..., 0], plane_b[..., 1]
-    line_b = [E[i, 0] * ax + E[i, 1] * ay + E[i, 2] for i in range(3)]
-    line_a = [E[0, i] * bx + E[1, i] * by + E[2, i] for i in range(2)]
-    product = bx * line_b[0] + by * line_b[1] + line_b[2]
-    slopes = (line_b[0] ** 2 + line_b[1] ** 2) / cameras.focals[pair[1]] ** 2
-    slopes = slopes + (line_a[0] ** 2 + line_a[1] ** 2) / cameras.focals[pair[0]] ** 2
-    return np.abs(product) / np.sqrt(np.maximum(slopes, 1e-18))
+def epipolar_px(cameras: Cameras, pair: Pair, plane_a: np.ndarray, plane_b: np.ndarray) -> np.ndarray:
+    """Sampson distance of matches, points [M, 2] on the planes of two cameras, in pixels. [M]"""
+    essential = essential_matrix(cameras, *pair)
+    line_b, line_a = homogeneous(plane_a) @ essential.T, homogeneous(plane_b) @ essential
+    products = (homogeneous(plane_b) * line_b).sum(-1)
+    slopes = (line_b[:, :2] ** 2).sum(-1) / cameras.focals[pair[1]] ** 2
+    slopes += (line_a[:, :2] ** 2).sum(-1) / cameras.focals[pair[0]] ** 2
+    return np.abs(products) / np.sqrt(np.maximum(slopes, 1e-18))
 
 
 def _equal_moments(first: KeyPoints, second: KeyPoints):
@@ -126,8 +136,12 @@ def _mutual_best(alike: np.ndarray, pixels_b: np.ndarray, pixels_a: np.ndarray, 
 
 def _is_clear(alike: np.ndarray, best: np.ndarray, pixels: np.ndarray, max_ratio: float) -> np.ndarray:
     """Whether the best column of each row beats every other that is not its twin. [rows]"""
-    rivals = alike.copy()
-    is_twin = ((pixels[best][:, None] - pixels[None]) ** 2).sum(-1) < TWIN_PX**2
+    if not len(alike):
+        return np.zeros(0, dtype=bool)
+    n = min(N_RIVALS, alike.shape[1])
+    columns = np.argpartition(alike, alike.shape[1] - n, axis=1)[:, -n:]
+    rivals = np.take_along_axis(alike, columns, axis=1)
+    is_twin = ((pixels[columns] - pixels[best][:, None]) ** 2).sum(-1) < TWIN_PX**2
     rivals[is_twin] = -1.0
     return _distance(alike[np.arange(len(alike)), best]) < max_ratio * _distance(rivals.max(1))
 

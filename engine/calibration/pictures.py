@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.calibration.videos import PlainVideo
-from engine.capture.frames import resize_area
+from engine.capture.camera_optics import resize_area
 from engine.cloud.background.background import estimate_background
 from engine.images.image_filters import dilate, erode
 

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from engine.calibration.bundle import Observations, errors_px
 from engine.calibration.cameras import Cameras
-from engine.calibration.matching import KeyPoints, Pair, epipolar_px, essential_matrix
+from engine.calibration.matching import KeyPoints, Pair, epipolar_px
 
 MIN_ANGLE_DEG = 1.5
 """Between the rays to a point: less says nothing about its distance."""
@@ -23,6 +23,11 @@ class Tracks:
     points: np.ndarray
     seen: Observations
 
+    @staticmethod
+    def none() -> Tracks:
+        """No tracks."""
+        return Tracks(np.zeros((0, 3)), Observations(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2))))
+
 
 def fitting_matches(
     matches: dict[Pair, np.ndarray], key_points: list[KeyPoints], cameras: Cameras, reach_px: float
@@ -31,8 +36,7 @@ def fitting_matches(
     planes = [cameras.plane(row, points.pixels) for row, points in enumerate(key_points)]
     kept = {}
     for pair, rows in matches.items():
-        essential = essential_matrix(cameras, *pair)
-        off = epipolar_px(cameras, pair, essential, planes[pair[0]][rows[:, 0]], planes[pair[1]][rows[:, 1]])
+        off = epipolar_px(cameras, pair, planes[pair[0]][rows[:, 0]], planes[pair[1]][rows[:, 1]])
         kept[pair] = rows[off <= reach_px]
     return kept
 
@@ -48,7 +52,7 @@ def build_tracks(
     offsets = np.concatenate([[0], np.cumsum([len(points) for points in key_points])])
     edges = [(pair, rows) for pair, rows in sorted(matches.items()) if len(rows)]
     if not edges:
-        return Tracks(np.zeros((0, 3)), Observations(*(np.zeros(0, int),) * 2, np.zeros((0, 2))))
+        return Tracks.none()
     a = np.concatenate([rows[:, 0] + offsets[pair[0]] for pair, rows in edges])
     b = np.concatenate([rows[:, 1] + offsets[pair[1]] for pair, rows in edges])
     graph = sparse.coo_matrix((np.ones(len(a)), (a, b)), shape=(offsets[-1], offsets[-1]))

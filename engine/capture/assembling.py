@@ -24,17 +24,23 @@ from engine.capture.format_checks import (
     shortened,
 )
 from engine.capture.format_result import CameraEntry, Layout
-from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames, VideoFrames
+from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames, VideoFrames, is_turned_as_calibrated
 from engine.capture.media import read_image_header, read_video_header
-from engine.capture.timed_frames import at_common_moments
+from engine.capture.timed_frames import at_common_moments, own_times
 from engine.errors import CaptureError
 
 THREADS = 4
 """Videos and images looked at side by side: FFmpeg works, or waits for the disk, without the interpreter."""
 ASPECT_TOLERANCE = 0.01
 """Share by which the sides of frames and calibration may differ in proportion where one is a smaller copy."""
+MAX_LENS = 1e6
+"""Largest parameter of a lens; those of the worst calibrations are in the hundreds."""
+MIN_LENS_RADIUS = 0.01
+"""Half a degree off the axis: a lens that folds back before shows nothing."""
 DEFAULT_FPS = 30.0
 """Where nothing says how fast a capture was recorded, as with images."""
+CLOCK_TOLERANCE = 0.02
+"""Share by which rates of cameras may differ and their frames still be taken one by one."""
 RATE_TOLERANCE = 0.01
 """Share by which the rate of a video may differ from that of the capture, as 29.97 does from 30."""
 
@@ -80,6 +86,8 @@ class _Files:
     rate: float
     paths: Sequence[Path]
     n_bytes: Sequence[int]
+    is_even: bool = True
+    is_lying: bool = False
 
 
 def assemble(
@@ -90,6 +98,7 @@ def assemble(
     fps: float | None = None,
     default_holdout: Sequence[str] = (),
     points: Path | None = None,
+    points_to_world: np.ndarray | None = None,
     fisheye_fov_deg: float | None = None,
     problems: Sequence[CaptureError] = (),
     warnings: Sequence[str] = (),
@@ -103,7 +112,7 @@ def assemble(
         cameras: In the order in which the capture shall have them.
         fps: Frames per second; None takes that of the videos.
         default_holdout: Names of cameras that the capture sets aside; unknown ones are a problem.
-        points: A point cloud that came along.
+        points, points_to_world: See `Layout`.
         fisheye_fov_deg: See `Layout`.
         problems: What the reader found already; they are reported with the others.
         warnings: What the reader found odd but usable.
@@ -160,13 +169,19 @@ def assemble(
     raise_problems(found, folder)
     if scaled:
         said.append(f"Frames have another size than their calibration, which is scaled to them: {shortened(scaled)}.")
-    frame_times_s = [camera.frame_times_s for camera in cameras]
-    if any(times_s is not None for times_s in frame_times_s):
-        entries, n_frames, rate, note = at_common_moments(entries, frame_times_s, fps)
+    lying = [name for name, seen in files.items() if seen.is_lying]
+    if lying:
+        said.append(f"Not turned for display as they ask, because only as stored they fit: {shortened(lying)}.")
+    offsets = [camera.offset_frames for camera in cameras]
+    frame_times_s: Sequence[np.ndarray | None] | None = [camera.frame_times_s for camera in cameras]
+    if all(times_s is None for times_s in frame_times_s):
+        frame_times_s = own_times([entry.source for entry in entries], _evenness(files), fps or DEFAULT_FPS)
+    if frame_times_s is not None:
+        entries, n_frames, rate, note = at_common_moments(entries, frame_times_s, fps, offsets)
         said.append(note)
     else:
         rate = _rate(fps, files, said)
-        entries, n_frames = _on_one_clock(entries, [camera.offset_frames for camera in cameras], said, folder)
+        entries, n_frames = _on_one_clock(entries, offsets, rate, said, folder)
     return Layout(
         format=format_name,
         cameras=tuple(entries),
@@ -175,6 +190,7 @@ def assemble(
         default_holdout=tuple(dict.fromkeys(default_holdout)),
         warnings=tuple(said),
         points=points,
+        points_to_world=points_to_world,
         fisheye_fov_deg=fisheye_fov_deg,
     )
 
@@ -186,6 +202,9 @@ def _check_numbers(camera: DescribedCamera, size: tuple[int, int]) -> list[Captu
         hint = "Export the calibration again."
         text = f'Camera "{camera.name}" has NaN or infinity in the parameters of its lens.'
         found.append(CaptureError(text, hint=hint, path=camera.said_in))
+    elif np.abs(camera.lens.params).max(initial=0.0) > MAX_LENS or camera.lens.max_radius() < MIN_LENS_RADIUS:
+        text = f'The lens of camera "{camera.name}" bends all rays back on themselves.'
+        found.append(CaptureError(text, hint="Calibrate again, with fewer parameters.", path=camera.said_in))
     if camera.color_matrix is not None and not np.isfinite(camera.color_matrix).all():
         text = f'Camera "{camera.name}" has NaN or infinity in its colour matrix.'
         found.append(CaptureError(text, hint="Correct it or take it out.", path=camera.said_in))
@@ -196,8 +215,10 @@ def _look_at(camera: DescribedCamera) -> _Files:
     """Headers of a video, or of the first, middle and last image: others are looked at when they are decoded."""
     if isinstance(camera.files, Path):
         header = read_video_header(camera.files)
-        source = VideoFrames(camera.files, header.n_frames)
-        return _Files(source, header.size, header.rate, [camera.files], [header.n_bytes])
+        is_turned = camera.calibrated_size is None or is_turned_as_calibrated(header, camera.calibrated_size)
+        size = header.size if is_turned else header.stored_size
+        source = VideoFrames(camera.files, header.n_frames, is_turned=is_turned)
+        return _Files(source, size, header.rate, [camera.files], [header.n_bytes], header.is_even, not is_turned)
     paths = list(camera.files)
     if not paths:
         raise CaptureError("There are no frames.", hint="Add its frames or take the camera out.", path=camera.said_in)
@@ -235,8 +256,18 @@ def _rate(fps: float | None, files: dict[str, _Files], said: list[str]) -> float
     return fps
 
 
+def _evenness(files: dict[str, _Files]) -> list[bool]:
+    """Whether frames of each camera may be taken one by one: evenly recorded, at the rate of most cameras."""
+    rates = [seen.rate for seen in files.values() if seen.rate > 0]
+    usual = float(np.median(rates)) if rates else 0.0
+    return [
+        seen.is_even and (seen.rate <= 0 or abs(seen.rate - usual) <= CLOCK_TOLERANCE * usual)
+        for seen in files.values()
+    ]
+
+
 def _on_one_clock(
-    entries: list[CameraEntry], offsets: Sequence[float], said: list[str], folder: Path
+    entries: list[CameraEntry], offsets: Sequence[float], fps: float, said: list[str], folder: Path
 ) -> tuple[list[CameraEntry], int]:
     """The frames that all cameras have, each camera's own moved by its offset, and how many they are."""
     own = np.round(offsets).astype(np.int64)  # a frame between two does not exist
@@ -248,6 +279,12 @@ def _on_one_clock(
     if len(set(counts.tolist())) > 1:
         listed = shortened([f"{entry.name} {count}" for entry, count in zip(entries, counts, strict=True)])
         said.append(f"Cameras differ in length ({listed} frames); the {stop - start} frames that all have are used.")
+    missed_s = np.abs(own - offsets) / fps
+    if missed_s.max(initial=0.0) * fps > 0.01:
+        said.append(
+            f"Offsets in time are taken to the nearest frame: off by {missed_s.mean() * 1000:.1f} ms on average and "
+            f"{missed_s.max() * 1000:.1f} ms at worst."
+        )
     if not own.any() and start == 0 and (counts == stop).all():
         return entries, stop
     moved = []

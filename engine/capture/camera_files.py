@@ -12,10 +12,12 @@ from engine.capture.format_checks import shortened
 from engine.capture.frame_files import (
     IMAGE_SUFFIXES,
     VIDEO_SUFFIXES,
+    Files,
     folders_in,
-    images_in,
+    frames_in_folder,
     listed,
     natural_key,
+    plain_name,
 )
 from engine.capture.places import place_in
 from engine.errors import CaptureError
@@ -23,9 +25,6 @@ from engine.text import shown
 
 PLACES = ("", "videos", "images", "input", "frames", "rgb")
 """Folders of a capture in which cameras have their videos, folders or images; the first is the capture's own."""
-INNER_FOLDERS = ("images", "")
-"""Where in the folder of a camera its images lie."""
-Files = Path | list[Path]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,61 +94,21 @@ def find_camera_frames(
 def match_names(names: Sequence[str], candidates: Sequence[str]) -> dict[str, str]:
     """Which candidate belongs to which name: the same one, or the only one that people would call the same.
 
-    Case and leading zeros of numbers count as the same: cam1 and Cam001.
+    Case, separators and leading zeros count as the same: cam1 and Cam_001.
     """
     exact = set(candidates)
-    by_key: dict[tuple, list[str]] = {}
+    by_key: dict[str, list[str]] = {}
     for candidate in candidates:
-        by_key.setdefault(_loose_key(candidate), []).append(candidate)
+        by_key.setdefault(plain_name(candidate), []).append(candidate)
     found = {name: name for name in names if name in exact}
     taken = set(found.values())
-    wanted = Counter(_loose_key(name) for name in names)
+    wanted = Counter(plain_name(name) for name in names)
     for name in names:
-        key = _loose_key(name)
+        key = plain_name(name)
         others = [candidate for candidate in by_key.get(key, []) if candidate not in taken]
         if name not in found and len(others) == 1 and wanted[key] == 1:
             found[name] = others[0]
     return found
-
-
-def frames_in_folder(folder: Path, directory: str, *, follow_links: bool, named_in: Path) -> Files:
-    """Frames of one camera: the images in its folder or in "images" inside it, or its only video.
-
-    Args:
-        folder: Of the capture.
-        directory: Of the camera, relative to it.
-        follow_links, named_in: See `place_in`.
-    Raises:
-        CaptureError: There are none, images of several kinds, or several videos.
-    """
-    where = place_in(folder, directory, follow_links=follow_links, named_in=named_in)
-    videos: list[str] = []
-    try:
-        for inner in INNER_FOLDERS:
-            inside = f"{directory}/{inner}" if inner else directory
-            if not (folder / inside).is_dir():
-                continue
-            names = listed(folder / inside, IMAGE_SUFFIXES)
-            if names:
-                check_one_kind(names, folder / inside)
-                return images_in(folder, inside, names, follow_links=follow_links, named_in=named_in)
-            videos = videos or [f"{inside}/{name}" for name in listed(folder / inside, VIDEO_SUFFIXES)]
-    except OSError as error:
-        text = f"Its folder cannot be read ({error.strerror})."
-        raise CaptureError(text, hint="Check that you may read it.", path=where) from error
-    if len(videos) == 1:
-        return place_in(folder, videos[0], follow_links=follow_links, named_in=named_in)
-    text = f"Its folder has {len(videos)} videos." if videos else "Its folder has no images and no video."
-    raise CaptureError(text, hint="Put one video or the images of all frames there.", path=where)
-
-
-def check_one_kind(names: Sequence[str], folder: Path) -> None:
-    """Raise CaptureError where images of a folder have different suffixes: which of them are the frames?"""
-    kinds = Counter(os.path.splitext(name)[1].lower() for name in names)
-    if len(kinds) > 1:
-        counts = " and ".join(f"{n} {kind}" for kind, n in kinds.most_common())
-        hint = "Keep the frames there and take the others out."
-        raise CaptureError(f"The folder has {counts} images.", hint=hint, path=folder)
 
 
 def missing_frames(names: Sequence[str], found: CameraFrames, path: Path) -> list[CaptureError]:
@@ -169,10 +128,6 @@ def missing_frames(names: Sequence[str], found: CameraFrames, path: Path) -> lis
         hint = "Name each video or folder of images as its camera, or take the camera out of the calibration."
         problems.append(CaptureError(text, hint=hint, path=path))
     return problems
-
-
-def _loose_key(name: str) -> tuple:
-    return tuple((kind, number, "" if kind else text) for kind, number, text in natural_key(name.lower()))
 
 
 def _ways(folder: Path, place: str) -> Iterator[_Way]:

@@ -70,7 +70,7 @@ class Capture:
         path: The folder.
         format: Name of the reader that understood it.
         rig: Pinhole cameras at the working size, so that `rig.Ks` fits what `frame` returns.
-        n_frames: Frames of every camera.
+        n_frames: Frames of every camera that are worked on.
         fps: Frames per second.
         scale: Requested working size divided by stored size.
         native_rig: The same at the size of the stored frames.
@@ -79,6 +79,7 @@ class Capture:
         fingerprint: Short hash of format, cameras, sizes and length; the same wherever the folder lies and whatever
             the scale.
         follow_links: Whether the user allowed its files to lie outside of the folder.
+        first_frame: Where those frames begin in the whole capture. Everywhere else frames are counted from there.
     """
 
     path: Path
@@ -94,6 +95,30 @@ class Capture:
     store: FrameStore = field(repr=False)
     layout: Layout = field(repr=False)
     follow_links: bool = False
+    first_frame: int = 0
+
+    @property
+    def frames(self) -> tuple[int, int] | None:
+        """First frame of the whole capture that is worked on, and the one after the last; None where that is all."""
+        chosen = self.first_frame, self.first_frame + self.n_frames
+        return None if chosen == (0, self.layout.n_frames) else chosen
+
+    @property
+    def part_key(self) -> str:
+        """The fingerprint, and which frames are worked on where these are not all."""
+        return self.fingerprint if self.frames is None else f"{self.fingerprint}:{self.frames[0]}:{self.frames[1]}"
+
+    def resized(self, scale: float, frames: tuple[int, int] | None = None) -> Capture:
+        """The same capture at another working size, and other frames of it, without reading its files again.
+
+        Args:
+            scale: See `open_capture`.
+            frames: Likewise.
+        Raises:
+            CaptureError: A scale or frames that are not possible.
+        """
+        cache_bytes = self.store.cache.max_bytes
+        return _make_capture(self.layout, self.path, scale, frames, cache_bytes, follow_links=self.follow_links)
 
     def frame(self, camera_index: int, frame_index: int) -> np.ndarray:
         """One picture at the working size. Cached; safe to call from several threads.
@@ -105,7 +130,7 @@ class Capture:
             IndexError: No such camera or frame.
         """
         self._check(camera_index, (frame_index,))
-        return next(iter(self.store.frames(camera_index, (frame_index,))))
+        return next(iter(self.store.frames(camera_index, (self.first_frame + frame_index,))))
 
     def frames_of(self, camera_index: int, frame_indices: Sequence[int]) -> np.ndarray:
         """Several pictures of one camera, decoded in the order given; rising indices are cheap for video.
@@ -119,7 +144,8 @@ class Capture:
         self._check(camera_index, frame_indices)
         width, height = (int(value) for value in self.rig.image_sizes[camera_index])
         frames = np.empty((len(frame_indices), height, width, 3), dtype=np.uint8)
-        for row, frame in enumerate(self.store.frames(camera_index, frame_indices)):
+        wanted = [self.first_frame + frame_index for frame_index in frame_indices]
+        for row, frame in enumerate(self.store.frames(camera_index, wanted)):
             frames[row] = frame
         return frames
 
@@ -166,7 +192,12 @@ class Capture:
 
 
 def open_capture(
-    path: Path | str, *, scale: float = 1.0, cache_bytes: int = DEFAULT_CACHE_BYTES, follow_links: bool = False
+    path: Path | str,
+    *,
+    scale: float = 1.0,
+    frames: tuple[int, int] | None = None,
+    cache_bytes: int = DEFAULT_CACHE_BYTES,
+    follow_links: bool = False,
 ) -> Capture:
     """Open a capture folder of any known layout.
 
@@ -174,14 +205,15 @@ def open_capture(
         path: The capture folder.
         scale: Working size divided by stored size, in (0, 1]; frames are area-filtered, K scales by the actual
             ratio of the rounded sizes.
+        frames: First frame to work on and the one after the last; None for all. The capture then looks as if there were
+            no others.
         cache_bytes: Bound on decoded frames kept in memory.
         follow_links: Whether files that the capture names may lie outside of its folder. Only where the user said so.
     Raises:
         CaptureError: The folder does not hold a capture, or one that cannot be used; lists every problem found.
     """
     folder = Path(path)
-    if not 0.0 < scale <= 1.0:
-        raise CaptureError(f"The scale is {scale:g}.", hint="Give a number above 0 and up to 1.", path=path)
+    _check_scale(scale, folder)
     try:
         layout = _read_layout(folder, follow_links=follow_links)
     except OSError as error:  # rights, a drive that went away, a path too long
@@ -190,17 +222,37 @@ def open_capture(
             hint="Check the path, and that you may read all its files.",
             path=error.filename or folder,
         ) from error
+    return _make_capture(layout, folder, scale, frames, cache_bytes, follow_links=follow_links)
+
+
+def _make_capture(
+    layout: Layout,
+    folder: Path,
+    scale: float,
+    frames: tuple[int, int] | None,
+    cache_bytes: int,
+    *,
+    follow_links: bool,
+) -> Capture:
+    _check_scale(scale, folder)
+    first, stop = (0, layout.n_frames) if frames is None else frames
+    if not 0 <= first < stop <= layout.n_frames:
+        raise CaptureError(
+            f"Frames {first}:{stop} were asked for, of which the capture does not have all.",
+            hint=f"It has frames 0 to {layout.n_frames - 1}; write 0:{layout.n_frames} for all of them.",
+            path=folder,
+        )
     native_rig = layout.rig()
     extent = rig_extent(native_rig)
     raise_problems(check_rig(native_rig, extent, folder), folder)
     rig, optics = _working_rig(layout, native_rig, scale, folder)
     store = FrameStore([camera.source for camera in layout.cameras], optics, cache_bytes=cache_bytes)
-    logger.info("opened %s: %d cameras, %d frames (%s)", folder, len(rig), layout.n_frames, layout.format)
+    logger.info("opened %s: %d cameras, %d frames (%s)", folder, len(rig), stop - first, layout.format)
     return Capture(
         path=folder,
         format=layout.format,
         rig=rig,
-        n_frames=layout.n_frames,
+        n_frames=stop - first,
         fps=layout.fps,
         scale=scale,
         native_rig=native_rig,
@@ -210,7 +262,13 @@ def open_capture(
         store=store,
         layout=layout,
         follow_links=follow_links,
+        first_frame=first,
     )
+
+
+def _check_scale(scale: float, folder: Path) -> None:
+    if not 0.0 < scale <= 1.0:
+        raise CaptureError(f"The scale is {scale:g}.", hint="Give a number above 0 and up to 1.", path=folder)
 
 
 def _working_rig(

@@ -7,13 +7,12 @@ much it misses. The moments follow the recordings: where all cameras slow down t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from engine.capture.frames import FrameSource
+from engine.capture.frames import FrameSource, IndexedFrames
 from engine.capture.limits import FPS_RANGE
 from engine.errors import CaptureError
 
@@ -81,33 +80,7 @@ class Clock:
         frame_indices = self.frame_indices[camera_index]
         if source.n_frames == self.n_frames and (frame_indices == np.arange(self.n_frames)).all():
             return source
-        return ClockedFrames(source, frame_indices)
-
-
-class ClockedFrames:
-    """The frames of a source in the order, and as many of them, as a clock asks for."""
-
-    def __init__(self, source: FrameSource, frame_indices: np.ndarray) -> None:
-        self.source = source
-        self.frame_indices = np.asarray(frame_indices, dtype=np.int64)  # [T] into `source`
-
-    @property
-    def path(self) -> Path:
-        """Where the frames come from."""
-        return self.source.path
-
-    @property
-    def n_frames(self) -> int:
-        """Moments of the clock."""
-        return len(self.frame_indices)
-
-    def read(self, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
-        """Decode the frames of these moments, each [H, W, 3] uint8 RGB. Raises CaptureError for unreadable data."""
-        return self.source.read([int(self.frame_indices[index]) for index in frame_indices])
-
-    def close(self) -> None:
-        """Let go of open files."""
-        self.source.close()
+        return IndexedFrames(source, frame_indices)
 
 
 def common_clock(

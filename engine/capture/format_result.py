@@ -69,7 +69,8 @@ class Layout:
         fps: Frames per second.
         default_holdout: Names of the cameras that the capture itself sets aside for evaluation. May be empty.
         warnings: Plain sentences about what was found odd but usable.
-        points: File with a point cloud that came along, in the cameras' world; None without.
+        points: File with a point cloud that came along; None without.
+        points_to_world: Brings its points into the world of the cameras; None where they are in it. [4, 4]
         fisheye_fov_deg: Horizontal view that fisheye pictures are brought to; None takes the usual one.
     """
 
@@ -80,6 +81,7 @@ class Layout:
     default_holdout: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     points: Path | None = None
+    points_to_world: np.ndarray | None = None
     fisheye_fov_deg: float | None = None
 
     def rig(self) -> CameraRig:

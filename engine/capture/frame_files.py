@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections import Counter
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -14,7 +15,13 @@ from engine.text import shown
 
 IMAGE_SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")
 VIDEO_SUFFIXES = (".mp4", ".mov", ".m4v", ".mkv", ".avi", ".webm", ".mts", ".ts", ".mpg")
+INNER_FOLDERS = ("images", "")
+"""Where in the folder of a camera its images lie."""
+Files = Path | Sequence[Path]
+"""A video, or one image per frame."""
 _NUMBER = re.compile(r"(\d+)")
+_SEPARATORS = re.compile(r"[\s_.\-]+")
+_ZEROS = re.compile(r"(?<!\d)0+(?=\d)")
 
 
 def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
@@ -83,6 +90,51 @@ def images_in(folder: Path, directory: str, names: Sequence[str], *, follow_link
             if name in links:
                 place_in(folder, f"{directory}/{name}" if directory else name, follow_links=False, named_in=named_in)
     return [inside / name for name in names]
+
+
+def frames_in_folder(folder: Path, directory: str, *, follow_links: bool, named_in: Path) -> Files:
+    """Frames of one camera: the images in its folder or in "images" inside it, or its only video.
+
+    Args:
+        folder: Of the capture.
+        directory: Of the camera, relative to it.
+        follow_links, named_in: See `place_in`.
+    Raises:
+        CaptureError: There are none, images of several kinds, or several videos.
+    """
+    where = place_in(folder, directory, follow_links=follow_links, named_in=named_in)
+    videos: list[str] = []
+    try:
+        for inner in INNER_FOLDERS:
+            inside = f"{directory}/{inner}" if inner else directory
+            if not (folder / inside).is_dir():
+                continue
+            names = listed(folder / inside, IMAGE_SUFFIXES)
+            if names:
+                check_one_kind(names, folder / inside)
+                return images_in(folder, inside, names, follow_links=follow_links, named_in=named_in)
+            videos = videos or [f"{inside}/{name}" for name in listed(folder / inside, VIDEO_SUFFIXES)]
+    except OSError as error:
+        text = f"Its folder cannot be read ({error.strerror})."
+        raise CaptureError(text, hint="Check that you may read it.", path=where) from error
+    if len(videos) == 1:
+        return place_in(folder, videos[0], follow_links=follow_links, named_in=named_in)
+    text = f"Its folder has {len(videos)} videos." if videos else "Its folder has no images and no video."
+    raise CaptureError(text, hint="Put one video or the images of all frames there.", path=where)
+
+
+def check_one_kind(names: Sequence[str], folder: Path) -> None:
+    """Raise CaptureError where images of a folder have different suffixes: which of them are the frames?"""
+    kinds = Counter(os.path.splitext(name)[1].lower() for name in names)
+    if len(kinds) > 1:
+        counts = " and ".join(f"{n} {kind}" for kind, n in kinds.most_common())
+        hint = "Keep the frames there and take the others out."
+        raise CaptureError(f"The folder has {counts} images.", hint=hint, path=folder)
+
+
+def plain_name(name: str) -> str:
+    """What is the same for names that people would call the same, as cam1 and Cam_001."""
+    return _ZEROS.sub("", _SEPARATORS.sub("", name).casefold())
 
 
 def _is_folder(entry: os.DirEntry[str]) -> bool:

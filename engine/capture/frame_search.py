@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
 from engine.capture.format_checks import shortened
-from engine.capture.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, folders_in, images_in, listed
+from engine.capture.frame_files import VIDEO_SUFFIXES, Files, folders_in, frames_in_folder, listed, plain_name
 from engine.capture.places import place_in
 from engine.errors import CaptureError
 from engine.text import shown
-
-_SEPARATORS = re.compile(r"[\s_.\-]+")
-_ZEROS = re.compile(r"(?<!\d)0+(?=\d)")
-
-Files = Path | Sequence[Path]
-"""A video, or one image per frame."""
 
 
 class FrameSearch:
@@ -61,7 +54,7 @@ class FrameSearch:
                 if known == name:
                     return self._at(place, is_video=is_video)
         for name in names:
-            alike = [found for found in self._places if _plain(found[0]) == _plain(name)]
+            alike = [found for found in self._places if plain_name(found[0]) == plain_name(name)]
             if len({known for known, _, _ in alike}) > 1:
                 several = shortened([place for _, place, _ in alike])
                 hint = f"Name one of them {shown(name)}."
@@ -104,18 +97,7 @@ class FrameSearch:
         return [by_name[path.stem] for path in frames], ""
 
     def _at(self, place: str, *, is_video: bool) -> Files:
-        path = place_in(self._folder, place, follow_links=self._follow_links, named_in=self._named_in)
-        if is_video:
-            return path
-        try:
-            names = listed(path, IMAGE_SUFFIXES)
-        except OSError as error:
-            text = f"The folder of its images cannot be read ({error.strerror})."
-            raise CaptureError(text, hint="Check that you may read it.", path=path) from error
-        if not names:
-            raise CaptureError("Its folder holds no images.", hint="Add its frames.", path=path)
-        return images_in(self._folder, place, names, follow_links=self._follow_links, named_in=self._named_in)
-
-
-def _plain(name: str) -> str:
-    return _ZEROS.sub("", _SEPARATORS.sub("", name).casefold())
+        options = {"follow_links": self._follow_links, "named_in": self._named_in}
+        return (
+            place_in(self._folder, place, **options) if is_video else frames_in_folder(self._folder, place, **options)
+        )

@@ -244,8 +244,12 @@ class VideoFrames:
 
 
 def is_turned_as_calibrated(header: VideoHeader, calibrated: tuple[int, int]) -> bool:
-    """Whether pictures of a video are to be turned as it says: unless only as stored they have the calibrated size."""
-    return header.size == calibrated or header.stored_size != calibrated
+    """Whether pictures of a video are to be turned as it says: unless only as stored they are of calibrated shape."""
+
+    def fits(size: tuple[int, int]) -> bool:
+        return abs(size[0] * calibrated[1] - size[1] * calibrated[0]) <= 0.01 * size[0] * calibrated[1]
+
+    return fits(header.size) or not fits(header.stored_size)
 
 
 class IndexedFrames:

@@ -10,7 +10,7 @@ import os
 import struct
 import warnings
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -151,6 +151,7 @@ class VideoHeader:
         rate: Frames per second; 0 when the container does not say.
         n_bytes: Size of the file.
         turn: How its pictures are to be turned for display.
+        is_even: Whether its frames have the same distance in time, as far as its index tells.
     """
 
     n_frames: int
@@ -158,6 +159,7 @@ class VideoHeader:
     rate: float
     n_bytes: int
     turn: Turn = UPRIGHT
+    is_even: bool = True
 
     @property
     def size(self) -> tuple[int, int]:
@@ -189,8 +191,9 @@ def read_video_header(path: Path) -> VideoHeader:
             turn = _read_turn(path, container.format.name)
             entries = [entry for entry in stream.index_entries if not entry.is_discard]
             if len(entries) != stream.frames or not entries:  # the index lists key frames only, or frames not shown
-                n_shown = sum(shown_pts(packet) is not None for packet in container.demux(stream))
-                return VideoHeader(n_shown, size, rate, n_bytes, turn)
+                pts = [pts for packet in container.demux(stream) if (pts := shown_pts(packet)) is not None]
+                return VideoHeader(len(pts), size, rate, n_bytes, turn, _is_even(pts))
+            is_even = _is_even([entry.timestamp for entry in entries])
             n_whole = sum(entry.pos + entry.size <= n_bytes for entry in entries)
     except FileNotFoundError as error:
         raise CaptureError(
@@ -212,7 +215,16 @@ def read_video_header(path: Path) -> VideoHeader:
             hint=again,
             path=path,
         )
-    return VideoHeader(len(entries), size, rate, n_bytes, turn)
+    return VideoHeader(len(entries), size, rate, n_bytes, turn, is_even)
+
+
+def _is_even(times: Sequence[int]) -> bool:
+    """Whether times, in any order and unit, are evenly spaced to a quarter of their distance."""
+    if len(times) < 3:
+        return True
+    rising = np.sort(np.array(times, dtype=np.float64))
+    step = (rising[-1] - rising[0]) / (len(rising) - 1)
+    return bool(np.abs(rising - rising[0] - step * np.arange(len(rising))).max() <= 0.25 * step)
 
 
 def _read_turn(path: Path, container_kind: str) -> Turn:

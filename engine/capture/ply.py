@@ -23,7 +23,11 @@ _TYPES = {
     **{"float": "<f4", "float32": "<f4", "double": "<f8", "float64": "<f8"},
 }
 _COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
-_BLOCK_POINTS = 1 << 16
+_TO_BYTES = {
+    **{"u1": 1.0, "i1": 1.0, "<u2": 255.0 / 65535.0, "<i2": 1.0, "<i4": 1.0, "<u4": 1.0, "<f4": 255.0, "<f8": 255.0}
+}
+"""What a colour is multiplied with, by the type that it has in the file."""
+_BLOCK_POINTS = 1 << 12
 
 
 def check_n_points(n: int, path: Path) -> None:
@@ -34,7 +38,7 @@ def check_n_points(n: int, path: Path) -> None:
 
 
 def read_ply(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray | None]:
-    """Points [P, 3] float64 and colours [P, 3] float32 0..1, or None where the file has none.
+    """Points [P, 3], float32 or float64 as the file has them, and colours [P, 3] uint8, or None where it has none.
 
     Args:
         file: Open for reading, at its beginning.
@@ -52,19 +56,22 @@ def read_ply(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray | None]
     least = np.dtype(fields).itemsize if form == "binary_little_endian" else 2 * len(fields) - 1
     if n_points * least > left:
         raise damaged(path, f"it announces {n_points} points, but only {left} bytes follow")
-    points = np.empty((n_points, 3))
-    colors = None if colors_of is None else np.empty((n_points, 3), np.float32)
+    types = dict(fields)
+    points = np.empty((n_points, 3), np.float32 if types["x"] == "<f4" else np.float64)
+    colors = None if colors_of is None else np.empty((n_points, 3), np.uint8)
     for start in range(0, n_points, _BLOCK_POINTS):
         n = min(_BLOCK_POINTS, n_points - start)
         block = _binary(file, path, n, fields, columns) if form != "ascii" else _text(file, path, n, fields, columns)
-        points[start : start + n] = block[:, :3]
-        if colors is not None:
-            colors[start : start + n] = block[:, 3:]
-    if colors is not None and colors_of is not None:
-        kind = dict(fields)[colors_of[0]]
-        if not kind.startswith("<f"):
-            colors /= 65535.0 if kind == "<u2" else 255.0
+        with np.errstate(over="ignore"):
+            points[start : start + n] = block[:, :3]
+        if colors is not None and colors_of is not None:
+            colors[start : start + n] = as_bytes(block[:, 3:] * _TO_BYTES[types[colors_of[0]]])
     return points, colors
+
+
+def as_bytes(colors: np.ndarray) -> np.ndarray:
+    """Colours 0..255 of any numbers, rounded; what is not a number becomes 0. [P, 3] uint8"""
+    return np.floor(np.clip(np.nan_to_num(colors), 0.0, 255.0) + 0.5).astype(np.uint8)
 
 
 def _header(file: BinaryIO, path: Path) -> tuple[str, int, list[tuple[str, str]]]:

@@ -8,16 +8,17 @@ import zipfile
 import zlib
 from array import array
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
 from engine.capture.colmap.model_files import BinaryReader, damaged, lines_of, unreadable
+from engine.capture.format_result import Layout
 from engine.capture.limits import MAX_POSITION
 from engine.capture.places import place_in
-from engine.capture.ply import check_n_points, read_ply
+from engine.capture.ply import as_bytes, check_n_points, read_ply
 from engine.errors import CaptureError
 from engine.storage.files import open_regular
 from engine.storage.npy_files import NpyError, parse_npy
@@ -33,8 +34,8 @@ class CapturePoints:
     """A point cloud. A value.
 
     Attributes:
-        points: [P, 3] float64, in the world of the file.
-        colors: Display colours 0..1, None where the file has none. [P, 3] float32
+        points: [P, 3] float32 or float64, in the world of the file.
+        colors: Display colours, None where the file has none. [P, 3] uint8
         n_dropped: Points of the file that are left out: NaN, infinite, or farther away than anything may be.
     """
 
@@ -56,6 +57,19 @@ def points_that_came(folder: Path, names: Sequence[str], *, follow_links: bool) 
     return None
 
 
+def points_of(layout: Layout) -> CapturePoints | None:
+    """The cloud that came with a capture, in the world of its cameras; None where none came.
+
+    Raises:
+        CaptureError: As of `read_points`.
+    """
+    if layout.points is None:
+        return None
+    cloud = read_points(layout.points)
+    matrix = layout.points_to_world
+    return cloud if matrix is None else replace(cloud, points=cloud.points @ matrix[:3, :3].T + matrix[:3, 3])
+
+
 def read_points(path: Path) -> CapturePoints:
     """Points of points3D.bin, points3D.txt, a .ply or a .npz with an array "data" [P, 3 or more].
 
@@ -73,10 +87,10 @@ def read_points(path: Path) -> CapturePoints:
             points, colors = reader(file, path)
     except OSError as error:
         raise unreadable(path, error) from error
+    is_good = np.ones(len(points), bool)
     with np.errstate(invalid="ignore"):
-        is_good = (np.abs(points) <= MAX_POSITION).all(axis=1)
-    if colors is not None:
-        is_good &= np.isfinite(colors).all(axis=1)
+        for column in points.T:
+            is_good &= np.abs(column) <= MAX_POSITION
     n_dropped = int(len(points) - is_good.sum())
     if n_dropped:
         points, colors = points[is_good], None if colors is None else colors[is_good]
@@ -93,25 +107,28 @@ def _read_binary(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray]:
         points[row], colors[row] = values[:3], values[3:]
         reader.skip(8 * n_track)
     reader.end()
-    return points, colors.astype(np.float32) / 255.0
+    return points, colors
 
 
 def _read_text(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray]:
-    values = array("d")
+    values, colors = array("d"), bytearray()
     for line in lines_of(file, path):
         words = line.split(None, 7)
         if not words:
             continue
-        row = len(values) // 6
+        row = len(values) // 3
         check_n_points(row + 1, path)
         try:
-            values.extend([float(word) for word in words[1:7]])
+            position = [float(word) for word in words[1:4]]
+            color = [min(max(int(word), 0), 255) for word in words[4:7]]
         except ValueError as error:
             raise damaged(path, f"point number {row} has something else than numbers") from error
-        if len(values) != 6 * (row + 1):
+        if len(color) != 3:
             raise damaged(path, f"point number {row} has no position and colour")
-    rows = np.array(values).reshape(-1, 6)
-    return rows[:, :3], _display(rows[:, 3:])
+        values.extend(position)
+        colors.extend(color)
+    points = np.frombuffer(values, np.float64) if values else np.zeros(0)
+    return points.reshape(-1, 3), np.frombuffer(colors, np.uint8).reshape(-1, 3)
 
 
 def _read_npz(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray | None]:
@@ -135,15 +152,12 @@ def _read_npz(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray | None
     if values.ndim != 2 or values.shape[1] < 3:
         raise damaged(path, f"its array has shape {values.shape}, not points by coordinates")
     check_n_points(len(values), path)
-    colors = _display(values[:, 3:6]) if values.shape[1] >= 6 else None
+    colors = None
+    if values.shape[1] >= 6:
+        colors = values[:, 3:6]
+        is_share = len(colors) == 0 or not np.nanmax(colors, initial=0.0) > 1.0
+        colors = as_bytes(colors * 255.0 if is_share else colors)
     return values[:, :3].astype(np.float64), colors
-
-
-def _display(colors: np.ndarray) -> np.ndarray:
-    """Colours in 0..255 or 0..1 as 0..1. [P, 3] float32"""
-    with np.errstate(invalid="ignore"):
-        is_bytes = len(colors) > 0 and float(np.nanmax(colors, initial=0.0)) > 1.0
-    return (colors / 255.0 if is_bytes else colors).astype(np.float32)
 
 
 def said_of(points: CapturePoints, path: Path) -> Iterable[str]:

@@ -137,7 +137,9 @@ def read_bytes(path: Path | str, *, max_bytes: int) -> bytes:
         n_bytes = os.fstat(file.fileno()).st_size
         if n_bytes > max_bytes:
             raise OSError(errno.EFBIG, f"{n_bytes} bytes, at most {max_bytes} are read", str(path))
-        data = file.read(max_bytes + 1)
+        data = file.read(n_bytes + 1)  # reading takes as much memory as it is asked for
+        if len(data) > n_bytes:
+            data += file.read(max_bytes + 1 - len(data))
     if len(data) > max_bytes:  # it grew, or its size is not known, as in /proc
         raise OSError(errno.EFBIG, f"more than {max_bytes} bytes", str(path))
     return data

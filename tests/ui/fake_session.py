@@ -19,17 +19,22 @@ from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
 from app.playback.view_modes import MODES, ShownAs
 from app.playback.views import Views
+from app.project.capture_report import RefusedFolder
+from app.project.opening_answers import OpeningAnswers
 from app.project.recents import RecentProject
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands
+from app.session.calibration_page import CalibrationPage
 from app.session.marking import after_marking
 from app.session.notices import Notices
-from app.session.questions import Question, RetrainQuestion
+from app.session.questions import OpeningPage, Question, RetrainQuestion
+from app.session.synchronisation_page import SynchronisationPage
 from app.status import (
     CELL_RANGES,
     ClipStatus,
     JobStatus,
+    OpeningForecast,
     Overlays,
     PlanStatus,
     ProjectStatus,
@@ -96,6 +101,44 @@ class FakeRecent:
     pictures: FakePictures = field(default_factory=FakePictures)
 
 
+@dataclass
+class FakeOpening:
+    """What the dialog reads of CaptureOpening; `asked` are the answers that a forecast was wanted for."""
+
+    page: OpeningPage | None = None
+    refused: RefusedFolder | None = None
+    pictures: dict[int, Picture] = field(default_factory=dict)
+    found: OpeningForecast | None = None
+    asked: list[OpeningAnswers] = field(default_factory=list)
+
+    def forecast(self, answers: OpeningAnswers) -> tuple[OpeningForecast | None, bool]:
+        """What was made up."""
+        self.asked.append(answers)
+        return self.found, True
+
+    def problem(self, answers: OpeningAnswers) -> str:
+        """As the real one has it."""
+        assert self.page is not None
+        n_left = len(self.page.report.cameras) - len(answers.holdout)
+        return "Fewer than two cameras are left for training." if n_left < 2 else ""
+
+
+@dataclass
+class FakeCalibrating:
+    """What the dialog reads of Calibrating."""
+
+    page: CalibrationPage | None = None
+    progress: JobStatus | None = None
+
+
+@dataclass
+class FakeSynchronising:
+    """What the dialog reads of Synchronising."""
+
+    page: SynchronisationPage | None = None
+    progress: JobStatus | None = None
+
+
 class FakeSession:
     """See the module docstring. `has_capture=False` starts empty."""
 
@@ -113,6 +156,9 @@ class FakeSession:
         )
         self.project_status: ProjectStatus | None = None
         self.question: Question | None = None
+        self.opening = FakeOpening()
+        self.calibrating = FakeCalibrating()
+        self.synchronising = FakeSynchronising()
         self.queue = QueueStatus()
         self.usage = UsageStatus(window_mb=412.0, window_cores=0.1, n_cores=2)
         self.versions: dict[int, tuple[VersionStatus, ...]] = {}
@@ -229,7 +275,8 @@ class FakeSession:
         self.commands.append(command)
         match command:
             case commands.OpenCapture(path=path):
-                self.question = None
+                self.question = self.opening.page = self.opening.refused = None
+                self.calibrating.page = self.synchronising.page = None
                 self._open(replace(FakeCapture(make_rig()), path=Path(path)))
             case commands.SetFrame():
                 self.timeline.seek(command.frame_index)
@@ -266,7 +313,10 @@ class FakeSession:
                 if self.clip_states[clip_index].state == "trained":
                     self.question = RetrainQuestion(clip_index, False, "", 29.7, (), None, True, None, None)
             case commands.CloseQuestion() | commands.OpenProject() | commands.TrainClip(is_confirmed=True):
-                self.question = None
+                self.question = self.opening.page = self.opening.refused = None
+                self.calibrating.page = self.synchronising.page = None
+            case commands.LookAtVideos():
+                self.opening.page = self.opening.refused = None
             case commands.DismissNotice():
                 self.notices.dismiss(command.index)
 

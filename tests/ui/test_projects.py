@@ -43,7 +43,7 @@ def test_recent_projects_open_with_a_click_and_those_that_are_gone_can_be_remove
     pilot.click("welcome.forget1")
     assert pilot.sent(ForgetRecent) == [ForgetRecent(Path("/projects/gone"))]
     pilot.click("welcome.recent2")  # a capture, as earlier versions kept them
-    assert pilot.sent(OpenCapture) == [OpenCapture(Path("/captures/dance_floor"))]
+    assert pilot.sent(OpenCapture) == [OpenCapture(Path("/captures/dance_floor"), is_asking=True)]
 
 
 def test_the_window_names_its_project(pilot: Pilot) -> None:
@@ -111,7 +111,7 @@ def test_one_of_several_projects_is_chosen(pilot: Pilot) -> None:
     pilot.draw(4)
     pilot.key(key.UP)  # the last row
     pilot.key(key.ENTER)
-    assert pilot.session.commands[-1] == OpenCapture(Path("/captures/kitchen"), is_new_project=True)
+    assert pilot.session.commands[-1] == OpenCapture(Path("/captures/kitchen"), is_new_project=True, is_asking=True)
 
 
 def test_a_stopped_clip_says_where_it_goes_on_and_a_damaged_one_is_not_offered(pilot: Pilot) -> None:

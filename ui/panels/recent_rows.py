@@ -48,7 +48,7 @@ class RecentList(Protocol):
 
 def open_recent(entry: RecentProject) -> OpenProject | OpenCapture:
     """What opens an entry of the list of recent projects."""
-    return OpenProject(entry.folder) if entry.project else OpenCapture(entry.folder)
+    return OpenProject(entry.folder) if entry.project else OpenCapture(entry.folder, is_asking=True)
 
 
 class RecentRows:

@@ -56,8 +56,14 @@ def draw_welcome(session: WelcomeNeeds, dispatch: Dispatch, ui: UiState, area: R
     if primary_button(f"{Icon.FOLDER}  Open a capture or project folder", ImVec2(-1, 40), ui):
         ui.is_open_requested = True
     ui.mark("welcome.open")
-    if SAMPLE_PATH.is_dir():
-        if imgui.button(f"{Icon.FILM}  Open the sample capture", ImVec2(-1, 36)):
+    has_sample = SAMPLE_PATH.is_dir()
+    half = (imgui.get_content_region_avail().x - imgui.get_style().item_spacing.x) / 2
+    if imgui.button(f"{Icon.CAMERA}  Calibrate plain videos ...", ImVec2(half if has_sample else -1, 36)):
+        ui.wishes.is_calibration = True
+    ui.mark("welcome.calibrate")
+    if has_sample:
+        imgui.same_line()
+        if imgui.button(f"{Icon.FILM}  Try the sample", ImVec2(-1, 36)):
             dispatch(OpenCapture(SAMPLE_PATH))
         ui.mark("welcome.sample")
     imgui.end_disabled()

@@ -29,6 +29,13 @@ def text_wrapped_dim(text: str) -> None:
     imgui.pop_text_wrap_pos()
 
 
+def text_wrapped(text: str) -> None:
+    """Text, wrapped at the panel's edge, with nothing in it that formats."""
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text(text)
+    imgui.pop_text_wrap_pos()
+
+
 def primary_button(label: str, size: ImVec2, ui: UiState) -> bool:
     """The one button of a panel that the user most likely wants."""
     imgui.push_style_color(imgui.Col_.button, ImVec4(*theme.SKY))

@@ -14,6 +14,7 @@ class Wishes:
     Attributes:
         is_palette: Open the palette.
         preferences_page: Open the preferences at the page of this title; None for no wish, empty for the last one.
+        is_calibration: Ask for a folder of plain videos to calibrate.
         is_fullscreen: Fill the screen, or go back to a window.
         layout: Name of the layout to show; None for no wish.
         is_layout_name: Ask for the name that the present layout is kept under.
@@ -24,6 +25,7 @@ class Wishes:
     is_palette: bool = False
     preferences_page: str | None = None
     is_fullscreen: bool = False
+    is_calibration: bool = False
     layout: str | None = None
     is_layout_name: bool = False
     layout_removed: str | None = None

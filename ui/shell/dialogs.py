@@ -14,7 +14,7 @@ from typing import Any
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import portable_file_dialogs as native
 
-from app.session.commands import OpenCapture
+from app.session.commands import LookAtVideos, OpenCapture
 from ui.panels.actions.action import BOOKMARKS, PLAY, TIME, WINDOW
 from ui.panels.actions.table import ACTIONS
 from ui.panels.gestures import mouse_help
@@ -23,7 +23,13 @@ from ui.panels.widgets import text_wrapped_dim
 from ui.style import theme
 
 _LINUX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
-_POPUP = "Open a capture or project folder"
+OPEN, CALIBRATE = "open", "calibrate"
+"""What a folder is asked for."""
+_TITLES = {OPEN: "Open a capture or project folder", CALIBRATE: "Calibrate a folder of plain videos"}
+_HINTS = {
+    OPEN: "Folder with the cameras and their videos or pictures, or of a project",
+    CALIBRATE: "Folder with one video, or one folder of pictures, per camera",
+}
 _MAX_LISTED = 500
 NO_KEY = "no key"
 """Such actions are in the menus and in the palette."""
@@ -68,39 +74,48 @@ class OpenFolderDialog:
         self._is_keyboard_wanted = False
         self._text = str(self._start)
         self._listed: tuple[str, list[str]] = ("", [])
+        self._purpose = OPEN
 
     @property
     def is_waiting(self) -> bool:
         """True while the desktop's dialog is up and has to be polled."""
         return self._native is not None
 
-    def open(self, start: Path | None = None) -> None:
-        """Ask. A second call while a question is up does nothing."""
+    def open(self, start: Path | None = None, *, purpose: str = OPEN) -> None:
+        """Ask, for OPEN or CALIBRATE. A second call while a question is up does nothing."""
         if self._native is not None:
             return
+        self._purpose = purpose
         if start is not None:
             self._start = start
             self._text = str(start)
         if has_native_dialog():
-            self._native = native.select_folder(_POPUP, str(self._start))
+            self._native = native.select_folder(_TITLES[self._purpose], str(self._start))
         else:
             self._is_box_wanted = True
 
     def draw(self, dispatch: Dispatch, ui: UiState) -> None:
-        """Poll the desktop's dialog or draw our own; dispatches OpenCapture on an answer."""
+        """Poll the desktop's dialog or draw our own; dispatches a command on an answer."""
         if self._native is not None:
             self._poll_native(dispatch, ui)
         if self._is_box_wanted:
             self._is_box_wanted = False
             self._is_keyboard_wanted = True
-            imgui.open_popup(_POPUP)
+            imgui.open_popup(self._popup)
         center = imgui.get_main_viewport().get_center()
         imgui.set_next_window_pos(center, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
         imgui.set_next_window_size(ImVec2(620, 420), imgui.Cond_.appearing)
-        is_open, _ = imgui.begin_popup_modal(_POPUP, True, imgui.WindowFlags_.no_saved_settings)
+        is_open, _ = imgui.begin_popup_modal(self._popup, True, imgui.WindowFlags_.no_saved_settings)
         if is_open:
             self._draw_box(dispatch, ui)
             imgui.end_popup()
+
+    @property
+    def _popup(self) -> str:
+        return f"{_TITLES[self._purpose]}###folder"
+
+    def _answer(self, folder: Path) -> OpenCapture | LookAtVideos:
+        return LookAtVideos(folder) if self._purpose == CALIBRATE else OpenCapture(folder, is_asking=True)
 
     def _poll_native(self, dispatch: Dispatch, ui: UiState) -> None:
         if not self._native.ready(0):
@@ -109,10 +124,10 @@ class OpenFolderDialog:
         answer, self._native = self._native.result(), None
         if answer:
             self._start = Path(answer)
-            dispatch(OpenCapture(Path(answer)))
+            dispatch(self._answer(Path(answer)))
 
     def _draw_box(self, dispatch: Dispatch, ui: UiState) -> None:
-        imgui.text_disabled("Folder with the cameras and their videos or pictures, or of a project")
+        imgui.text_disabled(_HINTS[self._purpose])
         if self._is_keyboard_wanted:
             self._is_keyboard_wanted = False
             imgui.set_keyboard_focus_here()
@@ -134,12 +149,12 @@ class OpenFolderDialog:
             imgui.close_current_popup()
         imgui.same_line()
         imgui.begin_disabled(not is_folder)
-        is_clicked = imgui.button("Open", ImVec2(120, 0))
+        is_clicked = imgui.button("Open" if self._purpose == OPEN else "Go on", ImVec2(120, 0))
         ui.mark("open.accept")
         imgui.end_disabled()
         if (is_clicked or is_entered) and folder is not None and is_folder:
             self._start = folder
-            dispatch(OpenCapture(folder))
+            dispatch(self._answer(folder))
             imgui.close_current_popup()
         elif imgui.is_key_pressed(imgui.Key.escape, False):
             imgui.close_current_popup()

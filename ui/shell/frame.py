@@ -47,11 +47,13 @@ from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.panel import draw_timeline
 from ui.panels.training import draw_training
 from ui.panels.viewport import ViewportNeeds, ViewportPanel
-from ui.shell.dialogs import OpenFolderDialog, draw_help
+from ui.shell.calibration_dialog import CalibrationDialog, HasCalibrating
+from ui.shell.dialogs import CALIBRATE, OPEN, OpenFolderDialog, draw_help
 from ui.shell.imgui_backend import ImGuiBackend
 from ui.shell.layout import hold_sizes, is_laid_out, lay_out
 from ui.shell.layouts import Layouts
 from ui.shell.menu_bar import MenuNeeds, draw_menu_bar
+from ui.shell.opening_dialog import HasOpening, OpeningDialog
 from ui.shell.palette import Palette
 from ui.shell.palette_entries import PaletteNeeds
 from ui.shell.preferences import PreferencesDialog
@@ -60,6 +62,7 @@ from ui.shell.redraw import FRAMES_AFTER_INPUT, RedrawPlan
 from ui.shell.remembering import Remembering, RememberNeeds
 from ui.shell.status_bar import HEIGHT as STATUS_BAR_HEIGHT
 from ui.shell.status_bar import StatusNeeds, draw_status_bar
+from ui.shell.synchronisation_dialog import HasSynchronising, SynchronisationDialog
 from ui.style import theme
 from ui.style.fonts import load_fonts
 from ui.style.theme_in_use import ThemeInUse
@@ -90,6 +93,9 @@ class FrameNeeds(
     PaletteNeeds,
     StatusNeeds,
     QuestionNeeds,
+    HasOpening,
+    HasCalibrating,
+    HasSynchronising,
     RememberNeeds,
     NoticesNeeds,
     LogNeeds,
@@ -161,6 +167,9 @@ class Frame:
         self.log = LogPanel()
         self.dialog = OpenFolderDialog()
         self.questions = QuestionDialogs()
+        self.calibration = CalibrationDialog()
+        self.synchronisation = SynchronisationDialog()
+        self.opening = OpeningDialog(lambda: ImageTexture(ctx))
         self.palette = Palette()
         self.preferences = PreferencesDialog()
         self.layouts = Layouts()
@@ -311,14 +320,17 @@ class Frame:
             if title == VIEWPORT or not ui.is_picture_only:
                 self._draw_panel(title, draw_panel, has_padding)
         hold_sizes(self._dock_ids)
-        if ui.is_open_requested:
-            ui.is_open_requested = False
-            self.dialog.open()
+        if ui.is_open_requested or ui.wishes.is_calibration:
+            self.dialog.open(purpose=CALIBRATE if ui.wishes.is_calibration else OPEN)
+            ui.is_open_requested = ui.wishes.is_calibration = False
         self._guard("Open dialog", lambda: self.dialog.draw(dispatch, ui))
         self._guard("Help", lambda: draw_help(ui))
         self._guard("Layouts", lambda: self.layouts.draw(ui))
         self._guard("Preferences", lambda: self.preferences.draw(ui))
         self._guard("Palette", lambda: self.palette.draw(session, dispatch, ui))
+        self._guard("Opening", lambda: self.opening.draw(session, dispatch, ui))
+        self._guard("Synchronisation", lambda: self.synchronisation.draw(session, dispatch, ui))
+        self._guard("Calibration", lambda: self.calibration.draw(session, dispatch, ui))
         self._guard("Question", lambda: self.questions.draw(session, dispatch, ui))
         size = imgui.get_main_viewport().size
         whole = Rect(0.0, 0.0, size.x, size.y - STATUS_BAR_HEIGHT)
@@ -338,7 +350,8 @@ class Frame:
         """Open a capture or project folder, or the folder of a file that was dropped."""
         from app.session.commands import OpenCapture  # here to keep the module's imports about drawing
 
-        self.dispatch(OpenCapture(path if path.is_dir() or not path.exists() else path.parent))
+        folder = path if path.is_dir() or not path.exists() else path.parent
+        self.dispatch(OpenCapture(folder, is_asking=True))
 
     def _draw_panel(self, title: str, draw_panel: Callable[..., None], has_padding: bool) -> None:
         is_wanted = title == self.ui.wanted_panel
@@ -397,5 +410,6 @@ class Frame:
         """Release GL objects and ImGui. The GL context must still be current."""
         self.viewport.release()
         self.capture.release()
+        self.opening.release()
         self.residuals.release()
         self.backend.close()

@@ -101,7 +101,9 @@ class QuestionDialogs:
             if self._draw_row(index, f"{Icon.FOLDER}  {choice.name}", choice.trained_text, choice.project, width):
                 answer = OpenProject(Path(choice.project))
             ui.mark(f"question.choice{index}")
-        new = OpenCapture(Path(question.capture), is_new_project=True, follow_links=question.follow_links)
+        new = OpenCapture(
+            Path(question.capture), is_new_project=True, follow_links=question.follow_links, is_asking=True
+        )
         words = "nothing is trained in it yet"
         if self._draw_row(n_rows - 1, f"{Icon.ADD}  New project", words, "The others stay as they are", width):
             answer = new

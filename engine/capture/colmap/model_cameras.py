@@ -110,10 +110,8 @@ def _grouped(images: list[ColmapImage]) -> tuple[dict[str, list[ColmapImage]], l
     twice: list[str] = []
     for image, part in zip(images, parts, strict=True):
         is_folder = len(folders) > 1 and bool(part[:-1])
-        if is_folder:
-            name = part[-2] if is_last_enough else "_".join(part[:-1])
-        else:
-            name = os.path.splitext(part[-1])[0]
+        in_folder = part[-2] if is_folder and is_last_enough else "_".join(part[:-1])
+        name = in_folder if is_folder else os.path.splitext(part[-1])[0]
         if name in by_camera and not is_folder:
             twice.append(name)
         by_camera.setdefault(name, []).append(image)

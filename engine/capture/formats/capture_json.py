@@ -92,7 +92,8 @@ class CaptureDocument:
         fps: Frames per second; without it that of the videos.
         pixel_center: Where the middle of the first pixel lies: 0.5 as in COLMAP, 0 as in OpenCV.
         holdout: Names of cameras kept out of training unless the user chooses others.
-        points: A .ply with a point cloud in the cameras' world.
+        points: A .ply, or a file of another layout's points, in the world that `world_to_camera` is written in.
+        points_to_world: Brings the points into that world, where they are in another one. 4x4
         fisheye_fov_deg: Horizontal view that fisheye pictures are brought to.
         world_scale: All distances are multiplied by it.
         up: Direction in the world that is up; the world is turned so that it becomes +z.
@@ -104,6 +105,7 @@ class CaptureDocument:
     pixel_center: Annotated[float, Meta(ge=0, le=0.5)] = 0.5
     holdout: list[str] = field(default_factory=list)
     points: str | None = None
+    points_to_world: Matrix | None = None
     fisheye_fov_deg: Annotated[float, Meta(ge=10, le=150)] | None = None
     world_scale: Annotated[float, Meta(gt=0, le=1e9)] = 1.0
     up: tuple[float, float, float] | None = None
@@ -162,6 +164,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
         fps=document.fps,
         default_holdout=[name for name in document.holdout if name not in excluded],
         points=points,
+        points_to_world=_points_to_world(document, path, problems),
         fisheye_fov_deg=document.fisheye_fov_deg,
         problems=problems,
         said_in=path,
@@ -246,6 +249,24 @@ def _described(
         color_matrix=colors,
         offset_frames=entry.offset_frames,
     )
+
+
+def _points_to_world(document: CaptureDocument, path: Path, problems: list[CaptureError]) -> np.ndarray | None:
+    """From the points of the file to the world of the cameras as they are read: turned up and scaled, too."""
+    matrix = np.eye(4)
+    if document.points_to_world is not None:
+        given = parse_matrix(document.points_to_world, (4, 4))
+        if given is None or not np.isfinite(given).all() or not np.array_equal(given[3], [0.0, 0.0, 0.0, 1.0]):
+            text = "points_to_world is not a 4x4 map with the last row 0 0 0 1."
+            problems.append(CaptureError(text, hint=SEE, path=path))
+        else:
+            matrix = given
+    if document.up is not None:
+        turn = np.eye(4)
+        turn[:3, :3] = turn_up(np.array(document.up))
+        matrix = turn @ matrix
+    matrix[:3] *= document.world_scale
+    return None if np.array_equal(matrix, np.eye(4)) else matrix
 
 
 def turn_up(up: np.ndarray) -> np.ndarray:

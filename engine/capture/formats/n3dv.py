@@ -13,10 +13,18 @@ from pathlib import Path
 import numpy as np
 
 from engine.capture.assembling import DescribedCamera, assemble
-from engine.capture.camera_files import INNER_FOLDERS, Files, frames_in_folder
 from engine.capture.format_checks import check_equal_counts, parse_size, size_problem
 from engine.capture.format_result import MATCH, Layout, Probe
-from engine.capture.frame_files import IMAGE_SUFFIXES, VIDEO_SUFFIXES, folders_in, listed, natural_key
+from engine.capture.frame_files import (
+    IMAGE_SUFFIXES,
+    INNER_FOLDERS,
+    VIDEO_SUFFIXES,
+    Files,
+    folders_in,
+    frames_in_folder,
+    listed,
+    natural_key,
+)
 from engine.capture.places import place_in
 from engine.capture.points import points_that_came
 from engine.errors import CaptureError
@@ -153,7 +161,7 @@ def _described(name: str, row: np.ndarray, files: Files, path: Path) -> Describe
     return DescribedCamera(name, K, world_to_camera, files, path, calibrated_size=size)
 
 
-def _other_count(n_rows: int, candidates: dict[str, Sequence[str]], path: Path) -> CaptureError:
+def _other_count(n_rows: int, candidates: dict[str, list[str]], path: Path) -> CaptureError:
     """What to say where nothing has as many cameras as there are rows: how many there are, and which are missing."""
     words = {"video": "videos", "folder": "folders of frames", "image": "images in images/"}
     there = [f"{len(names)} {words[kind]}" for kind, names in candidates.items() if names]

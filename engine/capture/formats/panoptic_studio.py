@@ -23,8 +23,8 @@ from engine.capture.format_checks import (
     size_problem,
 )
 from engine.capture.format_result import MATCH, Layout, Probe
-from engine.capture.frame_files import listed, natural_key
-from engine.capture.frame_search import Files, FrameSearch
+from engine.capture.frame_files import Files, listed, natural_key
+from engine.capture.frame_search import FrameSearch
 from engine.capture.opencv_numbers import lens_of, pose_of, shifted
 from engine.errors import CaptureError
 from engine.text import shown

@@ -21,8 +21,8 @@ from engine.capture.assembling import DescribedCamera, assemble
 from engine.capture.findings import Findings
 from engine.capture.format_checks import check_fps, parse_matrix, parse_size, read_json_object, size_problem
 from engine.capture.format_result import MATCH, Layout, Probe
-from engine.capture.frame_files import IMAGE_SUFFIXES, images_in, listed
-from engine.capture.frame_search import Files, FrameSearch
+from engine.capture.frame_files import IMAGE_SUFFIXES, Files, images_in, listed
+from engine.capture.frame_search import FrameSearch
 from engine.capture.grouped_frames import FrameGroup, ListedFrame, grouped, time_faults
 from engine.capture.media import read_image_header
 from engine.capture.places import place_in

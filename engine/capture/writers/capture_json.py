@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +13,7 @@ from engine.capture.format_checks import read_json_object
 from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.formats.capture_json import FILE, SCHEMA
 from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames
+from engine.capture.writers.frame_files import name_in
 from engine.errors import CaptureError
 from engine.storage.files import checked_path
 from engine.storage.json_files import json_text
@@ -51,7 +51,9 @@ def capture_document(layout: Layout, folder: Path) -> dict[str, Any]:
     if layout.default_holdout:
         document["holdout"] = list(layout.default_holdout)
     if layout.points is not None:
-        document["points"] = _named(layout.points, folder)
+        document["points"] = name_in(layout.points, folder)
+    if layout.points_to_world is not None:
+        document["points_to_world"] = layout.points_to_world.tolist()
     if layout.fisheye_fov_deg is not None:
         document["fisheye_fov_deg"] = layout.fisheye_fov_deg
     document["cameras"] = [_camera(entry, folder) for entry in layout.cameras]
@@ -120,15 +122,15 @@ def _camera(entry: CameraEntry, folder: Path) -> dict[str, Any]:
         row["lens"] = {"model": entry.lens.model, "params": list(entry.lens.params)}
     source, offset = _unmoved(entry.source)
     if isinstance(source, ImageFrames):
-        row["images"] = [_named(path, folder) for path in source.files]
+        row["images"] = [name_in(path, folder) for path in source.files]
     else:
-        row["video"] = _named(source.path, folder)
+        row["video"] = name_in(source.path, folder)
     if offset:
         row["offset_frames"] = offset
     if entry.masks is not None:
         masks, _ = _unmoved(entry.masks)
         is_images = isinstance(masks, ImageFrames)
-        row["masks"] = [_named(path, folder) for path in masks.files] if is_images else _named(masks.path, folder)
+        row["masks"] = [name_in(path, folder) for path in masks.files] if is_images else name_in(masks.path, folder)
     if entry.color_matrix is not None:
         row["color_matrix"] = np.asarray(entry.color_matrix).tolist()
     return row
@@ -139,9 +141,3 @@ def _unmoved(source: FrameSource) -> tuple[FrameSource, int]:
     if isinstance(source, IndexedFrames):
         return source.source, int(source.frame_indices[0])
     return source, 0
-
-
-def _named(path: Path, folder: Path) -> str:
-    absolute, root = os.path.abspath(path), os.path.abspath(folder)
-    inside = os.path.commonpath((absolute, root)) == root
-    return Path(os.path.relpath(absolute, root)).as_posix() if inside else absolute

@@ -7,17 +7,13 @@ Never imported by the program: pycolmap must stay out of its processes.
 from __future__ import annotations
 
 import shutil
-import sys
-import threading
-import time
 import zlib  # noqa: F401  must be loaded before pycolmap, whose own zlib symbols otherwise replace it
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
-from engine.kernels.parent import end_with_parent
+from engine.children.child import serve
 
 MAX_FEATURES = 2048
 MAX_SIDE_PX = 1280
@@ -111,18 +107,5 @@ def _known_reconstruction(pycolmap, tables, names: list[str], Ks: np.ndarray, po
     return reconstruction
 
 
-def _beat(path: Path) -> None:
-    """Touch a file for as long as this process works, so that the parent can tell work from standing still."""
-    worked_s = 0.0
-    while True:
-        time.sleep(1.0)
-        if (now_s := time.process_time()) > worked_s + 0.005:
-            worked_s = now_s
-            with suppress(OSError):
-                path.touch()
-
-
 if __name__ == "__main__":
-    threading.Thread(target=_beat, args=(Path(sys.argv[3]),), daemon=True).start()
-    end_with_parent(lambda: shutil.rmtree(Path(sys.argv[1]).parent, ignore_errors=True))
-    main(Path(sys.argv[1]), Path(sys.argv[2]))
+    serve(main)

@@ -226,7 +226,7 @@ class ClipPreparation:
             return None if state is None else state.header.fingerprint
 
         return {
-            "capture": self._capture.fingerprint,
+            "capture": self._capture.part_key,
             "size": [int(side) for side in self._rig.image_sizes[0]],
             "cameras": list(self._rig.names),
             "frames": [self._clip.start, self._clip.n_frames, self._clip.clip_length],

@@ -294,7 +294,7 @@ def key_of_corrected(capture: Capture, camera_indices: Sequence[int], config: Tr
     """What corrected backgrounds belong to, as `write_backgrounds` keeps it beside them."""
     rig = capture.rig.subset(list(camera_indices))
     return {
-        "capture": capture.fingerprint,
+        "capture": capture.part_key,
         "cameras": list(rig.names),
         "size": [int(side) for side in rig.image_sizes[0]],
         "frames": config.background_frames,

@@ -71,6 +71,7 @@ def job_of(project: Path, *, trained=(0, 1), is_kept: bool = True, rows=None, pa
         project=str(project),
         capture=settings.capture,
         scale=1.0,
+        frames=None,
         follow_links=False,
         trained=trained,
         rows=everything if rows is None else rows,

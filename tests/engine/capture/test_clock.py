@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine.capture.clock import ClockedFrames, common_clock
+from engine.capture.clock import common_clock
+from engine.capture.frames import IndexedFrames
 from engine.errors import CaptureError
 
 EVEN = np.arange(100) / 30
@@ -128,7 +129,7 @@ class _Numbered:
 def test_pictures_are_read_through_the_clock():
     clock = common_clock([EVEN, EVEN], offsets_s=[0, 7 / 30])
     source = clock.source(1, _Numbered())
-    assert isinstance(source, ClockedFrames)
+    assert isinstance(source, IndexedFrames)
     assert source.n_frames == 93
     assert [int(frame[0, 0, 0]) for frame in source.read([0, 3, 1])] == [7, 10, 8]
 

@@ -148,7 +148,7 @@ def test_a_second_model_and_files_of_newer_versions_change_nothing(tmp_path: Pat
     assert any("other models" in text for text in capture.warnings)
 
 
-Spoil = Callable[[Path], None]
+Spoil = Callable[[Path], object]
 
 
 def unlink(name: str) -> Spoil:

@@ -66,7 +66,7 @@ def test_a_left_handed_camera_is_refused(tmp_path: Path) -> None:
     rows = written_n3dv.poses_bounds(scene)
     rows[2, [2, 7, 12]] *= -1
     np.save(tmp_path / "poses_bounds.npy", rows)
-    with pytest.raises(CaptureError, match='"cam10" is not a rotation.*determinant is -1'):
+    with pytest.raises(CaptureError, match=r'"cam10" is not a rotation.*determinant is -1'):
         open_capture(tmp_path)
 
 

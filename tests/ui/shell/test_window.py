@@ -407,7 +407,7 @@ def test_dropped_folder_and_dropped_file_open_the_capture(open_pilot: Callable[.
     inside.write_text("{}")
     pilot.studio.window.dispatch_event("on_file_drop", 5, 5, [str(tmp_path)])
     pilot.studio.window.dispatch_event("on_file_drop", 5, 5, [str(inside)])
-    assert pilot.sent(OpenCapture) == [OpenCapture(tmp_path), OpenCapture(tmp_path)]
+    assert pilot.sent(OpenCapture) == 2 * [OpenCapture(tmp_path, is_asking=True)]
 
 
 def test_path_box_opens_a_typed_folder(
@@ -421,7 +421,7 @@ def test_path_box_opens_a_typed_folder(
     pilot.type(str(tmp_path))
     pilot.key(key.RETURN)
     pilot.draw(2)
-    assert pilot.sent(OpenCapture) == [OpenCapture(tmp_path)]
+    assert pilot.sent(OpenCapture) == [OpenCapture(tmp_path, is_asking=True)]
 
 
 @pytest.mark.parametrize("text", ["", "/" + "x" * 300, "~nobody-has-this-name/x"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+from app.session.commands import SynchroniseCameras
 from ui.panels.actions.action import WINDOW, Action, ActionNeeds, Run
 from ui.panels.state import LAYOUT_WORDS, LAYOUTS, PANELS, Dispatch, UiState
 from ui.style.palette import THEMES
@@ -37,6 +38,14 @@ def _help(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 def _open(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_open_requested = True
+
+
+def _calibrate(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.wishes.is_calibration = True
+
+
+def _synchronise(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(SynchroniseCameras())
 
 
 def _palette(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
@@ -105,6 +114,8 @@ _THEMES: dict[str, Any] = _ALWAYS | {"menu": "View/Theme"}
 
 ACTIONS = (
     Action("window.open", "Open a capture or project folder", WINDOW, _open, keys=("Ctrl+O",), **_FILE),
+    Action("window.calibrate", "Calibrate plain videos ...", WINDOW, _calibrate, **_FILE),
+    Action("window.synchronise", "Synchronise cameras ...", WINDOW, _synchronise, menu="File"),
     Action("window.palette", "Find an action by its name", WINDOW, _palette, keys=("Ctrl+K", "Ctrl+P"), **_ALWAYS),
     Action("window.preferences", "Preferences", WINDOW, _preferences(), keys=("Ctrl+,",), **_FILE),
     Action("window.keys", "Change keys", WINDOW, _preferences("Keys"), **_FILE),

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from engine.camera.rig import CameraRig
+from engine.children import running
 from engine.cloud.stereo import sparse
 from engine.cloud.stereo.sparse import triangulate
 
@@ -57,7 +58,7 @@ def test_a_child_that_stands_still_is_ended_and_tried_again(monkeypatch, scratch
     pictures, rig = wall_views()
     lines: list[str] = []
     started = []
-    monkeypatch.setattr(sparse.subprocess, "Popen", _sleeping_child(started))
+    monkeypatch.setattr(running.subprocess, "Popen", _sleeping_child(started))
     found = triangulate(pictures, rig, report=lines.append, stall_s=0.5)
     assert len(found.points) == 0
     assert len(started) == sparse.N_ATTEMPTS
@@ -82,7 +83,7 @@ def test_a_slow_child_is_waited_for(scratch) -> None:
 def test_whoever_is_interrupted_leaves_no_child_and_no_folder(monkeypatch, scratch) -> None:
     pictures, rig = wall_views()
     started = []
-    monkeypatch.setattr(sparse.subprocess, "Popen", _sleeping_child(started))
+    monkeypatch.setattr(running.subprocess, "Popen", _sleeping_child(started))
 
     def stop() -> None:
         raise KeyboardInterrupt
@@ -113,7 +114,7 @@ def test_folders_of_killed_processes_are_removed_and_those_of_living_ones_stay(s
     for folder in (dead, living):
         folder.mkdir()
         (folder / "job.npz").touch()
-    sparse.remove_leftovers()
+    running.remove_leftovers(sparse.FOLDER_PREFIX)
     assert [folder.name for folder in scratch.iterdir()] == [living.name]
 
 

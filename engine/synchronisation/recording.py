@@ -1,0 +1,102 @@
+"""Recording: what one camera recorded, as far as finding its offset needs it: pictures, their times, the file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from engine.capture.capture import FORMATS, Capture
+from engine.capture.frame_files import VIDEO_SUFFIXES, listed
+from engine.capture.frames import FrameSource, IndexedFrames, VideoFrames
+from engine.capture.media import read_frame_times, read_video_header
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One camera.
+
+    Attributes:
+        name: What it is called.
+        source: Its pictures; undistorted and of the size of the rig where a rig is given along with it.
+        times_s: When each picture is shown, in seconds from the first. [T] float64
+        video: The file with sound and tags; None for images.
+        start_s: When the first picture is shown, in seconds of that file.
+        skipped_s: How long after the first picture in the file that is.
+    """
+
+    name: str
+    source: FrameSource
+    times_s: np.ndarray
+    video: Path | None = None
+    start_s: float = 0.0
+    skipped_s: float = 0.0
+
+
+class CapturePictures:
+    """The pictures of one camera of a capture, undistorted and at working size, as a source."""
+
+    def __init__(self, capture: Capture, camera_index: int) -> None:
+        self.path = capture.path
+        self.n_frames = capture.n_frames
+        self._capture, self._camera_index = capture, camera_index
+
+    def read(self, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
+        """Pictures, each [H, W, 3] uint8 RGB. Raises CaptureError for unreadable data."""
+        for frame_index in frame_indices:
+            yield self._capture.frame(self._camera_index, frame_index)
+
+    def close(self) -> None:
+        """The capture keeps its own files."""
+
+
+def recordings_of(capture: Capture) -> list[Recording]:
+    """The cameras of a capture, by its own clock: what is found is what is left after its offsets were applied.
+
+    Raises:
+        CaptureError: A video cannot be read.
+    """
+    times_s = np.arange(capture.n_frames) / capture.fps
+    recordings = []
+    for camera_index, name in enumerate(capture.rig.names):
+        source, first = capture.store.sources[camera_index], 0
+        if isinstance(source, IndexedFrames):
+            source, first = source.source, int(source.frame_indices[0])
+        pictures = CapturePictures(capture, camera_index)
+        if isinstance(source, VideoFrames):
+            own_s = read_frame_times(source.path)
+            start_s, skipped_s = float(own_s[first]), float(own_s[first] - own_s[0])
+            recordings.append(Recording(name, pictures, times_s, source.path, start_s, skipped_s))
+        else:
+            recordings.append(Recording(name, pictures, times_s))
+    return recordings
+
+
+def recordings_in_videos(videos: Sequence[Path], names: Sequence[str] | None = None) -> list[Recording]:
+    """Plain videos without calibration, one per camera.
+
+    Raises:
+        CaptureError: A file is missing or not a video.
+    """
+    recordings = []
+    for row, path in enumerate(videos):
+        header = read_video_header(path)
+        times_s = read_frame_times(path)
+        name = path.stem if names is None else names[row]
+        source = VideoFrames(path, header.n_frames)
+        recordings.append(Recording(name, source, times_s - times_s[0], path, float(times_s[0])))
+    return recordings
+
+
+def videos_without_calibration(folder: Path) -> list[Path]:
+    """The videos of a folder that is not a capture of any known layout, in natural order; none where it is one.
+
+    Raises:
+        OSError: The folder cannot be read.
+    """
+    if not folder.is_dir() or any(reader.probe(folder).is_match for reader in FORMATS):
+        return []
+    names = listed(folder, VIDEO_SUFFIXES)
+    return [folder / name for name in names] if len(names) > 1 else []
