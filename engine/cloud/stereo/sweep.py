@@ -47,7 +47,7 @@ def preferred_angle_deg(rig: CameraRig) -> float:
     mean /= max(float(np.linalg.norm(mean)), 1e-9)
     spread = np.degrees(np.arccos(np.clip(rig.forwards @ mean, -1.0, 1.0)))
     preferred = float(np.clip(np.median(spread) / 3.0, *BEST_ANGLES_DEG))
-    if len(rig) < 2:
+    if len(rig) < 2 or np.ptp(rig.centers, axis=0).max() == 0:
         return preferred
     directions = rig.centers - rig.focus_point()
     directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-9)
