@@ -12,6 +12,7 @@ from engine.cloud.background.light import AnchorLight
 from engine.cloud.background.masks import motion_mask
 from engine.cloud.motion.hull import Grid, carve, hull_colors, hull_visibility
 from engine.cloud.stereo.consistency import check_depths
+from engine.cloud.stereo.slanted import refine_slanted
 from engine.cloud.stereo.smoothing import smooth_inverse_depth
 from engine.cloud.stereo.sweep import matching_costs
 from engine.images.image_filters import dilate
@@ -42,6 +43,8 @@ def warm_up() -> None:
     is_usable = np.ones(greys.shape, dtype=bool)
     costs = matching_costs(greys, is_usable, rig, camera=0, sources=[1], inverse_depths=planes)
     smooth_inverse_depth(costs, greys[0], planes)
+    prior = np.full(greys[0].shape, 0.5)
+    refine_slanted(greys, is_usable, rig, camera=0, sources=[1], seeds=prior[None], prior=prior, low=0.2, high=1.0)
     check_depths(np.full(greys.shape, 2.0), rig, camera=0, others=[1], tolerance=0.01)
 
     grid, projections = Grid.over(np.array([-0.4, -0.4, 1.6]), np.array([0.4, 0.4, 2.4]), 0.1), projection_matrices(rig)

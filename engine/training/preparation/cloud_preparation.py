@@ -124,10 +124,10 @@ def static_cloud(
 
     def build() -> Arrays:
         cloud = _build_static_cloud(backgrounds, rig, is_valid, config, report, keep, layout)
-        return {name: np.asarray(getattr(cloud, name)) for name in ("points", "colors", "gains", "spacing")}
+        return {name: np.asarray(getattr(cloud, name)) for name in ("points", "colors", "sizes", "gains", "spacing")}
 
     arrays = keep("static cloud", build)
-    return StaticCloud(arrays["points"], arrays["colors"], arrays["gains"], float(arrays["spacing"]))
+    return StaticCloud(**{**arrays, "spacing": float(arrays["spacing"])})
 
 
 def _build_static_cloud(
