@@ -261,9 +261,11 @@ class IndexedFrames:
     """Frames of another source under other numbers: some of them, some twice. Owns nothing but the numbers."""
 
     def __init__(self, source: FrameSource, frame_indices: Sequence[int] | np.ndarray) -> None:
-        self.source = source
+        indices = np.asarray(frame_indices, dtype=np.int64)
+        is_numbered = isinstance(source, IndexedFrames)
+        self.source: FrameSource = source.source if is_numbered else source
         self.path = source.path
-        self.frame_indices = np.asarray(frame_indices, dtype=np.int64)  # of the source, by number here
+        self.frame_indices = source.frame_indices[indices] if is_numbered else indices  # of the source, by number here
 
     @property
     def n_frames(self) -> int:
