@@ -186,12 +186,14 @@ def test_unknown_kinds_are_errors_of_the_caller(open_residuals):
         opened.residuals.anchor_heat(opened.timeline, "psnr")
 
 
-def test_what_a_camera_does_not_see_is_blank_and_not_counted(open_residuals, project, monkeypatch):
-    height, width = open_trained(open_project(project, is_writable=False)).capture.frame(0, 0).shape[:2]
+def test_what_a_camera_does_not_see_is_blank_and_not_counted(open_residuals, monkeypatch):
+    opened = open_residuals()
+    plain = opened.heat(1, 4, "error").values
+    height, width = plain.shape
     is_valid = np.zeros((height, width), bool)
     is_valid[height // 4 :, : width // 2] = True
-    plain = open_residuals().heat(1, 4, "error").values
     monkeypatch.setattr(Capture, "valid", lambda self, camera_index: is_valid)
+    opened.close()
     found = open_residuals().heat(1, 4, "error")
     np.testing.assert_array_equal(np.isnan(found.values), ~is_valid)
     np.testing.assert_array_equal(found.values[is_valid], plain[is_valid])
