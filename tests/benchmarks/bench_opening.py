@@ -108,7 +108,9 @@ def look_in_window(folder: Path, work: Path, n_frames: int) -> str:
     try:
         desk.wait_for("a window", lambda state: bool(state), 120)
         shown_s = time.monotonic() - start
-        desk.wait_for("all frames", lambda state: state["n_frames"] == n_frames and "timeline.track" in state["rects"], 120)
+        desk.wait_for(
+            "all frames", lambda state: state["n_frames"] == n_frames and "timeline.track" in state["rects"], 120
+        )
         opened_s = time.monotonic() - start
         opened = _memory(desk.program.pid)
         x0, y0, x1, y1 = desk.state["rects"]["timeline.track"]
