@@ -79,7 +79,12 @@ def paint(rig: CameraRig, camera: int, time_s: float, wall: np.ndarray, n_balls:
 
 
 def made_recordings(
-    rig: CameraRig, offsets_frames: Sequence[float], n_frames: int = 60, *, noise: float = 2.0, seed: int = 0
+    rig: CameraRig,
+    offsets_frames: Sequence[float] | np.ndarray,
+    n_frames: int = 60,
+    *,
+    noise: float = 2.0,
+    seed: int = 0,
 ) -> list[Recording]:
     """One recording per camera; its own frame = common frame + offset. Cameras differ in brightness."""
     recordings = []

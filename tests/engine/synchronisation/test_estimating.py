@@ -33,6 +33,13 @@ def test_parts_of_frames_are_found_with_calibration(seed):
     assert not found.is_in_step
 
 
+def test_short_recordings_are_not_in_step_because_all_begin():
+    rig = ring(5)
+    offsets = np.array([0.0, 6.0, 0.0, -5.0, 0.0])
+    found = estimate_offsets(made_recordings(rig, offsets, n_frames=28), fps=FPS, rig=rig)
+    assert errors(found.offsets_frames, offsets).max() < 0.7
+
+
 def test_cameras_in_step_are_said_to_be():
     rig = ring(5)
     found = estimate_offsets(made_recordings(rig, np.zeros(5)), fps=FPS, rig=rig)
