@@ -1,4 +1,4 @@
-"""Cameras that are good to hold out for measuring: inside the arrangement, with neighbours on both sides, spread evenly.
+"""Cameras that are good to hold out for measuring: inside the arrangement, neighbours on both sides, spread evenly.
 
 A camera at the edge measures how far a scene can be extrapolated, not how well it was learned.
 """
