@@ -18,6 +18,7 @@ from pyglet.window import key
 
 from app.calibration.job import CalibrationRequest
 from app.session.commands import TrainNextClip
+from app.session.session import Session
 from engine.assets import asset_path
 from engine.capture.capture import open_capture
 from engine.capture.frames import VideoFrames
@@ -50,6 +51,11 @@ def calibrated(request: CalibrationRequest) -> Callable[[Any], Any]:
     return work
 
 
+def state_of(session: Session) -> str:
+    """Of the calibration; empty where none is shown."""
+    return "" if session.calibrating.page is None else session.calibrating.page.state
+
+
 def keep(pilot: Pilot, folder: Path, name: str) -> None:
     """Write what stands in the window, to be looked at."""
     pilot.draw(3)
@@ -80,10 +86,10 @@ def test_from_plain_videos_to_a_trained_clip(
     draw_until(pilot, lambda: session.opening.refused is not None, "why it does not open")
     keep(pilot, tmp_path, "refused")
     pilot.key(key.RETURN)
-    draw_until(pilot, lambda: session.calibrating.page is not None and session.calibrating.page.cameras, "its cameras")
+    draw_until(pilot, lambda: state_of(session) == "asking", "its cameras")
     keep(pilot, tmp_path, "calibration")
     pilot.key(key.RETURN)
-    draw_until(pilot, lambda: session.calibrating.page and session.calibrating.page.state == "done", "the calibration")
+    draw_until(pilot, lambda: state_of(session) == "done", "the calibration")
     keep(pilot, tmp_path, "calibrated")
 
     # what it is now, and what is asked
