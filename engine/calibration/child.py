@@ -9,6 +9,7 @@ import json
 import shutil
 import zlib  # noqa: F401  must be loaded before pycolmap, whose own zlib symbols otherwise replace it
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +18,17 @@ import numpy as np
 
 from engine.calibration.features import extract
 from engine.calibration.finishing import finished
-from engine.calibration.mapping import map_cameras, verified_matches
+from engine.calibration.mapping import FirstEstimate, map_cameras, verified_matches
 from engine.calibration.matching import KeyPoints, match_all
 from engine.calibration.options import CalibrationOptions
 from engine.calibration.pictures import matching_size, read_pictures
-from engine.calibration.solving import Solution, solve
+from engine.calibration.solving import FINE, ROUGH, Solution, solve
 from engine.calibration.videos import common_length, find_videos
 from engine.children.child import serve
 from engine.errors import CaptureError, EngineError, PreparationError
 from engine.parallel import map_ordered
 
-STAGES = {"Key points": 0.5, "Matching": 0.2, "Mapping": 0.1, "Adjusting": 0.2}
+STAGES = {"Key points": 0.45, "Matching": 0.15, "Mapping": 0.2, "Adjusting": 0.2}
 """Stages and their shares of the time."""
 N_STARTS = 3
 """Times that mapping begins anew, from other random numbers: repeating patterns lead single ones astray."""
@@ -44,10 +45,10 @@ class Teller:
         names = list(STAGES)
         before = sum(STAGES[name] for name in names[: names.index(stage)])
         document = {"stage": stage, "done": before + done * STAGES[stage], "message": message}
-        partial = self._path.with_name("progress.partial")
+        unfinished = self._path.with_name("progress.partial")
         with suppress(OSError):
-            partial.write_text(json.dumps(document))
-            partial.replace(self._path)
+            unfinished.write_text(json.dumps(document))
+            unfinished.replace(self._path)
 
 
 def main(job: Path, result: Path) -> None:
@@ -62,9 +63,9 @@ def main(job: Path, result: Path) -> None:
         message, hint = (str(error), "") if getattr(error, "problems", ()) else (error.message, error.hint)
         arrays: dict[str, np.ndarray] = {}
         document = {"error": message, "hint": hint, "is_bad_input": isinstance(error, CaptureError)}
-    partial = result.with_name("partial.npz")
-    np.savez(partial, document=np.array(json.dumps(document)), **arrays)  # type: ignore[arg-type]
-    partial.replace(result)
+    unfinished = result.with_name("partial.npz")
+    np.savez(unfinished, document=np.array(json.dumps(document)), **arrays)  # type: ignore[arg-type]
+    unfinished.replace(result)
 
 
 def calibrate_here(
@@ -105,29 +106,21 @@ def calibrate_here(
 def _best_solution(scratch, key_points, matches, sizes, options: CalibrationOptions, teller: Teller) -> Solution | None:
     """Of several starts the one that places most cameras; of those the one with most sightings that fit."""
     best: Solution | None = None
-    seen: set[tuple[int, float]] = set()
+    chosen = {"lens": options.lens, "is_shared": options.is_lens_shared}
     for start in range(N_STARTS):
         teller.tell("Mapping", start / N_STARTS)
         found = map_cameras(scratch, len(sizes), options.lens, seed=start)
         if not found:
             continue
-        key = (len(found[0].rows), round(float(found[0].cameras.focals.sum()), 6))
-        if key in seen:
-            continue
-        seen.add(key)
-        teller.tell("Adjusting", start / N_STARTS)
-        solution = solve(
-            found[0],
-            key_points,
-            matches,
-            sizes,
-            lens=options.lens,
-            is_shared=options.is_lens_shared,
-            progress=lambda done, start=start: teller.tell("Adjusting", (start + done) / N_STARTS),
-        )
+        solution = solve(found[0], key_points, matches, sizes, stages=ROUGH, **chosen)
         if len(solution.tracks.points) and (best is None or _worth(solution) > _worth(best)):
             best = solution
-    return best
+    if best is None:
+        return None
+    teller.tell("Adjusting", 0.0)
+    rough = FirstEstimate(best.rows, best.cameras)
+    tell = partial(teller.tell, "Adjusting")
+    return solve(rough, key_points, matches, sizes, stages=FINE, progress=tell, **chosen)
 
 
 def _worth(solution: Solution) -> tuple[int, int]:

@@ -16,6 +16,8 @@ from engine.calibration.world import find_up, known_scale, unit_scale, upright
 FEW_KEY_POINTS = 150
 FEW_MATCHES = 30
 WEAK_SIGHTINGS = 60
+ODD_FOCAL = 0.2
+"""Of ln(focal length) from the median: cameras of one rig rarely differ by more, misplaced ones do."""
 LENS_MODEL = {"simple": "opencv", "opencv": "opencv", "fisheye": "fisheye"}
 """Names of engine.camera.lens."""
 
@@ -41,6 +43,11 @@ def finished(
     weak = [name for name, n in zip(names, n_sightings, strict=True) if n < WEAK_SIGHTINGS]
     if weak:
         warnings.append(f"These cameras see few points, and their places are rough: {', '.join(weak)}.")
+    shares = solution.cameras.focals / sizes[rows].max(1)
+    is_odd = np.abs(np.log(shares / np.median(shares))) > ODD_FOCAL
+    if is_odd.any() and not is_odd.all():
+        odd = ", ".join(name for name, one in zip(names, is_odd, strict=True) if one)
+        warnings.append(f"Focal lengths far from those of the others: {odd}. Unless they zoom, they are misplaced.")
     native = np.array([videos[row].size for row in rows], dtype=np.int64)
     arrays = {
         "world_to_camera": _poses(cameras),

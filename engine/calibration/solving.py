@@ -3,7 +3,7 @@ turn, each time more strictly."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,10 +14,11 @@ from engine.calibration.mapping import FirstEstimate
 from engine.calibration.matching import KeyPoints, Pair, all_pairs, match_guided
 from engine.calibration.tracks import Tracks, build_tracks, cleaned, fitting_matches
 
-FIRST_REACHES = (12.0, 6.0)
-"""Pixels, at a width of 640, that sightings may be off while estimates are rough."""
-LAST_REACHES = (3.0, 2.0)
-"""Likewise at the end, where matches are looked for anew along epipolar lines."""
+ROUGH = ((12.0, False), (6.0, False))
+"""Stages while estimates are rough: pixels, at a width of 640, that sightings may be off; and whether matches are
+looked for anew along epipolar lines, with the lens that was asked for."""
+FINE = ((3.0, True), (2.0, True))
+"""Stages at the end."""
 MIN_REACH_PX = 1.5
 MAX_ANGLE_DEG = 70.0
 """Between the views of two cameras that are matched anew: key points do not look alike from farther apart."""
@@ -52,6 +53,7 @@ def solve(
     *,
     lens: str,
     is_shared: bool,
+    stages: Sequence[tuple[float, bool]],
     progress: Callable[[float], None] = lambda _: None,
 ) -> Solution:
     """Adjust an estimate until points land where they were seen.
@@ -62,6 +64,7 @@ def solve(
         matches: By looks alone, of all cameras.
         sizes: Of all pictures. [C, 2]
         lens, is_shared: Of CalibrationOptions.
+        stages: ROUGH or FINE.
         progress: Told the share that is done.
     """
     rows, cameras = estimate.rows, estimate.cameras
@@ -70,7 +73,6 @@ def solve(
     known = {(a, b): matches[int(rows[a]), int(rows[b])] for a, b in pairs}
     middles, widths = sizes[rows] / 2.0, sizes[rows, 0].astype(np.float64)
     per_640 = float(np.median(sizes[rows].max(1))) / 640
-    stages = [(reach, False) for reach in FIRST_REACHES] + [(reach, True) for reach in LAST_REACHES]
     tracks = Tracks.none()
     is_shared = is_shared and len(np.unique(sizes[rows], axis=0)) == 1  # at other sizes lenses are others
     if is_shared:
@@ -86,7 +88,7 @@ def solve(
         tracks = build_tracks(fitting_matches(found, chosen, cameras, reach_px), chosen, cameras, reach_px)
         if len(tracks.points) < len(rows):
             break
-        expect = Expectations(is_shared=is_shared) if number else Expectations(principal=0.0, is_shared=is_shared)
+        expect = Expectations(is_shared=is_shared)
         cameras, points = adjust(
             cameras,
             tracks.points,
