@@ -30,6 +30,7 @@ from app.playback.arrays import Picture  # noqa: E402
 from app.playback.view_modes import COLOR  # noqa: E402
 from app.project.project_picture import fitted  # noqa: E402
 from app.project.recents import RecentProject  # noqa: E402
+from app.session.calibration_page import CalibrationPage, VideoFacts  # noqa: E402
 from app.session.commands import (  # noqa: E402
     ActivateView,
     LookThrough,
@@ -61,8 +62,8 @@ JPEG_QUALITY = 88
 """A third of the bytes of a PNG, and letters are still sharp."""
 TIMEOUT_S = 400.0
 """Kernels may have to be compiled first."""
-SHOWN_FOLDER = Path("/projects")
-"""Where the project seems to lie: pictures name no folder of the machine that they were made on."""
+SHOWN_FOLDER, CAPTURES = Path("/projects"), Path("/captures")
+"""Where things seem to lie: pictures name no folder of the machine that they were made on."""
 
 
 class _Session(Session):
@@ -224,6 +225,28 @@ def draw_welcome(stage: Stage) -> None:
     stage.studio.settle(8)
 
 
+def draw_opening(stage: Stage) -> None:
+    """What is said and asked of a capture that has no project yet."""
+    opening = stage.session.opening
+    stage.session.dispatch(OpenCapture(asset_path("sample"), is_asking=True))
+    stage.wait(lambda: opening.page is not None, "the capture is reported")
+    page = opening.page
+    assert page is not None
+    opening.page = replace(page, report=replace(page.report, path=CAPTURES / "juggling room"))
+    stage.wait(lambda: len(opening.pictures) == len(page.report.cameras), "all small pictures are there")
+    stage.wait(lambda: opening.forecast(page.answers)[1], "the forecast is made")
+    stage.studio.settle(6, until_idle_s=2.0)
+
+
+def draw_calibration(stage: Stage) -> None:
+    """The cameras of a folder of plain videos, and how they are to be calibrated."""
+    cameras = tuple(VideoFacts(f"camera {row + 1}", (1920, 1080), 1800 + row % 3, 60.0) for row in range(12))
+    stage.session.calibrating.page = CalibrationPage(CAPTURES / "garden", "asking", cameras)
+    stage.studio.settle(4)
+    stage.pilot.click("calibration.distance")
+    stage.studio.settle(6)
+
+
 @dataclass(frozen=True)
 class Screen:
     """One picture.
@@ -247,6 +270,8 @@ class Screen:
 
 SCREENS = (
     Screen("welcome", draw_welcome, is_empty=True),
+    Screen("opening", draw_opening, is_empty=True),
+    Screen("calibration", draw_calibration, is_empty=True),
     Screen("main", draw_main),
     Screen("training", draw_training),
     Screen("anchors", draw_anchors, is_in_documents=False),

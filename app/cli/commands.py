@@ -59,7 +59,7 @@ COMMANDS = {
         "A video was not written; single pictures that were finished are there.",
     ),
     "inspect": Command(
-        "describe a capture and how exposure changes in it, or what the trained clips of a project weigh",
+        "examine and correct a capture, or say what the trained clips of a project weigh",
         "app.cli.inspect_command",
     ),
     "calibrate": Command(

@@ -1,28 +1,34 @@
-"""clipgstream inspect: a capture, or what the trained clips of a project weigh, as text or JSON."""
+"""clipgstream inspect: a capture with the findings of the capture doctor, or what the trained clips of a project weigh,
+as text or JSON; and corrections of a capture.
+"""
 
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from app.background.kernels import use_threads
 from app.cli.arguments import EXIT_OK, add_follow_links, path_argument
+from app.cli.capture_lines import capture_lines
+from app.cli.correction_arguments import add_correction_arguments, asked_corrections, sure_corrections, write_asked
+from app.cli.terminal.progress import ProgressLine
 from app.training.service import Launch
-from engine.capture.capture import FORMATS, open_capture
+from engine.capture.capture import Capture, open_capture
 from engine.storage.json_files import json_text
 from engine.text import printable
-
-LAYOUTS = {reader.FORMAT: reader.LAYOUT for reader in FORMATS}
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream inspect`."""
     command.add_argument("path", type=path_argument, help="capture or project folder")
     command.add_argument("--json", action="store_true", help="print everything as JSON")
+    command.add_argument("--quick", action="store_true", help="look at no pixels: done in a moment")
     add_follow_links(command)
+    add_correction_arguments(command)
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
-    """clipgstream inspect: describe a capture or a project. Returns the exit code."""
+    """clipgstream inspect: describe a capture or a project, or correct a capture. Returns the exit code."""
     from app.project.project import is_project
     from app.project.project_summary import describe_project, project_lines
 
@@ -34,31 +40,64 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
 
 
 def _inspect_capture(options: argparse.Namespace) -> int:
-    """What a capture is, and how the exposure of its cameras changes."""
+    """What a capture is, and what is wrong with it; or write what is to be corrected."""
     capture = open_capture(options.path, follow_links=options.follow_links)
+    try:
+        corrections = asked_corrections(options)
+        if corrections is not None:
+            return _say_written(options, write_asked(capture, corrections, options.out))
+        return _describe(options, capture)
+    finally:
+        capture.close()
+
+
+def _describe(options: argparse.Namespace, capture: Capture) -> int:
+    from engine.capture.capture_summary import describe
+
+    found = describe(capture)
+    if not options.json:
+        print("\n".join(capture_lines(found)), flush=True)
+    more = _quick(options, capture) if options.quick else _doctor(options, capture)
+    if options.json:
+        print(json_text(found | more, indent=2))
+    return EXIT_OK
+
+
+def _quick(options: argparse.Namespace, capture: Capture) -> dict[str, Any]:
+    from app.cli.finding_lines import finding_document, finding_lines
+    from engine.doctor.quick import quick_findings
+
+    findings = quick_findings(capture)
+    if not options.json:
+        print("\n".join(finding_lines(findings, path=str(options.path)) or ["Nothing odd in the numbers."]))
+    return {"doctor": {"findings": [finding_document(finding) for finding in findings]}}
+
+
+def _doctor(options: argparse.Namespace, capture: Capture) -> dict[str, Any]:
     use_threads(None)
     from app.cli.exposure_lines import exposure_document, exposure_lines
-    from engine.capture.capture_summary import describe
-    from engine.cloud.background.exposure_survey import survey_exposure
+    from app.cli.finding_lines import diagnosis_document, diagnosis_lines
+    from engine.doctor.doctor import examine
 
-    found, survey = describe(capture), survey_exposure(capture)
-    capture.close()
-    if options.json:
-        print(json_text(found | {"exposure": exposure_document(survey)}, indent=2))
-        return EXIT_OK
-    print(
-        f"{printable(found['path'])}: {found['n_cameras']} cameras, {found['n_frames']} frames at {found['fps']:g} per "
-        f"second ({found['duration_s']:.1f} s); {LAYOUTS[found['format']]}"
-    )
-    for camera in found["cameras"]:
-        held_out = "  suggested as hold-out" if camera["is_default_holdout"] else ""
-        print(
-            f"  {camera['name']:>8}  {camera['width']}x{camera['height']}  view {camera['fov_x_deg']:.0f} x "
-            f"{camera['fov_y_deg']:.0f} degrees{held_out}"
-        )
-    print(f"The cameras are up to {found['rig_extent']:.3g} scene units apart.")
-    for line in exposure_lines(survey):
-        print(line)
-    for warning in found["warnings"]:
-        print(f"Note: {warning}")
+    line = ProgressLine()
+    diagnosis = examine(capture, report=lambda progress: line.update(progress.stage, progress.done, progress.message))
+    line.finish()
+    if not options.json:
+        lines = exposure_lines(diagnosis.exposure)
+        print("\n".join([*lines, *diagnosis_lines(diagnosis, capture.rig.names, path=str(options.path))]))
+    if options.apply:
+        corrections = sure_corrections(diagnosis.findings)
+        if corrections is None:
+            if not options.json:
+                print("Nothing that is certain enough is to be corrected.")
+        else:
+            _say_written(options, write_asked(capture, corrections, options.out))
+    exposure = exposure_document(diagnosis.exposure)
+    return {"exposure": exposure, "doctor": diagnosis_document(diagnosis, capture.rig.names)}
+
+
+def _say_written(options: argparse.Namespace, path: object) -> int:
+    if not options.json:
+        print(printable(f"Written: {path}"))
+        print("Projects made from this capture before do not fit it any more; train a new one.")
     return EXIT_OK

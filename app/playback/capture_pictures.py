@@ -11,6 +11,7 @@ from PIL import Image
 
 from app.background.latest import LatestWorker
 from app.playback.arrays import Picture
+from app.playback.hatching import hatched
 from app.playback.picture_source import PictureSource
 from engine.byte_cache import ByteCache
 from engine.capture.capture import Capture
@@ -111,6 +112,9 @@ class CapturedPictures:
         image = downsized(request.capture.frame(request.camera_index, request.frame_index), request.max_width)
         if request.scene_gain is not None:
             image = to_reference(image, np.array(request.scene_gain))
+        valid = request.capture.valid(request.camera_index)
+        if valid is not None and not request.is_thumbnail:
+            image = hatched(image, valid)
         source = PictureSource(
             frame_index=request.frame_index,
             camera_index=request.camera_index,

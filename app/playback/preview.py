@@ -116,10 +116,12 @@ def write_cloud(
             capture = capture.resized(CLOUD_WIDTH_PX / widest, frames)
         cameras = capture.training_cameras(holdout)
         pictures = np.stack([capture.frame(camera, 0) for camera in cameras])
+        is_valid = capture.valid_of(cameras)
         cloud = build_static_cloud(
             pictures,
-            np.ones(pictures.shape[:3], bool),
+            np.ones(pictures.shape[:3], bool) if is_valid is None else is_valid,
             capture.rig.subset(cameras),
+            is_valid=is_valid,
             max_points=MAX_CLOUD_POINTS,
             report=logger.debug,
         )
@@ -128,7 +130,7 @@ def write_cloud(
             "colors": np.ascontiguousarray(np.clip(cloud.colors, 0.0, 1.0), np.float32),
         }
         write_arrays(path, arrays, {}, what="The first cloud")
-    except (EngineError, ValueError) as error:  # ValueError: cameras of different sizes cannot be stacked
+    except EngineError as error:
         logger.warning("no first cloud: %s", error)
         raise SystemExit(1) from error
 

@@ -13,7 +13,7 @@ import numpy as np
 from engine.camera.lens import Lens
 from engine.capture.capture import FORMATS, Capture
 from engine.capture.capture_summary import describe
-from engine.capture.folder_contents import videos_in
+from engine.capture.frame_files import VIDEO_SUFFIXES, listed
 from engine.errors import CaptureError, EngineError
 from engine.text import duration_text, printable
 
@@ -179,10 +179,17 @@ def refusal_of(path: Path, error: EngineError) -> RefusedFolder:
     """Put into words why a folder does not open. Reads the folder's list of files."""
     problems: Sequence[EngineError] = error.problems if isinstance(error, CaptureError) else ()
     several = tuple(problem.told_apart() for problem in problems) if len(problems) > 1 else ()
-    videos = () if several else tuple(videos_in(path))
+    videos = () if several else _videos_in(path)
     is_all = several or error.path in (None, path)  # else the place is said, too
     message, hint = (error.message, error.hint) if is_all else error.told_apart()
     return RefusedFolder(path, message, hint, several, videos if len(videos) >= LEAST_VIDEOS else ())
+
+
+def _videos_in(folder: Path) -> tuple[Path, ...]:
+    try:
+        return tuple(folder / name for name in listed(folder, VIDEO_SUFFIXES))
+    except OSError:
+        return ()
 
 
 def lens_text(lens: Lens) -> str:

@@ -195,7 +195,8 @@ class AnchorHeats:
         trained = self._pictures.trained(moment.main)
         clip_time = moment.main.clip.clip_time(moment.main.frame_index)
         camera = moment.cameras[n_known]
-        shares = anchor_shares(trained, moment.capture.rig, camera, clip_time, self._maps(moment, camera))
+        maps, is_valid = self._maps(moment, camera), moment.capture.valid(camera)
+        shares = anchor_shares(trained, moment.capture.rig, camera, clip_time, maps, is_valid)
         if known is None:
             rows, positions = anchors_at(trained, clip_time)
         else:

@@ -89,8 +89,10 @@ class ClipPictures:
         self._clips[request.model_key] = trained
 
     def render(self, capture: Capture, request: FrameRequest, camera_index: int, clip_time: float) -> np.ndarray:
-        """A camera's picture of a clip in its own colours, as it is compared. [H, W, 3] float32 in 0..1
+        """A camera's picture of a clip in its own colours, as it is compared: black where the camera sees nothing.
 
+        Returns:
+            [H, W, 3] float32 in 0..1
         Raises:
             ProjectError: See `trained`.
         """
@@ -101,6 +103,8 @@ class ClipPictures:
         if known is None:
             trained = self.trained(request)
             known = as_shown(trained.picture(capture.rig, camera_index, clip_time), "float")
+            valid = capture.valid(camera_index)
+            known = known if valid is None else np.where(valid[..., None], known, np.float32(0.0))
             self._renders.put(key, known, known.nbytes)
         return known
 

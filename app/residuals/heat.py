@@ -142,6 +142,9 @@ class Heat:
 
     def _compute(self, request: HeatRequest) -> HeatMap:
         values, note, is_extrapolated = self._values(request)
+        valid = request.capture.valid(request.camera_index)
+        if valid is not None:
+            values = np.where(valid, values, np.float32(np.nan))
         heat = HeatMap(
             np.ascontiguousarray(values, np.float32),
             request.kind,
@@ -149,7 +152,7 @@ class Heat:
             request.clip_index,
             request.frame_index,
             request.camera_index,
-            mean=float(values.mean(dtype=np.float64)),
+            mean=float((values if valid is None else values[valid]).mean(dtype=np.float64)),
             is_extrapolated=is_extrapolated,
             note=note,
         )

@@ -114,11 +114,12 @@ class HeatMap:
     """One picture's map, or why there is none.
 
     Attributes:
-        values: In the unit of the kind; None where there is nothing to show. [H, W] float32
+        values: In the unit of the kind, NaN in pixels that the camera does not see; None where there is nothing to
+            show. [H, W] float32
         kind: Name, see HEAT_KINDS.
         key: What it shows; equal keys mean equal values.
         clip_index, frame_index, camera_index: Of which picture.
-        mean: Of the values over all pixels.
+        mean: Of the values over all pixels that the camera sees.
         is_stale: It is not what was asked for now, but the last one of this kind and camera.
         is_extrapolated: One of the two clips was asked for an instant outside of its own frames.
         note: Why there is none, or what has to be known about it, in a sentence; may be empty.

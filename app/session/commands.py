@@ -10,6 +10,7 @@ from pathlib import Path
 
 from app.calibration.job import CalibrationRequest
 from app.project.opening_answers import OpeningAnswers
+from engine.capture.writers.capture_json import Corrections
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,6 +304,34 @@ class DismissNotice:
 
 
 @dataclass(frozen=True, slots=True)
+class ExamineCapture:
+    """Let the capture doctor look at the open capture."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopExamining:
+    """Let it stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class CorrectCapture:
+    """Write corrections into the capture's capture.json and open it as a new project.
+
+    Attributes:
+        corrections: What to change.
+        words: The same for the question that is asked before, as "Exclude cam07".
+        is_confirmed: It was asked and answered.
+    """
+
+    corrections: Corrections
+    words: str
+    is_confirmed: bool = False
+
+
+DoctorCommand = ExamineCapture | StopExamining | CorrectCapture
+"""What the capture doctor does."""
+
+
 class LookAtVideos:
     """Show which cameras are in a folder of plain videos, to calibrate them."""
 
@@ -390,4 +419,5 @@ Command = (
     | CloseQuestion
     | ForgetRecent
     | DismissNotice
+    | DoctorCommand
 )

@@ -8,6 +8,7 @@ from app.project.capture_report import CaptureReport
 from app.project.clip_catalog import ClipCatalog
 from app.project.opening_answers import OpeningAnswers
 from app.project.recents import RecentProject
+from engine.capture.writers.capture_json import Corrections
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +90,25 @@ class OwnSetting:
     help_text: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class CorrectionQuestion:
+    """Are corrections to be written into the capture, although the open project will not fit it then?
+
+    Attributes:
+        capture: Folder of the capture, which gets a capture.json.
+        words: What is corrected, as "Exclude cam07".
+        corrections: The same for the file.
+        project: Folder of the project that is open.
+        has_progress: Whether something was learned in it.
+    """
+
+    capture: str
+    words: str
+    corrections: Corrections
+    project: str
+    has_progress: bool
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class OpeningPage:
     """A capture without a project, and what the user is asked about it.
@@ -106,7 +126,7 @@ class OpeningPage:
     follow_links: bool
 
 
-Question = RetrainQuestion | SettingsQuestion | ProjectQuestion
+Question = RetrainQuestion | SettingsQuestion | ProjectQuestion | CorrectionQuestion
 
 
 def retrain_question(catalog: ClipCatalog, clip_index: int) -> RetrainQuestion:

@@ -34,8 +34,10 @@ from app.residuals.residuals import Residuals
 from app.session import commands
 from app.session.attention import Attention
 from app.session.calibrating import Calibrating
+from app.session.capture_doctor import CaptureDoctor
 from app.session.capture_opening import CaptureOpening
 from app.session.clip_versions import Versions
+from app.session.doctor_status import DoctorStatus
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
@@ -89,6 +91,7 @@ class Session:
         calibrating: Plain videos on their way to a capture.
         synchronising: How far the cameras of the open capture are ahead of each other.
         recent: What was opened lately.
+        doctor: What is wrong with the open capture, and what helps.
         notices: What the user has to know.
 
     Args:
@@ -150,6 +153,7 @@ class Session:
             open_path=opener,
             refuse=self.opening.refuse,
         )
+        self.doctor = CaptureDoctor(self._jobs, self.notices, self.dispatch)
         self._attention = Attention()
         self._seen = self._news_key()
         self.recent.look()
@@ -207,6 +211,11 @@ class Session:
     def residual_status(self) -> ResidualStatus:
         """What is measured of every picture."""
         return self.residuals.status
+
+    @property
+    def doctor_status(self) -> DoctorStatus:
+        """What the capture doctor found, or how far it is."""
+        return self.doctor.status
 
     @property
     def jobs(self) -> list[JobStatus]:
@@ -313,6 +322,14 @@ class Session:
                 self.playback.favour(self.views.active_index)
             case commands.DismissNotice(index=index):
                 self.notices.dismiss(index)
+            case commands.ExamineCapture():
+                self.doctor.examine()
+            case commands.StopExamining():
+                self.doctor.stop()
+            case commands.CorrectCapture(corrections=corrections, words=words, is_confirmed=is_confirmed):
+                self.question = None if is_confirmed else self.doctor.question(corrections, words)
+                if is_confirmed:
+                    self.doctor.correct(corrections)
             case _ if isinstance(command, commands.EditCommand):
                 self.marking.apply(command)
             case _:
@@ -373,6 +390,7 @@ class Session:
         self.live_training.open(opened, found.catalog)
         self.versions.open(opened)
         self._open_residuals(opened)
+        self.doctor.open(opened)
         self.views.look_at(opened.rig)
         self.bookmarks = Bookmarks()
         self._keep_recent()
@@ -446,6 +464,7 @@ class Session:
             jobs,
             self.notices.revision,
             self.recent.missing,
+            self.doctor.finished,
         )
 
     def _release_snapshot(self) -> None:
@@ -508,6 +527,7 @@ class Session:
         self.calibrating.close()
         self.synchronising.close()
         self.residuals.close()
+        self.doctor.close()
         self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)
         self.playback.close()
         self.versions.close()
@@ -635,4 +655,5 @@ _TITLES: dict[type, str] = {
     commands.RemoveRegion: "The region cannot be removed",
     commands.UndoMark: "The last mark cannot be taken back",
     commands.RedoMark: "The mark cannot be made again",
+    commands.CorrectCapture: "The capture cannot be corrected",
 }

@@ -62,6 +62,7 @@ class DescribedCamera:
         offset_frames: Its own frame is the capture's frame plus this.
         frame_times_s: When each of its frames was taken, in seconds of a clock that all cameras share, rising; None
             where nothing says so. Either all cameras have them or none. [T]
+        frame_indices: Numbers of its own frames that the capture shows, in order; None shows all. [T]
     """
 
     name: str
@@ -75,6 +76,7 @@ class DescribedCamera:
     color_matrix: np.ndarray | None = None
     offset_frames: float = 0.0
     frame_times_s: np.ndarray | None = None
+    frame_indices: Sequence[int] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +127,7 @@ def assemble(
     if cameras or not found:
         found += check_names([camera.name for camera in cameras], said_in)
     with ThreadPoolExecutor(THREADS) as pool:
-        looks = [pool.submit(_look_at, camera) for camera in cameras]
+        looks = [pool.submit(_shown, camera) for camera in cameras]
     entries: list[CameraEntry] = []
     files: dict[str, _Files] = {}
     scaled: list[str] = []
@@ -156,7 +158,7 @@ def assemble(
                     image_size=seen.size,
                     source=seen.source,
                     lens=camera.lens,
-                    masks=None if camera.masks is None else _mask_source(camera.masks),
+                    masks=None if camera.masks is None else _mask_source(camera.masks, camera.frame_indices),
                     color_matrix=camera.color_matrix,
                 )
             )
@@ -211,6 +213,18 @@ def _check_numbers(camera: DescribedCamera, size: tuple[int, int]) -> list[Captu
     return found
 
 
+def _shown(camera: DescribedCamera) -> _Files:
+    """The frames that the capture shows, which then count as evenly recorded."""
+    files = _look_at(camera)
+    if camera.frame_indices is None:
+        return files
+    n_frames = files.source.n_frames
+    if not camera.frame_indices or not 0 <= min(camera.frame_indices) <= max(camera.frame_indices) < n_frames:
+        text = f"The numbers of its frames go beyond the {n_frames} that it has."
+        raise CaptureError(text, hint="Correct the list, or take it out.", path=camera.said_in)
+    return replace(files, source=IndexedFrames(files.source, camera.frame_indices), rate=0.0, is_even=True)
+
+
 def _look_at(camera: DescribedCamera) -> _Files:
     """Headers of a video, or of the first, middle and last image: others are looked at when they are decoded."""
     if isinstance(camera.files, Path):
@@ -233,10 +247,13 @@ def _look_at(camera: DescribedCamera) -> _Files:
     return _Files(source, headers[0].size, 0.0, paths, [header.n_bytes for header in headers])
 
 
-def _mask_source(files: Path | Sequence[Path]) -> FrameSource:
+def _mask_source(files: Path | Sequence[Path], frame_indices: Sequence[int] | None) -> FrameSource:
+    source: FrameSource
     if isinstance(files, Path):
-        return VideoFrames(files, read_video_header(files).n_frames)
-    return ImageFrames(files[0].parent, files)
+        source = VideoFrames(files, read_video_header(files).n_frames)
+    else:
+        source = ImageFrames(files[0].parent, files)
+    return source if frame_indices is None else IndexedFrames(source, frame_indices)
 
 
 def _rate(fps: float | None, files: dict[str, _Files], said: list[str]) -> float:

@@ -44,6 +44,18 @@ class CameraOptics:
         picture[: inner.shape[0], : inner.shape[1]] = inner
         return picture
 
+    def mask(self, stored: np.ndarray) -> np.ndarray:
+        """A stored mask [h, w, 3] uint8 of any size, bright where it is set, as one of the picture. [H, W] bool"""
+        bright = np.where(stored.max(axis=-1, keepdims=True) > 127, 255, 0).astype(np.uint8)
+        bright = np.repeat(bright, 3, axis=-1)
+        if bright.shape[1::-1] != self.stored_size:
+            bright = np.asarray(Image.fromarray(bright).resize(self.stored_size, Image.Resampling.NEAREST))
+        shares = resize_area(bright, self.inner_size) if self.undistortion is None else self.undistortion.apply(bright)
+        width, height = self.picture_size
+        mask = np.zeros((height, width), bool)
+        mask[: shares.shape[0], : shares.shape[1]] = shares[..., 0] > 127
+        return mask
+
     def valid(self) -> np.ndarray | None:
         """Pixels of the picture that the camera sees. [H, W] bool, or None where it sees all."""
         if self.undistortion is None and self.inner_size == self.picture_size:

@@ -38,6 +38,7 @@ from engine.capture.formats import (
 from engine.capture.frames import FrameStore, IndexedFrames
 from engine.capture.rig_checks import check_rig, rig_extent, rig_warnings
 from engine.capture.undistortion import Undistortion
+from engine.capture.user_masks import with_masks
 from engine.errors import CaptureError
 
 logger = logging.getLogger(__name__)
@@ -150,7 +151,7 @@ class Capture:
         return frames
 
     def valid(self, camera_index: int) -> np.ndarray | None:
-        """Pixels that a camera sees, the same in all of its frames; the others are black or its border, drawn out.
+        """Pixels that a camera sees, the same in all of its frames; the others are black.
 
         Returns:
             [H, W] bool, read-only; None where it sees all.
@@ -159,6 +160,37 @@ class Capture:
         """
         self._check(camera_index, ())
         return self.store.valid(camera_index)
+
+    def valid_of(self, camera_indices: Sequence[int]) -> np.ndarray | None:
+        """`valid` of several cameras. [C, H, W] bool, or None where all of them see all."""
+        found = [self.valid(camera) for camera in camera_indices]
+        if all(valid is None for valid in found):
+            return None
+        width, height = self.picture_size
+        return np.stack([np.ones((height, width), bool) if valid is None else valid for valid in found])
+
+    def moving_mask(self, camera_index: int, frame_index: int) -> np.ndarray | None:
+        """What moves in a picture according to masks that came with the capture. Decoded anew at every call.
+
+        Returns:
+            [H, W] bool at the working size, undistorted as the picture is; None where the camera has no masks.
+        Raises:
+            CaptureError: The mask cannot be decoded.
+            IndexError: No such camera or frame.
+        """
+        self._check(camera_index, (frame_index,))
+        return self.store.moving_mask(camera_index, self.first_frame + frame_index)
+
+    @property
+    def has_masks(self) -> tuple[bool, ...]:
+        """Which cameras have masks of what moves."""
+        return tuple(camera.masks is not None for camera in self.layout.cameras)
+
+    @property
+    def picture_size(self) -> tuple[int, int]:
+        """Width and height of every picture."""
+        width, height = self.rig.image_sizes[0]
+        return int(width), int(height)
 
     def camera_indices(self, names: Sequence[str]) -> list[int]:
         """Rows of the rig for these camera names, in the order given.
@@ -246,7 +278,12 @@ def _make_capture(
     extent = rig_extent(native_rig)
     raise_problems(check_rig(native_rig, extent, folder), folder)
     rig, optics = _working_rig(layout, native_rig, scale, folder)
-    store = FrameStore([camera.source for camera in layout.cameras], optics, cache_bytes=cache_bytes)
+    store = FrameStore(
+        [camera.source for camera in layout.cameras],
+        optics,
+        masks=[camera.masks for camera in layout.cameras],
+        cache_bytes=cache_bytes,
+    )
     logger.info("opened %s: %d cameras, %d frames (%s)", folder, len(rig), stop - first, layout.format)
     return Capture(
         path=folder,
@@ -334,7 +371,8 @@ def _read_layout(folder: Path, *, follow_links: bool) -> Layout:
     probes = [(reader, reader.probe(folder)) for reader in FORMATS]
     for reader, probe in probes:
         if probe.is_match:
-            return reader.read(folder, follow_links=follow_links)
+            layout = reader.read(folder, follow_links=follow_links)
+            return with_masks(layout, folder, follow_links=follow_links)
     raise _not_a_capture(folder, [probe for _, probe in probes])
 
 

@@ -18,8 +18,9 @@ def describe(capture: Capture) -> dict[str, Any]:
 
     Returns:
         schema, path, format, fingerprint, n_cameras, n_frames, fps, duration_s, scale, default_holdout, cameras,
-        rig_extent (largest distance between two cameras, scene units), focus_point [3], warnings (sentences).
-        Each camera: name, path, width, height (stored), working_width, working_height, fx, fy, cx, cy (pixels at the
+        rig_extent (largest distance between two cameras, scene units), focus_point [3], has_points (a point cloud came
+        along), warnings (sentences).
+        Each camera: name, path, lens (model of the stored frames), has_masks, width, height (stored), working_width, working_height, fx, fy, cx, cy (pixels at the
         working size), fov_x_deg, fov_y_deg, center [3], forward [3], focus_distance (scene units), is_default_holdout.
     """
     rig = capture.rig
@@ -49,6 +50,7 @@ def describe(capture: Capture) -> dict[str, Any]:
         ],
         "rig_extent": rig_extent(rig),
         "focus_point": _floats(focus_point),
+        "has_points": capture.layout.points is not None,
         "warnings": list(capture.warnings),
     }
 
@@ -60,6 +62,8 @@ def _describe_camera(capture: Capture, row: int) -> dict[str, Any]:
     return {
         "name": rig.names[row],
         "path": str(capture.store.sources[row].path),
+        "lens": capture.layout.cameras[row].lens.model,
+        "has_masks": capture.layout.cameras[row].masks is not None,
         "width": int(capture.native_rig.image_sizes[row, 0]),
         "height": int(capture.native_rig.image_sizes[row, 1]),
         "working_width": width,

@@ -7,8 +7,6 @@ from collections import Counter
 from itertools import islice
 from pathlib import Path
 
-from engine.capture.frame_files import natural_key
-
 MAX_LOOKED_AT = 20_000
 """Entries of a folder that are counted."""
 _KINDS = {
@@ -31,16 +29,6 @@ def folder_contents(folder: Path) -> str:
     counts = [f"{kinds[kind]:,} {kind}{'s' if kinds[kind] > 1 else ''}" for kind in _ORDER if kinds[kind]]
     text = counts[0] if len(counts) == 1 else f"{', '.join(counts[:-1])} and {counts[-1]}"
     return f"{text} among its first {MAX_LOOKED_AT:,} entries" if kinds.total() == MAX_LOOKED_AT else text
-
-
-def videos_in(folder: Path) -> list[Path]:
-    """Video files that lie in a folder itself, by name in natural order; none where it cannot be read."""
-    try:
-        with os.scandir(folder) as entries:
-            names = [entry.name for entry in islice(entries, MAX_LOOKED_AT) if _kind(entry) == "video"]
-    except OSError:
-        return []
-    return [folder / name for name in sorted(names, key=natural_key) if not name.startswith(".")]
 
 
 def _kind(entry: os.DirEntry[str]) -> str:

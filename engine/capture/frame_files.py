@@ -19,6 +19,8 @@ INNER_FOLDERS = ("images", "")
 """Where in the folder of a camera its images lie."""
 Files = Path | Sequence[Path]
 """A video, or one image per frame."""
+MAX_DIGITS = 300
+"""Of a number in a name: no file name has longer ones, and Python refuses to count so far."""
 _NUMBER = re.compile(r"(\d+)")
 _SEPARATORS = re.compile(r"[\s_.\-]+")
 _ZEROS = re.compile(r"(?<!\d)0+(?=\d)")
@@ -27,7 +29,7 @@ _ZEROS = re.compile(r"(?<!\d)0+(?=\d)")
 def natural_key(name: str) -> tuple[tuple[int, int, str], ...]:
     """Key that sorts names as people count: cam2 before cam10."""
     parts = _NUMBER.split(name)
-    return tuple((1, int(part), part) if row % 2 else (0, 0, part) for row, part in enumerate(parts))
+    return tuple((1, int(part[:MAX_DIGITS]), part) if row % 2 else (0, 0, part) for row, part in enumerate(parts))
 
 
 def listed(folder: Path, suffixes: Sequence[str]) -> list[str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 from bisect import bisect_left
+from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -34,6 +35,10 @@ from engine.capture.video_colors import rgb_picture
 from engine.errors import CaptureError
 from engine.storage.files import open_regular
 
+MAX_DECODER_BYTES = 384 << 20
+"""What all open videos of a capture may hold in decoded frames that others refer to."""
+DECODER_BYTES_PER_PIXEL = 24
+"""Sixteen frames of one and a half bytes: what H.264 may refer to."""
 MAX_FORWARD_DECODE = 64
 """Frames decoded forward before a seek is considered cheaper even inside one group of pictures."""
 
@@ -256,9 +261,11 @@ class IndexedFrames:
     """Frames of another source under other numbers: some of them, some twice. Owns nothing but the numbers."""
 
     def __init__(self, source: FrameSource, frame_indices: Sequence[int] | np.ndarray) -> None:
-        self.source = source
+        indices = np.asarray(frame_indices, dtype=np.int64)
+        is_numbered = isinstance(source, IndexedFrames)
+        self.source: FrameSource = source.source if is_numbered else source
         self.path = source.path
-        self.frame_indices = np.asarray(frame_indices, dtype=np.int64)  # of the source, by number here
+        self.frame_indices = source.frame_indices[indices] if is_numbered else indices  # of the source, by number here
 
     @property
     def n_frames(self) -> int:
@@ -282,14 +289,25 @@ class FrameStore:
     Args:
         sources: One per camera.
         optics: Of each camera, from a stored frame to a picture.
+        masks: Of each camera, masks of what moves or None; none at all by default.
         cache_bytes: Bound on pictures kept.
     """
 
-    def __init__(self, sources: Sequence[FrameSource], optics: Sequence[CameraOptics], *, cache_bytes: int) -> None:
+    def __init__(
+        self,
+        sources: Sequence[FrameSource],
+        optics: Sequence[CameraOptics],
+        *,
+        masks: Sequence[FrameSource | None] = (),
+        cache_bytes: int,
+    ) -> None:
         self.sources = tuple(sources)
+        self.masks = tuple(masks) or (None,) * len(self.sources)
         self.optics = tuple(optics)
         self.cache: ByteCache[tuple[int, int], np.ndarray] = ByteCache(cache_bytes)
         self._valid: dict[int, np.ndarray | None] = {}
+        self._open: OrderedDict[int, int] = OrderedDict()  # bytes that decoders hold by camera, used longest ago first
+        self._open_lock = threading.Lock()
 
     def valid(self, camera_index: int) -> np.ndarray | None:
         """Pixels that a camera sees. [H, W] bool, read-only, or None where it sees all."""
@@ -299,6 +317,11 @@ class FrameStore:
                 valid.flags.writeable = False
             self._valid[camera_index] = valid
         return self._valid[camera_index]
+
+    def moving_mask(self, camera_index: int, frame_index: int) -> np.ndarray | None:
+        """What moves in a picture. [H, W] bool, or None where the camera has no masks. Raises CaptureError."""
+        masks = self.masks[camera_index]
+        return None if masks is None else self.optics[camera_index].mask(next(iter(masks.read([frame_index]))))
 
     def frames(self, camera_index: int, frame_indices: Sequence[int]) -> Iterator[np.ndarray]:
         """Frames of one camera at the working size, each a read-only [H, W, 3] uint8.
@@ -316,13 +339,28 @@ class FrameStore:
 
     def close(self) -> None:
         """Close files and forget cached frames."""
-        for source in self.sources:
+        for source in (*self.sources, *(masks for masks in self.masks if masks is not None)):
             source.close()
+        with self._open_lock:
+            self._open.clear()
         self.cache.clear()
+
+    def _close_others(self, camera_index: int) -> None:
+        """Close files that were used longest ago where decoders would hold too much: all cameras are often asked."""
+        width, height = self.optics[camera_index].stored_size
+        with self._open_lock:
+            self._open[camera_index] = width * height * DECODER_BYTES_PER_PIXEL
+            self._open.move_to_end(camera_index)
+            closing = []
+            while len(self._open) > 1 and sum(self._open.values()) > MAX_DECODER_BYTES:
+                closing.append(self._open.popitem(last=False)[0])
+        for other in closing:
+            self.sources[other].close()
 
     def _decode(self, camera_index: int, frame_index: int) -> np.ndarray:
         source, optics = self.sources[camera_index], self.optics[camera_index]
         stored = next(iter(source.read([frame_index])))
+        self._close_others(camera_index)
         width, height = optics.stored_size
         if stored.shape[:2] != (height, width):
             raise CaptureError(

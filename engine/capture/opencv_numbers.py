@@ -59,9 +59,9 @@ def pose_of(rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
 
 def rotation_matrix(vector: np.ndarray) -> np.ndarray:
     """The rotation about a vector [3] by its length in radians; NaN of one that is not a number. [3, 3]"""
-    angle = float(np.linalg.norm(vector)) if np.isfinite(vector).all() else math.nan
-    if not angle < 1e6:  # turns lose their digits; check_pose then names the camera
+    if not np.abs(vector).max() < 1e6:  # turns lose their digits, and NaN; check_pose then names the camera
         return np.full((3, 3), math.nan)
+    angle = float(np.linalg.norm(vector))
     if angle == 0.0:
         return np.eye(3)
     x, y, z = vector / angle

@@ -147,7 +147,7 @@ def _read_npz(file: BinaryIO, path: Path) -> tuple[np.ndarray, np.ndarray | None
         raise CaptureError("The file has no array called data.", hint=hint, path=path) from error
     except NpyError as error:
         raise damaged(path, str(error)) from error
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
+    except (OSError, zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError) as error:
         raise damaged(path, "it is not an archive of arrays") from error
     if values.ndim != 2 or values.shape[1] < 3:
         raise damaged(path, f"its array has shape {values.shape}, not points by coordinates")

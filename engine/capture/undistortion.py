@@ -63,16 +63,25 @@ class Undistortion:
     _made: dict[str, np.ndarray] = field(default_factory=dict, repr=False)
 
     def apply(self, image: np.ndarray) -> np.ndarray:
-        """A stored picture [H, W, 3] uint8 as a pinhole picture [new H, new W, 3] uint8."""
+        """A stored picture [H, W, 3] uint8 as a pinhole picture [new H, new W, 3] uint8, black where not valid."""
+        valid = self.valid()
         with self._lock:
             lattice = self._made.get("lattice")
             if lattice is None:
                 lattice = self._made["lattice"] = self._lattice()
         shrinking = max(self.K[0, 0] / self.new_K[0, 0], self.K[1, 1] / self.new_K[1, 1])
-        return remap(image, lattice, _STEP_PX, self.new_size, max(1, math.ceil(shrinking - 1e-6)))
+        return remap(image, lattice, _STEP_PX, self.new_size, max(1, math.ceil(shrinking - 1e-6)), valid)
 
     def valid(self) -> np.ndarray:
-        """Pixels of the pinhole picture that the stored picture reaches. [new H, new W] bool"""
+        """Pixels of the pinhole picture that the stored picture reaches. [new H, new W] bool, read-only"""
+        with self._lock:
+            valid = self._made.get("valid")
+            if valid is None:
+                valid = self._made["valid"] = self._valid()
+                valid.flags.writeable = False
+        return valid
+
+    def _valid(self) -> np.ndarray:
         width, height = self.new_size
         x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
         places, is_reached = self._places(np.stack([x, y], axis=-1))

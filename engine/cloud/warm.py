@@ -12,6 +12,7 @@ from engine.cloud.background.light import AnchorLight
 from engine.cloud.background.masks import motion_mask
 from engine.cloud.motion.hull import Grid, carve, hull_colors, hull_visibility
 from engine.cloud.stereo.consistency import check_depths
+from engine.cloud.stereo.slanted import refine_slanted
 from engine.cloud.stereo.smoothing import smooth_inverse_depth
 from engine.cloud.stereo.sweep import matching_costs
 from engine.images.image_filters import dilate
@@ -33,13 +34,17 @@ def warm_up() -> None:
     motion_mask(frames[0], background.image)
     motion_mask(background.image, frames[0].astype(np.float32))
     dilate(~background.is_stable, 1)
-    remap(frames[0], np.zeros((4, 4, 2), np.float32), _SIZE_PX, (_SIZE_PX, _SIZE_PX), 1)
+    for n_sub in (1, 2):
+        lattice, is_valid = np.zeros((4, 4, 2), np.float32), np.ones((_SIZE_PX, _SIZE_PX), bool)
+        remap(frames[0], lattice, _SIZE_PX, (_SIZE_PX, _SIZE_PX), n_sub, is_valid)
 
     planes = np.linspace(0.2, 1.0, 4, dtype=np.float32)
     greys = frames[:2].mean(-1).astype(np.float32)
     is_usable = np.ones(greys.shape, dtype=bool)
     costs = matching_costs(greys, is_usable, rig, camera=0, sources=[1], inverse_depths=planes)
     smooth_inverse_depth(costs, greys[0], planes)
+    prior = np.full(greys[0].shape, 0.5)
+    refine_slanted(greys, is_usable, rig, camera=0, sources=[1], seeds=prior[None], prior=prior, low=0.2, high=1.0)
     check_depths(np.full(greys.shape, 2.0), rig, camera=0, others=[1], tolerance=0.01)
 
     grid, projections = Grid.over(np.array([-0.4, -0.4, 1.6]), np.array([0.4, 0.4, 2.4]), 0.1), projection_matrices(rig)

@@ -61,7 +61,7 @@ class AnchorSet(nn.Module):
         points: Tensor,
         colors: Tensor,
         *,
-        spacing: float,
+        spacing: float | Tensor,
         feature_dim: int,
         presence: Tensor | None,
     ) -> AnchorSet:
@@ -70,11 +70,12 @@ class AnchorSet(nn.Module):
         Args:
             points: Scene units. [A, 3]
             colors: Scene colours in 0..1, the start of the Gaussians' colour. [A, 3]
-            spacing: Distance between neighbours, scene units.
+            spacing: Distance between neighbours, scene units; one for all, or one each [A].
             feature_dim: Width of the static feature.
             presence: Frames of the clip in which each anchor exists, or None for a static set. [A, M] bool
         """
-        log_scales = torch.full((len(points), 3), float(torch.log(torch.tensor(spacing))))
+        spacings = torch.as_tensor(spacing, dtype=torch.float32).expand(len(points))
+        log_scales = torch.log(spacings)[:, None].expand(-1, 3).clone()
         return cls(
             positions=points.float(),
             color_logits=torch.logit(colors.float().clamp(_COLOR_EDGE, 1 - _COLOR_EDGE)),

@@ -42,12 +42,12 @@ def audio_estimate(
         fps: Frames per second in which offsets are counted.
         after_camera: Called with how many tracks are read.
     """
-    spectra: dict[int, tuple[np.ndarray, float]] = {}
+    spectra: dict[int, tuple[np.ndarray, float, int]] = {}
     n_fft = 1 << (2 * int(MAX_SECONDS * RATE)).bit_length()
     for row, recording in enumerate(recordings):
         track = None if recording.video is None else _sound(recording)
         if track is not None and float(np.abs(track[0]).max()) > 1e-4:
-            spectra[row] = (_whitened(track[0], n_fft), track[1] - recording.start_s)
+            spectra[row] = (_whitened(track[0], n_fft), track[1] - recording.start_s, len(track[0]))
         after_camera(row + 1)
     pairs = []
     rows = list(spectra)
@@ -56,7 +56,7 @@ def audio_estimate(
             second = rows[(at + step) % len(rows)]
             if second == first or (2 * step > len(rows) or (2 * step == len(rows) and at >= step)):
                 continue
-            delay_s = _delay(spectra[first][0], spectra[second][0], n_fft)
+            delay_s = _delay(spectra[first][0], spectra[second][0], n_fft, min(spectra[first][2], spectra[second][2]))
             if delay_s is not None:
                 offset = (delay_s + spectra[second][1] - spectra[first][1]) * fps
                 pairs.append(PairOffset(first, second, offset, SIGMA_S * fps))
@@ -110,14 +110,17 @@ def _whitened(sound: np.ndarray, n_fft: int) -> np.ndarray:
     return np.where(is_in_band, spectrum / np.maximum(size, 1e-30), 0).astype(np.complex64)
 
 
-def _delay(first: np.ndarray, second: np.ndarray, n_fft: int) -> float | None:
-    """Seconds by which the same sound comes later in the second track; None where nothing is the same."""
+def _delay(first: np.ndarray, second: np.ndarray, n_fft: int, n_shared: int) -> float | None:
+    """Seconds by which the same sound comes later in the second track; None where nothing is the same.
+
+    n_shared: samples of the shorter track: so far are the tracks shifted against each other.
+    """
     likeness = np.fft.irfft(np.conj(first) * second, n_fft)
-    row = int(np.argmax(likeness))
-    if likeness[row] < MIN_PEAK * float(likeness.std()):
+    shifts = np.r_[likeness[-n_shared:], likeness[: n_shared + 1]]  # from -n_shared on
+    row = int(np.argmax(shifts))
+    if not 0 < row < len(shifts) - 1 or shifts[row] < MIN_PEAK * float(shifts.std()):
         return None
-    before, top, after = likeness[row - 1], likeness[row], likeness[(row + 1) % n_fft]
+    before, top, after = shifts[row - 1 : row + 2]
     bend = before - 2 * top + after
     shift = 0.5 * (before - after) / bend if bend < 0 else 0.0
-    lag = row if row < n_fft // 2 else row - n_fft
-    return float((lag + shift) / RATE)
+    return float((row - n_shared + shift) / RATE)

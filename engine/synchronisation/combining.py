@@ -50,7 +50,7 @@ def combine(names: Sequence[str], estimates: Sequence[Estimate], fps: float) -> 
             cameras.append(CameraOffset(name, 0.0, math.inf, 0.0, None))
             continue
         taken = next(aligned for estimate, aligned in used if estimate is source)[row]
-        n_for, against = 0, []
+        n_for, doubt, against = 0, 1.0, []
         for estimate, aligned in used:
             if estimate is source or not np.isfinite(aligned[row]):
                 continue
@@ -59,9 +59,10 @@ def combine(names: Sequence[str], estimates: Sequence[Estimate], fps: float) -> 
             if abs(difference) <= apart:
                 n_for += 1
             else:
+                doubt *= 1 - 0.4 * min(1.0, float(sigmas[row] / estimate.sigmas_frames[row]))
                 against.append(_disagreement(row, name, source.source, estimate, difference, offsets[row], fps))
         disagreements += against
-        confidence = _confidence(source, row, float(sigmas[row]), n_for, len(against))
+        confidence = _confidence(source, row, float(sigmas[row]), n_for) * doubt
         cameras.append(CameraOffset(name, float(offsets[row]), float(sigmas[row]), confidence, source.source))
     return Synchronisation(tuple(cameras), tuple(estimates), tuple(disagreements), fps)
 
@@ -115,7 +116,7 @@ def _disagreement(
     return Disagreement(row, source, other.source, difference, text)
 
 
-def _confidence(estimate: Estimate, row: int, sigma: float, n_for: int, n_against: int) -> float:
+def _confidence(estimate: Estimate, row: int, sigma: float, n_for: int) -> float:
     """How likely an offset is right to half a frame, 0..1."""
     confidence = math.erf(0.5 / (math.sqrt(2) * max(sigma, 1e-6)))
     agreement = estimate.agreements[row]
@@ -124,4 +125,4 @@ def _confidence(estimate: Estimate, row: int, sigma: float, n_for: int, n_agains
         confidence *= min(float(agreement) + 0.3, 1.0) if n_pairs > 1 else ONE_PAIR_TRUST
     for _ in range(n_for):
         confidence = 1 - (1 - confidence) * 0.5
-    return confidence * 0.6**n_against
+    return confidence

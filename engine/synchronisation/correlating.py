@@ -50,7 +50,15 @@ def correlate(first: np.ndarray, second: np.ndarray, max_lag: int) -> tuple[np.n
     n = 1 << (n_first + n_second).bit_length()
     spectrum = (np.conj(np.fft.rfft(first, n, axis=0)) * np.fft.rfft(second, n, axis=0)).sum(axis=1)
     products = np.fft.irfft(spectrum, n)[lags]
-    energies = [np.concatenate([[0.0], np.cumsum((signal**2).sum(axis=1))]) for signal in (first, second)]
     low, high = np.maximum(0, -lags), np.minimum(n_first, n_second - lags)
-    powers = (energies[0][high] - energies[0][low]) * (energies[1][high + lags] - energies[1][low + lags])
-    return lags, products / np.sqrt(np.maximum(powers, 1e-20))
+    counts = (high - low).astype(np.float64)
+    sums, powers = [], []
+    for signal, begin, end in ((first, low, high), (second, low + lags, high + lags)):
+        heap = np.concatenate([np.zeros((1, signal.shape[1])), np.cumsum(signal, axis=0)])
+        energy = np.concatenate([[0.0], np.cumsum((signal**2).sum(axis=1))])
+        part = heap[end] - heap[begin]  # [L, B]
+        sums.append(part)
+        powers.append(energy[end] - energy[begin] - (part**2).sum(axis=1) / counts)
+    # means of what overlaps are taken away, not those of all: signals often rise and fall with the window itself
+    shared = products - (sums[0] * sums[1]).sum(axis=1) / counts
+    return lags, shared / np.sqrt(np.maximum(powers[0] * powers[1], 1e-20))

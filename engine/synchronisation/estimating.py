@@ -28,7 +28,7 @@ MAX_FRAMES = 150
 """Pictures of each camera that are compared, from the middle of what all recorded."""
 MIN_FRAMES = 16
 """Fewer successive pictures tell nothing."""
-EPIPOLAR_SIGMA_FRAMES, MOTION_SIGMA_FRAMES = 0.06, 0.4
+EPIPOLAR_SIGMA_FRAMES, MOTION_SIGMA_FRAMES = 0.06, 0.9
 """What is uncertain beside the scatter of pairs: views differ, and those of neighbours in the same way."""
 
 

@@ -45,7 +45,6 @@ def _signal(motion: MotionPictures, fps: float) -> np.ndarray:
     times = np.arange(len(changes))
     heights = np.interp(times, times[is_moving], heights[is_moving])
     signals = np.stack([np.log(changes + 1e-3 * width * height), np.log(presence + 1e-3 * width * height), heights], 1)
-    signals[0] = signals[1]  # nothing comes before the first frame that could change
     signals = ndimage.gaussian_filter1d(signals, 0.7, axis=0)
     signals -= ndimage.gaussian_filter1d(signals, SLOW_S * fps / 2, axis=0)
     return signals / np.maximum(signals.std(axis=0), 1e-9)

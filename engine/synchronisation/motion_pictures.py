@@ -34,7 +34,8 @@ class MotionPictures:
     """What moves in one camera, over successive frames.
 
     Attributes:
-        changes: Difference from the frame before, 0..1 per pixel; the first row is empty. Sparse [T, H * W] float32
+        changes: Difference from the frame before, 0..1 per pixel; the first row is the second one
+            again. Sparse [T, H * W] float32
         presence: Difference from what the pixel usually shows. Sparse [T, H * W] float32
         size: Width and height of the pictures looked at.
         times_s: When each frame was shown, own time. [T] float64
@@ -57,7 +58,8 @@ def motion_pictures(
     frames = _small_frames(recording.source, first, last, after_frame)
     spread = np.unique(np.linspace(0, len(frames) - 1, N_USUAL).round().astype(int))
     usual = np.median(frames[spread], axis=0)
-    changes = [_weights(frame, before) for frame, before in zip(frames, [frames[0], *frames[:-1]], strict=True)]
+    changes = [_weights(frame, before) for frame, before in zip(frames[1:], frames[:-1], strict=True)]
+    changes = changes[:1] + changes  # an empty row would be a sudden rest, at the same place in every camera
     presence = [_weights(frame, usual) for frame in frames]
     height, width = frames.shape[1:3]
     return MotionPictures(

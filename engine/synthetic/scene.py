@@ -23,8 +23,9 @@ LIGHT_POSITION = np.array([0.5, -0.7, 2.6])
 LIGHT_RADIUS = 0.45
 """The lamp is a level disc of this radius, which makes shadows soft."""
 SAMPLE_CAMERAS = 20
-"""18 degrees apart: with 12 (30 degrees) a third of the floor finds no match and depth is off by 28 cm at the third
-quartile; with 20 by 10 cm."""
+"""18 degrees apart."""
+SKY_RADIUS = 25.0
+"""Distance of the sky outdoors."""
 DEGREES_PER_CLIP_BALL = 84.0
 """Way of the ball round the room in one clip: a chord of 1.2 units, a third of a view."""
 DEGREES_PER_CLIP_SCULPTURE = 80.0
@@ -89,6 +90,7 @@ def make_scene(
     clip_length: int = 10,
     fps: float = 30.0,
     rig: CameraRig | None = None,
+    surroundings: str = "room",
 ) -> SyntheticScene:
     """The sample scene at any size and length.
 
@@ -99,19 +101,21 @@ def make_scene(
         clip_length: Frames per clip.
         fps: Frames per second.
         rig: Cameras of another kind (engine.synthetic.rigs), in place of `size` and `n_cameras`.
+        surroundings: One of SURROUNDINGS.
     Raises:
-        ValueError: A number is below 1.
+        ValueError: A number is below 1, or there are no such surroundings.
     """
+    if surroundings not in SURROUNDINGS:
+        raise ValueError(f"no surroundings called {surroundings}; there are {', '.join(SURROUNDINGS)}")
     if min(*size, n_cameras, n_frames, clip_length) < 1:
         raise ValueError("size, n_cameras, n_frames and clip_length must be at least 1")
-    return SyntheticScene(
-        make_parts(clip_length), make_rig(n_cameras, size) if rig is None else rig, n_frames, clip_length, fps
-    )
+    parts = (*SURROUNDINGS[surroundings](), *make_parts(clip_length)[1:])
+    rig = make_rig(n_cameras, size) if rig is None else rig
+    return SyntheticScene(parts, rig, n_frames, clip_length, fps)
 
 
 def make_parts(clip_length: int) -> tuple[Part, ...]:
     """The room, three standing things, a turning sculpture, a flying ball and a parcel that appears with clip 1."""
-    shell = meshes.box(ROOM_SIZE, is_inward=True).moved(placed(0, 0, ROOM_SIZE[2] / 2))
     pillar = meshes.cylinder(0.14, 1.5)
     plinth = meshes.box((0.52, 0.52, 0.5))
     figure = meshes.joined(
@@ -123,7 +127,7 @@ def make_parts(clip_length: int) -> tuple[Part, ...]:
         ]
     )
     return (
-        Part("room", shell, textures.room, still(np.eye(4))),
+        *make_room(),
         Part("pillar", pillar, textures.spiral, still(placed(-1.3, 0.75, 0.75))),
         Part("crate", meshes.box((0.56, 0.56, 0.56)), textures.planks, still(placed(1.0, 0.75, 0.28, turn_deg=28))),
         Part("plinth", plinth, textures.marble, still(placed(-0.35, -0.3, 0.25, turn_deg=12))),
@@ -136,6 +140,31 @@ def make_parts(clip_length: int) -> tuple[Part, ...]:
             still(placed(0.75, -0.7, 0.24, turn_deg=-20), from_frame=clip_length),
         ),
     )
+
+
+def make_room(texture: Texture = textures.room) -> tuple[Part, ...]:
+    """Floor, ceiling and walls."""
+    shell = meshes.box(ROOM_SIZE, is_inward=True).moved(placed(0, 0, ROOM_SIZE[2] / 2))
+    return (Part("room", shell, texture, still(np.eye(4))),)
+
+
+def make_outdoors() -> tuple[Part, ...]:
+    """A meadow under a sky that is ten times as far away as what stands on it."""
+    ground = meshes.box((2 * SKY_RADIUS, 2 * SKY_RADIUS, 0.2)).moved(placed(0, 0, -0.1))
+    dome = meshes.sphere(SKY_RADIUS)
+    inside = Mesh(dome.vertices, dome.triangles[:, ::-1], -dome.corner_normals[:, ::-1])
+    return (
+        Part("ground", ground, textures.meadow, still(np.eye(4))),
+        Part("sky", inside, textures.sky, still(np.eye(4))),
+    )
+
+
+SURROUNDINGS: dict[str, Callable[[], tuple[Part, ...]]] = {
+    "room": make_room,
+    "bare room": lambda: make_room(textures.bare_room),
+    "outdoors": make_outdoors,
+}
+"""What may be around the things of the scene, by name."""
 
 
 def placed(x: float, y: float, z: float, *, turn_deg: float = 0.0) -> np.ndarray:

@@ -98,6 +98,28 @@ def room(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return color
 
 
+def bare_room(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Floor, ceiling and walls in one plain paint each: nothing to match but edges and shadows."""
+    color = np.empty_like(points)
+    for axis, sign, paint in ((0, 1, "8fa6a0"), (0, -1, "c2a27f"), (1, 1, "a9adbd"), (1, -1, "b5b88c")):
+        color[normals[:, axis] * sign > 0.5] = rgb(paint)
+    color[normals[:, 2] > 0.5] = rgb("9a8468")
+    color[normals[:, 2] < -0.5] = rgb("dcd8ce")
+    return color
+
+
+def meadow(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Grass and bare earth in patches."""
+    grass = mix(rgb("5b7a38"), rgb("93a257"), cloudy(points[:, :2] * 4.0, 111))
+    earth = rgb("8a6f4e") * (0.8 + 0.4 * cloudy(points[:, :2] * 6.0, 113))[:, None]
+    return mix(grass, earth, step(noise(points[:, :2] * 0.9, 117), 0.6, 0.2))
+
+
+def sky(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Blue that grows paler towards the horizon. Points are around the middle of the sky."""
+    return mix(rgb("e6eef4"), rgb("a8c8ee"), np.clip(points[:, 2] / 25.0, 0, 1) ** 0.5)
+
+
 def _wall(along: np.ndarray, height: np.ndarray, paint: np.ndarray, *, seed: int) -> np.ndarray:
     """One wall: `along` from -3 to 3 and `height` from 0 up, scene units. [P, 3]"""
     plane = np.stack([along, height], axis=-1)

@@ -39,11 +39,11 @@ from engine.training.phases import phase_at, phases_of
 from engine.training.preparation.clip_field import n_alive
 from engine.training.preparation.clip_preparation import ClipParts, ClipPreparation
 from engine.training.preparation.method import Method
-from engine.training.preparation.training_pictures import shared_image_size
 from engine.training.step.active_tiles import ActivePicture, ActiveTiles
 from engine.training.step.losses import photometric_loss
 from engine.training.step.nonfinite import gradient_not_finite, loss_not_finite
 from engine.training.step.order import ShuffledOrder
+from engine.training.step.valid_pixels import ValidPixels
 from engine.training.step.visible_anchors import Sight, camera_views
 
 
@@ -95,7 +95,6 @@ class ClipTraining:
                 path=capture.path,
             )
         self.seed, self.prep_dir, self.report = seed, Path(prep_dir), report
-        self.width, self.height = shared_image_size(capture)
         self.rig = capture.rig.subset(self.camera_indices)
         self.near_plane = float(near_plane(self.rig)) if self._base is None else self._base.header.near_plane
         n_cameras = len(self.camera_indices)
@@ -183,7 +182,8 @@ class ClipTraining:
         self._sight = Sight(self.model, self._training_views, reach=self._reach)  # a set may have become dynamic
         has_rest = name == "source" and self.method.has_active_tiles and not self.gains.requires_grad
         has_rest = has_rest and ActiveTiles.applies(self.model)
-        self._tiles = ActiveTiles(self.model, backend=self.backend) if has_rest else None
+        self._valid = ValidPixels(self.pictures.is_valid, self.backend.device)
+        self._tiles = ActiveTiles(self.model, backend=self.backend, valid=self._valid) if has_rest else None
         if not parameters:  # nothing to learn, as in a source clip in which nothing moves
             self._say("Nothing to learn", f"Nothing moves in this clip: no steps instead of {n_steps}")
             self.phases[index] = (name, steps_in_phase)
@@ -201,11 +201,12 @@ class ClipTraining:
         stage, item = self.phases[index][0], self._order.draw()
         if stage == "static":
             camera_row, clip_time = item, 0.0
-            truth, is_counted = self.backgrounds.images[camera_row], self.backgrounds.is_stable[camera_row]
+            truth = self.backgrounds.images[camera_row]
+            is_counted = self._tensor(self.backgrounds.is_stable[camera_row])  # unstable pixels do not count
         else:
             camera_row, frame = divmod(item, self.clip.n_frames)
             clip_time = frame / self.clip.clip_length
-            truth, is_counted = self.pictures.picture(camera_row, frame), None
+            truth, is_counted = self.pictures.picture(camera_row, frame), self._valid.of(camera_row)
         view = self._training_views[camera_row]
         active = self._active_picture(camera_row, view, clip_time)
         image = render_gaussians(active.gaussians, view, backend=self.backend, tile_mask=active.tile_mask).image[0]
@@ -216,8 +217,7 @@ class ClipTraining:
             backend=self.backend,
             ssim_weight=self.config.ssim_weight,
             gain=self.gains[camera_row],
-            # unstable pixels of a background do not count
-            is_counted=None if is_counted is None else self._tensor(is_counted),
+            is_counted=is_counted,
             tile_mask=active.tile_mask,
             rest=active.rest,
         )
@@ -248,7 +248,7 @@ class ClipTraining:
             step=self.steps_done,
             n_steps=self.n_steps,
             loss=value,
-            train_psnr=-10.0 * float(np.log10(max(mean_square, 1e-10))),
+            train_psnr=-10.0 * float(np.log10(max(mean_square / self._valid.share_of(camera_row), 1e-10))),
             n_gaussians=active.n_all,
             stage=stage,
             gradient_norm=gradient_norm,
@@ -263,7 +263,7 @@ class ClipTraining:
         if self._tiles is not None:
             return self._tiles.split(camera_row, view, clip_time, rows)
         gaussians = self.model.decode(clip_time, rows)
-        return ActivePicture(gaussians, gaussians, len(gaussians))
+        return ActivePicture(gaussians, gaussians, len(gaussians), self._valid.tiles_of(camera_row))
 
     @property
     def _reach(self) -> float:
@@ -280,7 +280,7 @@ class ClipTraining:
             clip_time = self.clip.clip_time(frame)
             image = render_model(self.model, self._views[camera], clip_time, reach=self._reach)
             shown = colors.in_camera(host_array(image), self.capture.rig, camera, clip_time)
-            values.append(psnr(shown, self.capture.frame(camera, frame) / 255.0))
+            values.append(psnr(shown, self.capture.frame(camera, frame) / 255.0, self.capture.valid(camera)))
         return float(np.mean(values)) if values else float("nan")
 
     def state(self) -> ClipState:
@@ -378,7 +378,7 @@ class ClipTraining:
             raise damaged_checkpoint(error, path) from error
 
     def _go_on(self, kept: Checkpoint) -> None:
-        width, height = shared_image_size(self.capture)
+        width, height = self.capture.picture_size
         if kept.backgrounds.images.shape != (len(self.rig), height, width, 3) or kept.gains.shape != (len(self.rig), 3):
             found = f"{kept.backgrounds.images.shape} and {kept.gains.shape}"
             raise ValueError(f"backgrounds and gains are {found}, not of {len(self.rig)} cameras of {width}x{height}")

@@ -224,3 +224,27 @@ def test_a_scene_of_another_rig_is_written_as_a_capture(tmp_path: Path) -> None:
     capture = open_capture(tmp_path)
     assert capture.n_frames == 1
     assert np.allclose(capture.rig.centers, scene.rig.centers)
+
+
+def test_surroundings_without_texture_and_outdoors_with_a_sky() -> None:
+    rig = SHIPPED.rig.subset([0, 7]).resized(np.full((2, 2), 48))
+    bare, outdoors = (make_scene(rig=rig, surroundings=name) for name in ("bare room", "outdoors"))
+    truth = make_truth(bare, 0, 0)
+    picture = SceneCamera(bare, 0, supersampling=1).image(0)
+    usual = SceneCamera(make_scene(rig=rig), 0, supersampling=1).image(0)
+    is_room = truth.mask("room")
+    assert np.abs(np.diff(picture.astype(int), axis=0))[is_room[1:]].mean() < 0.5 * (
+        np.abs(np.diff(usual.astype(int), axis=0))[is_room[1:]].mean()
+    )
+    far = make_truth(outdoors, 0, 0)
+    assert 0.05 < far.mask("sky").mean() < 0.6
+    assert far.depths[far.mask("sky")].min() > 10
+    assert np.isfinite(far.depths).all()
+    colors = SceneCamera(outdoors, 0, supersampling=1).image(0)[far.mask("sky")]
+    assert colors.min() > 120  # bright, and bluer than red
+    assert (colors[:, 2] >= colors[:, 0]).all()
+
+
+def test_unknown_surroundings_are_refused() -> None:
+    with pytest.raises(ValueError, match="there are room, bare room, outdoors"):
+        make_scene(surroundings="cave")

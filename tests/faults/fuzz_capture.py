@@ -258,9 +258,9 @@ def _inspect(folder: Path) -> tuple[int, str, str]:
 
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = main(["inspect", str(folder), "--json"])
+        code = main(["inspect", str(folder), "--json", "--quick"])
         if code == 0:
-            code = main(["inspect", str(folder)])
+            code = main(["inspect", str(folder), "--quick"])
     text = out.getvalue()
     end = text.find("\n}\n")
     return code, text[: end + 3], err.getvalue()

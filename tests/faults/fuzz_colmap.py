@@ -2,8 +2,8 @@
 the file.
 
 Each case damages the bytes of one file with cameras, poses or points, or puts something else under its name, and opens
-the capture and its points. Counted as faults: an exception that is not an EngineError, a reading with numbers that
-are not finite or poses that are not rigid, and more memory than twice the damaged file and a fixed megabyte.
+the capture and its points. Counted as faults: an exception that is not an EngineError, a reading with NaN or with
+poses that are not rigid, and more memory than twice the largest file and a fixed megabyte.
 
     python -m tests.faults.fuzz_colmap --cases 2000 --seed 1
 """

@@ -43,10 +43,10 @@ class Outcome:
     Attributes:
         what: What was damaged and how, to find the case again.
         verdict: "typed" (refused with an EngineError), "accepted" (without effect on the result, or one that was
-            named), or a fault: "untyped", "hang", "outside", "changed".
+            named), or a fault: "untyped", "hang", "outside", "changed", "memory".
         detail: The message.
         file_bytes: Size of the damaged file.
-        extra_bytes: Peak memory beyond that before the case.
+        extra_bytes: Peak memory beyond that before the case: what the case itself found, or of the process.
         seconds: Wall time.
     """
 
@@ -58,7 +58,7 @@ class Outcome:
     seconds: float = 0.0
 
 
-FAULTS = ("untyped", "hang", "outside", "changed")
+FAULTS = ("untyped", "hang", "outside", "changed", "memory")
 RunCase = Callable[[Case], Outcome]
 
 
@@ -168,7 +168,7 @@ def _serve(pipe: Connection, run_case: RunCase) -> None:
             outcome = run_case(case)
         except Exception:  # noqa: BLE001 - the harness itself: shown as a fault
             outcome = Outcome(f"case {case.index}", "untyped", traceback.format_exc())
-        pipe.send(replace(outcome, extra_bytes=max(_peak_bytes() - _before[0], 0)))
+        pipe.send(replace(outcome, extra_bytes=max(outcome.extra_bytes, _peak_bytes() - _before[0], 0)))
 
 
 def judge(act: Callable[[], object]) -> tuple[str, str]:

@@ -26,6 +26,7 @@ from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands
 from app.session.calibration_page import CalibrationPage
+from app.session.doctor_status import DoctorStatus
 from app.session.marking import after_marking
 from app.session.notices import Notices
 from app.session.questions import OpeningPage, Question, RetrainQuestion
@@ -199,6 +200,7 @@ class FakeSession:
         self.measured: ResidualStatus | None = None  # in place of what residual_status makes up
         self.cached: list[tuple[int, int]] = []  # what cached_frames answers
         self.project = None
+        self.doctor_status = DoctorStatus()
         self.timeline, self.views = Timeline(), Views()
         self.bookmarks = Bookmarks()
         if has_capture:

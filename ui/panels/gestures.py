@@ -154,7 +154,7 @@ def mouse_help(preset: Preset) -> tuple[tuple[str, str], ...]:
         ("Hold B", "See the picture that the render is compared with, alone"),
         ("Timeline wheel", "Move what is shown (also middle drag); with Ctrl closer or farther, double click for all"),
         ("Seam click", "Play around the boundary between two clips"),
-        ("Folder drop", "Open it: a capture or a project"),
+        ("Folder drop", "Open it: a capture or a project; of a new capture, first say what it is"),
     )
 
 

@@ -16,7 +16,6 @@ from ui.style.theme import Icon
 
 WIDTH_PX = 160
 MOST = 256
-"""So many are kept; the one that was not drawn for longest goes first."""
 ASK_AGAIN_S = 0.1
 
 
@@ -31,13 +30,16 @@ class Thumbnails:
 
     Args:
         make_texture: Makes an empty texture.
+        width_px: So wide are the pictures.
+        most: So many are kept; the one that was not drawn for longest goes first.
 
     Attributes:
         is_waiting: Is one that was drawn in this frame still to come?
     """
 
-    def __init__(self, make_texture: Callable[[], ImageTexture]) -> None:
+    def __init__(self, make_texture: Callable[[], ImageTexture], *, width_px: int = WIDTH_PX, most: int = MOST) -> None:
         self._make_texture = make_texture
+        self._width_px, self._most = width_px, most
         self._textures: OrderedDict[tuple[int, int], ImageTexture] = OrderedDict()
         self.is_waiting = False
 
@@ -71,7 +73,7 @@ class Thumbnails:
             return known
         if self.is_waiting:  # one at a time, so that decoding never crowds out the viewport
             return None
-        picture = session.ground_truth(camera_index, frame_index, WIDTH_PX)
+        picture = session.ground_truth(camera_index, frame_index, self._width_px)
         self.is_waiting = True
         ui.redraw_within(ASK_AGAIN_S)
         if picture is None or picture.source.frame_index not in (None, frame_index):
@@ -79,7 +81,7 @@ class Thumbnails:
         texture = self._make_texture()
         texture.set(picture.image)
         self._textures[key] = texture
-        while len(self._textures) > MOST:
+        while len(self._textures) > self._most:
             self._textures.popitem(last=False)[1].release()
         return texture
 

@@ -22,6 +22,7 @@ from ui.gl import ImageTexture, free_dropped, n_changes
 from ui.panels.actions.key_map import KeyMap
 from ui.panels.actions.table import ACTIONS, handle_keys
 from ui.panels.capture import CaptureNeeds, CapturePanel
+from ui.panels.doctor.panel import DoctorNeeds, DoctorPanel
 from ui.panels.heat_overlay import HeatOverlay
 from ui.panels.log import LogNeeds, LogPanel
 from ui.panels.notices import NoticesNeeds, NoticesPanel
@@ -32,6 +33,7 @@ from ui.panels.regions import draw_regions
 from ui.panels.residuals.panel import ResidualsNeeds, ResidualsPanel
 from ui.panels.state import (
     CAPTURE,
+    DOCTOR,
     LAYOUTS,
     LOG,
     REGIONS,
@@ -100,6 +102,7 @@ class FrameNeeds(
     NoticesNeeds,
     LogNeeds,
     ResidualsNeeds,
+    DoctorNeeds,
     Protocol,
 ):
     """Everything that the window and its panels use of a session."""
@@ -163,6 +166,7 @@ class Frame:
         self.viewport = ViewportPanel(lambda: PicturePane(Scene(ctx), HeatOverlay(ctx)), rows)
         self.capture = CapturePanel(lambda: ImageTexture(ctx))
         self.residuals = ResidualsPanel(lambda: ImageTexture(ctx))
+        self.doctor = DoctorPanel(lambda: ImageTexture(ctx))
         self.notices = NoticesPanel()
         self.log = LogPanel()
         self.dialog = OpenFolderDialog()
@@ -196,6 +200,7 @@ class Frame:
             (RESIDUALS, self.residuals.draw, True),
             (TIMELINE, draw_timeline, True),
             (LOG, self.log.draw, True),
+            (DOCTOR, self.doctor.draw, True),
             (VIEWPORT, self.viewport.draw, False),  # last: it shows what the others have just changed
         )
 
@@ -412,4 +417,5 @@ class Frame:
         self.capture.release()
         self.opening.release()
         self.residuals.release()
+        self.doctor.release()
         self.backend.close()

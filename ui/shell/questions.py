@@ -10,8 +10,8 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
-from app.session.commands import CloseQuestion, Command, OpenCapture, OpenProject, TrainClip
-from app.session.questions import ProjectQuestion, Question, RetrainQuestion, SettingsQuestion
+from app.session.commands import CloseQuestion, Command, CorrectCapture, OpenCapture, OpenProject, TrainClip
+from app.session.questions import CorrectionQuestion, ProjectQuestion, Question, RetrainQuestion, SettingsQuestion
 from engine.text import duration_text
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, primary_button, text_wrapped_dim
@@ -68,6 +68,8 @@ class QuestionDialogs:
             answer = _draw_retrain(question, ui, is_agreed)
         elif isinstance(question, SettingsQuestion):
             answer = self._draw_settings(question, ui, is_agreed)
+        elif isinstance(question, CorrectionQuestion):
+            answer = _draw_correction(question, ui, is_agreed)
         else:
             answer = self._draw_projects(question, ui, is_agreed)
         imgui.pop_text_wrap_pos()
@@ -140,7 +142,18 @@ def _title(question: Question) -> str:
         return f"Train clip {question.clip_index} with other settings###question"
     if isinstance(question, RetrainQuestion):
         return f"Train clip {question.clip_index} again?###question"
+    if isinstance(question, CorrectionQuestion):
+        return "Correct the capture?###question"
     return "Several projects###question"
+
+
+def _draw_correction(question: CorrectionQuestion, ui: UiState, is_agreed: bool) -> Command | None:
+    for text in correction_texts(question):
+        imgui.text_wrapped(text)
+        imgui.spacing()
+    if _button_row(ui, "Write and open") or is_agreed:
+        return CorrectCapture(question.corrections, question.words, is_confirmed=True)
+    return CloseQuestion() if _cancelled(ui) else None
 
 
 def _draw_retrain(question: RetrainQuestion, ui: UiState, is_agreed: bool) -> Command | None:
@@ -179,6 +192,17 @@ def _cancelled(ui: UiState) -> bool:
 
 
 # ---- words -----------------------------------------------------------------------------------------------------
+
+
+def correction_texts(question: CorrectionQuestion) -> list[str]:
+    """What the dialog says before a capture is corrected, paragraph by paragraph."""
+    kept = " with what it has learned" if question.has_progress else ""
+    return [
+        f"{question.words}: this is written to capture.json in {question.capture}. No other file of the capture "
+        "changes; deleting or editing that file takes it back.",
+        f"The open project was made from the capture as it is now and will not fit it any more. It stays "
+        f"in {question.project}{kept}. The corrected capture is opened as a new project.",
+    ]
 
 
 def retrain_texts(question: RetrainQuestion) -> list[str]:

@@ -9,6 +9,7 @@ import moderngl
 import numpy as np
 
 from app.playback.color_maps import mapped
+from app.playback.hatching import hatched
 from ui.gl import ImageTexture
 
 
@@ -27,13 +28,13 @@ class HeatImage:
         """Take up other values.
 
         Args:
-            values: [H, W]
+            values: [H, W]; hatched where they are not numbers.
             map_name, low, high: See app.playback.color_maps.mapped.
             key: Differs whenever the values do.
         """
         whole = (key, map_name, low, high)
         if whole != self._image.key:
-            self._image.set(mapped(values, map_name, low, high), key=whole)
+            self._image.set(hatched(mapped(values, map_name, low, high), ~np.isnan(values)), key=whole)
 
     def release(self) -> None:
         """Free the texture."""

@@ -65,6 +65,7 @@ class CameraDocument:
         masks: A video, a list or a pattern like `images`: bright where something moves.
         color_matrix: New RGB = matrix @ old. 3x3
         offset_frames: Its own frame is the capture's frame plus this.
+        frames: Numbers of its own frames that the capture shows, in order, where they are not all or not one by one.
         is_excluded: Not used at all.
     """
 
@@ -79,6 +80,7 @@ class CameraDocument:
     masks: Files | None = None
     color_matrix: Matrix | None = None
     offset_frames: Annotated[float, Meta(ge=-MAX_OFFSET_FRAMES, le=MAX_OFFSET_FRAMES)] = 0.0
+    frames: list[int] | None = None
     is_excluded: bool = False
 
 
@@ -248,6 +250,7 @@ def _described(
         masks=masks,
         color_matrix=colors,
         offset_frames=entry.offset_frames,
+        frame_indices=entry.frames,
     )
 
 

@@ -97,21 +97,25 @@ def _model_folder(folder: Path, frames: list[str]) -> Path | None:
 def _files(folder: Path, frames: list[str], rig: ModelRig, *, follow_links: bool) -> dict[str, Files]:
     """One image per camera and frame; adds what is missing to the problems of the rig."""
     names = [camera.name for camera in rig.cameras]
-    files: dict[str, Files] = {name: [] for name in names}
+    files: dict[str, list[Path]] = {name: [] for name in names}
     missing: dict[str, list[str]] = {}
     left_over: set[str] = set()
+    images: list[str] = []
+    by_stem: dict[str, str] = {}
+    matched: dict[str, str] = {}
     for frame in frames:
         try:
             inner = next((place for place in INNER_FOLDERS if (folder / frame / place).is_dir()), "")
             directory = f"{frame}/{inner}" if inner else frame
-            images = listed(folder / directory, IMAGE_SUFFIXES)
-            by_stem = {os.path.splitext(image)[0]: image for image in reversed(images)}
-            matched = match_names(names, list(by_stem))
+            found = listed(folder / directory, IMAGE_SUFFIXES)
+            if found != images:  # most frames have images of the same names
+                images, by_stem = found, {os.path.splitext(image)[0]: image for image in reversed(found)}
+                matched = match_names(names, list(by_stem))
             used = [by_stem[matched[name]] for name in names if name in matched]
             if used:
                 paths = images_in(folder, directory, used, follow_links=follow_links, named_in=folder / frame)
                 for name, path in zip([name for name in names if name in matched], paths, strict=True):
-                    files[name].append(path)  # type: ignore[union-attr]
+                    files[name].append(path)
         except (CaptureError, OSError) as error:
             text = error.message if isinstance(error, CaptureError) else f"It cannot be read ({error.strerror})."
             hint = error.hint if isinstance(error, CaptureError) else "Check that you may read it."

@@ -33,13 +33,17 @@ from engine.capture.frames import ImageFrames
 from engine.capture.limits import MAX_CAMERA_ID
 from engine.capture.media import ImageHeader, read_image_header
 from engine.capture.places import place_in
+from engine.capture.points import points_that_came
 from engine.errors import CaptureError
 
 FORMAT = "panoptic"
 LAYOUT = "train_meta.json, test_meta.json and images below ims/ (CMU Panoptic, as for Dynamic 3D Gaussians)"
 """The layout in words."""
 FPS = 30.0
+POINTS = "init_pt_cld.npz"
 META_FILES = ("train_meta.json", "test_meta.json")
+MAX_HEADERS = 6000
+"""Images whose headers are read on opening, spread over cameras and time; others are looked at when decoded."""
 KEYS = ("w", "h", "k", "w2c", "fn", "cam_id")
 
 
@@ -94,6 +98,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
         fps=FPS,
         default_holdout=tuple(str(camera.camera_id) for camera in cameras if camera.is_test),
         warnings=tuple(warnings),
+        points=points_that_came(folder, (POINTS,), follow_links=follow_links),
     )
 
 
@@ -202,9 +207,8 @@ def _read_frames(
     for camera, files in zip(cameras, cameras_files, strict=True):
         name = str(camera.camera_id)
         paths = [folder / "ims" / file for file in files]
-        read = _read_headers(
-            camera, [path for path, file in zip(paths, files, strict=True) if file in present], problems
-        )
+        there = [path for path, file in zip(paths, files, strict=True) if file in present]
+        read = _read_headers(camera, spread(there, MAX_HEADERS // max(len(cameras), 1)), problems)
         headers[name] = read
         turned += [path for path, header in read.items() if header.orientation != 1][:1]
         source = ImageFrames(paths[0].parent, paths)
@@ -273,8 +277,15 @@ def _missing_frames(folder: Path, cameras: list[_MetaCamera], found: list[list[b
     return problems
 
 
+def spread(paths: list[Path], n_most: int) -> list[Path]:
+    """Evenly chosen from a list, the first and the last included; all of them where they are not more."""
+    if len(paths) <= max(n_most, 2):
+        return paths
+    return [paths[i * (len(paths) - 1) // (max(n_most, 2) - 1)] for i in range(max(n_most, 2))]
+
+
 def _read_headers(camera: _MetaCamera, paths: list[Path], problems: list[CaptureError]) -> dict[Path, ImageHeader]:
-    """Headers of all images of a camera. Adds what is wrong with one, and one problem per size not calibrated for."""
+    """Headers of images of a camera. Adds what is wrong with one, and one problem per size not calibrated for."""
     headers: dict[Path, ImageHeader] = {}
     for path in paths:
         try:

@@ -188,7 +188,7 @@ def _described(
     sizes = findings.tried(lambda: [_size(table, path)], camera=called)
     lens = findings.tried(lambda: _lens(table, path), camera=called)
     pose = findings.tried(lambda: _pose(table, path), camera=called)
-    likely = [name, key, f"cam_{number}", f"port_{number}"]
+    likely = [name] if "name" in table else [name, key, f"cam_{number}", f"port_{number}"]
     files = findings.tried(lambda: search.files(likely), camera=called)
     if K is None or sizes is None or lens is None or pose is None or files is None:
         return None

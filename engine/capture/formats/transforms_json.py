@@ -8,7 +8,6 @@ Where no times are given and each camera has one picture, its other frames are t
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from engine.camera.lens import Lens
 from engine.capture.assembling import DescribedCamera, assemble
 from engine.capture.findings import Findings
 from engine.capture.format_checks import check_fps, parse_matrix, parse_size, read_json_object, size_problem
@@ -26,6 +24,7 @@ from engine.capture.frame_search import FrameSearch
 from engine.capture.grouped_frames import FrameGroup, ListedFrame, grouped, time_faults
 from engine.capture.media import read_image_header
 from engine.capture.places import place_in
+from engine.capture.transforms_numbers import K_of, lens_of, world_to_camera_of
 from engine.errors import CaptureError
 from engine.text import shown
 
@@ -35,10 +34,6 @@ LAYOUT = "transforms.json, or transforms_train.json, with images or videos (nerf
 WHOLE = "transforms.json"
 SPLITS = ("transforms_train.json", "transforms_val.json", "transforms_test.json")
 FRAME_FOLDERS = ("videos", "images", "")
-MODELS = {
-    "opencv": ("PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "PERSPECTIVE"),
-    "fisheye": ("OPENCV_FISHEYE", "FISHEYE"),
-}
 VALUES = (
     *("fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "k4", "p1", "p2"),
     *("camera_angle_x", "camera_angle_y", "camera_model", "is_fisheye"),
@@ -47,8 +42,6 @@ VALUES = (
 HINT = "docs/layouts/transforms_json.md describes the file."
 MAX_PROBLEMS = 50
 """Pictures whose faults are told."""
-FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
-"""From OpenGL to OpenCV axes of a camera."""
 
 
 def probe(folder: Path) -> Probe:
@@ -192,9 +185,9 @@ def _described(
     if files is None:
         return None
     size = tried(lambda: _size(first.values, files, place), camera=group.name)
-    lens = tried(lambda: _lens(first.values, place), camera=group.name)
-    K = None if size is None else tried(lambda: _K(first.values, size, place), camera=group.name)
-    pose = tried(lambda: _world_to_camera(first.camera_to_world, place), camera=group.name)
+    lens = tried(lambda: lens_of(first.values, place.path), camera=group.name)
+    K = None if size is None else tried(lambda: K_of(first.values, size, place.path), camera=group.name)
+    pose = tried(lambda: world_to_camera_of(first.camera_to_world, place.path), camera=group.name)
     masks = tried(lambda: [_masks(group, files, place)], camera=group.name)
     if size is None or lens is None or K is None or pose is None or masks is None:
         return None
@@ -208,19 +201,6 @@ def _described(
         lens=lens,
         masks=masks[0],
     )
-
-
-def _world_to_camera(camera_to_world: np.ndarray, place: _Place) -> np.ndarray:
-    pose = camera_to_world @ FLIP
-    rotation = pose[:3, :3]
-    if not np.isfinite(pose).all() or not np.array_equal(pose[3], [0.0, 0.0, 0.0, 1.0]):
-        text = "Its transform_matrix has NaN, infinity or a last row that is not 0 0 0 1."
-        raise CaptureError(text, hint="Export the cameras again.", path=place.path)
-    inverse = np.eye(4)
-    inverse[:3, :3] = rotation.T  # check_pose tells when it is not a rotation
-    with np.errstate(over="ignore", invalid="ignore"):
-        inverse[:3, 3] = -rotation.T @ pose[:3, 3]
-    return inverse
 
 
 def _files(group: FrameGroup, groups: Sequence[FrameGroup], place: _Place, *, has_times: bool) -> Files:
@@ -259,50 +239,6 @@ def _size(values: dict[str, Any], files: Files, place: _Place) -> tuple[int, int
     if size is None:
         raise size_problem("w and h are", sides[0], sides[1], place.path)
     return size
-
-
-def _number(values: dict[str, Any], key: str, default: float | None, place: _Place) -> float:
-    value = values.get(key, default)
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        what = "is missing" if value is None else f"is {shown(value)}, not a number"
-        raise CaptureError(f"{key} {what}.", hint=HINT, path=place.path)
-    try:
-        return float(value)
-    except OverflowError:
-        return math.inf
-
-
-def _K(values: dict[str, Any], size: tuple[int, int], place: _Place) -> np.ndarray:
-    width, height = size
-    from_angle = None
-    if "fl_x" not in values:
-        from_angle = _focal(_number(values, "camera_angle_x", None, place), width)
-    fx = _number(values, "fl_x", from_angle, place)
-    other = _focal(_number(values, "camera_angle_y", None, place), height) if "camera_angle_y" in values else fx
-    fy = _number(values, "fl_y", fx if "fl_x" in values else other, place)
-    cx, cy = _number(values, "cx", width / 2, place), _number(values, "cy", height / 2, place)
-    return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-
-
-def _focal(angle: float, side: int) -> float:
-    """Pixels, of a view of so many radians; NaN of an angle that is none, which check_K then tells."""
-    return side / 2 / math.tan(angle / 2) if 0 < angle < math.pi else math.nan
-
-
-def _lens(values: dict[str, Any], place: _Place) -> Lens:
-    stated = values.get("camera_model", "OPENCV_FISHEYE" if values.get("is_fisheye") is True else "OPENCV")
-    model = next((name for name, known in MODELS.items() if stated in known), None)
-    if model is None:
-        known = ", ".join(name for names in MODELS.values() for name in names)
-        raise CaptureError(f"Its camera_model is {shown(stated)}.", hint=f"Known are {known}.", path=place.path)
-    k1, k2, k3, k4, p1, p2 = (_number(values, key, 0.0, place) for key in ("k1", "k2", "k3", "k4", "p1", "p2"))
-    if model == "fisheye":
-        return Lens("fisheye", (k1, k2, k3, k4))
-    if k4 != 0:
-        text = f"k4 is {k4:g}, which only {MODELS['fisheye'][0]} has."
-        raise CaptureError(text, hint="Correct camera_model or k4.", path=place.path)
-    params = (k1, k2, p1, p2, k3)
-    return Lens("opencv", params) if any(params) else Lens()
 
 
 def _points(documents: dict[str, dict[str, Any]], place: _Place, warnings: list[str]) -> Path | None:

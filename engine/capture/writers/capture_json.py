@@ -30,6 +30,7 @@ class Corrections:
         masks: By camera name: a pattern or video relative to the folder.
         world_scale, up: See `CaptureDocument`; None leaves them.
         fps: None leaves it.
+        fisheye_fov_deg: Horizontal view that fisheye pictures are brought to, 10 to 150; None leaves it.
     """
 
     is_excluded: Mapping[str, bool] = field(default_factory=dict)
@@ -39,6 +40,7 @@ class Corrections:
     world_scale: float | None = None
     up: tuple[float, float, float] | None = None
     fps: float | None = None
+    fisheye_fov_deg: float | None = None
 
 
 def capture_document(layout: Layout, folder: Path) -> dict[str, Any]:
@@ -56,7 +58,8 @@ def capture_document(layout: Layout, folder: Path) -> dict[str, Any]:
         document["points_to_world"] = layout.points_to_world.tolist()
     if layout.fisheye_fov_deg is not None:
         document["fisheye_fov_deg"] = layout.fisheye_fov_deg
-    document["cameras"] = [_camera(entry, folder) for entry in layout.cameras]
+    is_resampled = any(not _is_one_by_one(entry.source) for entry in layout.cameras)
+    document["cameras"] = [_camera(entry, folder, is_resampled=is_resampled) for entry in layout.cameras]
     return document
 
 
@@ -103,14 +106,14 @@ def write_corrections(layout: Layout, folder: Path, corrections: Corrections, *,
     ):
         for name, value in values.items():
             rows[name][key] = value
-    for key in ("holdout", "world_scale", "up", "fps"):
+    for key in ("holdout", "world_scale", "up", "fps", "fisheye_fov_deg"):
         value = getattr(corrections, key)
         if value is not None:
             document[key] = list(value) if isinstance(value, Sequence) else value
     return write_capture_json(place, document)
 
 
-def _camera(entry: CameraEntry, folder: Path) -> dict[str, Any]:
+def _camera(entry: CameraEntry, folder: Path, *, is_resampled: bool) -> dict[str, Any]:
     row: dict[str, Any] = {
         "name": entry.name,
         "width": entry.image_size[0],
@@ -125,7 +128,10 @@ def _camera(entry: CameraEntry, folder: Path) -> dict[str, Any]:
         row["images"] = [name_in(path, folder) for path in source.files]
     else:
         row["video"] = name_in(source.path, folder)
-    if offset:
+    if is_resampled:
+        shown = entry.source.frame_indices if isinstance(entry.source, IndexedFrames) else range(source.n_frames)
+        row["frames"] = [int(index) for index in shown]
+    elif offset:
         row["offset_frames"] = offset
     if entry.masks is not None:
         masks, _ = _unmoved(entry.masks)
@@ -134,6 +140,10 @@ def _camera(entry: CameraEntry, folder: Path) -> dict[str, Any]:
     if entry.color_matrix is not None:
         row["color_matrix"] = np.asarray(entry.color_matrix).tolist()
     return row
+
+
+def _is_one_by_one(source: FrameSource) -> bool:
+    return not isinstance(source, IndexedFrames) or bool((np.diff(source.frame_indices) == 1).all())
 
 
 def _unmoved(source: FrameSource) -> tuple[FrameSource, int]:

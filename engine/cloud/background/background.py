@@ -43,11 +43,12 @@ class Background:
     is_stable: np.ndarray
 
 
-def estimate_background(frames: np.ndarray) -> Background:
+def estimate_background(frames: np.ndarray, is_valid: np.ndarray | None = None) -> Background:
     """The densest colour over time per pixel.
 
     Args:
         frames: Frames of one motionless camera, spread over as much of the capture as possible. [T, H, W, 3] uint8
+        is_valid: Pixels that the camera sees, None for all: the others are never stable. [H, W] bool
     Returns:
         Background. With fewer than 3 frames there is no majority: their mean, stable where they agree.
 
@@ -58,13 +59,15 @@ def estimate_background(frames: np.ndarray) -> Background:
     if n_frames < 3:
         mean = frames.astype(np.float32).mean(0)
         is_agreed = (((frames - mean) ** 2).sum(-1) <= MIN_REACH).all(0)
-        return Background((mean + 0.5).astype(np.uint8), _without_specks(is_agreed))
+        return Background((mean + 0.5).astype(np.uint8), _among(is_valid, _without_specks(is_agreed)))
     frames = np.ascontiguousarray(frames)
     window = max(3, int(np.ceil(CLUSTER_SHARE * n_frames)))
     flat = np.ones(N_BRIGHTNESS_BINS, dtype=np.float32)
     # every 16th pixel is plenty for a median noise per brightness; strided like rows below, so compiled once for both
     sampled = frames[:, ::4, ::4]
     colors, variances, _ = _clusters(sampled, window, flat, 0.0)
+    if is_valid is not None and is_valid[::4, ::4].any():  # black where it sees nothing, and without any noise
+        colors, variances = colors[is_valid[::4, ::4]], variances[is_valid[::4, ::4]]
     noise = _noise_by_brightness(colors, variances)
 
     def rows(span: tuple[int, int]):
@@ -73,7 +76,11 @@ def estimate_background(frames: np.ndarray) -> Background:
     parts = map_ordered(rows, row_spans(height))
     colors = np.concatenate([part[0] for part in parts])
     shares = np.concatenate([part[2] for part in parts])
-    return Background((colors + 0.5).astype(np.uint8), _without_specks(shares >= STABLE_SHARE))
+    return Background((colors + 0.5).astype(np.uint8), _among(is_valid, _without_specks(shares >= STABLE_SHARE)))
+
+
+def _among(is_valid: np.ndarray | None, mask: np.ndarray) -> np.ndarray:
+    return mask if is_valid is None else mask & is_valid
 
 
 def _without_specks(is_stable: np.ndarray) -> np.ndarray:

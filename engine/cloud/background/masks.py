@@ -17,7 +17,13 @@ NOISE_FACTOR = 5.0
 """Threshold in medians of the difference picture; most of a picture is static, so its median measures noise."""
 
 
-def motion_mask(frame: np.ndarray, background: np.ndarray, *, threshold: float | None = None) -> np.ndarray:
+def motion_mask(
+    frame: np.ndarray,
+    background: np.ndarray,
+    *,
+    threshold: float | None = None,
+    is_valid: np.ndarray | None = None,
+) -> np.ndarray:
     """Pixels that differ from the background.
 
     Args:
@@ -25,21 +31,29 @@ def motion_mask(frame: np.ndarray, background: np.ndarray, *, threshold: float |
         background: [H, W, 3] uint8 or float 0..255.
         threshold: Sum over RGB of the blurred difference that counts as motion, 0..765. None derives it from the
             picture's own noise: NOISE_FACTOR x the median difference, at least MIN_THRESHOLD.
+        is_valid: Pixels that the camera sees, None for all: the others, black in both pictures, never move. [H, W] bool
     Returns:
         [H, W] bool.
     """
     scale = frame.shape[1] / REFERENCE_WIDTH
     difference = blurred_difference(frame, background, sigma_px=max(0.6, scale))
     if threshold is None:
-        threshold = noise_threshold(difference)
+        threshold = noise_threshold(difference, is_valid)
     mask = difference > threshold
     open_px = round(scale)
     mask = dilate(erode(mask, open_px), open_px)
     close_px = max(1, round(4 * scale))
     mask = erode(dilate(mask, close_px), close_px)
+    if is_valid is not None:
+        mask &= is_valid
     return remove_small_blobs(mask, max(6, round(60 * scale * scale)))
 
 
-def noise_threshold(difference: np.ndarray) -> float:
-    """Threshold for a blurred difference picture [H, W] from its median, robust while under half of it moves."""
-    return max(MIN_THRESHOLD, NOISE_FACTOR * float(np.median(difference[::2, ::2])))
+def noise_threshold(difference: np.ndarray, is_valid: np.ndarray | None = None) -> float:
+    """Threshold for a blurred difference picture [H, W] from its median, robust while under half of it moves.
+
+    Args:
+        is_valid: Pixels of which the median is taken; None for all. [H, W] bool
+    """
+    sampled = difference[::2, ::2] if is_valid is None else difference[::2, ::2][is_valid[::2, ::2]]
+    return max(MIN_THRESHOLD, NOISE_FACTOR * float(np.median(sampled))) if sampled.size else MIN_THRESHOLD

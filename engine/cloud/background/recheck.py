@@ -24,7 +24,11 @@ swaying outline. Everywhere else a difference is the render's own error (lamps, 
 
 
 def recheck_background(
-    background: np.ndarray, is_stable: np.ndarray, static_render: np.ndarray, frames: np.ndarray
+    background: np.ndarray,
+    is_stable: np.ndarray,
+    static_render: np.ndarray,
+    frames: np.ndarray,
+    is_valid: np.ndarray | None = None,
 ) -> np.ndarray:
     """The background with its ghosts replaced.
 
@@ -33,20 +37,26 @@ def recheck_background(
         is_stable: [H, W] bool
         static_render: Trained static scene in this camera's colours, 0..1. [H, W, 3] float
         frames: Some frames of this camera. [T, H, W, 3] uint8
+        is_valid: Pixels that the camera sees, None for all; the others stay as they are. [H, W] bool
     Returns:
         [H, W, 3] uint8. Pixels of the render that are not finite change nothing.
     """
-    is_finite = np.asarray(np.isfinite(static_render).all(axis=-1))
-    render = np.where(is_finite[..., None], np.clip(static_render, 0.0, 1.0) * 255.0, background).astype(np.float32)
+    is_asked = np.asarray(np.isfinite(static_render).all(axis=-1))
+    is_unstable = ~is_stable
+    if is_valid is not None:
+        is_asked, is_unstable = is_asked & is_valid, is_unstable & is_valid
+    render = np.where(is_asked[..., None], np.clip(static_render, 0.0, 1.0) * 255.0, background).astype(np.float32)
     scale = background.shape[1] / REFERENCE_WIDTH
     sigma_px = max(0.8, 2.0 * scale)
     difference = blurred_difference(background, render, sigma_px)
     is_ghost = difference > np.where(is_stable, STABLE_LIMIT, UNSTABLE_LIMIT)
-    is_ghost &= dilate(~is_stable, max(2, round(REACH_PX * scale)))
+    is_ghost &= dilate(is_unstable, max(2, round(REACH_PX * scale)))
     radius = max(1, round(scale))
     is_ghost = dilate(erode(is_ghost, radius), radius)  # renders are soft: thin edges always differ
     is_ghost = remove_small_blobs(is_ghost, max(6, round(80 * scale * scale)))
     is_ghost = dilate(is_ghost, max(1, round(3 * scale)))
+    if is_valid is not None:
+        is_ghost &= is_valid
     if not is_ghost.any():
         return background.copy()
     sums, n_support = np.zeros(render.shape, dtype=np.float32), np.zeros(is_ghost.shape, dtype=np.int64)

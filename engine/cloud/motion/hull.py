@@ -49,7 +49,14 @@ class Grid:
 
 
 def carve(
-    masks: np.ndarray, projections: np.ndarray, grid: Grid, *, near: float, n_misses: int, min_hits: int
+    masks: np.ndarray,
+    projections: np.ndarray,
+    grid: Grid,
+    *,
+    near: float,
+    n_misses: int,
+    min_hits: int,
+    is_valid: np.ndarray | None = None,
 ) -> np.ndarray:
     """Voxels of the hull.
 
@@ -59,13 +66,15 @@ def carve(
         near: Points nearer than this to a camera are not judged by it, scene units.
         n_misses: Cameras that see the voxel outside their mask and are outvoted.
         min_hits: Cameras that have to see the voxel inside their mask.
+        is_valid: Pixels that the cameras see, None for all: of a voxel that falls elsewhere, as of one beside the
+            picture, a camera says nothing. [C, H, W] bool
     Returns:
         Integer voxels, sorted by block and then x, y, z. [P, 3] int64
     """
-    integrals = np.zeros((len(masks), masks.shape[1] + 1, masks.shape[2] + 1), np.int32)
-    map_ordered(lambda camera: _integrate(masks[camera], integrals[camera]), range(len(masks)))
+    integrals = _integrated(masks)
+    blind = _integrated(~is_valid) if is_valid is not None else np.zeros((0, 1, 1), np.int32)
     blocks = np.stack(np.meshgrid(*(np.arange(n) for n in grid.n_blocks), indexing="ij"), axis=-1).reshape(-1, 3)
-    arguments = (integrals, projections, grid.origin, grid.size, near, n_misses, min_hits)
+    arguments = (integrals, blind, projections, grid.origin, grid.size, near, n_misses, min_hits)
     # |d pixel| <= |d point| (|row| + |pixel| |row2|) / depth; rows of K R bound the footprint without knowing K
     rows = np.sqrt((projections[:, :, :3] ** 2).sum(-1))
     footprints = np.maximum(rows[:, 0], rows[:, 1]) + max(masks.shape[1:]) * rows[:, 2]
@@ -156,6 +165,13 @@ def hull_colors(pictures: np.ndarray, pixel: np.ndarray, is_visible: np.ndarray,
     return median_over_cameras(samples)
 
 
+def _integrated(masks: np.ndarray) -> np.ndarray:
+    """Of each mask the sums over all pixels left of and above each corner. [C, H + 1, W + 1] int32"""
+    sums = np.zeros((len(masks), masks.shape[1] + 1, masks.shape[2] + 1), np.int32)
+    map_ordered(lambda camera: _integrate(masks[camera], sums[camera]), range(len(masks)))
+    return sums
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _integrate(mask, sums):
     """Writes sums of the mask over all pixels left of and above each corner. [H + 1, W + 1], zeros before"""
@@ -168,8 +184,8 @@ def _integrate(mask, sums):
 
 
 @njit(nogil=True, error_model="numpy")
-def _box_has_foreground(integrals, camera, x, y, radius):
-    """Any mask pixel whose area the square around (x, y) touches, after cutting it to the picture."""
+def _box_has_any(integrals, camera, x, y, radius):
+    """Any set pixel whose area the square around (x, y) touches, after cutting it to the picture."""
     height, width = integrals.shape[1] - 1, integrals.shape[2] - 1
     x0, x1 = min(max(math.floor(x - radius), 0), width), min(max(math.floor(x + radius) + 1, 0), width)
     y0, y1 = min(max(math.floor(y - radius), 0), height), min(max(math.floor(y + radius) + 1, 0), height)
@@ -178,7 +194,7 @@ def _box_has_foreground(integrals, camera, x, y, radius):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _carve_blocks(blocks, integrals, p, origin, size, near, n_misses, min_hits, footprints, is_kept):
+def _carve_blocks(blocks, integrals, blind, p, origin, size, near, n_misses, min_hits, footprints, is_kept):
     """Blocks that may hold a hull voxel: conservative, a block is dropped only if every voxel of it would be."""
     height, width = integrals.shape[1] - 1, integrals.shape[2] - 1
     edge = size * BLOCK
@@ -200,11 +216,11 @@ def _carve_blocks(blocks, integrals, p, origin, size, near, n_misses, min_hits, 
             radius = ball * footprints[c] / (depth - ball) + 2.0
             if x + radius < 0 or y + radius < 0 or x - radius > width or y - radius > height:
                 continue
-            if _box_has_foreground(integrals, c, x, y, radius):
+            if _box_has_any(integrals, c, x, y, radius):
                 hits += 1
                 continue
             is_inside = x - radius >= 0 and y - radius >= 0 and x + radius <= width and y + radius <= height
-            if is_inside and depth - ball > near:
+            if is_inside and depth - ball > near and not (len(blind) and _box_has_any(blind, c, x, y, radius)):
                 misses += 1
                 if misses > n_misses:
                     break
@@ -212,7 +228,7 @@ def _carve_blocks(blocks, integrals, p, origin, size, near, n_misses, min_hits, 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _carve_voxels(blocks, integrals, p, origin, size, near, n_misses, min_hits, found):
+def _carve_voxels(blocks, integrals, blind, p, origin, size, near, n_misses, min_hits, found):
     """Writes voxels of the hull and returns how many there are."""
     height, width = integrals.shape[1] - 1, integrals.shape[2] - 1
     n_found = 0
@@ -233,7 +249,9 @@ def _carve_voxels(blocks, integrals, p, origin, size, near, n_misses, min_hits, 
                         y = (p[c, 1, 0] * px + p[c, 1, 1] * py + p[c, 1, 2] * pz + p[c, 1, 3]) / depth
                         if x < 0 or y < 0 or x >= width or y >= height:
                             continue
-                        if _box_has_foreground(integrals, c, x, y, 1.0):
+                        if len(blind) and _box_has_any(blind, c, x, y, 0.0):
+                            continue
+                        if _box_has_any(integrals, c, x, y, 1.0):
                             hits += 1
                         else:
                             misses += 1

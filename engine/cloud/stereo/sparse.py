@@ -1,7 +1,6 @@
 """Sparse points from SIFT matches and the known poses, by pycolmap in a child process of its own.
 
-See engine.children.running for how the child is run. A failure costs the points, never the job: they only set depth
-ranges, and the coarse sweep can do that too.
+A failure costs the points, never the job: they only set depth ranges, and the coarse sweep can do that too.
 """
 
 from __future__ import annotations
@@ -12,16 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine.camera.rig import CameraRig
-from engine.children.running import STALL_S, child_folder, run_child
-from engine.storage.files import disk_error
+from engine.children.running import STALL_S
+from engine.features.child import ChildFailed, run_child
+from engine.images.image_filters import erode
 
-N_ATTEMPTS = 2
-"""A child that was killed or hung gets another chance: what kills it, as too little memory, need not do so again."""
 MAX_CAMERAS = 48
 """Of more cameras so many are matched, spread over all: every pair of them is, and depth ranges need no more."""
 MIN_POINTS = 30
 """Fewer points than this are noise."""
-FOLDER_PREFIX = "clipgstream-sparse-"
+MASK_MARGIN_PX = 6
+"""Features so near to pixels that the camera does not see may be the edge between both."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +41,7 @@ def triangulate(
     images: np.ndarray,
     rig: CameraRig,
     *,
+    is_valid: np.ndarray | None = None,
     report: Callable[[str], None],
     alive: Callable[[], None] = lambda: None,
     stall_s: float = STALL_S,
@@ -51,6 +51,7 @@ def triangulate(
     Args:
         images: One picture per camera. [C, H, W, 3] uint8
         rig: At the size of the images.
+        is_valid: Pixels that the cameras see, None for all; features near others are edges of nothing. [C, H, W] bool
         report: Gets one line with the count, or with the reason why there are no points.
         alive: Called several times a second; what it raises ends the child.
         stall_s: Seconds without any work of the child after which it is taken for hung.
@@ -60,32 +61,22 @@ def triangulate(
     Raises:
         DiskError: There is no room for the pictures that the child reads.
     """
-    what = "The pictures for matching"
-    with child_folder(FOLDER_PREFIX, what=what) as folder:
-        job, result = folder / "job.npz", folder / "result.npz"
-        try:
-            rows = np.unique(np.linspace(0, len(rig) - 1, min(len(rig), MAX_CAMERAS)).round().astype(int))
-            np.savez(job, images=images[rows], Ks=rig.Ks[rows], world_to_camera=rig.world_to_camera[rows])
-        except OSError as error:
-            raise disk_error(error, what=what, path=job) from error
-        reason, is_final = "", False
-        for _ in range(N_ATTEMPTS):
-            reason, is_final = run_child(
-                "engine.cloud.stereo.sparse_child",
-                job,
-                result,
-                what="the triangulation process",
-                alive=alive,
-                stall_s=stall_s,
-            )
-            if not reason or is_final:
-                break
-        if reason:
-            report(f"Sparse points: none, {reason}; depth ranges come from a coarse sweep instead")
-            return SparsePoints.none()
-        with np.load(result) as arrays:
-            points, colors, errors = arrays["points"], arrays["colors"], arrays["errors"]
-            n_features = int(arrays["n_features"])
+    rows = np.unique(np.linspace(0, len(rig) - 1, min(len(rig), MAX_CAMERAS)).round().astype(int))
+    job = {"images": images[rows], "Ks": rig.Ks[rows], "world_to_camera": rig.world_to_camera[rows]}
+    if is_valid is not None:
+        job["is_valid"] = np.stack([erode(valid, MASK_MARGIN_PX) for valid in is_valid[rows]])
+    try:
+        found = run_child(
+            "engine.cloud.stereo.sparse_child",
+            job,
+            what="the triangulation process",
+            alive=alive,
+            stall_s=stall_s,
+        )
+    except ChildFailed as error:
+        report(f"Sparse points: none, {error}; depth ranges come from a coarse sweep instead")
+        return SparsePoints.none()
+    points, colors, errors, n_features = found["points"], found["colors"], found["errors"], int(found["n_features"])
     is_good = np.isfinite(points).all(axis=1) & (errors < 2.0)
     points, colors, errors = points[is_good], colors[is_good], errors[is_good]
     if len(points) < MIN_POINTS:

@@ -32,17 +32,28 @@ UNKNOWN_COST = 1.0
 """Cost of a plane that no source sees: the same as an uncorrelated patch."""
 BEST_ANGLES_DEG = (6.0, 18.0)
 """Preferred triangulation angle of a narrow (forward-facing) and of a wide (surrounding) rig."""
+NEIGHBOR_SHARE = 0.75
+WIDEST_ANGLE_DEG = 35.0
+"""Preferred triangulation angle at most, where cameras stand far apart."""
 
 
 def preferred_angle_deg(rig: CameraRig) -> float:
     """Triangulation angle worth aiming for, within BEST_ANGLES_DEG.
 
-    A third of the median angle between a camera's viewing direction and the mean of all.
+    A third of the median angle between a camera's viewing direction and the mean of all; where cameras are too few for
+    that, three quarters of the median angle between neighbours.
     """
     mean = rig.forwards.mean(0)
     mean /= max(float(np.linalg.norm(mean)), 1e-9)
     spread = np.degrees(np.arccos(np.clip(rig.forwards @ mean, -1.0, 1.0)))
-    return float(np.clip(np.median(spread) / 3.0, *BEST_ANGLES_DEG))
+    preferred = float(np.clip(np.median(spread) / 3.0, *BEST_ANGLES_DEG))
+    if len(rig) < 2 or np.ptp(rig.centers, axis=0).max() == 0:
+        return preferred
+    directions = rig.centers - rig.focus_point()
+    directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-9)
+    apart = np.degrees(np.arccos(np.clip(directions @ directions.T, -1.0, 1.0)))
+    nearest = float(np.median(np.sort(apart, axis=1)[:, 1]))  # the first is the camera itself
+    return min(max(preferred, NEIGHBOR_SHARE * nearest), WIDEST_ANGLE_DEG)
 
 
 def choose_sources(

@@ -38,12 +38,18 @@ class AnchorShares:
 
 
 def anchor_shares(
-    trained: TrainedClip, rig: CameraRig, camera: int, clip_time: float, maps: np.ndarray
+    trained: TrainedClip,
+    rig: CameraRig,
+    camera: int,
+    clip_time: float,
+    maps: np.ndarray,
+    is_valid: np.ndarray | None = None,
 ) -> AnchorShares:
     """Spread the maps of one picture over the anchors in it.
 
     Args:
         maps: Of the picture that the camera has of the clip at this time. [H, W, N_MAPS] float32
+        is_valid: Pixels that the camera sees, None for all; the others count for no anchor. [H, W] bool
     """
     model, view = trained.model, trained.view(rig, camera)
     height, width = maps.shape[:2]
@@ -55,6 +61,8 @@ def anchor_shares(
         image = render_gaussians(replace(decoded, colors=colors, is_frozen=None), view, backend=model.backend).image[0]
         gradient = np.ones((height, width, 3), np.float32)
         gradient[..., :N_MAPS] = maps
+        if is_valid is not None:
+            gradient[~is_valid] = 0.0
         image.backward(torch.from_numpy(gradient).to(image))
     assert colors.grad is not None
     per_anchor = host_array(colors.grad).astype(np.float64).reshape(-1, model.decoder.gaussians_per_anchor, 3).sum(1)

@@ -17,7 +17,7 @@ from engine.capture.clip import Clip
 from engine.cloud.background.background import estimate_background
 from engine.cloud.background.exposure import Exposure
 from engine.cloud.background.masks import motion_mask
-from engine.metrics.clips.seams import PairRow, SeamMaps, change_of, part_means, seam_maps
+from engine.metrics.clips.seams import PairRow, SeamMaps, change_of, seam_maps
 from engine.metrics.clips.summary import EvalRow
 from engine.metrics.clips.trained_clip import TrainedClip
 from engine.metrics.pictures.colors import Precision, as_shown
@@ -126,7 +126,12 @@ class Evaluation:
             shot = self._shot(trained, camera, frame)
             if frame in frames:
                 measured = measure_picture(
-                    shot.image, shot.pixels, shot.is_moving, metrics=self.metrics, precision=self.precision
+                    shot.image,
+                    shot.pixels,
+                    shot.is_moving,
+                    is_valid=self.capture.valid(camera),
+                    metrics=self.metrics,
+                    precision=self.precision,
                 )
                 yield EvalRow(clip.clip_index, frame, name, is_held_out, measured.figures, measured.missing)
             if frame in pairs and frame == clip.start:
@@ -135,7 +140,7 @@ class Evaluation:
             elif frame in pairs:
                 if last is None or last.frame_index != frame - 1:
                     last = self._shot(trained, camera, frame - 1)
-                yield _pair_row(self._maps(shot, last), clip, frame, name, is_held_out, is_boundary=False)
+                yield _pair_row(self._maps(camera, shot, last), clip, frame, name, is_held_out, is_boundary=False)
             last = shot
 
     def boundary_maps(self, before: TrainedClip, after: TrainedClip, camera: int) -> SeamMaps:
@@ -151,11 +156,11 @@ class Evaluation:
 
     def _boundary(self, clip: Clip, shot: _Shot, before: TrainedClip, camera: int) -> tuple[PairRow, SeamMaps]:
         last = self._shot(before, camera, clip.start - 1)
-        maps = self._maps(shot, last)
+        maps = self._maps(camera, shot, last)
         # the same instant by the clip before: its field may end with its last frame, and the picture with it
         is_held = before.is_held_beyond
         image = last.image if is_held else self._render(before, camera, before.beyond)
-        two_clips = part_means(change_of(shot.image, image), maps.is_static)
+        two_clips = maps.means(change_of(shot.image, image))
         row = _pair_row(
             maps,
             clip,
@@ -174,26 +179,30 @@ class Evaluation:
         return _Shot(frame, image, pixels, self._is_moving(camera, pixels))
 
     def _render(self, trained: TrainedClip, camera: int, clip_time: float) -> np.ndarray:
-        """Picture in the camera's colours, as it is compared. [H, W, 3] float32"""
-        return as_shown(trained.picture(self.capture.rig, camera, clip_time), self.precision)
+        """Picture in the camera's colours, as it is compared: black where the camera sees nothing. [H, W, 3] float32"""
+        image = as_shown(trained.picture(self.capture.rig, camera, clip_time), self.precision)
+        valid = self.capture.valid(camera)
+        return image if valid is None else np.where(valid[..., None], image, np.float32(0.0))
 
     def _is_moving(self, camera: int, pixels: np.ndarray) -> np.ndarray:
         """Where a picture differs from the camera's background, whatever its exposure. [H, W] bool"""
         background, exposure = self._background(camera)
-        return motion_mask(exposure.applied_to(pixels[None])[0], background)
+        return motion_mask(exposure.applied_to(pixels[None])[0], background, is_valid=self.capture.valid(camera))
 
     def _background(self, camera: int) -> tuple[np.ndarray, Exposure]:
         """What a camera sees when nothing moves, in its mean exposure, and that exposure."""
         if camera not in self._backgrounds:
             spread = spread_frames(self.capture.n_frames, _BACKGROUND_FRAMES)
             frames = self.capture.frames_of(camera, spread)
-            background = estimate_background(Exposure.of_frames(frames).applied_to(frames)).image
+            lit = Exposure.of_frames(frames).applied_to(frames)
+            background = estimate_background(lit, self.capture.valid(camera)).image
             self._backgrounds[camera] = (background, Exposure.of_background(background))
         return self._backgrounds[camera]
 
-    def _maps(self, shot: _Shot, last: _Shot) -> SeamMaps:
+    def _maps(self, camera: int, shot: _Shot, last: _Shot) -> SeamMaps:
         truth, last_truth = (s.pixels.astype(np.float32) / np.float32(255.0) for s in (shot, last))
-        return seam_maps(shot.image, last.image, truth, last_truth, shot.is_moving | last.is_moving)
+        is_moving, is_valid = shot.is_moving | last.is_moving, self.capture.valid(camera)
+        return seam_maps(shot.image, last.image, truth, last_truth, is_moving, is_valid)
 
 
 def _pair_row(
@@ -208,7 +217,7 @@ def _pair_row(
     is_held: bool = False,
 ) -> PairRow:
     (r_static, r_moving), (g_static, g_moving), (e_static, e_moving) = (
-        part_means(values, maps.is_static) for values in (maps.change, maps.truth_change, maps.excess)
+        maps.means(values) for values in (maps.change, maps.truth_change, maps.excess)
     )
     return PairRow(
         frame_index=frame,
@@ -222,7 +231,7 @@ def _pair_row(
         truth_change_moving=g_moving,
         excess_static=e_static,
         excess_moving=e_moving,
-        static_share=float(maps.is_static.mean()),
+        static_share=maps.static_share,
         two_clips_static=two_clips[0],
         two_clips_moving=two_clips[1],
         is_extrapolated=is_boundary,

@@ -34,12 +34,26 @@ class SeamMaps:
         truth_change: G. [H, W] float32 in 0..1
         excess: E. [H, W] float32 in 0..1
         is_static: The truth changes by less than STATIC_THRESHOLD and neither frame's motion mask is set. [H, W] bool
+        is_valid: What the camera sees; None for all. [H, W] bool
     """
 
     change: np.ndarray
     truth_change: np.ndarray
     excess: np.ndarray
     is_static: np.ndarray
+    is_valid: np.ndarray | None = None
+
+    def means(self, values: np.ndarray) -> tuple[float | None, float | None]:
+        """Means of values [H, W] over the static and the other pixels that the camera sees; None over none."""
+        if self.is_valid is None:
+            return part_means(values, self.is_static)
+        return part_means(values[self.is_valid], self.is_static[self.is_valid])
+
+    @property
+    def static_share(self) -> float:
+        """Share of static pixels among those that the camera sees."""
+        seen = self.is_static if self.is_valid is None else self.is_static[self.is_valid]
+        return float(seen.mean()) if seen.size else 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +114,7 @@ def seam_maps(
     truth: np.ndarray,
     previous_truth: np.ndarray,
     is_moving: np.ndarray,
+    is_valid: np.ndarray | None = None,
 ) -> SeamMaps:
     """R, G, E and the static pixels of two neighbouring frames.
 
@@ -107,16 +122,17 @@ def seam_maps(
         image, previous_image: Renders in 0..1, the later frame first. [H, W, 3]
         truth, previous_truth: What the camera took, in 0..1. [H, W, 3]
         is_moving: Motion masks of both frames together. [H, W] bool
+        is_valid: What the camera sees, None for all; the others are black in all four pictures. [H, W] bool
     """
     change, truth_change = change_of(image, previous_image), change_of(truth, previous_truth)
     sigma_px = BLUR_PX_PER_640 * max(truth.shape[1] / 640.0, 0.5)
     blurred = ndimage.gaussian_filter(truth_change, sigma_px, mode="nearest", truncate=3.0)
     is_static = (blurred < STATIC_THRESHOLD) & ~is_moving
-    return SeamMaps(change, truth_change, excess_of(change, truth_change), is_static)
+    return SeamMaps(change, truth_change, excess_of(change, truth_change), is_static, is_valid)
 
 
 def part_means(values: np.ndarray, is_static: np.ndarray) -> tuple[float | None, float | None]:
-    """Means of values [H, W] over the static and the other pixels; None over no pixels and for values not finite."""
+    """Means of values over the static and the other pixels; None over no pixels and for values not finite."""
     static, moving = (_finite_mean(values[part]) for part in (is_static, ~is_static))
     return static, moving
 

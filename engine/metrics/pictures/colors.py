@@ -33,19 +33,24 @@ def _rounded(clamped: np.ndarray) -> np.ndarray:
     return np.floor(clamped * np.float32(255.0) + np.float32(0.5))
 
 
-def fit_colors(image: np.ndarray, truth: np.ndarray) -> np.ndarray:
+def fit_colors(image: np.ndarray, truth: np.ndarray, mask: np.ndarray | None = None) -> np.ndarray:
     """The image after the gain and offset per channel that fit the truth best, least squares. [H, W, 3] float64
 
     A held-out camera's white balance cannot be known without its pictures; this removes it from the error, and only
     from figures that say so. A channel of one colour only gets an offset. Not rounded and not clamped.
+
+    Args:
+        mask: Pixels that the fit is made from, at least one; None for all. [H, W] bool
     """
     fitted = np.empty(image.shape, np.float64)
     for channel in range(3):
         x = image[..., channel].astype(np.float64)
         y = truth[..., channel].astype(np.float64)
-        x_mean, y_mean = x.mean(), y.mean()
+        own, other = (x, y) if mask is None else (x[mask], y[mask])
+        x_mean, y_mean = own.mean(), other.mean()
+        own = own - x_mean
+        variance = float((own * own).mean())
+        gain = float((own * (other - y_mean)).mean()) / variance if variance > 1e-12 else 1.0
         x -= x_mean
-        variance = float((x * x).mean())
-        gain = float((x * (y - y_mean)).mean()) / variance if variance > 1e-12 else 1.0
         fitted[..., channel] = gain * x + y_mean
     return fitted

@@ -46,50 +46,72 @@ def measure_picture(
     pixels: np.ndarray,
     is_moving: np.ndarray,
     *,
+    is_valid: np.ndarray | None = None,
     metrics: Choice = "all",
     precision: Precision = "float",
 ) -> Measured:
-    """Compare a picture with the truth.
+    """Compare a picture with the truth, where the camera sees anything.
+
+    Where it sees nothing, the truth stands in both pictures, which windows and filters then look at, and no mean is
+    taken over it: every figure is one of valid pixels.
 
     Args:
         image: Rendered, any float type; clamped, and rounded if `precision` says so. [H, W, 3]
         pixels: What the camera took. [H, W, 3] uint8
         is_moving: Which pixels move. [H, W] bool
+        is_valid: Which pixels the camera sees; None for all. [H, W] bool
         metrics: "quick" is PSNR, SSIM and DSSIM1; "all" is every column, at about twice the time.
         precision: See engine.metrics.pictures.colors.as_shown. The colour fit starts from that picture and is not
         rounded again.
     """
     if not np.isfinite(image).all():
         return _filled({}, "the picture has values that are not finite", metrics, is_moving, image.shape)
+    if is_valid is not None and not is_valid.any():
+        return _filled({}, "the camera sees nothing of the picture", metrics, is_moving, image.shape)
     truth = pixels.astype(np.float32) / np.float32(255.0)
-    shown = as_shown(image, precision)
+    shown = _with_truth(as_shown(image, precision), truth, is_valid)
+    still = ~is_moving
+    if is_valid is not None:
+        is_moving, still = is_moving & is_valid, still & is_valid
     truth_seen = flip.seen(truth) if metrics == "all" else None
-    found: dict[str, float | None] = {"moving_share": float(is_moving.mean())}
-    parts = {"": None, "_moving": is_moving, "_rest": ~is_moving}
-    fitted = np.clip(fit_colors(shown, truth), 0.0, 1.0).astype(np.float32)
-    found["psnr_light"] = _psnr_in_same_light(fitted, truth, ~is_moving)
+    found: dict[str, float | None] = {"moving_share": masked_mean(is_moving, is_valid)}
+    parts = {"": is_valid, "_moving": is_moving, "_rest": still}
+    fitted = np.clip(fit_colors(shown, truth, is_valid), 0.0, 1.0).astype(np.float32)
+    fitted = _with_truth(fitted, truth, is_valid)
+    found["psnr_light"] = _psnr_in_same_light(fitted, truth, still, is_valid)
     for fit, picture in (("", shown), ("_fit", fitted)):
         similarity = Similarity.of(picture, truth)
         error, alike = squared_error(picture, truth), ssim_pixels(similarity)
         for part, mask in parts.items():
             found[f"psnr{fit}{part}"] = psnr_of(error, mask)
             found[f"ssim{fit}{part}"] = masked_mean(alike, mask)
-        found[f"dssim1{fit}"] = 0.5 * (1.0 - masked_mean(alike, None))
+        found[f"dssim1{fit}"] = 0.5 * (1.0 - masked_mean(alike, is_valid))
         if truth_seen is None:  # the quick choice
             continue
-        found[f"dssim_range2{fit}"] = dssim_range2_of(similarity)
-        found[f"dssim_ms{fit}"] = dssim_ms_of(picture, truth, similarity)
+        found[f"dssim_range2{fit}"] = dssim_range2_of(similarity, is_valid)
+        found[f"dssim_ms{fit}"] = dssim_ms_of(picture, truth, similarity, is_valid)
         noticed = flip.flip_of(flip.seen(picture), truth_seen)
         found |= {f"flip{fit}{part}": masked_mean(noticed, mask) for part, mask in parts.items()}
-        found[f"lpips{fit}"] = lpips.lpips(picture, truth)
+        found[f"lpips{fit}"] = _of_valid(lpips.lpips(picture, truth), is_valid)
     if metrics == "all":
-        found["lpips_unscaled"] = lpips.lpips_unscaled(shown, truth)
+        found["lpips_unscaled"] = _of_valid(lpips.lpips_unscaled(shown, truth), is_valid)
     return _filled(found, None, metrics, is_moving, image.shape)
 
 
-def _psnr_in_same_light(fitted: np.ndarray, truth: np.ndarray, is_still: np.ndarray) -> float | None:
+def _with_truth(picture: np.ndarray, truth: np.ndarray, is_valid: np.ndarray | None) -> np.ndarray:
+    return picture if is_valid is None else np.where(is_valid[..., None], picture, truth)
+
+
+def _of_valid(distance: float | None, is_valid: np.ndarray | None) -> float | None:
+    """A mean over all places of two pictures that differ at valid ones only, as one over those."""
+    return distance if distance is None or is_valid is None else distance / float(is_valid.mean())
+
+
+def _psnr_in_same_light(
+    fitted: np.ndarray, truth: np.ndarray, is_still: np.ndarray, is_valid: np.ndarray | None
+) -> float | None:
     relit = fit_light(fitted, truth, is_still)
-    return None if relit is None else psnr_of(squared_error(np.clip(relit, 0.0, 1.0), truth))
+    return None if relit is None else psnr_of(squared_error(np.clip(relit, 0.0, 1.0), truth), is_valid)
 
 
 def _filled(
@@ -110,7 +132,9 @@ def _filled(
         elif name.startswith("lpips"):
             missing[name] = lpips.why_missing() or "the network gave no finite value"
         elif name.startswith("dssim_ms"):
-            missing[name] = f"a side of {min(shape[:2])} px is below {MS_MIN_SIDE_PX} px"
+            is_small = min(shape[:2]) < MS_MIN_SIDE_PX
+            side = f"a side of {min(shape[:2])} px is below {MS_MIN_SIDE_PX} px"
+            missing[name] = side if is_small else "the camera sees too little of the picture"
         else:
             missing[name] = "no moving pixels" if not is_moving.any() else "no pixels that do not move"
     return Measured(figures, missing)

@@ -71,9 +71,9 @@ def dssim_range2(image: np.ndarray, truth: np.ndarray) -> float:
     return dssim_range2_of(Similarity.of(image, truth))
 
 
-def dssim_range2_of(similarity: Similarity) -> float:
-    """`dssim_range2` from maps that are there already."""
-    return 0.5 * (1.0 - float(similarity.ssim_range2.mean(dtype=np.float64)))
+def dssim_range2_of(similarity: Similarity, mask: np.ndarray | None = None) -> float:
+    """`dssim_range2` from maps that are there already, of the pixels of a mask; NaN for an empty one."""
+    return 0.5 * (1.0 - masked_mean(similarity.ssim_range2, mask))
 
 
 def dssim_ms(image: np.ndarray, truth: np.ndarray) -> float:
@@ -87,8 +87,12 @@ def dssim_ms(image: np.ndarray, truth: np.ndarray) -> float:
     return dssim_ms_of(image, truth, Similarity.of(image, truth))
 
 
-def dssim_ms_of(image: np.ndarray, truth: np.ndarray, similarity: Similarity) -> float:
-    """`dssim_ms` with the maps of the finest scale given."""
+def dssim_ms_of(image: np.ndarray, truth: np.ndarray, similarity: Similarity, mask: np.ndarray | None = None) -> float:
+    """`dssim_ms` with the maps of the finest scale given.
+
+    With a mask: means over its pixels, at each scale over those that are made of its pixels alone (windows look over
+    its edge); NaN where none is left at the coarsest.
+    """
     if min(image.shape[:2]) < MS_MIN_SIDE_PX:
         return math.nan
     a, b = (np.clip(p, 0.0, 1.0).astype(np.float32, copy=False) for p in (image, truth))
@@ -98,9 +102,14 @@ def dssim_ms_of(image: np.ndarray, truth: np.ndarray, similarity: Similarity) ->
         is_coarsest = scale == len(MS_WEIGHTS) - 1
         if scale:
             a, b = _halve(a), _halve(b)
+            mask = None if mask is None else _halve(mask[..., None].astype(np.float32))[..., 0] == 1.0
             similarity = Similarity.of(_mirrored(a), _mirrored(b)) if is_coarsest else Similarity.of(a, b)
         factor = (similarity.ssim if is_coarsest else similarity.structure)[inside, inside]
-        product *= max(float(factor.mean(dtype=np.float64)), 0.0) ** weight
+        is_used = mask if mask is None or is_coarsest else mask[inside, inside]
+        mean = masked_mean(factor, is_used)
+        if math.isnan(mean):
+            return math.nan
+        product *= max(mean, 0.0) ** weight
     return 0.5 * (1.0 - product)
 
 

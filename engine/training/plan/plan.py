@@ -23,7 +23,6 @@ from engine.training.plan.forecast import (
     rough_memory_mb,
     rough_preparation_s,
 )
-from engine.training.preparation.training_pictures import shared_image_size
 
 Value = int | float | str | None
 
@@ -201,7 +200,7 @@ def footage_of(capture: Capture, holdout: Sequence[int]) -> Footage:
             hint="Hold out fewer cameras.",
             path=capture.path,
         )
-    width, height = shared_image_size(capture)
+    width, height = capture.picture_size
     return Footage(width, height, n_cameras, len(set(holdout)), capture.n_frames)
 
 

@@ -13,9 +13,8 @@ import numpy as np
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.cloud.background.exposure import Exposure
-from engine.cloud.background.masks import motion_mask
 from engine.training.config import TrainConfig
-from engine.training.preparation.cloud_preparation import key_of_corrected, read_backgrounds
+from engine.training.preparation.cloud_preparation import key_of_corrected, moving_pixels, read_backgrounds
 
 
 def looks_still(
@@ -44,7 +43,13 @@ def looks_still(
     last = clip.n_frames - 1
     instants = dict.fromkeys((last // 2, last, 0))  # each once; most motion shows in the first picture or two
     return not any(
-        motion_mask(_seen(capture.frame(camera, clip.start + instant), background, config), background).any()
+        moving_pixels(
+            _seen(capture.frame(camera, clip.start + instant), background, config),
+            background,
+            capture,
+            camera,
+            clip.start + instant,
+        ).any()
         for instant in instants
         for camera, background in zip(camera_indices, backgrounds.images, strict=True)
     )

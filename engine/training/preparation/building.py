@@ -61,7 +61,7 @@ def static_anchors(cloud: StaticCloud, config: TrainConfig) -> AnchorSet:
     return AnchorSet.from_cloud(
         torch.from_numpy(cloud.points),
         torch.from_numpy(cloud.colors),
-        spacing=float(cloud.spacing),
+        spacing=torch.from_numpy(cloud.sizes),
         feature_dim=config.static_feature_dim,
         presence=None,
     )

@@ -211,7 +211,8 @@ class ClipPreparation:
         Raises:
             DiskError: The disk refused.
         """
-        backgrounds = shown_elsewhere(backgrounds, self._render_static(model, gains))
+        is_valid = self._capture.valid_of(self._camera_indices)
+        backgrounds = shown_elsewhere(backgrounds, self._render_static(model, gains), is_valid)
         key = self._key_of_corrected()
         kept = read_backgrounds(self._prep_dir, key)
         if kept is None or not kept.equals(backgrounds):
@@ -229,6 +230,7 @@ class ClipPreparation:
             "capture": self._capture.part_key,
             "size": [int(side) for side in self._rig.image_sizes[0]],
             "cameras": list(self._rig.names),
+            "has_masks": list(self._capture.has_masks),
             "frames": [self._clip.start, self._clip.n_frames, self._clip.clip_length],
             "config": self._config.difference(),
             "regions": [region.as_dict() for region in self._regions],
@@ -274,7 +276,7 @@ class ClipPreparation:
         keep = self._keep_after(model, gains, estimated)
         backgrounds = self._corrected(estimated, model, gains, pictures, keep)
         seen = seen_still(backgrounds, pictures, motion_masks(pictures, backgrounds, None, self._report))
-        return shown_elsewhere(seen, self._render_static(model, gains))
+        return shown_elsewhere(seen, self._render_static(model, gains), pictures.is_valid)
 
     def _corrected(
         self,
@@ -294,7 +296,9 @@ class ClipPreparation:
         return key_of_corrected(self._capture, self._camera_indices, self._config)
 
     def _static_cloud(self, backgrounds: Backgrounds, keep: Keep) -> StaticCloud:
-        cloud = static_cloud(backgrounds, self._rig, self._config, self._report, keep)
+        is_valid = self._capture.valid_of(self._camera_indices)
+        layout = self._capture.layout
+        cloud = static_cloud(backgrounds, self._rig, is_valid, self._config, self._report, keep, layout)
         if len(cloud.points) == 0:
             raise PreparationError(
                 "No static point was found by any two cameras.",

@@ -18,14 +18,18 @@ import numpy as np
 
 from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture
+from engine.capture.format_result import Layout
+from engine.capture.points import points_of
 from engine.cloud.background.background import estimate_background
 from engine.cloud.background.exposure import Exposure
 from engine.cloud.background.masks import motion_mask
 from engine.cloud.background.recheck import recheck_background
 from engine.cloud.keeping import Arrays, Keep, do_now
 from engine.cloud.motion.moving_cloud import MovingCloud, build_moving_cloud, motion_bounds
+from engine.cloud.stereo.given_points import true_points
 from engine.cloud.stereo.sparse import triangulate
 from engine.cloud.stereo.static_cloud import StaticCloud, build_static_cloud
+from engine.errors import CaptureError
 from engine.parallel import map_ordered
 from engine.progress import Progress, ReportProgress
 from engine.storage.array_files import ArraysError, read_arrays, write_arrays
@@ -77,7 +81,11 @@ def estimate_backgrounds(
 
     def estimate(camera: int, exposure: Exposure | None) -> Arrays:
         pictures = capture.frames_of(camera, frames)
-        background = estimate_background(pictures if exposure is None else exposure.applied_to(pictures))
+        pictures = pictures if exposure is None else exposure.applied_to(pictures)
+        background = estimate_background(pictures, capture.valid(camera))
+        masks = [mask for frame in frames if (mask := capture.moving_mask(camera, frame)) is not None]
+        if masks:  # who stands still for most of the time looks like background, but a mask tells
+            background.is_stable[2 * np.sum(masks, axis=0) > len(masks)] = False
         return {"image": background.image, "is_stable": np.packbits(background.is_stable, axis=-1)}
 
     images, stable = [], []
@@ -101,22 +109,35 @@ def estimate_backgrounds(
 def static_cloud(
     backgrounds: Backgrounds,
     rig: CameraRig,
+    is_valid: np.ndarray | None,
     config: TrainConfig,
     report: ReportProgress,
     keep: Keep = do_now,
+    layout: Layout | None = None,
 ) -> StaticCloud:
-    """Dense points of what stands still, with white balance gains."""
+    """Dense points of what stands still, with white balance gains.
+
+    Args:
+        is_valid: Pixels that the cameras see; None for all. [C, H, W] bool
+        layout: Of the capture, whose own point cloud is used where it is true.
+    """
 
     def build() -> Arrays:
-        cloud = _build_static_cloud(backgrounds, rig, config, report, keep)
-        return {name: np.asarray(getattr(cloud, name)) for name in ("points", "colors", "gains", "spacing")}
+        cloud = _build_static_cloud(backgrounds, rig, is_valid, config, report, keep, layout)
+        return {name: np.asarray(getattr(cloud, name)) for name in ("points", "colors", "sizes", "gains", "spacing")}
 
     arrays = keep("static cloud", build)
-    return StaticCloud(arrays["points"], arrays["colors"], arrays["gains"], float(arrays["spacing"]))
+    return StaticCloud(**{**arrays, "spacing": float(arrays["spacing"])})
 
 
 def _build_static_cloud(
-    backgrounds: Backgrounds, rig: CameraRig, config: TrainConfig, report: ReportProgress, keep: Keep
+    backgrounds: Backgrounds,
+    rig: CameraRig,
+    is_valid: np.ndarray | None,
+    config: TrainConfig,
+    report: ReportProgress,
+    keep: Keep,
+    layout: Layout | None,
 ) -> StaticCloud:
 
     def say(line: str) -> None:
@@ -126,19 +147,38 @@ def _build_static_cloud(
         def alive() -> None:  # whoever wants to stop is heard here
             report(Progress("Building the static cloud", 0.5))
 
-        return {"points": triangulate(backgrounds.images, rig, report=say, alive=alive).points}
+        return {"points": triangulate(backgrounds.images, rig, is_valid=is_valid, report=say, alive=alive).points}
 
     sparse_points = keep("sparse points", find_sparse)["points"]
+    if layout is not None and layout.points is not None:
+        given = keep("given points", lambda: {"points": _given_points(layout, backgrounds, rig, say)})["points"]
+        sparse_points = np.concatenate([sparse_points, given])
     return build_static_cloud(
         backgrounds.images,
         backgrounds.is_stable,
         rig,
+        is_valid=is_valid,
         max_points=config.max_static_points,
         sparse_points=sparse_points if len(sparse_points) else None,
         color=config.color,
         report=say,
         keep=keep,
     )
+
+
+def _given_points(layout: Layout, backgrounds: Backgrounds, rig: CameraRig, say: Callable[[str], None]) -> np.ndarray:
+    """The points of the cloud that came with a capture in which its cameras agree; none where they do not. [P, 3]"""
+    try:
+        cloud = points_of(layout)
+    except CaptureError as error:
+        say(f"The point cloud that came along is not used. {error}")
+        return np.zeros((0, 3))
+    if cloud is None:
+        return np.zeros((0, 3))
+    found = true_points(cloud.points, backgrounds.images, backgrounds.is_stable, rig)
+    numbers = f"neighbouring cameras agree in {found.share:.0%} of its {found.n_seen} points that they see"
+    say(f"The point cloud that came along is {'used' if found.is_used else 'not used'}: {numbers}")
+    return found.points
 
 
 def correct_backgrounds(
@@ -161,6 +201,7 @@ def correct_backgrounds(
             backgrounds.is_stable[row],
             render_static(row),
             pictures.of_camera(row),
+            pictures.valid(row),
         )
         return {"image": image}
 
@@ -197,8 +238,12 @@ def motion_masks(
     def find(row: int) -> Arrays:
         background = backgrounds.images[row]
         found = [
-            motion_mask(
-                pictures.picture(row, frame), background if brightness is None else background * brightness(row, frame)
+            moving_pixels(
+                pictures.picture(row, frame),
+                background if brightness is None else background * brightness(row, frame),
+                pictures.capture,
+                pictures.camera_indices[row],
+                pictures.clip.start + frame,
             )
             for frame in range(n_frames)
         ]
@@ -210,6 +255,23 @@ def motion_masks(
         report(Progress("Finding what moves", (row + 1) / n_cameras))
     report(Progress("Finding what moves", 1.0, f"{100 * masks.mean():.1f} % of pixels move"))
     return masks
+
+
+def moving_pixels(
+    picture: np.ndarray, background: np.ndarray, capture: Capture, camera_index: int, frame_index: int
+) -> np.ndarray:
+    """What moves in one picture: what differs from the background, and what a mask of the capture says. [H, W] bool
+
+    Both together: masks are mostly of people and things, without the shadows that go with them.
+
+    Args:
+        picture: In the exposure of the background. [H, W, 3] uint8
+        background: [H, W, 3] uint8 or float 0..255
+        camera_index, frame_index: Of the picture, in the numbering of the capture.
+    """
+    found = motion_mask(picture, background, is_valid=capture.valid(camera_index))
+    masked = capture.moving_mask(camera_index, frame_index)
+    return found if masked is None else found | masked
 
 
 def seen_still(backgrounds: Backgrounds, pictures: TrainingPictures, masks: np.ndarray) -> Backgrounds:
@@ -230,13 +292,18 @@ def seen_still(backgrounds: Backgrounds, pictures: TrainingPictures, masks: np.n
         n_still = is_still.sum(0)[..., None]
         means = np.floor(sums / np.maximum(n_still, 1) + 0.5).astype(np.uint8)
         is_seen = 2 * n_still > n_frames
+        valid = pictures.valid(row)
+        if valid is not None:
+            is_seen &= valid[..., None]
         return np.where(is_seen, means, backgrounds.images[row]), is_seen[..., 0]
 
     images, is_seen = zip(*map_ordered(seen, range(masks.shape[1])), strict=True)
     return Backgrounds(np.stack(images), np.stack(is_seen))
 
 
-def shown_elsewhere(backgrounds: Backgrounds, render_static: Callable[[int], np.ndarray]) -> Backgrounds:
+def shown_elsewhere(
+    backgrounds: Backgrounds, render_static: Callable[[int], np.ndarray], is_valid: np.ndarray | None
+) -> Backgrounds:
     """Backgrounds of a trained clip: where nothing was seen to stand still, what its static anchors show instead.
 
     There a person stood, or a shadow lay, and the anchors may have taken on its darkness: clips that inherit them have
@@ -244,11 +311,14 @@ def shown_elsewhere(backgrounds: Backgrounds, render_static: Callable[[int], np.
 
     Args:
         render_static: Camera row to the static render in that camera's colours. [H, W, 3] float
+        is_valid: Pixels that the cameras see, None for all; the others stay black. [C, H, W] bool
     """
     images = backgrounds.images.copy()
     for row, is_seen in enumerate(backgrounds.is_stable):
         render = render_static(row)
         is_shown = ~is_seen & np.asarray(np.isfinite(render).all(-1))
+        if is_valid is not None:
+            is_shown &= is_valid[row]
         images[row][is_shown] = np.floor(np.clip(render[is_shown], 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
     return Backgrounds(images, backgrounds.is_stable)
 
@@ -283,6 +353,7 @@ def moving_cloud(
         gains,
         bounds_min=lower,
         bounds_max=upper,
+        is_valid=pictures.is_valid,
         max_points=config.max_moving_points,
         voxel_size=voxel_size,
         report=say,
@@ -293,7 +364,8 @@ def moving_cloud(
 def key_of_corrected(capture: Capture, camera_indices: Sequence[int], config: TrainConfig) -> dict:
     """What corrected backgrounds belong to, as `write_backgrounds` keeps it beside them."""
     rig = capture.rig.subset(list(camera_indices))
-    return {
+    masked = [name for name, has in zip(capture.rig.names, capture.has_masks, strict=True) if has]
+    return ({"masks": masked} if masked else {}) | {
         "capture": capture.part_key,
         "cameras": list(rig.names),
         "size": [int(side) for side in rig.image_sizes[0]],

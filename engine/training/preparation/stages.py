@@ -20,7 +20,7 @@ from engine.errors import DiskError
 from engine.progress import Progress, ReportProgress
 from engine.storage.array_files import ArraysError, read_arrays, read_metadata, write_arrays
 
-VERSION = 2
+VERSION = 3
 """To be raised whenever the code of any preparation step changes what it gives."""
 WRITE_AFTER_S = 3.0
 """Pieces are written when so much work has gathered: what takes less is done again rather than written."""

@@ -11,26 +11,8 @@ import numpy as np
 
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.errors import PreparationError
 from engine.images.exposure_curve import to_reference
 from engine.parallel import map_ordered
-
-
-def shared_image_size(capture: Capture) -> tuple[int, int]:
-    """Width and height of all cameras.
-
-    Raises:
-        PreparationError: Cameras differ in size; training needs one size.
-    """
-    sizes = {(int(w), int(h)) for w, h in capture.rig.image_sizes}
-    if len(sizes) != 1:
-        listed = ", ".join(f"{w}x{h}" for w, h in sorted(sizes))
-        raise PreparationError(
-            f"Cameras have different picture sizes ({listed}); training needs one size.",
-            hint="Resize the videos and their calibration to one size.",
-            path=capture.path,
-        )
-    return sizes.pop()
 
 
 class TrainingPictures:
@@ -40,13 +22,18 @@ class TrainingPictures:
         capture: Source of pixels.
         clip: Frames to load.
         camera_indices: Training cameras, in capture numbering; a row here is a position in this list.
+
+    Attributes:
+        is_valid: Pixels that these cameras see, in every frame; None where they see all. [C, H, W] bool
     """
 
     def __init__(self, capture: Capture, clip: Clip, camera_indices: Sequence[int]) -> None:
         self.camera_indices = list(camera_indices)
         self.capture, self.clip = capture, clip
+        self.is_valid = capture.valid_of(self.camera_indices)
         frames = list(clip.frame_indices())
-        self._pixels = [capture.frames_of(camera, frames) for camera in self.camera_indices]
+        # side by side: decoders and lenses work without the interpreter
+        self._pixels = map_ordered(lambda camera: capture.frames_of(camera, frames), self.camera_indices)
 
     def __len__(self) -> int:
         return len(self.camera_indices) * self.clip.n_frames
@@ -55,6 +42,10 @@ class TrainingPictures:
     def n_cameras(self) -> int:
         """Training cameras."""
         return len(self.camera_indices)
+
+    def valid(self, camera_row: int) -> np.ndarray | None:
+        """Pixels that a camera sees; None where it sees all. [H, W] bool"""
+        return self.capture.valid(self.camera_indices[camera_row])
 
     def picture(self, camera_row: int, frame_in_clip: int) -> np.ndarray:
         """One picture. [H, W, 3] uint8"""

@@ -21,6 +21,7 @@ from engine.model.clip_view import View, render_gaussians
 from engine.model.joining import join_frozen
 from engine.raster import TileBoxes, tile_boxes
 from engine.raster.gaussians import Gaussians
+from engine.training.step.valid_pixels import ValidPixels
 
 MAX_BYTES = 1 << 30
 """Memory for what is kept of cameras; those beyond it are drawn with all tiles. 27 cameras of 640 x 360: 100 MB."""
@@ -34,8 +35,8 @@ class ActivePicture:
         gaussians: Those that touch an active tile, and all that learn.
         learning: The ones that learn alone.
         n_all: How many there would be with all tiles.
-        tile_mask: Active tiles, or None for all. [rows, columns] bool
-        rest: What the other tiles hold. [H, W, 3]
+        tile_mask: Active tiles, or None for all; tiles that the camera sees nothing of are none. [rows, columns] bool
+        rest: What the other tiles hold; None where nothing of them counts. [H, W, 3]
     """
 
     gaussians: Gaussians
@@ -73,11 +74,15 @@ class ActiveTiles:
     Args:
         model: A clip in which one set is constant; see `applies`.
         backend: What it is trained with.
+        valid: Which pixels of its cameras count.
         max_bytes: Memory for what is kept.
     """
 
-    def __init__(self, model: ClipModel, *, backend: Backend, max_bytes: int = MAX_BYTES) -> None:
+    def __init__(
+        self, model: ClipModel, *, backend: Backend, valid: ValidPixels | None = None, max_bytes: int = MAX_BYTES
+    ) -> None:
         self._model, self._backend = model, backend
+        self._valid = ValidPixels(None, backend.device) if valid is None else valid
         self._constant = [role for role in model.roles() if model.is_constant(role)]
         self._max_bytes = max_bytes
         self._views: dict[int, _FrozenView] = {}
@@ -101,10 +106,13 @@ class ActiveTiles:
         if frozen_view is None:
             gaussians = self._model.decode(clip_time, rows)
             is_learning = slice(len(rows[role]) * self._model.decoder.gaussians_per_anchor, None)
-            return ActivePicture(gaussians, gaussians[is_learning], len(gaussians))
+            return ActivePicture(gaussians, gaussians[is_learning], len(gaussians), self._valid.tiles_of(camera_row))
         nothing = rows[role][:0]
         learning = self._model.decode(clip_time, rows | {role: nothing})
         mask = self._boxes(learning, view).mask()
+        seen_tiles = self._valid.tiles_of(camera_row)
+        if seen_tiles is not None:
+            mask = mask & seen_tiles
         chosen = frozen_view.boxes.meeting(mask, frozen_view.rows)
         lit = self._model.lit_gaussians(role, clip_time)
         gaussians = join_frozen(lit, chosen, learning, backend=self._backend)
@@ -138,7 +146,10 @@ class ActiveTiles:
             ends = (0.0, self._model.n_frames / self._model.clip_length) if self._model.has_light else (0.0,)
             with torch.no_grad():
                 lit = [self._model.lit_gaussians(role, clip_time)[seen] for clip_time in ends]
-                pictures = tuple(render_gaussians(part, view, backend=self._backend).image[0] for part in lit)
+                pictures = tuple(
+                    self._valid.shown(camera_row, render_gaussians(part, view, backend=self._backend).image[0])
+                    for part in lit
+                )
             gaussians = lit[0]
             boxes = self._boxes(gaussians, view)
             drawn = boxes.drawn()

@@ -12,11 +12,11 @@ from tests.clip_headers import with_header
 
 
 def test_inspecting_prints_stable_json(run, capture_folder):
-    code, out, _ = run("inspect", capture_folder, "--json")
+    code, out, _ = run("inspect", capture_folder, "--json", "--quick")
     assert code == 0
     document = json.loads(out)
     assert (document["schema"], document["n_cameras"], document["n_frames"]) == (1, 4, 6)
-    code, out, _ = run("inspect", capture_folder)
+    code, out, _ = run("inspect", capture_folder, "--quick")
     assert code == 0
     assert "4 cameras, 6 frames" in out
 
@@ -96,16 +96,16 @@ def test_what_cannot_be_a_path_is_one_message(run, path):
 def test_names_cannot_command_the_terminal_nor_stop_the_program(run, capture_folder, tmp_path):
     folder = tmp_path / os.fsdecode(b"caf\xe9 \x1b[2J")  # no UTF-8, as unpacked from an old archive
     shutil.copytree(capture_folder, folder)
-    code, out, _ = run("inspect", folder)
+    code, out, _ = run("inspect", folder, "--quick")
     assert code == 0
     out.encode("utf-8")
     assert "\x1b" not in out
-    code, out, _ = run("inspect", folder, "--json")
+    code, out, _ = run("inspect", folder, "--json", "--quick")
     assert code == 0
     assert out.isascii()
     assert json.loads(out)["path"] == str(folder)
     (folder / "train_meta.json").write_text("{")
-    code, out, err = run("inspect", folder)
+    code, out, err = run("inspect", folder, "--quick")
     assert (code, out, err.count("clipgstream: ")) == (2, "", 1)
     err.encode("utf-8")
     assert "\x1b" not in err
@@ -122,7 +122,7 @@ def test_links_outside_are_allowed_once_for_a_project(run, capture_folder, tmp_p
         assert "'ims' is a link that leads out of the capture folder" in err
         assert err.count("\n") == 1
         assert "--follow-links" in err
-    assert run("inspect", capture, "--follow-links")[0] == 0
+    assert run("inspect", capture, "--follow-links", "--quick")[0] == 0
     assert run("train", capture, "--project", project, "--clip-length", 3, "--follow-links")[0] == 0
     assert json.loads(run("inspect", project, "--json")[1])["fps"] == 30.0  # opens the capture as the project allows
     assert run("train", capture, "--project", project)[0] == 0
@@ -136,3 +136,67 @@ def test_training_repeats_what_is_odd_about_the_capture(run, capture_folder, tmp
     code, _, err = run("train", capture, "--project", tmp_path / "p", "--clip-length", 3)
     assert code == 0
     assert "Note: The calibration lists 6 frames, the first 5 are there and are used." in err
+
+
+def test_corrections_are_written_by_flags_and_taken_back(run, capture_folder, tmp_path):
+    capture = tmp_path / "capture"
+    shutil.copytree(capture_folder, capture)
+    names = [camera["name"] for camera in json.loads(run("inspect", capture, "--json", "--quick")[1])["cameras"]]
+    flags = ["--exclude", names[1], "--shift", f"{names[2]}=1", "--hold-out", names[3]]
+    code, out, _ = run("inspect", capture, *flags)
+    assert code == 0
+    assert "capture.json" in out
+    found = json.loads(run("inspect", capture, "--json", "--quick")[1])
+    assert [camera["name"] for camera in found["cameras"]] == [names[0], *names[2:]]
+    assert found["default_holdout"] == [names[3]]
+    assert found["n_frames"] == 5
+    assert run("inspect", capture, "--include", names[1], "--shift", f"{names[2]}=0", "--hold-out", "none")[0] == 0
+    found = json.loads(run("inspect", capture, "--json", "--quick")[1])
+    assert [camera["name"] for camera in found["cameras"]] == names
+    assert (found["default_holdout"], found["n_frames"]) == ([], 6)
+
+
+def test_corrections_go_to_another_folder_where_that_is_asked(run, capture_folder, tmp_path):
+    capture, out_folder = tmp_path / "capture", tmp_path / "corrected"
+    shutil.copytree(capture_folder, capture)
+    out_folder.mkdir()
+    before = sorted(path.name for path in capture.iterdir())
+    name = json.loads(run("inspect", capture, "--json", "--quick")[1])["cameras"][0]["name"]
+    assert run("inspect", capture, "--exclude", name, "--out", out_folder)[0] == 0
+    assert sorted(path.name for path in capture.iterdir()) == before
+    found = json.loads(run("inspect", out_folder, "--json", "--quick", "--follow-links")[1])
+    assert name not in [camera["name"] for camera in found["cameras"]]
+
+
+@pytest.mark.parametrize(
+    ("flags", "said"),
+    [
+        (["--exclude", "nobody"], "no camera called nobody"),
+        (["--shift", "0=x"], "is not a number of frames"),
+        (["--shift", "0"], "write CAM=FRAMES"),
+        (["--mask", "0="], "write CAM=FILES"),
+        (["--exclude", "0", "--exclude", "1", "--exclude", "2"], "would be left"),
+    ],
+)
+def test_corrections_that_cannot_be_are_one_message(run, capture_folder, tmp_path, flags, said):
+    capture = tmp_path / "capture"
+    shutil.copytree(capture_folder, capture)
+    names = [camera["name"] for camera in json.loads(run("inspect", capture, "--json", "--quick")[1])["cameras"]]
+    flags = [names[int(flag)] if flag in ("0", "1", "2") else flag for flag in flags]
+    code, out, err = run("inspect", capture, *flags)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert "Traceback" not in err
+    assert not (capture / "capture.json").exists()
+
+
+@pytest.mark.slow
+def test_inspecting_says_what_the_doctor_found(run, capture_folder):
+    code, out, err = run("inspect", capture_folder)
+    assert code == 0
+    assert "Capture doctor:" in out
+    assert "Exposure" in out
+    assert "Capture doctor" in err  # how far it is
+    document = json.loads(run("inspect", capture_folder, "--json")[1])
+    assert {"findings", "pairs", "cameras", "seconds", "n_pictures"} <= document["doctor"].keys()
+    assert document["exposure"]["n_measured"] == 4

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.playback.capture_pictures import CapturedPictures
+from app.playback.capture_pictures import CapturedPictures, downsized
+from app.playback.hatching import DARK, LIGHT
 from app.playback.picture_source import PictureSource
 from engine.capture.capture import Capture, open_capture
 from engine.images.exposure_curve import to_reference
@@ -87,4 +88,24 @@ def test_a_picture_of_another_take_is_never_shown(takes: tuple[Capture, Capture]
     picture = pictures.picture(second, 2, 0, 0, 400)
     assert picture is not None
     assert picture.image.max() < 8
+    pictures.close()
+
+
+def test_what_a_camera_does_not_see_is_hatched_except_in_thumbnails(
+    takes: tuple[Capture, Capture], monkeypatch: pytest.MonkeyPatch
+):
+    is_valid = np.ones((24, 32), bool)
+    is_valid[:, 20:] = False
+    plain = takes[0].frame(1, 1)
+    monkeypatch.setattr(Capture, "valid", lambda self, camera_index: is_valid)
+    pictures = CapturedPictures()
+    for max_width, worker in ((400, pictures.viewing), (20, pictures.thumbnails)):
+        pictures.picture(takes[0], 1, 1, 1, max_width)
+        assert worker.wait_idle(WAIT_S)
+    shown, small = (pictures.picture(takes[0], 1, 1, 1, max_width) for max_width in (400, 20))
+    assert shown is not None
+    assert small is not None
+    assert np.array_equal(shown.image[:, :20], plain[:, :20])
+    assert set(np.unique(shown.image[:, 20:])) == {DARK, LIGHT}
+    assert np.array_equal(small.image, downsized(plain, 20))
     pictures.close()

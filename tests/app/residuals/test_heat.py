@@ -10,6 +10,7 @@ from app.evaluation.headless import open_trained
 from app.project.project import open_project
 from app.residuals.figures import mean_excess
 from app.residuals.heat_map import HEAT_KINDS, LEVELS
+from engine.capture.capture import Capture
 from engine.metrics.clips.seams import PairRow
 from tests.app.residuals.conftest import until
 
@@ -183,3 +184,17 @@ def test_unknown_kinds_are_errors_of_the_caller(open_residuals):
         opened.residuals.heat(opened.timeline, 0, "heat")
     with pytest.raises(ValueError, match="columns of anchors are error, E, not 'psnr'"):
         opened.residuals.anchor_heat(opened.timeline, "psnr")
+
+
+def test_what_a_camera_does_not_see_is_blank_and_not_counted(open_residuals, monkeypatch):
+    opened = open_residuals()
+    plain = opened.heat(1, 4, "error").values
+    height, width = plain.shape
+    is_valid = np.zeros((height, width), bool)
+    is_valid[height // 4 :, : width // 2] = True
+    monkeypatch.setattr(Capture, "valid", lambda self, camera_index: is_valid)
+    opened.close()
+    found = open_residuals().heat(1, 4, "error")
+    np.testing.assert_array_equal(np.isnan(found.values), ~is_valid)
+    np.testing.assert_array_equal(found.values[is_valid], plain[is_valid])
+    assert found.mean == pytest.approx(plain[is_valid].mean(), rel=ROUNDING)

@@ -105,6 +105,23 @@ def test_a_lens_is_undistorted_and_part_of_the_fingerprint(described: Path) -> N
     assert after.valid(1) is None
 
 
+def test_the_view_of_a_fisheye_is_a_correction(described: Path) -> None:
+    def bend(document: dict[str, Any]) -> None:
+        for camera in document["cameras"]:
+            camera["lens"] = {"model": "fisheye", "params": [0.01]}
+
+    edited(described, bend)
+    before = open_capture(described)
+    write_corrections(before.layout, described, Corrections(fisheye_fov_deg=40.0))
+    after = open_capture(described)
+    width = after.picture_size[0]
+    for wide, narrow in zip(before.rig.Ks, after.rig.Ks, strict=True):
+        half = max(narrow[0, 2], width - narrow[0, 2])
+        assert np.degrees(np.arctan(half / narrow[0, 0])) == pytest.approx(20.0, abs=1e-9)
+        assert narrow[0, 0] > 1.1 * wide[0, 0]
+    assert after.valid(0) is None
+
+
 def test_cameras_of_different_sizes_share_one_picture_size(
     described: Path, pictures: Callable[..., np.ndarray]
 ) -> None:
@@ -135,6 +152,9 @@ def test_cameras_of_different_sizes_share_one_picture_size(
         (lambda d: d["cameras"][1].update(lens={"model": "magic"}), "lens"),
         (lambda d: d["cameras"][1].update(offset_frames=100), "No frame is left"),
         (lambda d: d["cameras"][1].update(name="cam00"), 'called "cam00"'),
+        (lambda d: d["cameras"][1].update(frames=[0, 6]), "go beyond the 6"),
+        (lambda d: d["cameras"][1].update(frames=[]), "go beyond the 6"),
+        (lambda d: d["cameras"][1].update(frames=[10**30]), "frames"),
         (lambda d: d.update(holdout=["nobody"]), "nobody"),
         (lambda d: d.update(up=[0, 0, 0]), "not a direction"),
         (lambda d: d["cameras"][1].pop("video"), "neither video nor images"),

@@ -30,6 +30,7 @@ def test_description_is_json_with_the_documented_keys(make_sample: Callable[...,
         "cameras",
         "rig_extent",
         "focus_point",
+        "has_points",
         "warnings",
     ]
     assert (found["schema"], found["n_cameras"], found["n_frames"], found["duration_s"]) == (1, 3, 6, 0.2)

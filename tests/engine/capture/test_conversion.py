@@ -19,13 +19,10 @@ from tests.engine.capture.layouts import written_capture_json, written_colmap
 from tests.engine.capture.layouts.scene import check_reads_as, make_points, make_scene
 from tests.engine.capture.layouts.written_colmap import write_model
 
-READ = tuple(target for target in TARGETS if target != "transforms")
-"""Layouts of which there is a reader here."""
-
 
 @pytest.mark.parametrize("frames", ["link", "copy", "png"])
 @pytest.mark.parametrize("source", ["videos", "folders"])
-@pytest.mark.parametrize("target", READ)
+@pytest.mark.parametrize("target", TARGETS)
 def test_a_converted_capture_reads_as_its_scene(tmp_path: Path, target: str, source: str, frames: str) -> None:
     scene = make_scene(lens="opencv5")
     written_colmap.write(tmp_path / "old", scene, lens="opencv5", frames=source)
@@ -67,7 +64,7 @@ def test_chosen_image_files_are_copied_in_order(tmp_path: Path) -> None:
     assert np.array_equal(after.frame(1, 1), before.frame(1, 1))
 
 
-@pytest.mark.parametrize("target", READ)
+@pytest.mark.parametrize("target", TARGETS)
 def test_points_come_along_in_the_world_of_the_cameras(tmp_path: Path, target: str) -> None:
     scene = make_scene(lens="pinhole")
     written_colmap.write(tmp_path / "old", scene, lens="pinhole")

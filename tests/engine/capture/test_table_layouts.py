@@ -10,6 +10,7 @@ import pytest
 
 from engine.capture.capture import open_capture
 from engine.capture.frames import IndexedFrames
+from engine.capture.writers.capture_json import Corrections, write_corrections
 from engine.errors import CaptureError
 from tests.engine.capture.layouts import written_easyvolcap, written_toml, written_transforms
 from tests.engine.capture.layouts.scene import check_reads_as, make_points, make_scene, projected
@@ -178,3 +179,27 @@ def test_lenses_are_what_was_written() -> None:
     pose = scene.world_to_camera[0]
     assert np.abs(projected(K, scene.lenses[0], pose, points) - scene.project(0, points)).max() > 0.4
     assert np.abs(projected(scene.Ks[0], type(scene.lenses[0])(), pose, points) - scene.project(0, points)).max() > 0.05
+
+
+def test_a_clock_survives_corrections(tmp_path: Path) -> None:
+    """Frames that a clock chose are the same after capture.json was written, which knows no times."""
+    scene = make_scene(lens="pinhole", n_frames=8)
+    written_toml.write(tmp_path, scene)
+    rows = ["cam_id,frame_time"]
+    for t in range(scene.n_frames):
+        for camera in range(len(scene.names)):  # the last camera takes twice as many pictures
+            rows.append(f"{camera},{100 + t / (15 if camera < 3 else 30):.6f}")
+    (tmp_path / "timestamps.csv").write_text("\n".join(rows))
+    before = open_capture(tmp_path)
+    write_corrections(before.layout, tmp_path, Corrections(holdout=["cam2"]))
+    after = open_capture(tmp_path)
+    assert after.format == "capture.json"
+    assert after.n_frames == before.n_frames == 4
+    for row in range(4):
+        for frame_index in range(4):
+            assert np.array_equal(after.frame(row, frame_index), before.frame(row, frame_index))
+    write_corrections(after.layout, tmp_path, Corrections(offset_frames={"cam1": 1}))
+    shifted = open_capture(tmp_path)
+    assert shifted.n_frames == 3
+    assert np.array_equal(shifted.frame(0, 0), before.frame(0, 1))
+    assert np.array_equal(shifted.frame(3, 2), before.frame(3, 2))

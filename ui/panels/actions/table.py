@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 from ui.panels.actions import (
     bookmarks,
     compare,
+    doctor,
     heat,
     marking,
     modes,
@@ -32,6 +33,7 @@ ACTIONS: tuple[Action, ...] = (
     *heat.ACTIONS,
     *marking.ACTIONS,
     *training.ACTIONS,
+    *doctor.ACTIONS,
     *window.ACTIONS,
 )
 

@@ -132,7 +132,13 @@ ACTIONS = (
         **_ALWAYS,
     ),
     *(
-        Action(f"window.panel.{title.lower()}", f"Show the panel {title}", WINDOW, _show_panel(title), **_PANELS)
+        Action(
+            f"window.panel.{title.lower().replace(' ', '_')}",
+            f"Show the panel {title}",
+            WINDOW,
+            _show_panel(title),
+            **_PANELS,
+        )
         for title in PANELS
     ),
     Action(

@@ -23,7 +23,9 @@ Write = Callable[[Path], Scene]
 """Writes the shared scene into a folder and tells what a reader must make of it."""
 
 
-def _with(write: Callable[[Path, Scene], None], make: Callable[[], Scene]) -> Write:
+def written_by(write: Callable[[Path, Scene], None], make: Callable[[], Scene]) -> Write:
+    """One function of a writer and the scene that it can say."""
+
     def written(folder: Path) -> Scene:
         scene = make()
         write(folder, scene)
@@ -37,42 +39,49 @@ _PLAIN = ("0", "1", "2", "3")
 
 TABLES: Mapping[str, Write] = {
     **{
-        f"capture_json-{lens}": _with(written_capture_json.write, partial(make_scene, lens=lens))
+        f"capture_json-{lens}": written_by(written_capture_json.write, partial(make_scene, lens=lens))
         for lens in ("pinhole", "opencv5", "fisheye")
     },
-    "sample": _with(written_sample.write, partial(make_scene, lens="pinhole")),
-    "panoptic": _with(written_panoptic.write, partial(make_scene, lens="pinhole", names=_PLAIN)),
+    "sample": written_by(written_sample.write, partial(make_scene, lens="pinhole")),
+    "panoptic": written_by(written_panoptic.write, partial(make_scene, lens="pinhole", names=_PLAIN)),
     **{
-        f"easyvolcap-{lens}": _with(written_easyvolcap.write, partial(make_scene, lens=lens))
+        f"easyvolcap-{lens}": written_by(written_easyvolcap.write, partial(make_scene, lens=lens))
         for lens in written_easyvolcap.LENSES
     },
-    "easyvolcap-videos": _with(
+    "easyvolcap-videos": written_by(
         partial(written_easyvolcap.write, has_videos=True, has_vectors=False), partial(make_scene, lens="opencv5")
     ),
-    **{f"anipose-{lens}": _with(written_toml.write, partial(make_scene, lens=lens)) for lens in written_toml.LENSES},
-    "caliscope": _with(
+    **{
+        f"anipose-{lens}": written_by(written_toml.write, partial(make_scene, lens=lens))
+        for lens in written_toml.LENSES
+    },
+    "caliscope": written_by(
         partial(written_toml.write, kind="caliscope"), partial(make_scene, lens="opencv5", names=_NUMBERED)
     ),
     **{
-        f"transforms-{lens}": _with(written_transforms.write, partial(make_scene, lens=lens))
+        f"transforms-{lens}": written_by(written_transforms.write, partial(make_scene, lens=lens))
         for lens in written_transforms.LENSES
     },
-    "transforms-folders": _with(partial(written_transforms.write, kind="folders"), partial(make_scene, lens="opencv4")),
-    "transforms-videos": _with(partial(written_transforms.write, kind="videos"), partial(make_scene, lens="fisheye")),
-    "transforms-split": _with(partial(written_transforms.write, split=True), partial(make_scene, lens="pinhole")),
-    "immersive": _with(
+    "transforms-folders": written_by(
+        partial(written_transforms.write, kind="folders"), partial(make_scene, lens="opencv4")
+    ),
+    "transforms-videos": written_by(
+        partial(written_transforms.write, kind="videos"), partial(make_scene, lens="fisheye")
+    ),
+    "transforms-split": written_by(partial(written_transforms.write, split=True), partial(make_scene, lens="pinhole")),
+    "immersive": written_by(
         written_immersive.write,
         lambda: written_immersive.simplified(
             make_scene(lens="fisheye2", names=("camera_0001", "camera_0002", "camera_0010"))
         ),
     ),
     **{
-        f"panoptic_studio-{lens}": _with(
+        f"panoptic_studio-{lens}": written_by(
             written_panoptic_studio.write, partial(make_scene, lens=lens, names=("00_01", "00_02", "00_10"))
         )
         for lens in written_panoptic_studio.LENSES
     },
-    "technicolor": _with(
+    "technicolor": written_by(
         written_technicolor.write, partial(make_scene, lens="pinhole", names=("00", "01", "02", "03"))
     ),
 }

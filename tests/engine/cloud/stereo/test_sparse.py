@@ -14,8 +14,8 @@ import pytest
 
 from engine.camera.rig import CameraRig
 from engine.children import running
-from engine.cloud.stereo import sparse
 from engine.cloud.stereo.sparse import triangulate
+from engine.features import child as child_process
 
 
 def wall_views(n_cameras: int = 4) -> tuple[np.ndarray, CameraRig]:
@@ -61,7 +61,7 @@ def test_a_child_that_stands_still_is_ended_and_tried_again(monkeypatch, scratch
     monkeypatch.setattr(running.subprocess, "Popen", _sleeping_child(started))
     found = triangulate(pictures, rig, report=lines.append, stall_s=0.5)
     assert len(found.points) == 0
-    assert len(started) == sparse.N_ATTEMPTS
+    assert len(started) == child_process.N_ATTEMPTS
     assert all(child.returncode == -9 for child in started)
     assert "did nothing for" in lines[0]
     assert not list(scratch.iterdir())
@@ -114,7 +114,7 @@ def test_folders_of_killed_processes_are_removed_and_those_of_living_ones_stay(s
     for folder in (dead, living):
         folder.mkdir()
         (folder / "job.npz").touch()
-    running.remove_leftovers(sparse.FOLDER_PREFIX)
+    running.remove_leftovers(child_process.FOLDER_PREFIX)
     assert [folder.name for folder in scratch.iterdir()] == [living.name]
 
 

@@ -8,6 +8,7 @@ from engine.camera.projection import project, projection_matrices
 from engine.camera.rig import CameraRig
 from engine.cloud.stereo.sweep import (
     BEST_ANGLES_DEG,
+    WIDEST_ANGLE_DEG,
     choose_sources,
     plane_inverse_depths,
     preferred_angle_deg,
@@ -38,6 +39,13 @@ def test_the_angle_aimed_for_is_a_third_of_the_median_spread(spread_deg):
 @pytest.mark.parametrize(("spread_deg", "expected"), [(1.0, BEST_ANGLES_DEG[0]), (85.0, BEST_ANGLES_DEG[1])])
 def test_the_angle_aimed_for_stays_within_what_narrow_and_wide_rigs_need(spread_deg, expected):
     assert preferred_angle_deg(cone_rig(spread_deg)) == expected
+
+
+def test_cameras_far_apart_aim_for_more_than_those_that_stand_close():
+    assert preferred_angle_deg(make_rig(20, (80, 60))) == BEST_ANGLES_DEG[1]
+    sparse = preferred_angle_deg(make_rig(12, (80, 60)))
+    assert 22.0 < sparse < 26.0  # three quarters of 32 degrees, the heights included
+    assert sparse < preferred_angle_deg(make_rig(8, (80, 60))) <= WIDEST_ANGLE_DEG
 
 
 # ---------------------------------------------------------------- sources and planes

@@ -25,6 +25,12 @@ class Noted:
             self.asked.append((camera_index, frame_index))
             yield self._picture(camera_index, frame_index)
 
+    def valid(self, camera_index):
+        return None
+
+    def moving_mask(self, camera_index, frame_index):
+        return None
+
 
 @pytest.fixture
 def look(tiny):

@@ -1,0 +1,75 @@
+"""What two cameras see alike: matches of SIFT features, checked for some epipolar geometry, but not for a known one.
+
+So a camera whose calibration is wrong has as many matches as the others, and they show that it is wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from engine.features.child import run_child
+
+MAX_FEATURES = 1536
+"""Of one picture: a pair of cameras needs no more to be judged."""
+
+
+@dataclass(frozen=True, slots=True)
+class PairMatches:
+    """What two pictures share.
+
+    Attributes:
+        first, second: Rows of the pictures.
+        pixels: In the first, x and y, centres at +0.5. [M, 2] float64
+        other_pixels: In the second. [M, 2] float64
+        features: Numbers of the features in both pictures; the same number is the same place. [M, 2] int64
+    """
+
+    first: int
+    second: int
+    pixels: np.ndarray
+    other_pixels: np.ndarray
+    features: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.pixels)
+
+
+@dataclass(frozen=True, slots=True)
+class Matches:
+    """Of several pairs of pictures. n_features: of each picture. [C]"""
+
+    pairs: tuple[PairMatches, ...]
+    n_features: np.ndarray
+
+
+def match_pairs(
+    images: np.ndarray,
+    pairs: Sequence[tuple[int, int]],
+    *,
+    alive: Callable[[], None] = lambda: None,
+    max_features: int = MAX_FEATURES,
+) -> Matches:
+    """Match SIFT features between pairs of pictures.
+
+    Args:
+        images: [C, H, W, 3] uint8
+        pairs: Rows of two pictures, each pair once.
+        alive: Called several times a second; what it raises ends the work.
+    Returns:
+        As many pairs as were asked for, in their order; those without matches are empty.
+    Raises:
+        ChildFailed: pycolmap's process gave no result; says why.
+        DiskError: There is no room for the pictures that it reads.
+    """
+    listed = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+    arrays = {"images": images, "pairs": listed, "max_features": np.array(max_features)}
+    answer = run_child("engine.features.match_child", arrays, what="the matching process", alive=alive)
+    ends = np.cumsum(answer["counts"])
+    found = []
+    for (first, second), start, end in zip(listed.tolist(), ends - answer["counts"], ends, strict=True):
+        pixels = answer["pixels"][start:end].astype(np.float64)
+        found.append(PairMatches(first, second, pixels[:, :2], pixels[:, 2:], answer["rows"][start:end]))
+    return Matches(tuple(found), answer["n_features"])

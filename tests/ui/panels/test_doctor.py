@@ -1,0 +1,110 @@
+"""The panel of the capture doctor: what it says and draws, and what its buttons do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from app.session import commands
+from app.session.doctor_status import DoctorStatus
+from app.session.questions import CorrectionQuestion
+from engine.capture.writers.capture_json import Corrections
+from engine.cloud.background.exposure_survey import ExposureSurvey
+from engine.doctor.doctor import Diagnosis
+from engine.doctor.finding import Finding, PairEvidence, PictureEvidence
+from tests.ui.fake_session import make_rig
+from tests.ui.pilot import Pilot
+from ui.panels.doctor.camera_map import camera_plan
+from ui.panels.doctor.evidence import picture_width
+from ui.panels.doctor.words import SEVERITY_ICONS, certainty_text, fix_words, summary_text
+from ui.panels.state import DOCTOR
+from ui.shell.questions import correction_texts
+
+
+def findings(names: tuple[str, ...]) -> tuple[Finding, ...]:
+    place, line = ((0.2, 0.3), (0.7, 0.6)), (((0.0, 0.2), (1.0, 0.4)),) * 2
+    pair = PairEvidence(names[1], names[2], 3, "2 features miss by 4.0 px", place, place, line, (4.0, 4.0))
+    excluded = Corrections(is_excluded={names[1]: True})
+    holdout = Corrections(holdout=(names[4], names[6]))
+    text = f"{names[1]} is turned by 100 %d degrees"  # a name may hold anything
+    return (
+        Finding("pose", "error", (names[1],), (), text, 0.97, "Calibrate again.", excluded, (pair,)),
+        Finding(
+            "frozen", "warning", (names[3],), (5,), "It stands still.", 0.7, "", None, (PictureEvidence(names[3], 5),)
+        ),
+        Finding("hold out", "note", (names[4], names[6]), (), "Good to hold out.", 0.8, "", holdout),
+    )
+
+
+def open_panel(pilot: Pilot, status: DoctorStatus) -> None:
+    pilot.session.doctor_status = status
+    pilot.studio.frame.ui.wanted_panel = DOCTOR
+    pilot.draw(8)
+
+
+def diagnosis(names: tuple[str, ...]) -> Diagnosis:
+    px = np.linspace(0.1, 4.0, len(names))
+    px[-1] = np.nan
+    survey = ExposureSurvey((0,), {}, len(names), {})
+    return Diagnosis(findings(names), px, (), np.zeros(len(names), np.int64), survey, 240, 12.0)
+
+
+@pytest.mark.gl
+def test_a_capture_is_examined_from_the_panel_and_stopped(pilot: Pilot) -> None:
+    open_panel(pilot, DoctorStatus())
+    pilot.click("doctor.examine")
+    assert pilot.session.commands[-1] == commands.ExamineCapture()
+    open_panel(pilot, DoctorStatus("running", (), None, 0.4, "looking at pictures of 100 %s", 30.0, 2))
+    pilot.click("doctor.stop")
+    assert pilot.session.commands[-1] == commands.StopExamining()
+    assert not [notice for notice in pilot.session.notices if notice.kind == "error"]
+
+
+@pytest.mark.gl
+def test_findings_offer_what_corrects_them(pilot: Pilot) -> None:
+    found = diagnosis(pilot.session.rig.names)
+    open_panel(pilot, DoctorStatus("done", found.findings, found, 1.0, revision=3))
+    rects = pilot.studio.frame.ui.rects
+    assert {"doctor.finding0", "doctor.picture0", "doctor.picture1", "doctor.map", "doctor.bars"} <= rects.keys()
+    pilot.click("doctor.fix")
+    asked = pilot.session.commands[-1]
+    assert isinstance(asked, commands.CorrectCapture)
+    assert not asked.is_confirmed
+    assert asked.corrections == found.findings[0].fix
+    pilot.click("doctor.picture1")
+    assert pilot.session.commands[-2:] == [commands.SetFrame(3), commands.LookThrough(2)]
+    pilot.click("doctor.finding1")
+    pilot.draw(3)
+    assert "doctor.fix" not in pilot.studio.frame.ui.rects
+    assert not [notice for notice in pilot.session.notices if notice.kind == "error"]
+
+
+def test_words_of_findings_do_not_depend_on_colours() -> None:
+    names = make_rig(8).names
+    found = findings(names)
+    assert len({SEVERITY_ICONS[finding.severity] for finding in found}) == 3
+    assert summary_text(found) == "1 error, 1 warning, 1 note"
+    assert summary_text(()) == "Nothing found"
+    assert certainty_text(found[0]) == "certain, 97 %"
+    assert fix_words(Corrections(is_excluded={"a": True})) == ("Exclude", "Exclude a")
+    assert fix_words(Corrections(offset_frames={"a": -2.0}))[1] == "Shift a by -2 frames"
+    assert fix_words(Corrections(holdout=("a", "b"))) == ("Hold out", "Hold out a and b")
+    assert fix_words(Corrections(masks={"a": "m/*.png"}))[0] == "Use masks"
+
+
+def test_the_question_says_what_becomes_of_the_open_project() -> None:
+    asked = CorrectionQuestion("/captures/dance", "Exclude a", Corrections(), "/projects/dance", True)
+    said = " ".join(correction_texts(asked))
+    assert "capture.json" in said
+    assert "will not fit it any more" in said
+    assert "/projects/dance" in said
+
+
+def test_the_map_keeps_a_ring_round_and_pictures_side_by_side() -> None:
+    plan = camera_plan(make_rig(12))
+    radii = np.linalg.norm(plan.places - 0.5, axis=1)
+    assert np.ptp(radii) < 0.02
+    towards = ((0.5 - plan.places) * plan.directions).sum(1)
+    assert (towards > 0).all()
+    assert picture_width(600.0, 400.0, 4 / 3, 2) * 2 < 600.0
+    assert picture_width(300.0, 2000.0, 4 / 3, 1) == 300.0

@@ -1,0 +1,16 @@
+"""Actions of the capture doctor."""
+
+from __future__ import annotations
+
+from app.session.commands import ExamineCapture
+from ui.panels.actions.action import WINDOW, Action, ActionNeeds
+from ui.panels.state import DOCTOR, Dispatch, UiState
+
+
+def _examine(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.is_picture_only = False
+    ui.wanted_panel = DOCTOR
+    dispatch(ExamineCapture())
+
+
+ACTIONS = (Action("doctor.examine", "Examine the capture: what is wrong with it", WINDOW, _examine, menu="File"),)

@@ -1,0 +1,184 @@
+"""The capture doctor: what is wrong with the open capture, how certain that is, what it looks like, and what helps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from imgui_bundle import ImVec2, imgui
+
+from app.project.project import Project
+from app.session.commands import ExamineCapture, LookThrough, StopExamining
+from app.session.doctor_status import DoctorStatus
+from app.status import ProjectStatus
+from engine.camera.rig import CameraRig
+from engine.doctor.finding import Finding
+from engine.text import duration_text
+from ui.gl import ImageTexture
+from ui.panels.doctor.camera_map import CameraPlan, camera_plan, draw_bars, draw_map, legend_text
+from ui.panels.doctor.evidence import Evidence
+from ui.panels.doctor.findings import draw_findings
+from ui.panels.doctor.words import summary_text
+from ui.panels.state import Dispatch, UiState
+from ui.panels.thumbnails import ThumbnailNeeds
+from ui.panels.widgets import primary_button, text_wrapped_dim
+from ui.style.theme import Icon
+
+WIDE = 720.0
+"""In a panel at least so wide the list, the pictures and the map stand side by side."""
+REFRESH_S = 0.25
+PROGRESS = 180.0
+"""Width of the bar."""
+SHARES = (0.34, 0.38)
+"""Of the width that the list and the pictures have."""
+LOW, WORDS = 250.0, 28.0
+"""In a room lower than this the bars stand beside the map; and the height of a line of words."""
+STACKED_HEIGHTS = (0.5, 0.3)
+
+
+class DoctorNeeds(ThumbnailNeeds, Protocol):
+    """What this panel reads."""
+
+    @property
+    def capture(self) -> object | None: ...
+
+    @property
+    def project(self) -> Project | None: ...
+
+    @property
+    def project_status(self) -> ProjectStatus | None: ...
+
+    @property
+    def rig(self) -> CameraRig: ...
+
+    @property
+    def doctor_status(self) -> DoctorStatus: ...
+
+
+class DoctorPanel:
+    """Owns which finding is chosen, and the pictures of it.
+
+    Args:
+        make_texture: Makes an empty texture.
+    """
+
+    def __init__(self, make_texture: Callable[[], ImageTexture]) -> None:
+        self._evidence = Evidence(make_texture)
+        self._chosen = 0
+        self._revision = -1
+        self._rig: CameraRig | None = None
+        self._plan: CameraPlan | None = None
+
+    def release(self) -> None:
+        """Free the pictures. GL thread only."""
+        self._evidence.release()
+
+    def draw(self, session: DoctorNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        """Buttons and progress, then findings, pictures and map."""
+        if session.capture is None:
+            text_wrapped_dim("What is wrong with a capture, and what helps, is listed here.")
+            return
+        status, rig = session.doctor_status, session.rig
+        if status.revision != self._revision:
+            self._revision, self._chosen = status.revision, 0
+            self.release()
+        if rig is not self._rig:
+            self._rig, self._plan = rig, camera_plan(rig)
+        self._draw_head(status, dispatch, ui)
+        self._chosen = min(self._chosen, max(len(status.findings) - 1, 0))
+        chosen = status.findings[self._chosen] if status.findings else None
+        room = imgui.get_content_region_avail()
+        is_wide = room.x >= WIDE
+        flags = imgui.ChildFlags_.nav_flattened
+        parts = [
+            ("findings", lambda: self._draw_list(session, status, rig, dispatch, ui)),
+            ("evidence", lambda: self._draw_evidence(session, chosen, rig, dispatch, ui)),
+            ("cameras", lambda: self._draw_cameras(status, chosen, rig, dispatch, ui)),
+        ]
+        for index, (name, draw_part) in enumerate(parts):
+            if is_wide and index:
+                imgui.same_line()
+            share = (SHARES if is_wide else STACKED_HEIGHTS)[index] if index < 2 else 0.0
+            size = ImVec2(room.x * share, 0) if is_wide else ImVec2(0, room.y * share)
+            if imgui.begin_child(f"##{name}", size, flags):
+                draw_part()
+            imgui.end_child()
+
+    def _draw_head(self, status: DoctorStatus, dispatch: Dispatch, ui: UiState) -> None:
+        if status.state == "running":
+            ui.redraw_within(REFRESH_S)
+            if imgui.button(f"{Icon.STOP}  Stop"):
+                dispatch(StopExamining())
+            ui.mark("doctor.stop")
+            imgui.same_line()
+            left = "" if status.eta_s is None else f", {duration_text(status.eta_s)} left"
+            words = f"{100 * status.done:.0f} %, {status.message}{left}"
+            imgui.progress_bar(status.done, ImVec2(PROGRESS, 0), "")
+            imgui.same_line()
+            imgui.align_text_to_frame_padding()
+            imgui.text(words)
+            return
+        label = f"{Icon.EYE}  Examine" if status.diagnosis is None else f"{Icon.EYE}  Examine again"
+        if primary_button(label, ImVec2(160, 0), ui):
+            dispatch(ExamineCapture())
+        ui.mark("doctor.examine")
+        imgui.same_line()
+        imgui.align_text_to_frame_padding()
+        found = summary_text(status.findings)
+        if status.diagnosis is None:
+            words = f"{found} in the numbers. Examining looks at the pictures too: usually less than a minute."
+        else:
+            words = f"{found}. {status.diagnosis.n_pictures} pictures looked at in {status.diagnosis.seconds:.0f} s."
+        imgui.push_text_wrap_pos(0.0)
+        imgui.text_disabled(words.replace("%", "%%"))
+        imgui.pop_text_wrap_pos()
+
+    def _draw_list(
+        self, session: DoctorNeeds, status: DoctorStatus, rig: CameraRig, dispatch: Dispatch, ui: UiState
+    ) -> None:
+        if not status.findings:
+            done = "Nothing is wrong with this capture, as far as can be seen."
+            text_wrapped_dim("Nothing odd so far." if status.diagnosis is None else done)
+            return
+        project = session.project
+        can_hold_out = project is not None and not project.has_progress
+        self._chosen = draw_findings(status.findings, self._chosen, rig, dispatch, ui, can_hold_out=can_hold_out)
+
+    def _draw_evidence(
+        self, session: DoctorNeeds, chosen: Finding | None, rig: CameraRig, dispatch: Dispatch, ui: UiState
+    ) -> None:
+        if chosen is not None and chosen.evidence:
+            self._evidence.draw(session, chosen, rig, dispatch, ui)
+
+    def _draw_cameras(
+        self, status: DoctorStatus, chosen: Finding | None, rig: CameraRig, dispatch: Dispatch, ui: UiState
+    ) -> None:
+        names = frozenset(() if chosen is None else chosen.cameras)
+        worst: dict[str, str] = {}
+        for finding in status.findings:
+            if finding.severity != "note":
+                for name in finding.cameras:
+                    worst.setdefault(name, finding.severity)
+        has_bars = status.diagnosis is not None
+        room = imgui.get_content_region_avail()
+        is_low = has_bars and room.y < LOW
+        width = (room.x - 8.0) / 2 if is_low else room.x
+        height = room.y - WORDS
+        if has_bars and not is_low:
+            height = (room.y - 2 * WORDS) * 0.6
+        assert self._plan is not None
+        imgui.begin_group()
+        clicked = draw_map(rig, self._plan, worst, names, ImVec2(width, max(height, 60.0)), ui)
+        imgui.text_disabled(legend_text(is_short=is_low))
+        imgui.end_group()
+        if clicked is not None:
+            dispatch(LookThrough(rig.names.index(clicked)))
+        if status.diagnosis is None:
+            return
+        if is_low:
+            imgui.same_line()
+        imgui.begin_group()
+        bars = imgui.get_content_region_avail().y - WORDS
+        draw_bars(rig, status.diagnosis.camera_px, names, max(bars, 40.0), ui)
+        imgui.text_disabled("Miss of features, px")
+        imgui.end_group()
