@@ -59,7 +59,7 @@ def test_wrong_sightings_do_not_pull() -> None:
 
 
 def test_the_numbers_of_a_shared_lens_are_the_same_for_all() -> None:
-    cameras, _ = adjusted(make_seen("forward", "simple"), "simple", is_shared=True)
+    cameras, _ = adjusted(make_seen("forward", "simple"), "simple", groups=(0,) * 12)
     assert np.ptp(cameras.lens_params) == pytest.approx(0.0, abs=1e-12)
 
 
