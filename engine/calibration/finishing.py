@@ -46,8 +46,8 @@ def finished(
     named = ", ".join(name for name, doubt in zip(names, doubts, strict=True) if doubt)
     if named:
         warnings.append(
-            f"The places of these cameras cannot be trusted: {named}. Look at them before you train, and leave out those "
-            "that are wrong, or film again with more that they and their neighbours both see."
+            f"The places of these cameras cannot be trusted: {named}. Look at them before you train, and leave out "
+            "those that are wrong, or film again with more that they and their neighbours both see."
         )
     native = np.array([videos[row].size for row in rows], dtype=np.int64)
     arrays = {
