@@ -85,7 +85,7 @@ def _doubts(solution: Solution, n_sightings: np.ndarray, agreed: Agreement, size
         elif agreed.is_doubtful[row]:
             doubts.append(f"{against} matches with one camera speak against its place, {n_for} with another for it")
         elif is_odd[row]:
-            doubts.append("its focal length is far from those of the others; right only if it zooms")
+            doubts.append("its focal length is far from those of the others; right only if its lens or zoom is another")
         else:
             doubts.append(f"only {n} points" if n < WEAK_SIGHTINGS else "")
     return doubts

@@ -63,6 +63,13 @@ def test_the_numbers_of_a_shared_lens_are_the_same_for_all() -> None:
     assert np.ptp(cameras.lens_params) == pytest.approx(0.0, abs=1e-12)
 
 
+def test_cameras_of_one_group_share_a_lens_and_groups_do_not() -> None:
+    cameras, _ = adjusted(make_seen("forward", "simple"), "simple", groups=(0, 1) * 6)
+    assert np.ptp(cameras.lens_params[::2]) == pytest.approx(0.0, abs=1e-12)
+    assert np.ptp(cameras.lens_params[1::2]) == pytest.approx(0.0, abs=1e-12)
+    assert abs(cameras.lens_params[0] - cameras.lens_params[1]) > 1e-9
+
+
 @pytest.mark.parametrize("lens", ["pinhole", "simple", "opencv", "fisheye"])
 def test_derivatives_are_those_of_finite_differences(lens: str) -> None:
     seen = make_seen("forward", lens, n_points=60)
