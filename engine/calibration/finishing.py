@@ -17,6 +17,8 @@ from engine.calibration.world import find_up, known_scale, unit_scale, upright
 FEW_KEY_POINTS = 150
 FEW_MATCHES = 30
 WEAK_SIGHTINGS = 60
+MANY_DOUBTFUL = 2
+"""Cameras that matches speak against; with so many, whole groups of cameras have been found in wrong places."""
 ODD_FOCAL = 0.2
 """Of ln(focal length) from the median: cameras of one rig rarely differ by more, misplaced ones do."""
 LENS_MODEL = {"simple": "opencv", "opencv": "opencv", "fisheye": "fisheye"}
@@ -43,12 +45,14 @@ def finished(
     n_sightings = np.bincount(tracks.seen.cameras, minlength=len(rows))
     agreed = agreement(rows, solution.cameras, key_points, verified, float(sizes.max()))
     doubts = _doubts(solution, n_sightings, agreed, sizes)
-    named = ", ".join(name for name, doubt in zip(names, doubts, strict=True) if doubt)
+    named = [name for name, doubt in zip(names, doubts, strict=True) if doubt]
     if named:
         warnings.append(
-            f"The places of these cameras cannot be trusted: {named}. Look at them before you train, and leave out "
-            "those that are wrong, or film again with more that they and their neighbours both see."
+            f"The places of these cameras cannot be trusted: {', '.join(named)}. Look at them before you train, and "
+            "leave out those that are wrong, or film again with more that they and their neighbours both see."
         )
+    if agreed.is_doubtful.sum() >= MANY_DOUBTFUL:
+        warnings.append("Matches contradict several cameras. All others may be misplaced with them.")
     native = np.array([videos[row].size for row in rows], dtype=np.int64)
     arrays = {
         "world_to_camera": _poses(cameras),
@@ -81,7 +85,8 @@ def _doubts(solution: Solution, n_sightings: np.ndarray, agreed: Agreement, size
     for row, n in enumerate(n_sightings.tolist()):
         against, n_for = int(agreed.n_contradicting[row]), int(agreed.n_agreeing[row])
         if agreed.n_neighbours[row] < MIN_AGREEING:
-            doubts.append(f"{agreed.n_neighbours[row]} cameras agree with its place; {MIN_AGREEING} are needed")
+            how_many = ("no camera agrees", "one camera agrees")[int(agreed.n_neighbours[row])]
+            doubts.append(f"{how_many} with its place; {MIN_AGREEING} are needed")
         elif agreed.is_doubtful[row]:
             doubts.append(f"{against} matches with one camera speak against its place, {n_for} with another for it")
         elif is_odd[row]:
