@@ -87,6 +87,10 @@ class CaptureError(EngineError):
         """As of every error; listed problems carry their own hints and stand with what happened."""
         return (str(self), "") if self.problems else super().told_apart()
 
+    def said_of(self, what: str) -> "CaptureError":
+        """The same kind of problem with what it is of named in front, as `Camera "a"`."""
+        return type(self)(f"{what}: {self.message}", hint=self.hint, path=self.path)
+
     @property
     def needs_links(self) -> bool:
         """Whether nothing is wrong but that files lie outside of the folder, so that follow_links helps."""

@@ -33,7 +33,7 @@ class Modal:
 
     def __init__(self) -> None:
         self._asked: object = None
-        self._n_tries, self._is_lost = 0, False
+        self._n_tries = 0
 
     def begin(self, asked: object, title: str, size: tuple[float, float]) -> ModalKeys | None:
         """Begin the dialog of what is asked; None where it is not up.
@@ -48,8 +48,7 @@ class Modal:
             return None
         if is_new:
             self._n_tries = 0
-            self._is_lost = True
-        if self._is_lost:
+        if is_new or (self._n_tries < MAX_TRIES and not imgui.is_popup_open(title)):
             self._n_tries += 1
             imgui.open_popup(title)
         viewport = imgui.get_main_viewport()
@@ -58,9 +57,8 @@ class Modal:
         imgui.set_next_window_size(ImVec2(width, height))
         flags = imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_resize
         is_open, is_kept = imgui.begin_popup_modal(title, True, flags)
-        self._is_lost = not is_open and is_kept and self._n_tries < MAX_TRIES
         if not is_open:
-            return None if self._is_lost else ModalKeys(is_closed=True, is_up=False)
+            return None if is_new else ModalKeys(is_closed=True, is_up=False)
         # the key that led here is still pressed in the first frame; while typing, Enter only ends the text
         is_free = not is_new and not imgui.get_io().want_text_input
         is_enter = imgui.is_key_pressed(imgui.Key.enter, False) or imgui.is_key_pressed(imgui.Key.keypad_enter, False)
