@@ -15,7 +15,8 @@ import numpy as np
 from msgspec import Meta
 
 from engine.camera.lens import PARAMETER_NAMES, Lens, LensModel
-from engine.capture.assembling import DescribedCamera, assemble
+from engine.capture.assembling import assemble
+from engine.capture.described_camera import DescribedCamera
 from engine.capture.format_checks import check_fps, is_name, parse_matrix, read_json_object
 from engine.capture.format_result import MATCH, Layout, Probe
 from engine.capture.frame_files import image_files

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.capture.assembling import DescribedCamera, assemble
+from engine.capture.assembling import assemble
+from engine.capture.described_camera import DescribedCamera
 from engine.capture.format_checks import check_equal_counts, parse_size, size_problem
 from engine.capture.format_result import MATCH, Layout, Probe
 from engine.capture.frame_files import (
