@@ -16,6 +16,7 @@ from app.project.opening_answers import LastAnswers, OpeningAnswers, default_ans
 from app.session.questions import OpeningPage
 from app.status import OpeningForecast
 from engine.capture.capture import Capture
+from engine.doctor.finding import Finding, in_order
 from engine.errors import EngineError
 from engine.training.plan.plan import StepSizes
 from engine.user_folders import data_dir
@@ -41,6 +42,7 @@ class CaptureOpening:
         page: What is asked; None while nothing is.
         refused: The folder that does not open, and why; None while there is none.
         pictures: Small ones of first frames, by camera.
+        findings: What the capture doctor sees in the numbers alone, the worst first; None until that is known.
         revision: Goes up when any of these is another.
 
     Args:
@@ -51,6 +53,7 @@ class CaptureOpening:
         self.page: OpeningPage | None = None
         self.refused: RefusedFolder | None = None
         self.pictures: dict[int, Picture] = {}
+        self.findings: tuple[Finding, ...] | None = None
         self.revision = 0
         self._can_measure, self._page_number = can_measure, 0
         self._capture: Capture | None = None
@@ -72,6 +75,11 @@ class CaptureOpening:
         self._page_number = page
 
         def read(context: JobContext) -> None:
+            from engine.doctor.quick import check_numbers  # loading it takes a moment
+
+            findings = tuple(in_order(check_numbers(capture)))
+            if self._page_number == page:
+                self.findings = findings
             small = capture.resized(min(1.0, PICTURE_WIDTH_PX / int(capture.native_rig.image_sizes[:, 0].max())))
             try:
                 for camera in range(len(small.rig)):
@@ -106,6 +114,7 @@ class CaptureOpening:
         if self._capture is not None:
             self._capture.close()
         self.page = self.refused = self._capture = self._last = None
+        self.findings = None
         self.pictures = {}
         self._page_number = 0
         self.revision += 1
@@ -148,7 +157,7 @@ class CaptureOpening:
     def finished(self) -> tuple[object, ...]:
         """Differs whenever there is something else to show."""
         done = tuple(None if (found := self._worker.newest_in(lane)) is None else found[0] for lane in (QUICK, TIMED))
-        return self.revision, len(self.pictures), done
+        return self.revision, len(self.pictures), self.findings is None, done
 
     def close(self) -> None:
         """End the threads."""

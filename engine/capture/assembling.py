@@ -135,7 +135,7 @@ def assemble(
         try:
             seen = look.result()
         except CaptureError as error:
-            found.append(CaptureError(f'Camera "{camera.name}": {error.message}', hint=error.hint, path=error.path))
+            found.append(error.said_of(f'Camera "{camera.name}"'))
             found += _check_numbers(camera, camera.calibrated_size or (0, 0)) if camera.calibrated_size else []
             continue
         files[camera.name] = seen

@@ -149,7 +149,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
         try:
             cameras.append(_described(entry, document, folder, follow_links=follow_links))
         except CaptureError as error:
-            problems.append(CaptureError(f'Camera "{entry.name}": {error.message}', hint=error.hint, path=error.path))
+            problems.append(error.said_of(f'Camera "{entry.name}"'))
     if document.fps is not None:
         problems += check_fps(document.fps, path)
     points = None

@@ -83,7 +83,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
             files = _files(folder, relative, kind, follow_links=follow_links)
             cameras.append(_described(name, row, files, path))
         except CaptureError as error:
-            problems.append(CaptureError(f"Camera {shown(name)}: {error.message}", hint=error.hint, path=error.path))
+            problems.append(error.said_of(f"Camera {shown(name)}"))
             continue
         if isinstance(files, list):
             counts[name] = len(files)
