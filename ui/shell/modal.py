@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from imgui_bundle import ImVec2, imgui
 
-
 MAX_TRIES = 8
 """A dialog that comes up with the window is lost while panels find their places; it is opened so many times."""
 
