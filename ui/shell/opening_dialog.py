@@ -34,6 +34,8 @@ BUTTON = ImVec2(150, 34)
 LEAST_PICTURE_WIDTH, PICTURE_SHAPE = 120.0, 0.62
 """Of the small pictures: units, and height by width."""
 WORD_WIDTH = 92.0
+INDENT = 23.0
+"""Of what belongs to words behind a sign."""
 MORE = 'Once it is open, "Examine the capture" looks at the pictures, too.'
 
 
@@ -215,5 +217,7 @@ def _draw_findings(findings: Sequence[Finding] | None, ui: UiState) -> None:
         imgui.same_line()
         text_wrapped(finding.text)
         ui.mark(f"opening.finding{index}")
+        imgui.indent(INDENT)
         text_wrapped_dim(finding.advice)
+        imgui.unindent(INDENT)
     text_wrapped_dim(MORE if findings else f"Nothing odd in the numbers. {MORE}")

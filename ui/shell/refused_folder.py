@@ -13,6 +13,8 @@ from ui.style.theme import Icon
 
 BUTTON = ImVec2(150, 34)
 MAX_NAMED = 4
+INDENT = 34.0
+"""Of what belongs to words behind a dot."""
 ALLOW = "Open it, the files are mine"
 
 
@@ -44,7 +46,9 @@ def draw_refused(
             imgui.bullet()
             text_wrapped(message)
             if hint:
+                imgui.indent(INDENT)
                 text_wrapped_dim(hint)
+                imgui.unindent(INDENT)
     imgui.end_child()
     imgui.separator()
     is_copied = imgui.button(f"{Icon.COPY}  Copy", ImVec2(0, BUTTON.y))
