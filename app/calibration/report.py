@@ -9,8 +9,6 @@ from engine.text import printable
 
 GOOD_ERROR_PX = 1.0
 """Median reprojection error, at a width of 1,000 pixels, up to which nothing is to be done."""
-POOR_SIGHTINGS = 60
-"""Of fewer points a camera's place follows only roughly."""
 WHAT_HELPS = (
     "What helps: a camera between it and its neighbour, or one of the two moved so that they see more of the same; "
     "posters, boxes or other objects with fine, irregular patterns where both cameras look; somebody who walks through "
@@ -42,11 +40,14 @@ def _camera_line(found: CalibratedRig, row: int) -> str:
     error, n = found.camera_errors_px[row], found.n_sightings[row]
     doubts = [
         *(["fits badly"] if error > GOOD_ERROR_PX * width / 1000 + 0.5 else []),
-        *(["sees few points"] if n < POOR_SIGHTINGS else []),
+        *([f"doubtful: {found.doubts[row]}"] if found.doubts[row] else []),
     ]
     lens = found.lenses[row]
     bend = f"{lens.model} {' '.join(f'{value:+.3f}' for value in lens.params)}"
-    text = f"{width}x{height}, focal length {K[0, 0]:.1f} px ({view:.0f} degrees), {bend}, {n} points, {error:.2f} px"
+    text = (
+        f"{width}x{height}, focal length {K[0, 0]:.1f} px ({view:.0f} degrees), {bend}, {n} points, {error:.2f} px, "
+        f"{found.explained_shares[row]:.0%} of its matches explained"
+    )
     return f"  {printable(found.rig.names[row])}: {text}" + (f" - {' and '.join(doubts)}" if doubts else "")
 
 

@@ -26,17 +26,18 @@ class Expectations:
 
     Attributes:
         principal: Of the principal point from the middle, as a share of the picture's width. 0 keeps it there.
-        focal: Of ln(focal length) from that at the start.
+        focal: Of ln(focal length) from that at the start, or from `focals` of `adjust`.
         aspect: Of ln(height divided by width of a pixel) from 0.
         lens: Of each number of the lens from 0.
-        is_shared: Whether all cameras have one focal length, principal point and lens.
+        groups: A number per camera; those with the same number have one focal length, principal point and lens. None
+            gives every camera its own.
     """
 
     principal: float = 0.01
     focal: float = 0.5
     aspect: float = 0.003
     lens: float = 0.2
-    is_shared: bool = False
+    groups: tuple[int, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +76,7 @@ def adjust(
     middles: np.ndarray,
     widths: np.ndarray,
     expect: Expectations,
+    focals: np.ndarray | None = None,
     n_iterations: int = 30,
 ) -> tuple[Cameras, np.ndarray]:
     """Cameras and points with the least robust error.
@@ -85,12 +87,13 @@ def adjust(
         seen: Every point is seen at least twice.
         middles, widths: Of the pictures, px. [C, 2], [C]
         expect: What is expected of lenses.
+        focals: Focal lengths that are expected, px; None expects those of the start. [C]
     Returns:
         Cameras and points [M, 3].
     """
     n_cameras, n_params = len(cameras), 10 + cameras.lens_params.shape[1]
-    share = _sharing(n_cameras, n_params, expect.is_shared)
-    start_focals = np.log(cameras.focals)
+    share = _sharing(n_cameras, n_params, expect.groups)
+    start_focals = np.log(cameras.focals if focals is None else focals)
     stiffness = _stiffness(n_params, widths, expect)
     damping = 1e-4
     residuals, scale = _residuals(cameras, points, seen), 0.0
@@ -154,15 +157,17 @@ def _expected(cameras: Cameras, start_focals: np.ndarray, middles: np.ndarray, n
     return off
 
 
-def _sharing(n_cameras: int, n_params: int, is_shared: bool) -> sparse.csr_matrix:
+def _sharing(n_cameras: int, n_params: int, groups: tuple[int, ...] | None) -> sparse.csr_matrix:
     """Maps the numbers that are sought to all numbers of all cameras. [C P, Q]"""
-    if not is_shared:
+    if groups is None:
         return sparse.csr_matrix(sparse.identity(n_cameras * n_params))
     n_lens = n_params - 6
     rows = np.arange(n_cameras * n_params)
     camera, param = np.divmod(rows, n_params)
-    columns = np.where(param < 6, camera * 6 + param, n_cameras * 6 + param - 6)
-    return sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(rows), n_cameras * 6 + n_lens))
+    group = np.asarray(groups)[camera]
+    columns = np.where(param < 6, camera * 6 + param, n_cameras * 6 + group * n_lens + param - 6)
+    n_columns = n_cameras * 6 + (max(groups) + 1) * n_lens
+    return sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(rows), n_columns))
 
 
 def _jacobians(cameras: Cameras, points: np.ndarray, seen: Observations) -> tuple[np.ndarray, np.ndarray]:

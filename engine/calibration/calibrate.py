@@ -116,6 +116,8 @@ def _read_result(path: Path, folder: Path) -> Calibration:
             point_errors_px=arrays["point_errors_px"],
             camera_errors_px=arrays["camera_errors_px"],
             n_sightings=arrays["n_sightings"],
+            explained_shares=arrays["explained_shares"],
+            doubts=tuple(document["doubts"]),
             is_metric=document["is_metric"],
             up=document["up"],
         )

@@ -22,6 +22,9 @@ class CalibratedRig:
         point_errors_px: Mean distance of each point's sightings from where it lands. [P]
         camera_errors_px: Median distance, per camera. [C]
         n_sightings: Points that each camera sees. [C]
+        explained_shares: Of the matches each camera has with others, found before there were cameras, those that the
+            cameras explain; low where patterns repeat or a camera is misplaced. [C]
+        doubts: Why each camera may be misplaced; empty for one that nothing speaks against.
         is_metric: Whether units are metres, by a known distance.
         up: What the up axis was found from: "floor" or "cameras".
     """
@@ -32,6 +35,8 @@ class CalibratedRig:
     point_errors_px: np.ndarray
     camera_errors_px: np.ndarray
     n_sightings: np.ndarray
+    explained_shares: np.ndarray
+    doubts: tuple[str, ...]
     is_metric: bool
     up: str
 

@@ -9,16 +9,16 @@ import json
 import shutil
 import zlib  # noqa: F401  must be loaded before pycolmap, whose own zlib symbols otherwise replace it
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 
+from engine.calibration.agreement import Agreement, agreement
 from engine.calibration.features import extract
 from engine.calibration.finishing import finished
-from engine.calibration.mapping import FirstEstimate, map_cameras, verified_matches
+from engine.calibration.mapping import FirstEstimate, focals_to_try, map_cameras, verified_matches
 from engine.calibration.matching import KeyPoints, match_all
 from engine.calibration.options import CalibrationOptions
 from engine.calibration.pictures import matching_size, read_pictures
@@ -30,8 +30,10 @@ from engine.parallel import map_ordered
 
 STAGES = {"Key points": 0.45, "Matching": 0.15, "Mapping": 0.2, "Adjusting": 0.2}
 """Stages and their shares of the time."""
-N_STARTS = 3
-"""Times that mapping begins anew, from other random numbers: repeating patterns lead single ones astray."""
+N_SEEDS = 3
+"""Random numbers with which every focal length is tried: repeating patterns lead single trials astray."""
+N_TRIED_ON = 3
+"""Of these first estimates, those that explain most matches are adjusted before one is chosen."""
 
 
 class Teller:
@@ -91,7 +93,7 @@ def calibrate_here(
     shutil.rmtree(scratch, ignore_errors=True)
     scratch.mkdir()
     verified = verified_matches(scratch, key_points, matches, sizes, options.lens)
-    solution = _best_solution(scratch, key_points, matches, sizes, options, teller)
+    solution = _best_solution(scratch, key_points, matches, verified, sizes, options, teller)
     if solution is None:
         n_pairs = sum(len(rows) >= 30 for rows in verified.values())
         raise PreparationError(
@@ -103,28 +105,47 @@ def calibrate_here(
     return finished(solution, videos, key_points, verified, sizes, options)
 
 
-def _best_solution(scratch, key_points, matches, sizes, options: CalibrationOptions, teller: Teller) -> Solution | None:
-    """Of several starts the one that places most cameras; of those the one with most sightings that fit."""
-    best: Solution | None = None
+def _best_solution(
+    scratch, key_points, matches, verified, sizes, options: CalibrationOptions, teller: Teller
+) -> Solution | None:
+    """Of many starts, alike and unlike, the one that explains most of the verified matches."""
+
+    def judged(one: FirstEstimate | Solution) -> Agreement:
+        return agreement(one.rows, one.cameras, key_points, verified, float(sizes.max()))
+
+    def worth(one: FirstEstimate | Solution) -> int:
+        return int(judged(one).n_explained.sum())
+
+    def is_clean(one: FirstEstimate | Solution) -> bool:
+        return len(one.rows) == len(sizes) and not judged(one).is_doubtful.any()
+
+    focals = focals_to_try(options.lens)
+    starts = [(focal, True, seed) for seed in range(N_SEEDS) for focal in focals]
+    starts.insert(len(focals), (focals[0], False, 0))  # cameras may be unlike, too
+    estimates: list[FirstEstimate] = []
+    for number, (focal, are_alike, seed) in enumerate(starts):
+        if seed and any(is_clean(estimate) for estimate in estimates):
+            break
+        teller.tell("Mapping", number / len(starts))
+        estimates += map_cameras(scratch, sizes, options.lens, focal=focal, are_alike=are_alike, seed=seed)[:1]
+    estimates.sort(key=worth, reverse=True)
     chosen = {"lens": options.lens, "is_shared": options.is_lens_shared}
-    for start in range(N_STARTS):
-        teller.tell("Mapping", start / N_STARTS)
-        found = map_cameras(scratch, len(sizes), options.lens, seed=start)
-        if not found:
-            continue
-        solution = solve(found[0], key_points, matches, sizes, stages=ROUGH, **chosen)
-        if len(solution.tracks.points) and (best is None or _worth(solution) > _worth(best)):
+    best: Solution | None = None
+    for number, estimate in enumerate(estimates[:N_TRIED_ON]):
+        teller.tell("Adjusting", 0.5 * number / N_TRIED_ON)
+        solution = solve(estimate, key_points, matches, sizes, stages=ROUGH, **chosen)
+        if len(solution.tracks.points) and (best is None or worth(solution) > worth(best)):
             best = solution
+        if best is not None and is_clean(best):
+            break
     if best is None:
         return None
-    teller.tell("Adjusting", 0.0)
-    rough = FirstEstimate(best.rows, best.cameras)
-    tell = partial(teller.tell, "Adjusting")
+    rough = FirstEstimate(best.rows, best.cameras, best.are_alike)
+
+    def tell(done: float) -> None:
+        teller.tell("Adjusting", 0.5 + 0.5 * done)
+
     return solve(rough, key_points, matches, sizes, stages=FINE, progress=tell, **chosen)
-
-
-def _worth(solution: Solution) -> tuple[int, int]:
-    return len(solution.rows), len(solution.tracks.seen)
 
 
 if __name__ == "__main__":

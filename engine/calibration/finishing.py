@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from engine.calibration.agreement import MIN_AGREEING, Agreement, agreement
 from engine.calibration.cameras import Cameras
 from engine.calibration.matching import KeyPoints, Pair
 from engine.calibration.options import CalibrationOptions
@@ -40,14 +41,14 @@ def finished(
         warnings.append("No floor was found below the cameras; up is where most of them have their upper edge.")
     cameras, points = upright(solution.cameras, tracks.points, up, origin, scale)
     n_sightings = np.bincount(tracks.seen.cameras, minlength=len(rows))
-    weak = [name for name, n in zip(names, n_sightings, strict=True) if n < WEAK_SIGHTINGS]
-    if weak:
-        warnings.append(f"These cameras see few points, and their places are rough: {', '.join(weak)}.")
-    shares = solution.cameras.focals / sizes[rows].max(1)
-    is_odd = np.abs(np.log(shares / np.median(shares))) > ODD_FOCAL
-    if is_odd.any() and not is_odd.all():
-        odd = ", ".join(name for name, one in zip(names, is_odd, strict=True) if one)
-        warnings.append(f"Focal lengths far from those of the others: {odd}. Unless they zoom, they are misplaced.")
+    agreed = agreement(rows, solution.cameras, key_points, verified, float(sizes.max()))
+    doubts = _doubts(solution, n_sightings, agreed, sizes)
+    named = ", ".join(name for name, doubt in zip(names, doubts, strict=True) if doubt)
+    if named:
+        warnings.append(
+            f"The places of these cameras cannot be trusted: {named}. Look at them before you train, and leave out "
+            "those that are wrong, or film again with more that they and their neighbours both see."
+        )
     native = np.array([videos[row].size for row in rows], dtype=np.int64)
     arrays = {
         "world_to_camera": _poses(cameras),
@@ -58,16 +59,36 @@ def finished(
         "point_errors_px": _means(errors, tracks.seen.points, len(points)),
         "camera_errors_px": _medians(errors, tracks.seen.cameras, len(rows)) * (native / sizes[rows])[:, 0],
         "n_sightings": n_sightings,
+        "explained_shares": agreed.shares,
     }
     document = {
         "names": names,
         "lens_model": LENS_MODEL[options.lens],
         "is_metric": is_metric,
         "up": up_from,
+        "doubts": doubts,
         "missing": [_missing(row, rows, videos, key_points, verified) for row in _absent(rows, len(videos))],
         "warnings": warnings,
     }
     return arrays, document
+
+
+def _doubts(solution: Solution, n_sightings: np.ndarray, agreed: Agreement, sizes: np.ndarray) -> list[str]:
+    """Why each camera may be misplaced; empty for those that nothing speaks against."""
+    shares = solution.cameras.focals / sizes[solution.rows].max(1)
+    is_odd = np.abs(np.log(shares / np.median(shares))) > ODD_FOCAL
+    doubts = []
+    for row, n in enumerate(n_sightings.tolist()):
+        against, n_for = int(agreed.n_contradicting[row]), int(agreed.n_agreeing[row])
+        if agreed.n_neighbours[row] < MIN_AGREEING:
+            doubts.append(f"{agreed.n_neighbours[row]} cameras agree with its place; {MIN_AGREEING} are needed")
+        elif agreed.is_doubtful[row]:
+            doubts.append(f"{against} matches with one camera speak against its place, {n_for} with another for it")
+        elif is_odd[row]:
+            doubts.append("its focal length is far from those of the others; right only if its lens or zoom is another")
+        else:
+            doubts.append(f"only {n} points" if n < WEAK_SIGHTINGS else "")
+    return doubts
 
 
 def _scale(cameras: Cameras, points, names: list[str], options: CalibrationOptions, warnings: list[str]):

@@ -13,9 +13,12 @@ from engine.calibration.cameras import Cameras
 from engine.calibration.matching import KeyPoints, Pair
 
 SEED = 0
-FOCAL_PER_SIDE = 0.85
-"""Focal length to begin with, per longer side of the picture: a view of 61 degrees."""
-FISHEYE_FOCAL_PER_SIDE = 0.5
+FOCALS_PER_SIDE = (0.8, 0.65, 1.0, 1.4)
+"""Focal lengths to begin with, per longer side of the picture: views of 64, 75, 53 and 39 degrees. The first estimate
+holds on to one of them for all cameras: where each could have its own, misplaced cameras would be made to fit by it."""
+FISHEYE_FOCALS_PER_SIDE = (0.5, 0.4, 0.3)
+REACH_PX = 6.0
+"""That sightings may be off at a width of 640, since focal lengths are only alike."""
 MIN_CAMERAS = 3
 MIN_MATCHES = 15
 """Of two cameras; fewer say nothing about them."""
@@ -32,10 +35,12 @@ class FirstEstimate:
     Attributes:
         rows: Which cameras, rising. [R]
         cameras: Their estimates, in this order.
+        are_alike: Whether all were taken to have one focal length per size of picture.
     """
 
     rows: np.ndarray
     cameras: Cameras
+    are_alike: bool
 
 
 def verified_matches(
@@ -54,7 +59,7 @@ def verified_matches(
     with pycolmap.Database.open(folder / "database.db") as tables:
         ids = []
         for row, points in enumerate(key_points):
-            camera = tables.write_camera(_camera(pycolmap, sizes[row], lens))
+            camera = tables.write_camera(_camera(pycolmap, sizes[row], lens, focals_to_try(lens)[0]))
             image = tables.write_image(pycolmap.Image(name=_name(row), camera_id=camera))
             tables.write_keypoints(image, points.pixels.astype(np.float32))
             ids.append(image)
@@ -79,24 +84,53 @@ def verified_matches(
         return found
 
 
-def map_cameras(folder: Path, n_cameras: int, lens: str, *, seed: int = SEED) -> list[FirstEstimate]:
-    """Estimates of groups of cameras that hang together, the largest group first. Empty where nothing does."""
+def focals_to_try(lens: str) -> tuple[float, ...]:
+    """Focal lengths per longer side of the picture that a lens model begins with."""
+    return FISHEYE_FOCALS_PER_SIDE if lens == "fisheye" else FOCALS_PER_SIDE
+
+
+def map_cameras(
+    folder: Path, sizes: np.ndarray, lens: str, *, focal: float, are_alike: bool, seed: int = SEED
+) -> list[FirstEstimate]:
+    """Estimates of groups of cameras that hang together, the largest group first. Empty where nothing does.
+
+    Args:
+        folder: Where `verified_matches` left the database.
+        sizes: Width and height of the pictures. [C, 2]
+        lens: Of CalibrationOptions.
+        focal: Per longer side of the picture.
+        are_alike: Hold on to this focal length; otherwise every camera's own is sought from there.
+        seed: Of all that is tried at random.
+    """
     import pycolmap
 
+    pycolmap.set_random_seed(seed)
+    with pycolmap.Database.open(folder / "database.db") as tables:
+        for camera in tables.read_all_images():
+            fresh = _camera(pycolmap, sizes[int(camera.name)], lens, focal)
+            fresh.camera_id = camera.camera_id
+            tables.update_camera(fresh)
     options = pycolmap.IncrementalPipelineOptions()
     options.num_threads = 1  # sums in another order would make it another result
     options.random_seed = options.mapper.random_seed = options.triangulation.random_seed = seed
     options.min_model_size = MIN_CAMERAS
     options.extract_colors = False
-    model = folder / f"model{seed}"
+    options.ba_global_max_refinements = 2
+    if are_alike:
+        options.ba_refine_focal_length = options.ba_refine_extra_params = False
+        options.mapper.abs_pose_refine_focal_length = options.mapper.abs_pose_refine_extra_params = False
+        reach_px = max(REACH_PX * float(sizes.max()) / 640, REACH_PX)
+        options.mapper.filter_max_reproj_error = reach_px
+        options.triangulation.merge_max_reproj_error = options.triangulation.complete_max_reproj_error = reach_px
+    model = folder / "model"
     shutil.rmtree(model, ignore_errors=True)
     model.mkdir()
     found = pycolmap.incremental_mapping(folder / "database.db", folder, model, options)
-    estimates = [_estimate(reconstruction, lens) for reconstruction in found.values()]
+    estimates = [_estimate(reconstruction, lens, are_alike) for reconstruction in found.values()]
     return sorted(estimates, key=lambda estimate: -len(estimate.rows))
 
 
-def _estimate(reconstruction: Any, lens: str) -> FirstEstimate:
+def _estimate(reconstruction: Any, lens: str, are_alike: bool) -> FirstEstimate:
     images = sorted((i for i in reconstruction.images.values() if i.has_pose), key=lambda image: image.name)
     cameras = [reconstruction.cameras[image.camera_id] for image in images]
     params = np.array([camera.params for camera in cameras])
@@ -115,13 +149,16 @@ def _estimate(reconstruction: Any, lens: str) -> FirstEstimate:
             principal=params[:, 1:3],
             lens_params=lens_params,
         ),
+        are_alike,
     )
 
 
-def _camera(pycolmap: Any, size: np.ndarray, lens: str) -> Any:
+def _camera(pycolmap: Any, size: np.ndarray, lens: str, focal: float) -> Any:
     width, height = (int(side) for side in size)
-    focal = (FISHEYE_FOCAL_PER_SIDE if lens == "fisheye" else FOCAL_PER_SIDE) * max(width, height)
-    return pycolmap.Camera(model=MODELS[lens], width=width, height=height, params=[focal, width / 2, height / 2, 0.0])
+    params = [focal * max(width, height), width / 2, height / 2, 0.0]
+    camera = pycolmap.Camera(model=MODELS[lens], width=width, height=height, params=params)
+    camera.has_prior_focal_length = True
+    return camera
 
 
 def _name(row: int) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,11 +15,27 @@ from engine.calibration.mapping import FirstEstimate
 from engine.calibration.matching import KeyPoints, Pair, all_pairs, match_guided
 from engine.calibration.tracks import Tracks, build_tracks, cleaned, fitting_matches
 
-ROUGH = ((12.0, False), (6.0, False))
-"""Stages while estimates are rough: pixels, at a width of 640, that sightings may be off; and whether matches are
-looked for anew along epipolar lines, with the lens that was asked for."""
-FINE = ((3.0, True), (2.0, True))
-"""Stages at the end."""
+
+class Stage(NamedTuple):
+    """One turn.
+
+    Attributes:
+        reach_px: At a width of 640, that sightings may be off.
+        is_common: Whether cameras that are taken for alike have one lens, with its middle in the middle of the picture.
+        is_guided: Whether matches are looked for anew along epipolar lines, with the lens that was asked for.
+    """
+
+    reach_px: float
+    is_common: bool = False
+    is_guided: bool = False
+
+
+ROUGH = (Stage(16.0, is_common=True), Stage(12.0, is_common=True), Stage(6.0))
+"""While estimates are rough."""
+FINE = (Stage(3.0, is_guided=True), Stage(2.0, is_guided=True))
+"""At the end."""
+ALIKE = 0.06
+"""Standard deviation of ln(focal length) among cameras that are taken for alike."""
 MIN_REACH_PX = 1.5
 MAX_ANGLE_DEG = 70.0
 """Between the views of two cameras that are matched anew: key points do not look alike from farther apart."""
@@ -33,11 +50,13 @@ class Solution:
         rows: Which cameras, rising. [R]
         cameras: In this order; pixels of the pictures that are matched.
         tracks: Points and sightings.
+        are_alike: Whether focal lengths of one size of picture were expected to be near each other.
     """
 
     rows: np.ndarray
     cameras: Cameras
     tracks: Tracks
+    are_alike: bool
 
     @property
     def errors(self) -> np.ndarray:
@@ -53,7 +72,7 @@ def solve(
     *,
     lens: str,
     is_shared: bool,
-    stages: Sequence[tuple[float, bool]],
+    stages: Sequence[Stage],
     progress: Callable[[float], None] = lambda _: None,
 ) -> Solution:
     """Adjust an estimate until points land where they were seen.
@@ -74,12 +93,12 @@ def solve(
     middles, widths = sizes[rows] / 2.0, sizes[rows, 0].astype(np.float64)
     per_640 = float(np.median(sizes[rows].max(1))) / 640
     tracks = Tracks.none()
-    is_shared = is_shared and len(np.unique(sizes[rows], axis=0)) == 1  # at other sizes lenses are others
+    groups = np.unique(sizes[rows], axis=0, return_inverse=True)[1].reshape(-1)  # at other sizes lenses are others
     if is_shared:
-        cameras = _with_one_lens(cameras)
-    for number, (reach, is_last) in enumerate(stages):
-        reach_px = max(reach * per_640, MIN_REACH_PX)
-        if is_last:
+        cameras = _with_one_lens(cameras, groups)
+    for number, stage in enumerate(stages):
+        reach_px = max(stage.reach_px * per_640, MIN_REACH_PX)
+        if stage.is_guided:
             cameras = _with_lens(cameras, lens)
             near = [pair for pair in pairs if _angle_deg(cameras, pair) <= MAX_ANGLE_DEG]
             found = known | match_guided(chosen, cameras, near, reach_px)
@@ -88,7 +107,12 @@ def solve(
         tracks = build_tracks(fitting_matches(found, chosen, cameras, reach_px), chosen, cameras, reach_px)
         if len(tracks.points) < len(rows):
             break
-        expect = Expectations(is_shared=is_shared)
+        is_common = estimate.are_alike and stage.is_common
+        expect = Expectations(groups=tuple(groups.tolist()) if is_shared or is_common else None)
+        if estimate.are_alike:
+            expect = replace(expect, focal=0.5 if is_common else ALIKE)
+        if is_common:
+            expect = replace(expect, principal=0.0, aspect=1e-6)
         cameras, points = adjust(
             cameras,
             tracks.points,
@@ -96,11 +120,12 @@ def solve(
             middles=middles,
             widths=widths,
             expect=expect,
+            focals=_medians(cameras.focals, groups) if estimate.are_alike else None,
             n_iterations=N_ITERATIONS,
         )
         tracks = cleaned(cameras, points, tracks.seen, reach_px)
         progress((number + 1) / len(stages))
-    return Solution(rows, cameras, tracks)
+    return Solution(rows, cameras, tracks, estimate.are_alike)
 
 
 def _with_lens(cameras: Cameras, lens: str) -> Cameras:
@@ -113,15 +138,20 @@ def _with_lens(cameras: Cameras, lens: str) -> Cameras:
     return replace(cameras, lens=lens, lens_params=params)
 
 
-def _with_one_lens(cameras: Cameras) -> Cameras:
-    """The same cameras, each with the lens in the middle of all."""
-    n = len(cameras)
+def _with_one_lens(cameras: Cameras, groups: np.ndarray) -> Cameras:
+    """The same cameras, each with the lens in the middle of its group."""
     return replace(
         cameras,
-        focals=np.full(n, np.median(cameras.focals)),
-        principal=np.tile(np.median(cameras.principal, axis=0), (n, 1)),
-        lens_params=np.tile(np.median(cameras.lens_params, axis=0), (n, 1)),
+        focals=_medians(cameras.focals, groups),
+        aspects=_medians(cameras.aspects, groups),
+        principal=_medians(cameras.principal, groups),
+        lens_params=_medians(cameras.lens_params, groups),
     )
+
+
+def _medians(values: np.ndarray, groups: np.ndarray) -> np.ndarray:
+    """The median of each camera's group, per column."""
+    return np.array([np.median(values[groups == group], axis=0) for group in groups])
 
 
 def _angle_deg(cameras: Cameras, pair: Pair) -> float:

@@ -46,6 +46,8 @@ def made_up(monkeypatch) -> Calibration:
         np.full(5, 0.3),
         np.array([0.3, 0.4, 2.5]),
         np.array([400, 300, 12]),
+        np.array([0.97, 0.62, 0.1]),
+        ("", "", "only 12 points"),
         False,
         "floor",
     )
@@ -96,7 +98,8 @@ def test_the_report_says_what_is_missing_why_and_what_helps(made_up: Calibration
     text = "\n".join(lines)
     assert "cam03: not found: it has at most 4 matches" in text
     assert "What helps:" in text
-    assert "fits badly and sees few points" in text
+    assert "10% of its matches explained - fits badly and doubtful: only 12 points" in text
+    assert text.count("doubtful") == 1
     assert "one unit is not one metre" in text
 
 

@@ -59,8 +59,15 @@ def test_wrong_sightings_do_not_pull() -> None:
 
 
 def test_the_numbers_of_a_shared_lens_are_the_same_for_all() -> None:
-    cameras, _ = adjusted(make_seen("forward", "simple"), "simple", is_shared=True)
+    cameras, _ = adjusted(make_seen("forward", "simple"), "simple", groups=(0,) * 12)
     assert np.ptp(cameras.lens_params) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_cameras_of_one_group_share_a_lens_and_groups_do_not() -> None:
+    cameras, _ = adjusted(make_seen("forward", "simple"), "simple", groups=(0, 1) * 6)
+    assert np.ptp(cameras.lens_params[::2]) == pytest.approx(0.0, abs=1e-12)
+    assert np.ptp(cameras.lens_params[1::2]) == pytest.approx(0.0, abs=1e-12)
+    assert abs(cameras.lens_params[0] - cameras.lens_params[1]) > 1e-9
 
 
 @pytest.mark.parametrize("lens", ["pinhole", "simple", "opencv", "fisheye"])
