@@ -77,7 +77,7 @@ def test_from_plain_videos_to_a_trained_clip(
     session = make_session(tmp_path)
     pilot = open_pilot(session)
 
-    # the folder is no capture; that leads to its calibration
+    # the folder is not a capture; that leads to its calibration
     pilot.key(key.O, modifiers=(CTRL,))
     pilot.draw(3)
     pilot.key(key.A, modifiers=(CTRL,))
