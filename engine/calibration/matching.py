@@ -1,4 +1,4 @@
-"""Which key points of two cameras look alike, at equal times only; and once cameras are known, along epipolar lines.
+"""Which key points of two cameras look alike, at equal times only.
 
 All key points of a still camera, those of its background and of several moments, form one list. A point of one moment
 is only ever compared with points of the same moment, so that whatever moves helps as a calibration board would.
@@ -15,7 +15,6 @@ from engine.parallel import map_ordered
 
 MAX_RATIO = 0.85
 """Distance of the best match divided by that of the second best."""
-GUIDED_RATIO = 0.9
 MAX_DISTANCE = 0.8
 """Distance of unit descriptors."""
 TWIN_PX = 3.0
@@ -62,32 +61,6 @@ def match_all(key_points: list[KeyPoints], alive=lambda: None) -> dict[Pair, np.
         return np.concatenate(found)
 
     pairs = all_pairs(len(key_points))
-    return dict(zip(pairs, map_ordered(one, pairs), strict=True))
-
-
-def match_guided(
-    key_points: list[KeyPoints], cameras: Cameras, pairs: list[Pair], reach_px: float
-) -> dict[Pair, np.ndarray]:
-    """Matches among those that lie within reach_px of each other's epipolar line. {pair: [M, 2]}"""
-    planes = [cameras.plane(row, points.pixels) for row, points in enumerate(key_points)]
-
-    def one(pair: Pair) -> np.ndarray:
-        first, second = (key_points[i] for i in pair)
-        essential = essential_matrix(cameras, *pair)
-        found = [np.zeros((0, 2), dtype=np.int64)]
-        for rows_a, rows_b in _equal_moments(first, second):
-            alike = first.descriptors[rows_a] @ second.descriptors[rows_b].T
-            plane_a, plane_b = homogeneous(planes[pair[0]][rows_a]), homogeneous(planes[pair[1]][rows_b])
-            lines = plane_a @ essential.T
-            slopes_a = (lines[:, :2] ** 2).sum(-1) / cameras.focals[pair[1]] ** 2
-            slopes_b = ((plane_b @ essential)[:, :2] ** 2).sum(-1) / cameras.focals[pair[0]] ** 2
-            products = lines.astype(np.float32) @ plane_b.astype(np.float32).T
-            limits = np.add.outer(slopes_a, slopes_b).astype(np.float32) * np.float32(reach_px**2)
-            alike[products**2 > limits] = -1.0
-            chosen = _mutual_best(alike, second.pixels[rows_b], first.pixels[rows_a], GUIDED_RATIO)
-            found.append(np.stack([rows_a[chosen[:, 0]], rows_b[chosen[:, 1]]], axis=-1))
-        return np.concatenate(found)
-
     return dict(zip(pairs, map_ordered(one, pairs), strict=True))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from engine.calibration.bundle import Expectations, adjust, errors_px
 from engine.calibration.cameras import N_LENS, Cameras
 from engine.calibration.mapping import FirstEstimate
-from engine.calibration.matching import KeyPoints, Pair, all_pairs, match_guided
+from engine.calibration.matching import KeyPoints, Pair, all_pairs
 from engine.calibration.tracks import Tracks, build_tracks, cleaned, fitting_matches
 
 
@@ -22,23 +22,21 @@ class Stage(NamedTuple):
     Attributes:
         reach_px: At a width of 640, that sightings may be off.
         is_common: Whether cameras that are taken for alike have one lens, with its middle in the middle of the picture.
-        is_guided: Whether matches are looked for anew along epipolar lines, with the lens that was asked for.
+        is_last: Whether cameras have the lens that was asked for.
     """
 
     reach_px: float
     is_common: bool = False
-    is_guided: bool = False
+    is_last: bool = False
 
 
 ROUGH = (Stage(16.0, is_common=True), Stage(12.0, is_common=True), Stage(6.0))
 """While estimates are rough."""
-FINE = (Stage(3.0, is_guided=True), Stage(2.0, is_guided=True))
+FINE = (Stage(3.0, is_last=True), Stage(2.0, is_last=True))
 """At the end."""
 ALIKE = 0.06
 """Standard deviation of ln(focal length) among cameras that are taken for alike."""
 MIN_REACH_PX = 1.5
-MAX_ANGLE_DEG = 70.0
-"""Between the views of two cameras that are matched anew: key points do not look alike from farther apart."""
 N_ITERATIONS = 25
 
 
@@ -98,13 +96,9 @@ def solve(
         cameras = _with_one_lens(cameras, groups)
     for number, stage in enumerate(stages):
         reach_px = max(stage.reach_px * per_640, MIN_REACH_PX)
-        if stage.is_guided:
+        if stage.is_last:
             cameras = _with_lens(cameras, lens)
-            near = [pair for pair in pairs if _angle_deg(cameras, pair) <= MAX_ANGLE_DEG]
-            found = known | match_guided(chosen, cameras, near, reach_px)
-        else:
-            found = known
-        tracks = build_tracks(fitting_matches(found, chosen, cameras, reach_px), chosen, cameras, reach_px)
+        tracks = build_tracks(fitting_matches(known, chosen, cameras, reach_px), chosen, cameras, reach_px)
         if len(tracks.points) < len(rows):
             break
         is_common = estimate.are_alike and stage.is_common
@@ -152,8 +146,3 @@ def _with_one_lens(cameras: Cameras, groups: np.ndarray) -> Cameras:
 def _medians(values: np.ndarray, groups: np.ndarray) -> np.ndarray:
     """The median of each camera's group, per column."""
     return np.array([np.median(values[groups == group], axis=0) for group in groups])
-
-
-def _angle_deg(cameras: Cameras, pair: Pair) -> float:
-    cosine = cameras.rotations[pair[0], 2] @ cameras.rotations[pair[1], 2]
-    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
