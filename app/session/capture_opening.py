@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,6 +24,8 @@ from engine.user_folders import data_dir
 
 PICTURE_WIDTH_PX = 320
 QUICK, TIMED = "quick", "timed"
+AGAIN_S = 3.0
+"""Pause before steps that could not be timed are tried again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +35,7 @@ class _Forecast:
     page: int
     answers: OpeningAnswers
     is_timed: bool
+    attempt: int
     capture: Capture = field(compare=False)
 
 
@@ -56,6 +60,7 @@ class CaptureOpening:
         self.findings: tuple[Finding, ...] | None = None
         self.revision = 0
         self._can_measure, self._page_number = can_measure, 0
+        self._attempt, self._again_s = 0, 0.0
         self._capture: Capture | None = None
         self._jobs = Jobs()
         self._worker: LatestWorker[_Forecast, OpeningForecast] = LatestWorker("opening forecast", _forecast)
@@ -131,10 +136,14 @@ class CaptureOpening:
             return self._last, False
         is_final = True
         for lane in (QUICK, TIMED) if self._can_measure else (QUICK,):
-            request = _Forecast(self._page_number, answers, lane == TIMED, self._capture)
+            request = _Forecast(self._page_number, answers, lane == TIMED, self._attempt, self._capture)
             newest = self._worker.newest_in(lane)
             if newest is not None and newest[0] == request:
                 self._last = newest[1]
+                if lane == TIMED and newest[1].reference_s is None:  # kernels are being compiled, at the first start
+                    is_final = False
+                    if time.monotonic() > self._again_s:
+                        self._attempt, self._again_s = self._attempt + 1, time.monotonic() + AGAIN_S
             elif not self._worker.has_failed(request):
                 is_final = False
                 self._worker.request(request, lane=lane)
