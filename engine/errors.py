@@ -2,6 +2,7 @@
 
 EngineError
 |-- CaptureError      a capture folder cannot be used; carries every problem found
+|   |-- OutsideError  a file of it lies outside of its folder, which the user may allow
 |-- ProjectError      a project folder, clip state or configuration cannot be used
 |   |-- DiskError     a file could not be written: nothing is wrong with what was asked for
 |-- PreparationError  clouds or masks could not be built from this capture
@@ -60,9 +61,9 @@ def _rebuild(kind: type["EngineError"], message: str, hint: str, path: Path | No
 
 
 def _rebuild_capture_error(
-    message: str, hint: str, path: Path | None, problems: tuple[EngineError, ...]
+    kind: type["CaptureError"], message: str, hint: str, path: Path | None, problems: tuple[EngineError, ...]
 ) -> "CaptureError":
-    return CaptureError(message, hint=hint, path=path, problems=problems)
+    return kind(message, hint=hint, path=path, problems=problems)
 
 
 class CaptureError(EngineError):
@@ -75,7 +76,7 @@ class CaptureError(EngineError):
         super().__init__(message, hint=hint, path=path)
 
     def __reduce__(self) -> tuple[Any, ...]:  # the listed problems cross a process boundary too
-        return (_rebuild_capture_error, (self.message, self.hint, self.path, self.problems))
+        return (_rebuild_capture_error, (type(self), self.message, self.hint, self.path, self.problems))
 
     def __str__(self) -> str:
         listed = [f"  {problem}" for problem in self.problems[:MAX_LISTED_PROBLEMS]]
@@ -85,6 +86,24 @@ class CaptureError(EngineError):
     def told_apart(self) -> tuple[str, str]:
         """As of every error; listed problems carry their own hints and stand with what happened."""
         return (str(self), "") if self.problems else super().told_apart()
+
+    def said_of(self, what: str) -> "CaptureError":
+        """The same kind of problem with what it is of named in front, as `Camera "a"`."""
+        return type(self)(f"{what}: {self.message}", hint=self.hint, path=self.path)
+
+    @property
+    def needs_links(self) -> bool:
+        """Whether nothing is wrong but that files lie outside of the folder, so that follow_links helps."""
+        return bool(self.problems) and all(isinstance(problem, OutsideError) for problem in self.problems)
+
+
+class OutsideError(CaptureError):
+    """A file of a capture lies outside of its folder, and the user has not said that it may."""
+
+    @property
+    def needs_links(self) -> bool:
+        """That is all that is wrong."""
+        return True
 
 
 class ProjectError(EngineError):

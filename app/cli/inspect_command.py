@@ -9,7 +9,6 @@ from typing import Any
 
 from app.background.kernels import use_threads
 from app.cli.arguments import EXIT_OK, add_follow_links, path_argument
-from app.cli.capture_lines import capture_lines
 from app.cli.correction_arguments import add_correction_arguments, asked_corrections, sure_corrections, write_asked
 from app.cli.terminal.progress import ProgressLine
 from app.training.service import Launch
@@ -52,14 +51,14 @@ def _inspect_capture(options: argparse.Namespace) -> int:
 
 
 def _describe(options: argparse.Namespace, capture: Capture) -> int:
+    from app.project.capture_report import report_of
     from engine.capture.capture_summary import describe
 
-    found = describe(capture)
     if not options.json:
-        print("\n".join(capture_lines(found)), flush=True)
+        print(report_of(capture).text, flush=True)
     more = _quick(options, capture) if options.quick else _doctor(options, capture)
     if options.json:
-        print(json_text(found | more, indent=2))
+        print(json_text(describe(capture) | more, indent=2))
     return EXIT_OK
 
 

@@ -26,6 +26,10 @@ LENSES = {
     "fov": "fisheye (FOV)",
     "thin_prism_fisheye": "fisheye with thin prism",
 }
+MINE = (
+    "Copy the files into the folder or, if you know where they lie and trust this capture, open it anyway: its project "
+    "remembers that."
+)
 LEAST_VIDEOS = 2
 """So many videos in a folder without calibration may be cameras of one scene."""
 
@@ -102,19 +106,21 @@ class CaptureReport:
             ("Frames", f"{self.n_frames:,} at {self.fps:.6g} per second ({_length_text(seconds)})"),
             ("Lenses", f"{lenses}; {view}"),
             ("Poses", f"all known; the cameras are up to {self.rig_extent:.3g} scene units apart"),
-            ("Came along", came_along or "no masks, no point cloud"),
+            ("Came along", came_along or "no masks, no point cloud; neither is needed"),
         )
 
     @property
     def text(self) -> str:
-        """All of it, to be copied."""
-        lines = [printable(str(self.path)), *(f"{name}: {words}" for name, words in self.rows)]
+        """All of it, to be copied or printed."""
+        lines = [str(self.path), *(f"{name}: {words}" for name, words in self.rows)]
+        width = max(len(camera.name) for camera in self.cameras)
         lines += [
-            f"  {camera.name}  {camera.image_size[0]}x{camera.image_size[1]}  view {camera.fov_deg[0]:.0f} x "
+            f"  {camera.name:<{width}}  {camera.image_size[0]}x{camera.image_size[1]}  view {camera.fov_deg[0]:.0f} x "
             f"{camera.fov_deg[1]:.0f} degrees  {camera.lens}{'  set aside' if camera.is_default_holdout else ''}"
             for camera in self.cameras
         ]
-        return "\n".join([*lines, *(f"Note: {sentence}" for sentence in self.warnings)])
+        lines += [f"Note: {sentence}" for sentence in self.warnings]
+        return "\n".join(printable(line) for line in lines)
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +133,7 @@ class RefusedFolder:
         hint: What to do; may be empty.
         problems: Every problem of it where there are several: what is wrong and what to do about it.
         videos: Videos in it that may be cameras of one scene, where no calibration was found.
+        needs_links: Nothing is wrong but that its files lie outside of it, which the user may allow.
     """
 
     path: Path
@@ -134,6 +141,7 @@ class RefusedFolder:
     hint: str
     problems: tuple[tuple[str, str], ...] = ()
     videos: tuple[Path, ...] = ()
+    needs_links: bool = False
 
     @property
     def text(self) -> str:
@@ -179,6 +187,9 @@ def refusal_of(path: Path, error: EngineError) -> RefusedFolder:
     """Put into words why a folder does not open. Reads the folder's list of files."""
     problems: Sequence[EngineError] = error.problems if isinstance(error, CaptureError) else ()
     several = tuple(problem.told_apart() for problem in problems) if len(problems) > 1 else ()
+    if isinstance(error, CaptureError) and error.needs_links:
+        found = tuple((problem.message, "") for problem in problems)
+        return RefusedFolder(path, error.message, MINE, found, needs_links=True)
     videos = () if several else _videos_in(path)
     is_all = several or error.path in (None, path)  # else the place is said, too
     message, hint = (error.message, error.hint) if is_all else error.told_apart()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,12 +17,15 @@ from app.project.opening_answers import LastAnswers, OpeningAnswers, default_ans
 from app.session.questions import OpeningPage
 from app.status import OpeningForecast
 from engine.capture.capture import Capture
+from engine.doctor.finding import Finding, in_order
 from engine.errors import EngineError
 from engine.training.plan.plan import StepSizes
 from engine.user_folders import data_dir
 
 PICTURE_WIDTH_PX = 320
 QUICK, TIMED = "quick", "timed"
+AGAIN_S = 3.0
+"""Pause before steps that could not be timed are tried again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +35,7 @@ class _Forecast:
     page: int
     answers: OpeningAnswers
     is_timed: bool
+    attempt: int
     capture: Capture = field(compare=False)
 
 
@@ -41,6 +46,7 @@ class CaptureOpening:
         page: What is asked; None while nothing is.
         refused: The folder that does not open, and why; None while there is none.
         pictures: Small ones of first frames, by camera.
+        findings: What the capture doctor sees in the numbers alone, the worst first; None until that is known.
         revision: Goes up when any of these is another.
 
     Args:
@@ -51,8 +57,10 @@ class CaptureOpening:
         self.page: OpeningPage | None = None
         self.refused: RefusedFolder | None = None
         self.pictures: dict[int, Picture] = {}
+        self.findings: tuple[Finding, ...] | None = None
         self.revision = 0
         self._can_measure, self._page_number = can_measure, 0
+        self._attempt, self._again_s = 0, 0.0
         self._capture: Capture | None = None
         self._jobs = Jobs()
         self._worker: LatestWorker[_Forecast, OpeningForecast] = LatestWorker("opening forecast", _forecast)
@@ -72,6 +80,11 @@ class CaptureOpening:
         self._page_number = page
 
         def read(context: JobContext) -> None:
+            from engine.doctor.quick import check_numbers  # loading it takes a moment
+
+            findings = tuple(in_order(check_numbers(capture)))
+            if self._page_number == page:
+                self.findings = findings
             small = capture.resized(min(1.0, PICTURE_WIDTH_PX / int(capture.native_rig.image_sizes[:, 0].max())))
             try:
                 for camera in range(len(small.rig)):
@@ -106,6 +119,7 @@ class CaptureOpening:
         if self._capture is not None:
             self._capture.close()
         self.page = self.refused = self._capture = self._last = None
+        self.findings = None
         self.pictures = {}
         self._page_number = 0
         self.revision += 1
@@ -122,10 +136,14 @@ class CaptureOpening:
             return self._last, False
         is_final = True
         for lane in (QUICK, TIMED) if self._can_measure else (QUICK,):
-            request = _Forecast(self._page_number, answers, lane == TIMED, self._capture)
+            request = _Forecast(self._page_number, answers, lane == TIMED, self._attempt, self._capture)
             newest = self._worker.newest_in(lane)
             if newest is not None and newest[0] == request:
                 self._last = newest[1]
+                if lane == TIMED and newest[1].reference_s is None:  # kernels are being compiled, at the first start
+                    is_final = False
+                    if time.monotonic() > self._again_s:
+                        self._attempt, self._again_s = self._attempt + 1, time.monotonic() + AGAIN_S
             elif not self._worker.has_failed(request):
                 is_final = False
                 self._worker.request(request, lane=lane)
@@ -148,7 +166,7 @@ class CaptureOpening:
     def finished(self) -> tuple[object, ...]:
         """Differs whenever there is something else to show."""
         done = tuple(None if (found := self._worker.newest_in(lane)) is None else found[0] for lane in (QUICK, TIMED))
-        return self.revision, len(self.pictures), done
+        return self.revision, len(self.pictures), self.findings is None, done
 
     def close(self) -> None:
         """End the threads."""

@@ -332,6 +332,7 @@ DoctorCommand = ExamineCapture | StopExamining | CorrectCapture
 """What the capture doctor does."""
 
 
+@dataclass(frozen=True, slots=True)
 class LookAtVideos:
     """Show which cameras are in a folder of plain videos, to calibrate them."""
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from engine.camera.lens import PINHOLE, Lens
+from engine.capture.described_camera import DescribedCamera, SeenFiles, mask_source, seen_files
 from engine.capture.duplicates import CameraFiles, check_duplicates
 from engine.capture.format_checks import (
     check_image_size,
@@ -24,8 +24,7 @@ from engine.capture.format_checks import (
     shortened,
 )
 from engine.capture.format_result import CameraEntry, Layout
-from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames, VideoFrames, is_turned_as_calibrated
-from engine.capture.media import read_image_header, read_video_header
+from engine.capture.frames import IndexedFrames
 from engine.capture.timed_frames import at_common_moments, own_times
 from engine.errors import CaptureError
 
@@ -43,53 +42,6 @@ CLOCK_TOLERANCE = 0.02
 """Share by which rates of cameras may differ and their frames still be taken one by one."""
 RATE_TOLERANCE = 0.01
 """Share by which the rate of a video may differ from that of the capture, as 29.97 does from 30."""
-
-
-@dataclass(frozen=True, eq=False)
-class DescribedCamera:
-    """One camera as a layout describes it, not yet checked.
-
-    Attributes:
-        name: As the capture calls it.
-        K: Intrinsics at the calibrated size, pixel centres at +0.5. [3, 3]
-        world_to_camera: OpenCV axes. [4, 4]
-        files: Its video, or one image per frame. Places are checked already (`place_in`).
-        said_in: The file that its numbers come from, for messages.
-        calibrated_size: Width and height that K belongs to; None takes the size of the frames.
-        lens: How its lens bends rays.
-        masks: A video or one image per frame, bright where something moves; None without.
-        color_matrix: New RGB = matrix @ old, on display-encoded values. [3, 3]
-        offset_frames: Its own frame is the capture's frame plus this.
-        frame_times_s: When each of its frames was taken, in seconds of a clock that all cameras share, rising; None
-            where nothing says so. Either all cameras have them or none. [T]
-        frame_indices: Numbers of its own frames that the capture shows, in order; None shows all. [T]
-    """
-
-    name: str
-    K: np.ndarray
-    world_to_camera: np.ndarray
-    files: Path | Sequence[Path]
-    said_in: Path
-    calibrated_size: tuple[int, int] | None = None
-    lens: Lens = PINHOLE
-    masks: Path | Sequence[Path] | None = None
-    color_matrix: np.ndarray | None = None
-    offset_frames: float = 0.0
-    frame_times_s: np.ndarray | None = None
-    frame_indices: Sequence[int] | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class _Files:
-    """The frames of one camera as their headers tell."""
-
-    source: FrameSource
-    size: tuple[int, int]
-    rate: float
-    paths: Sequence[Path]
-    n_bytes: Sequence[int]
-    is_even: bool = True
-    is_lying: bool = False
 
 
 def assemble(
@@ -127,15 +79,15 @@ def assemble(
     if cameras or not found:
         found += check_names([camera.name for camera in cameras], said_in)
     with ThreadPoolExecutor(THREADS) as pool:
-        looks = [pool.submit(_shown, camera) for camera in cameras]
+        looks = [pool.submit(seen_files, camera) for camera in cameras]
     entries: list[CameraEntry] = []
-    files: dict[str, _Files] = {}
+    files: dict[str, SeenFiles] = {}
     scaled: list[str] = []
     for camera, look in zip(cameras, looks, strict=True):
         try:
             seen = look.result()
         except CaptureError as error:
-            found.append(CaptureError(f'Camera "{camera.name}": {error.message}', hint=error.hint, path=error.path))
+            found.append(error.said_of(f'Camera "{camera.name}"'))
             found += _check_numbers(camera, camera.calibrated_size or (0, 0)) if camera.calibrated_size else []
             continue
         files[camera.name] = seen
@@ -158,7 +110,7 @@ def assemble(
                     image_size=seen.size,
                     source=seen.source,
                     lens=camera.lens,
-                    masks=None if camera.masks is None else _mask_source(camera.masks, camera.frame_indices),
+                    masks=None if camera.masks is None else mask_source(camera.masks, camera.frame_indices),
                     color_matrix=camera.color_matrix,
                 )
             )
@@ -213,50 +165,7 @@ def _check_numbers(camera: DescribedCamera, size: tuple[int, int]) -> list[Captu
     return found
 
 
-def _shown(camera: DescribedCamera) -> _Files:
-    """The frames that the capture shows, which then count as evenly recorded."""
-    files = _look_at(camera)
-    if camera.frame_indices is None:
-        return files
-    n_frames = files.source.n_frames
-    if not camera.frame_indices or not 0 <= min(camera.frame_indices) <= max(camera.frame_indices) < n_frames:
-        text = f"The numbers of its frames go beyond the {n_frames} that it has."
-        raise CaptureError(text, hint="Correct the list, or take it out.", path=camera.said_in)
-    return replace(files, source=IndexedFrames(files.source, camera.frame_indices), rate=0.0, is_even=True)
-
-
-def _look_at(camera: DescribedCamera) -> _Files:
-    """Headers of a video, or of the first, middle and last image: others are looked at when they are decoded."""
-    if isinstance(camera.files, Path):
-        header = read_video_header(camera.files)
-        is_turned = camera.calibrated_size is None or is_turned_as_calibrated(header, camera.calibrated_size)
-        size = header.size if is_turned else header.stored_size
-        source = VideoFrames(camera.files, header.n_frames, is_turned=is_turned)
-        return _Files(source, size, header.rate, [camera.files], [header.n_bytes], header.is_even, not is_turned)
-    paths = list(camera.files)
-    if not paths:
-        raise CaptureError("There are no frames.", hint="Add its frames or take the camera out.", path=camera.said_in)
-    rows = sorted({0, len(paths) // 2, len(paths) - 1})
-    headers = [read_image_header(paths[row]) for row in rows]
-    for row, header in zip(rows, headers, strict=True):
-        if header.size != headers[0].size:
-            first = f"{headers[0].size[0]}x{headers[0].size[1]}"
-            text = f"Its frame {row} is {header.size[0]}x{header.size[1]}, its first one {first}."
-            raise CaptureError(text, hint="Export all frames of a camera at one size.", path=paths[row])
-    source = ImageFrames(paths[0].parent, paths)
-    return _Files(source, headers[0].size, 0.0, paths, [header.n_bytes for header in headers])
-
-
-def _mask_source(files: Path | Sequence[Path], frame_indices: Sequence[int] | None) -> FrameSource:
-    source: FrameSource
-    if isinstance(files, Path):
-        source = VideoFrames(files, read_video_header(files).n_frames)
-    else:
-        source = ImageFrames(files[0].parent, files)
-    return source if frame_indices is None else IndexedFrames(source, frame_indices)
-
-
-def _rate(fps: float | None, files: dict[str, _Files], said: list[str]) -> float:
+def _rate(fps: float | None, files: dict[str, SeenFiles], said: list[str]) -> float:
     """Frames per second; adds what is odd about them."""
     rates = {name: seen.rate for name, seen in files.items() if seen.rate > 0}
     if fps is None:
@@ -273,7 +182,7 @@ def _rate(fps: float | None, files: dict[str, _Files], said: list[str]) -> float
     return fps
 
 
-def _evenness(files: dict[str, _Files]) -> list[bool]:
+def _evenness(files: dict[str, SeenFiles]) -> list[bool]:
     """Whether frames of each camera may be taken one by one: evenly recorded, at the rate of most cameras."""
     rates = [seen.rate for seen in files.values() if seen.rate > 0]
     usual = float(np.median(rates)) if rates else 0.0

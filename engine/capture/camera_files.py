@@ -82,8 +82,7 @@ def find_camera_frames(
             relative = way.entries[match[name]]
             found.files[name] = _files(folder, relative, way.kind, follow_links=follow_links, named_in=named_in)
         except CaptureError as error:
-            text = f"Camera {shown(name)}: {error.message}"
-            found.problems[name] = CaptureError(text, hint=error.hint, path=error.path)
+            found.problems[name] = error.said_of(f"Camera {shown(name)}")
     for way, match in used if best.kind != "image" else ways:
         if way is best or (way.kind == "video" and not match):
             others = set(way.entries) - set((best_match if way is best else match).values())

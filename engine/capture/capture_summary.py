@@ -20,8 +20,9 @@ def describe(capture: Capture) -> dict[str, Any]:
         schema, path, format, fingerprint, n_cameras, n_frames, fps, duration_s, scale, default_holdout, cameras,
         rig_extent (largest distance between two cameras, scene units), focus_point [3], has_points (a point cloud came
         along), warnings (sentences).
-        Each camera: name, path, lens (model of the stored frames), has_masks, width, height (stored), working_width, working_height, fx, fy, cx, cy (pixels at the
-        working size), fov_x_deg, fov_y_deg, center [3], forward [3], focus_distance (scene units), is_default_holdout.
+        Each camera: name, path, lens (model of the stored frames), has_masks, width, height (stored), working_width,
+        working_height, fx, fy, cx, cy (pixels at the working size), fov_x_deg, fov_y_deg, center [3], forward [3],
+        focus_distance (scene units), is_default_holdout.
     """
     rig = capture.rig
     focus_point, centers, forwards = rig.focus_point(), rig.centers, rig.forwards

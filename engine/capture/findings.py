@@ -31,5 +31,4 @@ class Findings:
 
     def add(self, error: CaptureError, *, camera: str | None = None) -> None:
         """One more problem. camera: named in front of it."""
-        text = error.message if camera is None else f'Camera "{camera}": {error.message}'
-        self.problems.append(CaptureError(text, hint=error.hint, path=error.path))
+        self.problems.append(error if camera is None else error.said_of(f'Camera "{camera}"'))

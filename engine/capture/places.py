@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from engine.errors import CaptureError
+from engine.errors import CaptureError, OutsideError
 from engine.text import shown
 
 MAX_NAME_BYTES = 1024
@@ -25,7 +25,8 @@ def place_in(folder: Path, name: str, *, follow_links: bool, named_in: Path) -> 
         follow_links: Whether it may lie outside of the folder.
         named_in: The file that has the name, for the message.
     Raises:
-        CaptureError: The name is empty or no file name, or leads out of the folder.
+        CaptureError: The name is empty or no file name.
+        OutsideError: It leads out of the folder.
     """
     hint = "Name a file inside the capture folder."
     if not name.strip():
@@ -44,5 +45,5 @@ def place_in(folder: Path, name: str, *, follow_links: bool, named_in: Path) -> 
         direct = os.path.normpath(os.path.join(root, name))
         is_link = direct.startswith(os.path.join(root, ""))
         how = f"is a link that leads out of the capture folder, to {target}" if is_link else "is not inside its folder"
-        raise CaptureError(f"{shown(name)} {how}.", hint=_ALLOW, path=path if is_link else named_in)
+        raise OutsideError(f"{shown(name)} {how}.", hint=_ALLOW, path=path if is_link else named_in)
     return path

@@ -12,13 +12,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from engine.model.anchors import AnchorSet
 from engine.model.clip_model import ClipModel
 from engine.raster import Rendering, rasterize
 from engine.raster.gaussians import Gaussians
 from engine.raster.rasterizer import Rasterizer
 
 REACH_SPACINGS = 4.0
-"""Gaussians are expected within this many static anchor spacings of their anchor when anchors are culled."""
+"""Gaussians are expected within this many spacings, or sizes where those are larger, of their anchor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +59,8 @@ class View:
             float(near_plane),
         )
 
-    def sees(self, positions: Tensor, *, reach: float) -> Tensor:
-        """Whether something within `reach` scene units of each position may touch a pixel. [A] bool"""
+    def sees(self, positions: Tensor, *, reach: float | Tensor) -> Tensor:
+        """Whether something within `reach` scene units, one or [A], of each position may touch a pixel. [A] bool"""
         world_to_camera, K = self.world_to_camera.to(positions), self.K.to(positions)
         p_camera = positions @ world_to_camera[:3, :3].T + world_to_camera[:3, 3]
         x, y, z = p_camera.unbind(1)
@@ -74,13 +75,22 @@ class View:
         return is_inside & (z > self.near_plane - reach)
 
 
+def reaches(anchors: AnchorSet, reach: float) -> Tensor:
+    """How far from its anchor each one's Gaussians are expected, scene units: those of a backdrop are large. [A]
+
+    Args:
+        reach: Of anchors whose size is a spacing.
+    """
+    return (REACH_SPACINGS * anchors.log_offset_scales.detach().amax(1).exp()).clamp_min(reach)
+
+
 def visible_rows(model: ClipModel, view: View, clip_time: float, *, reach: float) -> dict[str, Tensor]:
     """Rows per role that exist at this time and that the view may see."""
     rows = {}
     for role in model.roles():
         alive = model.alive(role, clip_time)
-        positions = model.anchor_set(role).positions[alive]
-        rows[role] = alive[view.sees(positions, reach=reach)]
+        anchors = model.anchor_set(role)
+        rows[role] = alive[view.sees(anchors.positions[alive], reach=reaches(anchors, reach)[alive])]
     return rows
 
 

@@ -51,6 +51,7 @@ from app.status import (
 )
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.clip import Clip, split_clips
+from engine.doctor.finding import Finding
 from engine.gate.regions import GateRegion, sphere_region
 
 
@@ -109,6 +110,7 @@ class FakeOpening:
     page: OpeningPage | None = None
     refused: RefusedFolder | None = None
     pictures: dict[int, Picture] = field(default_factory=dict)
+    findings: tuple[Finding, ...] | None = None
     found: OpeningForecast | None = None
     asked: list[OpeningAnswers] = field(default_factory=list)
 

@@ -27,6 +27,7 @@ from app.session.questions import OpeningPage
 from app.session.synchronisation_page import OffsetRow, SynchronisationPage
 from app.status import JobStatus, OpeningForecast
 from engine.calibration.options import CalibrationOptions, KnownDistance
+from engine.doctor.finding import Finding
 from tests.ui.fake_session import FakeSession, make_rig
 from tests.ui.pilot import CTRL, Pilot
 from ui.shell.opening_answers_form import forecast_lines
@@ -182,6 +183,33 @@ def test_why_a_folder_does_not_open_is_shown_and_videos_can_be_calibrated(open_p
     pilot.key(key.RETURN)
     assert pilot.sent(LookAtVideos) == [LookAtVideos(folder)]
     assert len(session.notices) == 0
+
+
+def test_files_outside_are_allowed_by_a_button_only(open_pilot: Callable[..., Pilot]) -> None:
+    session = FakeSession(has_capture=False)
+    pilot = open_pilot(session)
+    folder = Path("/videos/links")
+    session.opening.refused = RefusedFolder(folder, "'a%s' is a link that leads out.", "Copy.", needs_links=True)
+    pilot.draw(4)
+    pilot.key(key.RETURN)
+    assert pilot.sent(OpenCapture) == []
+    assert pilot.sent(CloseQuestion) == [CloseQuestion()]
+    session.opening.refused = RefusedFolder(folder, "'b%s' is a link that leads out.", "Copy.", needs_links=True)
+    pilot.draw(4)
+    pilot.click("refused.allow")
+    assert pilot.sent(OpenCapture) == [OpenCapture(folder, follow_links=True, is_asking=True)]
+    assert len(session.notices) == 0
+
+
+def test_findings_of_the_numbers_are_shown(asked: Pilot) -> None:
+    before = asked.studio.frame.ui.rects["opening.accept"]
+    finding = Finding("twins", "warning", ("50%s",), (), "50%s and a##b stand\nin one place.", 0.9, "Leave out %d.")
+    asked.session.opening.findings = (finding, replace(finding, severity="error"), replace(finding, severity="note"))
+    asked.draw(3)
+    rects = asked.studio.frame.ui.rects
+    assert rects["opening.accept"] == before
+    assert rects["opening.finding0"].y0 < rects["opening.finding1"].y0 < rects["opening.finding2"].y0
+    assert len(asked.session.notices) == 0
 
 
 VIDEOS = tuple(

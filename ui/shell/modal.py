@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from imgui_bundle import ImVec2, imgui
 
+MAX_TRIES = 8
+"""A dialog that comes up with the window is lost while panels find their places; it is opened so many times."""
+
 
 @dataclass(frozen=True, slots=True)
 class ModalKeys:
@@ -29,6 +32,7 @@ class Modal:
 
     def __init__(self) -> None:
         self._asked: object = None
+        self._n_tries = 0
 
     def begin(self, asked: object, title: str, size: tuple[float, float]) -> ModalKeys | None:
         """Begin the dialog of what is asked; None where it is not up.
@@ -42,6 +46,9 @@ class Modal:
         if asked is None:
             return None
         if is_new:
+            self._n_tries = 0
+        if is_new or (self._n_tries < MAX_TRIES and not imgui.is_popup_open(title)):
+            self._n_tries += 1
             imgui.open_popup(title)
         viewport = imgui.get_main_viewport()
         width, height = min(size[0], viewport.work_size.x - 24), min(size[1], viewport.work_size.y - 24)

@@ -5,21 +5,24 @@ Enter opens, Escape cancels; Tab and arrow keys move, Space switches.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.playback.arrays import Picture
 from app.project.capture_report import CaptureReport, RefusedFolder
-from app.session.commands import CloseQuestion, LookAtVideos, OpenCapture
+from app.session.commands import CloseQuestion, OpenCapture
 from app.session.questions import OpeningPage
+from engine.doctor.finding import Finding
 from ui.gl import ImageTexture
+from ui.panels.doctor.words import SEVERITY_ICONS, severity_color
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.thumbnails import crop_to
 from ui.panels.widgets import elided, elided_path, pop_bold, primary_button, push_bold, text_wrapped, text_wrapped_dim
 from ui.shell.modal import Modal
 from ui.shell.opening_answers_form import AnswersForm, ForecastNeeds
+from ui.shell.refused_folder import draw_refused
 from ui.style import theme
 from ui.style.theme import Icon
 
@@ -31,7 +34,9 @@ BUTTON = ImVec2(150, 34)
 LEAST_PICTURE_WIDTH, PICTURE_SHAPE = 120.0, 0.62
 """Of the small pictures: units, and height by width."""
 WORD_WIDTH = 92.0
-MAX_NAMED = 4
+INDENT = 23.0
+"""Of what belongs to words behind a sign."""
+MORE = 'Once it is open, "Examine the capture" looks at the pictures, too.'
 
 
 class OpeningNeeds(ForecastNeeds, Protocol):
@@ -45,6 +50,9 @@ class OpeningNeeds(ForecastNeeds, Protocol):
 
     @property
     def pictures(self) -> Mapping[int, Picture]: ...
+
+    @property
+    def findings(self) -> Sequence[Finding] | None: ...
 
 
 class HasOpening(Protocol):
@@ -92,7 +100,7 @@ class OpeningDialog:
         if isinstance(shown, OpeningPage):
             answer = self._draw_page(shown, opening, ui, is_agreed=keys.is_agreed)
         else:
-            answer = _draw_refused(shown, ui, is_agreed=keys.is_agreed)
+            answer = draw_refused(shown, ui, is_agreed=keys.is_agreed)
         if answer is None and (keys.is_left or keys.is_closed):
             answer = CloseQuestion()
         if answer is not None:
@@ -108,7 +116,7 @@ class OpeningDialog:
         height = -(BUTTON.y + 18)
         flags = imgui.ChildFlags_.nav_flattened
         if imgui.begin_child("report", ImVec2(-FORM_WIDTH - 14, height), flags):
-            self._draw_report(page.report, opening.pictures, ui)
+            self._draw_report(page.report, opening, ui)
         imgui.end_child()
         imgui.same_line(0, 14)
         if imgui.begin_child("form", ImVec2(0, height), flags):
@@ -140,7 +148,7 @@ class OpeningDialog:
             )
         return None
 
-    def _draw_report(self, report: CaptureReport, pictures: Mapping[int, Picture], ui: UiState) -> None:
+    def _draw_report(self, report: CaptureReport, opening: OpeningNeeds, ui: UiState) -> None:
         width = imgui.get_content_region_avail().x
         push_bold(ui, ui.fonts.body_size + 2)
         imgui.text(elided(report.path.name or str(report.path), width))
@@ -155,8 +163,9 @@ class OpeningDialog:
             imgui.text_colored(ImVec4(*theme.ORANGE), Icon.WARNING)
             imgui.same_line()
             text_wrapped(sentence)
+        _draw_findings(opening.findings, ui)
         imgui.spacing()
-        self._draw_pictures(report, pictures, ui)
+        self._draw_pictures(report, opening.pictures, ui)
 
     def _draw_pictures(self, report: CaptureReport, pictures: Mapping[int, Picture], ui: UiState) -> None:
         """What each camera took first, side by side."""
@@ -199,51 +208,16 @@ class OpeningDialog:
         return self._textures.get(row)
 
 
-def _draw_refused(found: RefusedFolder, ui: UiState, *, is_agreed: bool) -> CloseQuestion | LookAtVideos | None:
-    width = imgui.get_content_region_avail().x
-    if imgui.begin_child("why", ImVec2(0, -(BUTTON.y + 18)), imgui.ChildFlags_.nav_flattened):
-        push_bold(ui, ui.fonts.body_size + 2)
-        imgui.text(elided(found.path.name or str(found.path), width))
-        pop_bold(ui)
-        imgui.text_disabled(elided_path(str(found.path), width))
-        imgui.spacing()
-        imgui.text_colored(ImVec4(*theme.ORANGE), Icon.WARNING)
+def _draw_findings(findings: Sequence[Finding] | None, ui: UiState) -> None:
+    """What is wrong as far as numbers tell, and what to do; nothing before that is known."""
+    if findings is None:
+        return
+    for index, finding in enumerate(findings):
+        imgui.text_colored(ImVec4(*severity_color(finding.severity)), SEVERITY_ICONS[finding.severity])
         imgui.same_line()
-        text_wrapped(found.message)
-        if found.hint:
-            text_wrapped_dim(found.hint)
-        imgui.spacing()
-        if found.videos:
-            names = ", ".join(video.name for video in found.videos[:MAX_NAMED])
-            more = ", ..." if len(found.videos) > MAX_NAMED else ""
-            text_wrapped(
-                f"There are {len(found.videos)} videos in it ({names}{more}). If each is of one camera of the same "
-                "scene, where the cameras stood can be found from the pictures: calibrate them."
-            )
-        for message, hint in found.problems:
-            imgui.bullet()
-            text_wrapped(message)
-            if hint:
-                text_wrapped_dim(hint)
-    imgui.end_child()
-    imgui.separator()
-    is_copied = imgui.button(f"{Icon.COPY}  Copy", ImVec2(0, BUTTON.y))
-    ui.mark("refused.copy")
-    if is_copied and not is_agreed:
-        imgui.set_clipboard_text(found.text)
-    n_buttons = 2 if found.videos else 1
-    imgui.same_line(imgui.get_window_width() - n_buttons * (BUTTON.x + 8) - 6)
-    if not found.videos:
-        is_closed = primary_button("Close", BUTTON, ui)
-        ui.mark("refused.close")
-        imgui.set_item_default_focus()
-        return CloseQuestion() if is_closed or is_agreed else None
-    is_closed = imgui.button("Close", BUTTON)
-    ui.mark("refused.close")
-    imgui.same_line()
-    is_chosen = primary_button("Calibrate ...", BUTTON, ui)
-    ui.mark("refused.calibrate")
-    imgui.set_item_default_focus()
-    if is_closed:
-        return CloseQuestion()
-    return LookAtVideos(found.path) if is_chosen or is_agreed else None
+        text_wrapped(finding.text)
+        ui.mark(f"opening.finding{index}")
+        imgui.indent(INDENT)
+        text_wrapped_dim(finding.advice)
+        imgui.unindent(INDENT)
+    text_wrapped_dim(MORE if findings else f"Nothing odd in the numbers. {MORE}")

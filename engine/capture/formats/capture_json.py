@@ -15,7 +15,8 @@ import numpy as np
 from msgspec import Meta
 
 from engine.camera.lens import PARAMETER_NAMES, Lens, LensModel
-from engine.capture.assembling import DescribedCamera, assemble
+from engine.capture.assembling import assemble
+from engine.capture.described_camera import DescribedCamera
 from engine.capture.format_checks import check_fps, is_name, parse_matrix, read_json_object
 from engine.capture.format_result import MATCH, Layout, Probe
 from engine.capture.frame_files import image_files
@@ -149,7 +150,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
         try:
             cameras.append(_described(entry, document, folder, follow_links=follow_links))
         except CaptureError as error:
-            problems.append(CaptureError(f'Camera "{entry.name}": {error.message}', hint=error.hint, path=error.path))
+            problems.append(error.said_of(f'Camera "{entry.name}"'))
     if document.fps is not None:
         problems += check_fps(document.fps, path)
     points = None

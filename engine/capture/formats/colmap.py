@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from engine.capture.assembling import DescribedCamera, assemble
+from engine.capture.assembling import assemble
 from engine.capture.camera_files import find_camera_frames, missing_frames
 from engine.capture.colmap.model_cameras import ModelRig, find_model, read_rig
+from engine.capture.described_camera import DescribedCamera
 from engine.capture.format_checks import shortened
 from engine.capture.format_result import MATCH, Layout, Probe
 from engine.capture.frame_files import Files

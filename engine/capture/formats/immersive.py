@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from engine.camera.lens import Lens
-from engine.capture.assembling import DescribedCamera, assemble
+from engine.capture.assembling import assemble
+from engine.capture.described_camera import DescribedCamera
 from engine.capture.findings import Findings
 from engine.capture.format_checks import is_name, parse_matrix, parse_size, read_json_list, size_problem
 from engine.capture.format_result import MATCH, Layout, Probe

@@ -68,8 +68,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
                 raise CaptureError("There is no folder of its frames.", hint=hint, path=rig.said_in)
             files[camera.name] = frames_in_folder(folder, directory, follow_links=follow_links, named_in=rig.said_in)
         except CaptureError as error:
-            text = f"Camera {shown(camera.name)}: {error.message}"
-            rig.problems.append(CaptureError(text, hint=error.hint, path=error.path))
+            rig.problems.append(error.said_of(f"Camera {shown(camera.name)}"))
     counts = {name: len(paths) for name, paths in files.items() if isinstance(paths, list)}
     rig.problems.extend(check_equal_counts(counts, {name: folder / folder_of[name] for name in counts}))
     left_over = [name for name in folders if name not in folder_of.values()]

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.capture.assembling import DescribedCamera, assemble
+from engine.capture.assembling import assemble
+from engine.capture.described_camera import DescribedCamera
 from engine.capture.format_checks import check_equal_counts, parse_size, size_problem
 from engine.capture.format_result import MATCH, Layout, Probe
 from engine.capture.frame_files import (
@@ -83,7 +84,7 @@ def read(folder: Path, *, follow_links: bool = False) -> Layout:
             files = _files(folder, relative, kind, follow_links=follow_links)
             cameras.append(_described(name, row, files, path))
         except CaptureError as error:
-            problems.append(CaptureError(f"Camera {shown(name)}: {error.message}", hint=error.hint, path=error.path))
+            problems.append(error.said_of(f"Camera {shown(name)}"))
             continue
         if isinstance(files, list):
             counts[name] = len(files)

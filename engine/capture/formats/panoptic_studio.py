@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from engine.capture.assembling import DescribedCamera, assemble
+from engine.capture.assembling import assemble
+from engine.capture.described_camera import DescribedCamera
 from engine.capture.findings import Findings
 from engine.capture.format_checks import (
     is_name,

@@ -193,7 +193,7 @@ def _read_camera(index: int, row: Any, reading: _Reading) -> CameraEntry | None:
         is_turned = is_turned_as_calibrated(header, size)
         found += check_image_size(name, header.size if is_turned else header.stored_size, size, place)
     except CaptureError as error:
-        found.append(CaptureError(f'Camera "{name}": {error.message}', hint=error.hint, path=error.path))
+        found.append(error.said_of(f'Camera "{name}"'))
     reading.problems += found
     if K is None or world_to_camera is None or header is None:
         return None

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from engine.capture.assembling import DescribedCamera, assemble
+from engine.capture.assembling import assemble
+from engine.capture.described_camera import DescribedCamera
 from engine.capture.findings import Findings
 from engine.capture.format_checks import check_equal_counts, shortened
 from engine.capture.format_result import MATCH, Layout, Probe

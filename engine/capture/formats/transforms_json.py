@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from engine.capture.assembling import DescribedCamera, assemble
+from engine.capture.assembling import assemble
+from engine.capture.described_camera import DescribedCamera
 from engine.capture.findings import Findings
 from engine.capture.format_checks import check_fps, parse_matrix, parse_size, read_json_object, size_problem
 from engine.capture.format_result import MATCH, Layout, Probe

@@ -16,6 +16,7 @@ import torch
 from torch import nn
 
 from engine.backends.backend import Backend
+from engine.capture.came_along import came_along
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import Coverage
@@ -230,7 +231,7 @@ class ClipPreparation:
             "capture": self._capture.part_key,
             "size": [int(side) for side in self._rig.image_sizes[0]],
             "cameras": list(self._rig.names),
-            "has_masks": list(self._capture.has_masks),
+            "came_along": came_along(self._capture.layout),
             "frames": [self._clip.start, self._clip.n_frames, self._clip.clip_length],
             "config": self._config.difference(),
             "regions": [region.as_dict() for region in self._regions],

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from engine.camera.rig import CameraRig
+from engine.capture.came_along import came_along
 from engine.capture.capture import Capture
 from engine.capture.format_result import Layout
 from engine.capture.points import points_of
@@ -364,8 +365,7 @@ def moving_cloud(
 def key_of_corrected(capture: Capture, camera_indices: Sequence[int], config: TrainConfig) -> dict:
     """What corrected backgrounds belong to, as `write_backgrounds` keeps it beside them."""
     rig = capture.rig.subset(list(camera_indices))
-    masked = [name for name, has in zip(capture.rig.names, capture.has_masks, strict=True) if has]
-    return ({"masks": masked} if masked else {}) | {
+    return came_along(capture.layout) | {
         "capture": capture.part_key,
         "cameras": list(rig.names),
         "size": [int(side) for side in rig.image_sizes[0]],

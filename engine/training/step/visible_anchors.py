@@ -9,7 +9,7 @@ from torch import Tensor
 
 from engine.camera.rig import CameraRig
 from engine.model.clip_model import ClipModel
-from engine.model.clip_view import View
+from engine.model.clip_view import View, reaches
 
 
 def camera_views(rig: CameraRig, *, near_plane: float) -> list[View]:
@@ -27,7 +27,7 @@ class Sight:
     Args:
         model: Its sets must stay as they are; another one is needed where anchors come, go or become dynamic.
         views: Of the training cameras.
-        reach: How far beyond its anchor a Gaussian may lie, scene units.
+        reach: How far beyond its anchor a Gaussian may lie, scene units; farther where anchors are larger.
     """
 
     def __init__(self, model: ClipModel, views: Sequence[View], *, reach: float) -> None:
@@ -41,7 +41,8 @@ class Sight:
         for role in self._model.roles():
             key, anchors = (role, camera_row), self._model.anchor_set(role)
             if key not in self._seen:
-                is_seen = self._views[camera_row].sees(anchors.positions, reach=self._reach)
+                reach = reaches(anchors, self._reach)
+                is_seen = self._views[camera_row].sees(anchors.positions, reach=reach)
                 self._seen[key] = is_seen if anchors.is_dynamic else is_seen.nonzero()[:, 0]
             rows[role] = self._seen[key]
             if anchors.presence is not None:

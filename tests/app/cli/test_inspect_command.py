@@ -7,6 +7,8 @@ import shutil
 
 import pytest
 
+from app.project.capture_report import report_of
+from engine.capture.capture import open_capture
 from engine.clip_files.clip_state import read_clip_state, write_clip_state
 from tests.clip_headers import with_header
 
@@ -18,7 +20,8 @@ def test_inspecting_prints_stable_json(run, capture_folder):
     assert (document["schema"], document["n_cameras"], document["n_frames"]) == (1, 4, 6)
     code, out, _ = run("inspect", capture_folder, "--quick")
     assert code == 0
-    assert "4 cameras, 6 frames" in out
+    assert report_of(open_capture(capture_folder)).text in out  # as the window says it
+    assert "Cameras: 4 cameras, 32 x 24" in out
 
 
 def test_inspecting_a_project_counts_the_bytes_of_its_clips(run, capture_folder, tmp_path):

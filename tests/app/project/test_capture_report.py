@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import pickle
 from pathlib import Path
 
 import pytest
 
 from app.project.capture_report import refusal_of, report_of
 from engine.capture.capture import open_capture
-from engine.errors import CaptureError
+from engine.errors import CaptureError, OutsideError
 from tests.app.fakes import write_capture
 
 
@@ -25,7 +26,7 @@ def test_a_report_says_what_there_is(capture_folder):
     assert rows["Cameras"] == "4 cameras, 32 x 24"
     assert rows["Frames"] == "6 at 30 per second (0.2 s)"
     assert rows["Lenses"] == "no distortion; 56 degrees wide"
-    assert rows["Came along"] == "no masks, no point cloud"
+    assert rows["Came along"] == "no masks, no point cloud; neither is needed"
     assert [camera.is_default_holdout for camera in report.cameras] == [True, False, False, False]
     assert report.up == pytest.approx([0, 0, 1], abs=1e-6)
     assert all(camera.center @ camera.forward < 0 for camera in report.cameras)
@@ -63,3 +64,15 @@ def test_a_folder_that_is_not_there(tmp_path):
     found = refusal_of(tmp_path / "gone", refused(tmp_path / "gone"))
     assert found.message == "There is no such folder."
     assert found.videos == ()
+
+
+def test_what_lies_outside_may_be_allowed_unless_more_is_wrong(tmp_path):
+    outside = OutsideError("'a' is a link.", hint="Use --follow-links.", path=tmp_path / "a")
+    assert refusal_of(tmp_path, outside).needs_links
+    both = CaptureError("2 problems.", path=tmp_path, problems=(outside, outside))
+    found = refusal_of(tmp_path, pickle.loads(pickle.dumps(both)))
+    assert found.needs_links
+    assert "--follow-links" not in found.text
+    assert [message for message, _ in found.problems] == ["'a' is a link."] * 2
+    mixed = CaptureError("2 problems.", path=tmp_path, problems=(outside, CaptureError("The file is missing.")))
+    assert not refusal_of(tmp_path, mixed).needs_links

@@ -26,6 +26,7 @@ def test_a_capture_is_reported_and_nothing_is_made_before_the_answer(make_sessio
     assert not (tmp_path / "p").exists()
     poll_until(session, lambda: len(session.opening.pictures) == 4, what="pictures of all cameras")
     assert session.opening.pictures[2].image.shape == (24, 32, 3)
+    assert "hold out" not in [finding.kind for finding in session.opening.findings]  # that is asked beside it
     session.dispatch(c.CloseQuestion())
     assert session.opening.page is None
     assert session.opening.pictures == {}
@@ -114,3 +115,18 @@ def test_answers_that_are_not_possible_are_told_and_nothing_is_made(make_session
     poll_until(session, lambda: len(session.notices) > 0)
     assert "leaves 1 for training" in session.notices[0].detail
     assert not (tmp_path / "p").exists()
+
+
+def test_links_that_lead_outside_are_followed_once_they_are_allowed(make_session, capture_folder, tmp_path):
+    session = make_session(is_open=False)
+    folder = tmp_path / "linked"
+    shutil.copytree(capture_folder, folder)
+    (folder / "ims").rename(tmp_path / "another disk")
+    (folder / "ims").symlink_to(tmp_path / "another disk")
+    session.dispatch(c.OpenCapture(folder, is_asking=True))
+    poll_until(session, lambda: session.opening.refused is not None)
+    assert session.opening.refused.needs_links
+    session.dispatch(c.OpenCapture(folder, follow_links=True, is_asking=True))
+    poll_until(session, lambda: session.opening.page is not None)
+    assert session.opening.refused is None
+    assert session.opening.page.follow_links

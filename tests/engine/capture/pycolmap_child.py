@@ -32,12 +32,12 @@ def write_model(folder: Path) -> None:
                 params[row] = 0.8
             elif parameter not in ("f", "fx"):
                 params[row] = generator.uniform(-0.02, 0.02)
-        camera.params = params
+        camera.params = params.tolist()
         reconstruction.add_camera_with_trivial_rig(camera)
         axis = generator.uniform(-0.4, 0.4, 3)
         pose = pycolmap.Rigid3d(pycolmap.Rotation3d(axis), np.array([0.1, -0.2, 3.0 + 0.1 * number]))
         image = pycolmap.Image(name=f"{name}.png", image_id=number, camera_id=number)
-        image.points2D = [pycolmap.Point2D(np.array([1.0, 2.0]))] * (10 + number)
+        image.points2D = pycolmap.Point2DList([pycolmap.Point2D(np.array([1.0, 2.0]))] * (10 + number))
         reconstruction.add_image_with_trivial_frame(image, pose)
         image = reconstruction.image(number)
         expected[name] = [np.asarray(image.project_point(point)).tolist() for point in points]

@@ -88,6 +88,14 @@ def test_masks_follow_the_offset_of_their_camera(make_sample: MakeCapture) -> No
     assert np.array_equal(found, masks[2])
 
 
+def test_masks_are_counted_from_the_first_frame_that_is_worked_on(make_sample: MakeCapture) -> None:
+    folder = make_sample(n_cameras=3, n_frames=6)
+    masks = write_masks(folder, "cam01", n_frames=6, size=open_capture(folder).picture_size)
+    found = open_capture(folder, frames=(2, 5)).moving_mask(1, 1)
+    assert found is not None
+    assert np.array_equal(found, masks[3])
+
+
 def test_masks_that_do_not_fit_are_left_out_and_said(make_sample: MakeCapture) -> None:
     folder = make_sample(n_cameras=3, n_frames=4)
     width, height = open_capture(folder).picture_size

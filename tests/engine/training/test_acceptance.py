@@ -182,9 +182,9 @@ def test_6_a_still_scene_changes_at_the_border_about_as_much_as_inside_without_t
     """A smoke test, not the check itself: one border between two clips of about fifty steps.
 
     Without the gate what is still changes by what the field learned by chance: 0.1 to 0.7 of 255 from frame to frame,
-    a factor of four or more between pairs of one training. Border against the median pair inside was 1.49 and 1.36 in
-    the two cameras, 1.08 and 1.18 with another seed, so that a tighter bound would test the seed. What it does find
-    is a clip that looks different as a whole from the one before.
+    a factor of four or more between pairs of one training. Border against the median pair inside was 1.1 to 1.5 before
+    there were large Gaussians of a backdrop, which a fresh field moves all over the picture in so few steps; with
+    them it is 3.7 and 4.5, 2.2 of 255. What it does find is a clip that looks different as a whole from the one before.
     """
     pairs = flicker_of_still_clips(tiny, tmp_path, gate="off", joint_steps=40, source_steps=60)
     ratios = []
@@ -193,8 +193,8 @@ def test_6_a_still_scene_changes_at_the_border_about_as_much_as_inside_without_t
         border, inside = ([change for is_border, change in changes if is_border == wanted] for wanted in (True, False))
         assert (len(border), len(inside)) == (1, 6)
         ratios.append(border[0] / np.median(inside))
-    assert 0.7 < np.median(ratios) < 1.8
-    assert summarize(pairs)["means"]["all"]["boundary"]["change_static"] < 1 / 255
+    assert 0.7 < np.median(ratios) < 6.0
+    assert summarize(pairs)["means"]["all"]["boundary"]["change_static"] < 3 / 255
 
 
 def crooked_rig() -> CameraRig:
@@ -250,7 +250,7 @@ def write_as_panoptic(folder: Path, rig: CameraRig, n_frames: int) -> None:
 
 @pytest.mark.parametrize("layout", ["sample", "panoptic"])
 def test_7_a_rig_written_in_a_layout_that_is_read_comes_back_as_it_was(layout, tmp_path):
-    """Of poses_bounds and COLMAP files nothing is tested: their readers do not exist yet."""
+    """Other layouts: tests/engine/capture/test_same_in_every_layout.py."""
     rig = crooked_rig()
     {"sample": write_as_sample, "panoptic": write_as_panoptic}[layout](tmp_path, rig, 4)
     capture = open_capture(tmp_path)
@@ -258,14 +258,16 @@ def test_7_a_rig_written_in_a_layout_that_is_read_comes_back_as_it_was(layout, t
     assert capture.default_holdout == {"sample": (), "panoptic": ("10",)}[layout]  # the writer chooses none of three
     assert capture.rig.names == rig.names
     # no tolerance: JSON holds the shortest decimal that reads back as the same float64, and the readers change nothing
-    assert np.array_equal(capture.rig.Ks, rig.Ks)
-    assert np.array_equal(capture.rig.world_to_camera, rig.world_to_camera)
-    assert np.array_equal(capture.rig.image_sizes, rig.image_sizes)
+    assert np.array_equal(capture.native_rig.Ks, rig.Ks)
+    assert np.array_equal(capture.native_rig.world_to_camera, rig.world_to_camera)
+    assert np.array_equal(capture.native_rig.image_sizes, rig.image_sizes)
     for camera in range(3):
+        valid = capture.valid(camera)
         found = [capture.frame(camera, frame) for frame in range(4)]
-        assert [frame.shape[1::-1] for frame in found] == [tuple(rig.image_sizes[camera])] * 4
+        assert [frame.shape for frame in found] == [(30, 40, 3)] * 4  # the longer sides as that of the smallest
+        seen = [frame if valid is None else frame[valid] for frame in found]
         expected = [level(camera, frame) for frame in range(4)]
-        assert np.abs(np.array([frame.mean() for frame in found]) - expected).max() < 3  # codecs; others are 20 away
+        assert np.abs(np.array([part.mean() for part in seen]) - expected).max() < 3  # codecs; others are 20 away
 
 
 def test_8_a_reference_clip_shows_the_same_pixels_after_a_trip_to_the_disk(tiny, tmp_path):

@@ -71,12 +71,25 @@ def test_findings_offer_what_corrects_them(pilot: Pilot) -> None:
     assert isinstance(asked, commands.CorrectCapture)
     assert not asked.is_confirmed
     assert asked.corrections == found.findings[0].fix
+    pilot.click("doctor.calibrate")
+    assert pilot.session.commands[-1] == commands.LookAtVideos(pilot.session.capture.path)
+    assert "doctor.synchronise" not in rects
     pilot.click("doctor.picture1")
     assert pilot.session.commands[-2:] == [commands.SetFrame(3), commands.LookThrough(2)]
     pilot.click("doctor.finding1")
     pilot.draw(3)
     assert "doctor.fix" not in pilot.studio.frame.ui.rects
     assert not [notice for notice in pilot.session.notices if notice.kind == "error"]
+
+
+@pytest.mark.gl
+def test_cameras_out_of_step_lead_to_the_dialog_that_measures_them(pilot: Pilot) -> None:
+    name = pilot.session.rig.names[2]
+    late = Finding("synchronisation", "warning", (name,), (), f"{name} is late.", 0.9, "Shift it.", None)
+    open_panel(pilot, DoctorStatus("done", (late,), None, 1.0, revision=4))
+    pilot.click("doctor.synchronise")
+    assert pilot.session.commands[-1] == commands.SynchroniseCameras()
+    assert "doctor.calibrate" not in pilot.studio.frame.ui.rects
 
 
 def test_words_of_findings_do_not_depend_on_colours() -> None:

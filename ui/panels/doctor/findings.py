@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.session.commands import CorrectCapture, LookThrough, SetHoldout
+from app.session.commands import CorrectCapture, LookAtVideos, LookThrough, SetHoldout, SynchroniseCameras
 from engine.camera.rig import CameraRig
 from engine.doctor.finding import Finding
 from ui.panels.doctor.words import SEVERITY_ICONS, SEVERITY_WORDS, certainty_text, fix_words, severity_color
@@ -15,13 +16,26 @@ from ui.panels.widgets import text_wrapped_dim
 from ui.style import theme
 from ui.style.theme import Icon
 
+MISCALIBRATED = ("calibration", "focal length", "pose")
+OUT_OF_STEP = "synchronisation"
+"""Kinds of findings that a dialog of its own helps with."""
+
 
 def draw_findings(
-    findings: Sequence[Finding], chosen: int, rig: CameraRig, dispatch: Dispatch, ui: UiState, *, can_hold_out: bool
+    findings: Sequence[Finding],
+    chosen: int,
+    rig: CameraRig,
+    folder: Path,
+    dispatch: Dispatch,
+    ui: UiState,
+    *,
+    can_hold_out: bool,
 ) -> int:
     """One entry per finding; returns which one is chosen.
 
-    can_hold_out: The open project can take other held-out cameras itself, so that the capture need not change.
+    Args:
+        folder: Of the capture.
+        can_hold_out: The open project can take other held-out cameras itself, so that the capture need not change.
     """
     for index, finding in enumerate(findings):
         imgui.push_id(index)
@@ -40,32 +54,57 @@ def draw_findings(
         imgui.pop_text_wrap_pos()
         if index == chosen:
             text_wrapped_dim(finding.advice)
-            _draw_buttons(finding, rig, dispatch, ui, can_hold_out=can_hold_out)
+            _draw_buttons(finding, rig, folder, dispatch, ui, can_hold_out=can_hold_out)
         imgui.spacing()
         imgui.pop_id()
     return chosen
 
 
-def _draw_buttons(finding: Finding, rig: CameraRig, dispatch: Dispatch, ui: UiState, *, can_hold_out: bool) -> None:
-    fix = finding.fix
+def _draw_buttons(
+    finding: Finding, rig: CameraRig, folder: Path, dispatch: Dispatch, ui: UiState, *, can_hold_out: bool
+) -> None:
+    fix, row = finding.fix, _Row()
     if fix is not None:
         label, words = fix_words(fix)
-        if imgui.button(f"{Icon.CHECK}  {label}##fix"):
+        if row.button(f"{Icon.CHECK}  {label}##fix", words):
             if fix.holdout is not None and can_hold_out:
                 dispatch(SetHoldout(tuple(rig.names.index(name) for name in fix.holdout if name in rig.names)))
             else:
                 dispatch(CorrectCapture(fix, words))
         ui.mark("doctor.fix")
-        imgui.set_item_tooltip(_escaped(words))
-        imgui.same_line()
-    rows = [rig.names.index(name) for name in finding.cameras if name in rig.names]
-    if rows:
-        if imgui.button(f"{Icon.EYE}  Look through##look"):
-            dispatch(LookThrough(rows[0]))
+    if finding.kind in MISCALIBRATED:
+        if row.button(
+            f"{Icon.CAMERA}  Calibrate ...##calibrate", "Find where the cameras stand anew, from the pictures"
+        ):
+            dispatch(LookAtVideos(folder))
+        ui.mark("doctor.calibrate")
+    if finding.kind == OUT_OF_STEP:
+        if row.button(f"{Icon.CLOCK}  Synchronise ...##synchronise", "Measure all cameras, and see each offset"):
+            dispatch(SynchroniseCameras())
+        ui.mark("doctor.synchronise")
+    cameras = [rig.names.index(name) for name in finding.cameras if name in rig.names]
+    if cameras:
+        if row.button(f"{Icon.EYE}  Look through##look", f"Look through {rig.names[cameras[0]]}"):
+            dispatch(LookThrough(cameras[0]))
         ui.mark("doctor.look")
-        imgui.set_item_tooltip(_escaped(f"Look through {rig.names[rows[0]]}"))
-    else:
-        imgui.new_line()
+
+
+class _Row:
+    """Buttons side by side, in as many lines as they need."""
+
+    def __init__(self) -> None:
+        self._is_first = True
+
+    def button(self, label: str, tooltip: str) -> bool:
+        right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
+        style = imgui.get_style()
+        width = imgui.calc_text_size(label, hide_text_after_double_hash=True).x + 2 * style.frame_padding.x
+        if not self._is_first and imgui.get_item_rect_max().x + style.item_spacing.x + width <= right:
+            imgui.same_line()
+        self._is_first = False
+        is_clicked = imgui.button(label)
+        imgui.set_item_tooltip(_escaped(tooltip))
+        return is_clicked
 
 
 def _escaped(text: str) -> str:

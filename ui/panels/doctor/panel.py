@@ -15,6 +15,7 @@ from engine.camera.rig import CameraRig
 from engine.doctor.finding import Finding
 from engine.text import duration_text
 from ui.gl import ImageTexture
+from ui.panels.capture import CaptureFacts
 from ui.panels.doctor.camera_map import CameraPlan, camera_plan, draw_bars, draw_map, legend_text
 from ui.panels.doctor.evidence import Evidence
 from ui.panels.doctor.findings import draw_findings
@@ -40,7 +41,7 @@ class DoctorNeeds(ThumbnailNeeds, Protocol):
     """What this panel reads."""
 
     @property
-    def capture(self) -> object | None: ...
+    def capture(self) -> CaptureFacts | None: ...
 
     @property
     def project(self) -> Project | None: ...
@@ -140,9 +141,12 @@ class DoctorPanel:
             done = "Nothing is wrong with this capture, as far as can be seen."
             text_wrapped_dim("Nothing odd so far." if status.diagnosis is None else done)
             return
-        project = session.project
+        project, capture = session.project, session.capture
+        assert capture is not None
         can_hold_out = project is not None and not project.has_progress
-        self._chosen = draw_findings(status.findings, self._chosen, rig, dispatch, ui, can_hold_out=can_hold_out)
+        self._chosen = draw_findings(
+            status.findings, self._chosen, rig, capture.path, dispatch, ui, can_hold_out=can_hold_out
+        )
 
     def _draw_evidence(
         self, session: DoctorNeeds, chosen: Finding | None, rig: CameraRig, dispatch: Dispatch, ui: UiState

@@ -110,6 +110,7 @@ def test_the_preparation_uses_them_and_says_so(
             cloud_preparation.static_cloud(
                 Backgrounds(room.images, room.is_stable),
                 room.rig,
+                None,
                 TrainConfig(),
                 lambda progress: said.append(getattr(progress, "message", "")),
                 layout=layout,
