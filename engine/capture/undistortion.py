@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from engine.camera.lens import Lens
-from engine.images.remap import remap
 
 FISHEYE_FOV_DEG = 110.0
 """Width of view that pictures of a fisheye are brought to, unless the capture says another: at 110 degrees the border
@@ -64,6 +63,8 @@ class Undistortion:
 
     def apply(self, image: np.ndarray) -> np.ndarray:
         """A stored picture [H, W, 3] uint8 as a pinhole picture [new H, new W, 3] uint8, black where not valid."""
+        from engine.images.remap import remap  # numba: only whoever decodes pictures of a lens needs it
+
         valid = self.valid()
         with self._lock:
             lattice = self._made.get("lattice")

@@ -17,6 +17,7 @@ _VALUES = {
     "bool": st.booleans(),
     "int | None": st.none() | st.integers(-255, 255),
     "float | None": st.none() | st.floats(allow_nan=False),
+    "tuple[int, int] | None": st.none() | st.tuples(st.integers(0, 100), st.integers(0, 100)),
     "tuple[int, ...]": st.lists(st.integers(0, 100), max_size=5).map(tuple),
     "dict[str, SettingValue]": st.dictionaries(
         st.text(), st.integers() | st.text() | st.floats(allow_nan=False), max_size=4

@@ -115,4 +115,6 @@ def test_no_point_of_the_static_cloud_comes_from_pixels_that_are_not_valid() -> 
         x, y = np.floor(pixels).astype(int).T
         inside = (depths > 0) & (x >= 0) & (y >= 0) & (x < 160) & (y < 120)
         is_seen[inside] |= is_valid[camera, y[inside], x[inside]]
-    assert is_seen.mean() > 0.995
+    is_measured = cloud.sizes <= 1.001 * cloud.spacing  # the others continue surfaces to where no camera looks
+    assert is_measured.mean() > 0.7
+    assert is_seen[is_measured].mean() > 0.995

@@ -172,6 +172,9 @@ class _Pixels:
     def valid(self, camera_index: int) -> None:
         """All pixels are."""
 
+    def moving_mask(self, camera_index: int, frame_index: int) -> None:
+        """Nobody painted any."""
+
     def close(self) -> None:
         pass
 

@@ -94,7 +94,7 @@ def test_loss_and_gradient_are_those_of_the_whole_picture_up_to_a_constant(half)
         take_steps(training, 3)
         training._order = ShuffledOrder(len(training.pictures), training.seed)  # the first picture again
         changes[tiles] = training.step().loss - first
-    assert abs(changes["all"]) > 1e-4
+    assert abs(changes["all"]) > 5e-5  # far more than what is tolerated below
     # the mask may change with what is learned, and with it the constant: four steps leave it as it is here
     assert changes["active"] == pytest.approx(changes["all"], abs=2e-6)
 
