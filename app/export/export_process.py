@@ -36,7 +36,7 @@ logger = logging.getLogger(__name__)
 
 LISTEN_S = 0.1
 GRACE_S = 6.0
-"""A process that was cancelled tidies up for so long before it is killed: a clip that is being loaded is loaded first."""
+"""A process that was cancelled tidies up for so long before it is killed: what it loads just now is loaded first."""
 HINT = "Nothing was left of the export. Try again; the log may say more."
 
 
@@ -110,19 +110,22 @@ class ExportProcess:
         ending = self._listen()
         if ending is None:
             self.process.kill()
-        self.process.join()
-        self._sweep()
-        self._commands.close()
-        self._events.close()
-        if ending is None:
+            self.process.join()
+            self._sweep()
             ending = ExportStopped() if self._is_unwanted.is_set() else self._death()
         self._news.put(ending)
+        self._commands.close()
+        self._events.close()
+        self.process.join()
 
     def _listen(self) -> Ending | None:
         """Pass on what the process says until it ends; None where it did not say how."""
         cancelled_s: float | None = None
+        has_begun = False
         while True:
             if self._is_unwanted.is_set():
+                if not has_begun:  # it is still being loaded, and has written nothing
+                    return None
                 if cancelled_s is None:
                     cancelled_s = time.monotonic()
                     with suppress(OSError):
@@ -135,6 +138,7 @@ class ExportProcess:
                 event = decode_event(self._events.recv_bytes())
             except (EOFError, OSError, msgspec.DecodeError):
                 return None
+            has_begun = True
             if not isinstance(event, ExportGoesOn):
                 return event
             self._news.put(event)

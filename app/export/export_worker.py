@@ -11,7 +11,6 @@ import signal
 import time
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from pathlib import Path
 
 from app.background.kernels import use_threads
 from app.background.logs import start_logging
@@ -24,8 +23,8 @@ from engine.kernels.cache import use_kernel_cache
 
 logger = logging.getLogger(__name__)
 
-TELL_EVERY_S = 0.1
-"""Nobody reads faster."""
+TELL_EVERY_S = 0.25
+"""Nobody reads faster, and each time the window is drawn, which takes cores where there is no graphics processor."""
 
 
 def main(task: ExportTask, commands: Connection, events: Connection) -> None:

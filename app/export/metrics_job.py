@@ -209,9 +209,7 @@ def _write_json(chosen: _Chosen, file: TextIO, report: Report) -> None:
         "reference_clip": settings.reference_clip,
         "untrained_clips": chosen.untrained,
         "settings": msgspec.to_builtins(settings.config()),
-        "columns": {
-            column.name: {"unit": column.unit, "definition": column.definition} for column in COLUMNS.values()
-        },
+        "columns": {column.name: {"unit": column.unit, "definition": column.definition} for column in COLUMNS.values()},
     }
     file.write(json_text(head)[:-1] + ', "clips": [')
     for place, (clip_index, rows, pairs) in enumerate(_clips(chosen, report)):

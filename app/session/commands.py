@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.calibration.job import CalibrationRequest
+from app.export.export_choices import ExportChoices
 from app.project.opening_answers import OpeningAnswers
 from engine.capture.writers.capture_json import Corrections
 
@@ -391,6 +392,65 @@ SynchronisationCommand = SynchroniseCameras | ApplyOffsets
 CalibrationCommand = LookAtVideos | CalibrateVideos | StopCalibration
 """From plain videos to a capture."""
 
+
+@dataclass(frozen=True, slots=True)
+class AskExport:
+    """Ask what of the open project is to be exported, and where."""
+
+
+@dataclass(frozen=True, slots=True)
+class StartExport:
+    """Put an export into the queue."""
+
+    choices: ExportChoices
+
+
+@dataclass(frozen=True, slots=True)
+class CancelExport:
+    """End an export; what it began to write disappears."""
+
+    export_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class RetryExport:
+    """Begin an export anew that failed or was cancelled."""
+
+    export_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class MoveExport:
+    """Bring an export that waits to a place among those that wait."""
+
+    export_id: int
+    place: int
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveExport:
+    """Take an export that does not run out of the list; what it has written stays."""
+
+    export_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class ClearExports:
+    """Take all exports that have ended out of the list; what they have written stays."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShowExport:
+    """Show what an export has written in the system's file manager."""
+
+    export_id: int
+
+
+ExportCommand = (
+    AskExport | StartExport | CancelExport | RetryExport | MoveExport | RemoveExport | ClearExports | ShowExport
+)
+"""What leaves the project for other programs."""
+
 Command = (
     OpenCapture
     | OpenProject
@@ -421,4 +481,5 @@ Command = (
     | ForgetRecent
     | DismissNotice
     | DoctorCommand
+    | ExportCommand
 )

@@ -38,6 +38,7 @@ from app.session.capture_doctor import CaptureDoctor
 from app.session.capture_opening import CaptureOpening
 from app.session.clip_versions import Versions
 from app.session.doctor_status import DoctorStatus
+from app.session.exporting import Exporting
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
@@ -90,6 +91,7 @@ class Session:
         opening: What is asked about a capture that has no project yet.
         calibrating: Plain videos on their way to a capture.
         synchronising: How far the cameras of the open capture are ahead of each other.
+        exporting: What leaves the project for other programs: what is asked, and the queue.
         recent: What was opened lately.
         doctor: What is wrong with the open capture, and what helps.
         notices: What the user has to know.
@@ -130,6 +132,7 @@ class Session:
         self.opening = CaptureOpening(can_measure=is_preloading)
         self._is_new_asked = False
         self.calibrating, self.synchronising = Calibrating(), Synchronising()
+        self.exporting = Exporting(self.notices, settings)
         self.live_training = LiveTraining(
             self._jobs,
             self.notices,
@@ -251,6 +254,9 @@ class Session:
                 self.opening.close_page()
                 self.calibrating.close_page()
                 self.synchronising.close_page()
+                self.exporting.close_page()
+            case _ if isinstance(command, commands.ExportCommand):
+                self._export(command)
             case commands.SynchroniseCameras():
                 self.synchronising.measure(self.opened)
             case commands.ApplyOffsets(target=target):
@@ -335,6 +341,28 @@ class Session:
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
+    def _export(self, command: commands.ExportCommand) -> None:
+        exporting, service = self.exporting, self.live_training.service
+        match command:
+            case commands.AskExport():
+                catalog = () if service is None else service.catalog
+                trained = tuple(i for i in range(len(catalog)) if catalog[i].state == "trained")
+                exporting.ask(self.opened, self.timeline, trained)
+            case commands.StartExport(choices=choices):
+                exporting.start(choices)
+            case commands.CancelExport(export_id=export_id):
+                exporting.cancel(export_id)
+            case commands.RetryExport(export_id=export_id):
+                exporting.retry(export_id)
+            case commands.MoveExport(export_id=export_id, place=place):
+                exporting.move(export_id, place)
+            case commands.RemoveExport(export_id=export_id):
+                exporting.remove(export_id)
+            case commands.ClearExports():
+                exporting.clear()
+            case commands.ShowExport(export_id=export_id):
+                exporting.show(export_id)
+
     def _change_settings(self, command: commands.SettingCommand) -> None:
         """Replace settings that every clip shares; only while nothing was learned with the old ones."""
         opened = self.opened
@@ -370,6 +398,7 @@ class Session:
         self.opening.close_page()
         self.calibrating.close_page()
         self.synchronising.close_page()
+        self.exporting.close_page()
         return known
 
     def _take_opened(self, found: Opened) -> None:
@@ -436,6 +465,7 @@ class Session:
         self._release_snapshot()
         has_changed |= bool(events) | self.marking.poll()
         is_training = self.live_training.is_busy and self.training.state != "paused"
+        has_changed |= self.exporting.poll(is_training=is_training)
         is_attended = self._attention.follow((self.view.look_key, self.timeline.frame_index))
         if self._is_preloading:
             self.residuals.look_at(self.timeline, self.view.look_through)
@@ -460,6 +490,7 @@ class Session:
             *self.opening.finished,
             *self.calibrating.finished,
             *self.synchronising.finished,
+            *self.exporting.finished,
             looked,
             jobs,
             self.notices.revision,
@@ -526,6 +557,7 @@ class Session:
         self.opening.close()
         self.calibrating.close()
         self.synchronising.close()
+        self.exporting.close()
         self.residuals.close()
         self.doctor.close()
         self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)

@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 
+from app.export.export_choices import ExportChoices
 from app.project.opening_answers import LastAnswers
 from app.project.recents import RecentProject, read_recents, recents_document, with_entry
 from app.training.messages import LIVE_VIEWS
@@ -19,6 +20,7 @@ from engine.user_folders import config_dir
 logger = logging.getLogger(__name__)
 
 MAX_BYTES = 1 << 20
+Value = TypeVar("Value")
 
 
 class Settings:
@@ -28,6 +30,7 @@ class Settings:
         recent: Projects that were opened lately, newest first.
         live_view: How often the clip that trains is shown anew: "off", "low" or "live".
         last_answers: What was answered when a capture was opened last.
+        last_export: What was chosen when something was exported last.
 
     Args:
         path: The file; the platform's place when None.
@@ -38,11 +41,17 @@ class Settings:
         document = _read(self.path)
         self.recent: list[RecentProject] = read_recents(document)
         self.live_view = found if (found := document.get("live_view")) in LIVE_VIEWS else "live"
-        self.last_answers = _last_answers(document.get("opening"))
+        self.last_answers = _taken(document.get("opening"), LastAnswers)
+        self.last_export = _taken(document.get("export"), ExportChoices)
 
     def set_last_answers(self, answers: LastAnswers) -> None:
         """Keep what was answered when a capture was opened."""
         self.last_answers = answers
+        self._save()
+
+    def set_last_export(self, choices: ExportChoices) -> None:
+        """Keep what was chosen when something was exported."""
+        self.last_export = choices
         self._save()
 
     def add_recent(self, entry: RecentProject) -> None:
@@ -65,18 +74,19 @@ class Settings:
     def _save(self) -> None:
         document = {"schema": 1, "live_view": self.live_view}
         document |= {"opening": msgspec.to_builtins(self.last_answers)} | recents_document(self.recent)
+        document["export"] = msgspec.to_builtins(self.last_export)
         try:
             write_checked_json(self.path, document)
         except OSError as error:
             logger.warning("preferences could not be saved (%s) - %s", error.strerror, self.path)
 
 
-def _last_answers(found: Any) -> LastAnswers:
+def _taken(found: Any, kind: type[Value]) -> Value:
     """The values of a document; the usual ones where they make no sense."""
     try:
-        return LastAnswers() if found is None else msgspec.convert(found, LastAnswers)
+        return kind() if found is None else msgspec.convert(found, kind)
     except msgspec.ValidationError:
-        return LastAnswers()
+        return kind()
 
 
 def _read(path: Path) -> dict[str, Any]:

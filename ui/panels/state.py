@@ -24,8 +24,8 @@ from ui.style.ui_scale import UiScale
 from ui.viewport.region_tool import RegionTool
 
 VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
-RESIDUALS, LOG, DOCTOR = "Residuals", "Log", "Capture doctor"
-PANELS = (CAPTURE, TRAINING, REGIONS, RESIDUALS, TIMELINE, LOG, DOCTOR)
+RESIDUALS, LOG, DOCTOR, EXPORTS = "Residuals", "Log", "Capture doctor", "Exports"
+PANELS = (CAPTURE, TRAINING, REGIONS, RESIDUALS, TIMELINE, LOG, DOCTOR, EXPORTS)
 """Titles of the panels around the picture."""
 LAYOUT_WORDS = {"Standard": "as in the beginning", "Long capture": "with a tall timeline, for long captures"}
 LAYOUTS = tuple(LAYOUT_WORDS)

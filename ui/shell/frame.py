@@ -23,6 +23,7 @@ from ui.panels.actions.key_map import KeyMap
 from ui.panels.actions.table import ACTIONS, handle_keys
 from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.doctor.panel import DoctorNeeds, DoctorPanel
+from ui.panels.exports import draw_exports
 from ui.panels.heat_overlay import HeatOverlay
 from ui.panels.log import LogNeeds, LogPanel
 from ui.panels.notices import NoticesNeeds, NoticesPanel
@@ -34,6 +35,7 @@ from ui.panels.residuals.panel import ResidualsNeeds, ResidualsPanel
 from ui.panels.state import (
     CAPTURE,
     DOCTOR,
+    EXPORTS,
     LAYOUTS,
     LOG,
     REGIONS,
@@ -51,6 +53,7 @@ from ui.panels.training import draw_training
 from ui.panels.viewport import ViewportNeeds, ViewportPanel
 from ui.shell.calibration_dialog import CalibrationDialog, HasCalibrating
 from ui.shell.dialogs import CALIBRATE, OPEN, OpenFolderDialog, draw_help
+from ui.shell.export_dialog import ExportDialog, HasExporting
 from ui.shell.imgui_backend import ImGuiBackend
 from ui.shell.layout import hold_sizes, is_laid_out, lay_out
 from ui.shell.layouts import Layouts
@@ -103,6 +106,7 @@ class FrameNeeds(
     LogNeeds,
     ResidualsNeeds,
     DoctorNeeds,
+    HasExporting,
     Protocol,
 ):
     """Everything that the window and its panels use of a session."""
@@ -173,6 +177,7 @@ class Frame:
         self.questions = QuestionDialogs()
         self.calibration = CalibrationDialog()
         self.synchronisation = SynchronisationDialog()
+        self.export = ExportDialog()
         self.opening = OpeningDialog(lambda: ImageTexture(ctx))
         self.palette = Palette()
         self.preferences = PreferencesDialog()
@@ -201,6 +206,7 @@ class Frame:
             (TIMELINE, draw_timeline, True),
             (LOG, self.log.draw, True),
             (DOCTOR, self.doctor.draw, True),
+            (EXPORTS, draw_exports, True),
             (VIEWPORT, self.viewport.draw, False),  # last: it shows what the others have just changed
         )
 
@@ -336,6 +342,7 @@ class Frame:
         self._guard("Opening", lambda: self.opening.draw(session, dispatch, ui))
         self._guard("Synchronisation", lambda: self.synchronisation.draw(session, dispatch, ui))
         self._guard("Calibration", lambda: self.calibration.draw(session, dispatch, ui))
+        self._guard("Export", lambda: self.export.draw(session, dispatch, ui))
         self._guard("Question", lambda: self.questions.draw(session, dispatch, ui))
         size = imgui.get_main_viewport().size
         whole = Rect(0.0, 0.0, size.x, size.y - STATUS_BAR_HEIGHT)

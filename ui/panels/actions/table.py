@@ -8,6 +8,7 @@ from ui.panels.actions import (
     bookmarks,
     compare,
     doctor,
+    exporting,
     heat,
     marking,
     modes,
@@ -34,6 +35,7 @@ ACTIONS: tuple[Action, ...] = (
     *marking.ACTIONS,
     *training.ACTIONS,
     *doctor.ACTIONS,
+    *exporting.ACTIONS,
     *window.ACTIONS,
 )
 

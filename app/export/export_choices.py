@@ -1,0 +1,96 @@
+"""ExportChoices: what a user chooses in the export dialog, as one value that is compared, sent and remembered."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+FramesChoice = Literal["all", "range", "clip", "frame"]
+FRAMES_CHOICES: tuple[FramesChoice, ...] = ("all", "range", "clip", "frame")
+Word = Annotated[str, Meta(max_length=400)]
+
+
+class ExportChoices(msgspec.Struct, frozen=True):
+    """The value.
+
+    Attributes:
+        kind: One of the kinds of app.export.export_jobs.
+        answers: Chosen values by "kind.option", of every kind that was looked at.
+        frames: All that are trained, those from in to out of the timeline, this clip, or this frame.
+        step: Every so many frames.
+        out: The file or folder that is written; empty to have one suggested.
+    """
+
+    kind: Word = "gaussians"
+    answers: tuple[tuple[Word, Word], ...] = ()
+    frames: FramesChoice = "all"
+    step: Annotated[int, Meta(ge=1, le=100_000)] = 1
+    out: str = ""
+
+    def answer(self, option: str, usual: str = "") -> str:
+        """What was chosen for an option of the present kind."""
+        return dict(self.answers).get(f"{self.kind}.{option}", usual)
+
+    def with_answer(self, option: str, value: str) -> ExportChoices:
+        """The same with another answer."""
+        answers = {**dict(self.answers), f"{self.kind}.{option}": value}
+        return msgspec.structs.replace(self, answers=tuple(answers.items()))
+
+    def changed(self, **values: object) -> ExportChoices:
+        """The same with other values."""
+        return msgspec.structs.replace(self, **values)
+
+
+class ExportContext(msgspec.Struct, frozen=True):
+    """What choices are made of: plain facts of the open project.
+
+    Attributes:
+        name: Of the project, as the user knows it.
+        n_frames: Of the capture, as far as it is worked on.
+        clips: First frame and the one after the last, of every clip.
+        trained: Which of them are finished.
+        frame_index: Where the playhead stands.
+        in_frame, out_frame: Of the timeline, both included.
+        cameras: Names.
+        paths: Names of the project's camera paths.
+        picture_size: Width and height of a capture camera's picture.
+        fps: Frames per second.
+    """
+
+    name: str
+    n_frames: int
+    clips: tuple[tuple[int, int], ...]
+    trained: tuple[int, ...]
+    frame_index: int
+    in_frame: int
+    out_frame: int
+    cameras: tuple[str, ...]
+    picture_size: tuple[int, int]
+    fps: float
+    paths: tuple[str, ...] = ()
+
+    def frames(self, choice: FramesChoice, step: int) -> range:
+        """The frames of a choice; none where there are none."""
+        if choice == "range":
+            return range(self.in_frame, self.out_frame + 1, step)
+        if choice == "frame":
+            return range(self.frame_index, self.frame_index + 1)
+        if choice == "clip":
+            found = [span for span in self.clips if span[0] <= self.frame_index < span[1]]
+        else:
+            found = [self.clips[index] for index in self.trained]
+        return range(found[0][0], found[-1][1], step) if found else range(0)
+
+    def untrained(self, frames: range) -> list[tuple[int, int]]:
+        """First and last frames of the runs of clips that are not trained and that some of the frames lie in."""
+        runs: list[tuple[int, int]] = []
+        for index, (start, stop) in enumerate(self.clips):
+            if index in self.trained or not any(frame in frames for frame in range(start, stop)):
+                continue
+            if runs and runs[-1][1] == start - 1:
+                runs[-1] = (runs[-1][0], stop - 1)
+            else:
+                runs.append((start, stop - 1))
+        return runs

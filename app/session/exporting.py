@@ -1,0 +1,248 @@
+"""Exporting: what is asked for in the export dialog, what would be written, and the queue of exports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from app.background.jobs import JobContext, Jobs
+from app.background.latest import LatestWorker
+from app.export.export_choices import ExportChoices, ExportContext
+from app.export.export_forms import FORMS, Answers
+from app.export.export_jobs import ExportTask
+from app.export.export_plan import ExportPlan, plan_export, suggested_out
+from app.export.export_process import Exporter, ExportProcess
+from app.export.export_queue import ExportQueue
+from app.export.export_status import ExportStatus
+from app.export.show_in_folder import show_in_folder
+from app.playback.timeline import Timeline
+from app.project.opened_project import OpenedProject
+from app.project.recents import project_name
+from app.session.notices import Notices
+from app.session.settings import Settings
+from engine.errors import EngineError, ProjectError
+
+if TYPE_CHECKING:
+    from app.evaluation.headless import TrainedProject
+
+
+@dataclass(frozen=True, slots=True)
+class ExportPage:
+    """What the dialog shows.
+
+    Attributes:
+        context: Of the open project, when the dialog was opened.
+        choices: What it begins with.
+    """
+
+    context: ExportContext
+    choices: ExportChoices
+
+
+class _Wish(NamedTuple):
+    """Of the worker; equal ones are looked at once."""
+
+    generation: int
+    context: ExportContext
+    choices: ExportChoices
+
+
+class Exporting:
+    """For one thread, which does not wait.
+
+    Attributes:
+        page: What is asked; None while nothing is.
+
+    Args:
+        notices: Told what failed.
+        settings: Keeps what was chosen last.
+        launch: Starts an export; a process by default.
+        show: Shows a file in the system's file manager; called on a thread.
+    """
+
+    def __init__(
+        self,
+        notices: Notices,
+        settings: Settings,
+        *,
+        launch: Callable[[ExportTask], Exporter] = ExportProcess,
+        show: Callable[[Path], None] = show_in_folder,
+    ) -> None:
+        self.page: ExportPage | None = None
+        self._notices, self._settings, self._show = notices, settings, show
+        self._queue = ExportQueue(launch=launch)
+        self._jobs = Jobs()
+        self._planner: LatestWorker[_Wish, ExportPlan] = LatestWorker("export plan", self._plan)
+        self._opened: OpenedProject | None = None
+        self._read: tuple[object, TrainedProject] | None = None  # belongs to the planner's thread
+        self._revision = 0
+
+    @property
+    def statuses(self) -> tuple[ExportStatus, ...]:
+        """The queue: what runs, what waits, what has ended."""
+        return self._queue.statuses
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether an export runs or waits."""
+        return self._queue.is_busy
+
+    @property
+    def finished(self) -> tuple[object, ...]:
+        """Differs whenever there is something else to show."""
+        return self._revision, self._queue.revision, self._planner.newest
+
+    # ---- the dialog
+
+    def ask(self, opened: OpenedProject | None, timeline: Timeline, trained: tuple[int, ...]) -> None:
+        """Open the dialog.
+
+        Raises:
+            ProjectError: Nothing is trained yet.
+        """
+        if opened is None:
+            return
+        if not trained:
+            raise ProjectError("There is nothing to export yet: no clip is trained.", hint="Train a clip first.")
+        context = _context(opened, timeline, trained)
+        last = self._settings.last_export
+        if last.kind not in FORMS:
+            last = last.changed(kind=next(iter(FORMS)))
+        self._opened = opened
+        self.page = ExportPage(context, last.changed(out=self.suggest(context, last)))
+        self._revision += 1
+
+    def suggest(self, context: ExportContext, choices: ExportChoices) -> str:
+        """A place for an export, beside the one before."""
+        last = self._settings.last_export.out
+        return suggested_out(str(Path(last).parent) if last else "", context, choices)
+
+    def plan(self, choices: ExportChoices) -> ExportPlan | None:
+        """What would be written; None until that was looked at."""
+        if self.page is None or self._opened is None:
+            return None
+        wish = _Wish(self._opened.generation, self.page.context, choices)
+        newest = self._planner.newest
+        if newest is not None and newest[0] == wish:
+            return newest[1]
+        if self._planner.has_failed(wish):
+            error = self._planner.take_error()
+            reason = "" if error is None else f": {error[1]}"
+            return ExportPlan(choices, problems=(f"This could not be looked at{reason}.",))
+        self._planner.request(wish)
+        return None
+
+    def close_page(self) -> None:
+        """Ask no more."""
+        if self.page is not None:
+            self.page = None
+            self._revision += 1
+
+    # ---- the queue
+
+    def start(self, choices: ExportChoices) -> None:
+        """Put an export into the queue, and remember what was chosen.
+
+        Raises:
+            ProjectError: It cannot be written.
+        """
+        page, opened = self.page, self._opened
+        if page is None or opened is None:
+            return
+        answers = Answers(page.context, choices)
+        capture = opened.capture
+        task = ExportTask(
+            kind=choices.kind,
+            job=FORMS[choices.kind].make_job(answers),
+            project=str(opened.project.folder.absolute()),
+            capture=str(Path(capture.path).absolute()),
+            scale=capture.scale,
+            frames=capture.frames,
+            follow_links=capture.follow_links,
+        )
+        self._queue.add(task, answers.title)
+        self._settings.set_last_export(choices)
+        self.close_page()
+
+    def cancel(self, export_id: int) -> None:
+        """See ExportQueue."""
+        self._queue.cancel(export_id)
+
+    def remove(self, export_id: int) -> None:
+        """See ExportQueue."""
+        self._queue.remove(export_id)
+
+    def clear(self) -> None:
+        """See ExportQueue."""
+        self._queue.clear()
+
+    def move(self, export_id: int, place: int) -> None:
+        """See ExportQueue."""
+        self._queue.move(export_id, place)
+
+    def retry(self, export_id: int) -> None:
+        """See ExportQueue."""
+        self._queue.retry(export_id)
+
+    def show(self, export_id: int) -> None:
+        """Show what was written in the system's file manager, which is opened on a thread."""
+        status = next((one for one in self.statuses if one.export_id == export_id), None)
+        if status is None or status.result is None:
+            return
+        path = status.result.path
+
+        def work(context: JobContext) -> None:
+            self._show(path)
+
+        def fail(error: Exception) -> None:
+            self._notices.add_failure("The folder could not be shown", error)
+
+        self._jobs.start("Show in folder", work, lambda _: None, fail)
+
+    def poll(self, *, is_training: bool) -> bool:
+        """Take in what was finished, and begin what is next. Whether anything changed."""
+        has_news = self._jobs.poll()
+        ended = self._queue.poll(n_threads=1 if is_training else None)
+        for status in ended:
+            if status.state == "failed":
+                self._notices.add("error", f"{status.title} was not exported", status.message, status.hint)
+        return bool(ended) or has_news
+
+    def close(self) -> None:
+        """End what runs; what it began to write disappears."""
+        self._queue.close()
+        self._jobs.close()
+        self._planner.close(timeout_s=0.5)
+
+    # ---- on the planner's thread
+
+    def _plan(self, wish: _Wish) -> ExportPlan:
+        from app.evaluation.headless import open_trained
+
+        opened, key = self._opened, (wish.generation, wish.context.trained)
+        assert opened is not None
+        if self._read is None or self._read[0] != key:
+            try:
+                self._read = key, open_trained(opened.project, opened.capture)
+            except EngineError as error:
+                return ExportPlan(wish.choices, problems=(str(error),))
+        return plan_export(self._read[1], wish.context, wish.choices)
+
+
+def _context(opened: OpenedProject, timeline: Timeline, trained: tuple[int, ...]) -> ExportContext:
+    capture = opened.capture
+    first, last = timeline.in_frame, timeline.out_frame
+    return ExportContext(
+        name=project_name(opened.project.folder.absolute(), opened.project.settings.capture),
+        n_frames=capture.n_frames,
+        clips=tuple((clip.start, clip.stop) for clip in opened.clips),
+        trained=trained,
+        frame_index=timeline.frame_index,
+        in_frame=0 if first is None else first,
+        out_frame=timeline.last_frame if last is None else last,
+        cameras=tuple(capture.rig.names),
+        picture_size=capture.picture_size,
+        fps=capture.fps,
+    )

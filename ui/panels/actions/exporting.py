@@ -1,0 +1,23 @@
+"""Actions of exports."""
+
+from __future__ import annotations
+
+from app.session.commands import AskExport
+from ui.panels.actions.action import WINDOW, Action, ActionNeeds
+from ui.panels.state import Dispatch, UiState
+
+
+def _export(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(AskExport())
+
+
+ACTIONS = (
+    Action(
+        "export.ask",
+        "Export: Gaussians, video, player, figures, cameras ...",
+        WINDOW,
+        _export,
+        keys=("Ctrl+E",),
+        menu="File",
+    ),
+)
