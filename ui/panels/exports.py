@@ -27,7 +27,10 @@ from ui.style.numbers import format_count
 from ui.style.theme import Icon
 
 REFRESH_S = 0.25
-BAR_HEIGHT = 6.0
+BAR_WIDTH = 220.0
+WIDE = 620.0
+"""In a panel at least so wide the buttons stand at the end of the first line."""
+BUTTONS_WIDTH = 250.0
 EMPTY = "What leaves the project for other programs is listed here: Gaussians, videos, a player, figures, cameras."
 
 
@@ -144,14 +147,22 @@ def draw_exports(session: ExportsNeeds, dispatch: Dispatch, ui: UiState) -> None
 
 def _draw_row(status: ExportStatus, waiting: list[int], ui: UiState) -> Command | None:
     width = imgui.get_content_region_avail().x
+    is_wide = width >= WIDE
     imgui.separator()
     imgui.text_colored(ImVec4(*_color(status)), _LOOKS[status.state])
     imgui.same_line()
     imgui.text(elided(status.title, width - 30))
     ui.mark(f"exports.title{status.export_id}")
+    path_width, command = width, None
+    if is_wide:
+        imgui.same_line(0, 16)
+        path_width = imgui.get_content_region_avail().x - BUTTONS_WIDTH - 16
     imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_DIM))
-    imgui.text(elided_path(one_line(str(status.path)), width))
+    imgui.text(elided_path(one_line(str(status.path)), path_width))
     imgui.pop_style_color()
+    if is_wide:
+        imgui.same_line(width - BUTTONS_WIDTH)
+        command = _draw_buttons(status, waiting, ui)
     if status.is_over:
         text_wrapped(ending_text(status))
         ui.mark(f"exports.ending{status.export_id}")
@@ -161,10 +172,11 @@ def _draw_row(status: ExportStatus, waiting: list[int], ui: UiState) -> Command 
             imgui.pop_style_color()
     else:
         if status.state != "waiting":
-            imgui.progress_bar(status.done, ImVec2(-1, BAR_HEIGHT), "")
+            imgui.progress_bar(status.done, ImVec2(BAR_WIDTH, imgui.get_text_line_height()), "")
+            imgui.same_line()
         text_wrapped(progress_text(status))
         ui.mark(f"exports.progress{status.export_id}")
-    return _draw_buttons(status, waiting, ui)
+    return command if is_wide else _draw_buttons(status, waiting, ui)
 
 
 def _draw_buttons(status: ExportStatus, waiting: list[int], ui: UiState) -> Command | None:

@@ -17,7 +17,6 @@ SMALLEST = {
     TRAINING: SIDE,
     REGIONS: SIDE,
     RESIDUALS: SIDE,
-    EXPORTS: SIDE,
     TIMELINE: (0.0, 140.0),
 }
 """Width and height of docked panels, units. The timeline has its buttons, ruler and bands at this height."""
@@ -29,7 +28,7 @@ WIDE_UNITS = 1240.0
 
 
 def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
-    """Capture left, training, regions, residuals and exports right, the others below, the picture in the rest.
+    """Capture left, training, regions and residuals right, the others below, the picture in the rest.
 
     Args:
         name: One of LAYOUTS; others are laid out as the first.
@@ -57,7 +56,7 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
         (TIMELINE, bottom),
         (LOG, bottom),
         (DOCTOR, bottom),
-        (EXPORTS, right),
+        (EXPORTS, bottom),
     ):
         internal.dock_builder_dock_window(title, node_id)
     node = internal.dock_builder_get_node(middle)  # it stays the central node: the one that gives way
