@@ -116,7 +116,10 @@ class ExportProcess:
         self._news.put(ending)
         self._commands.close()
         self._events.close()
-        self.process.join()
+        while self.process.is_alive():  # libraries are unloaded; nothing comes of it any more
+            if self._is_urgent.wait(LISTEN_S):
+                self.process.kill()
+            self.process.join(LISTEN_S)
 
     def _listen(self) -> Ending | None:
         """Pass on what the process says until it ends; None where it did not say how."""

@@ -1,0 +1,66 @@
+"""Cameras for other programs: read back by the readers of those layouts, they are the same."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.evaluation.headless import TrainedProject
+from app.export.cameras_job import CAMERAS_FORMATS, WORLD, CamerasJob, estimate, run
+from app.export.export_progress import ExportCancelled, ExportProgress
+from engine.capture.colmap.model_cameras import read_rig
+from engine.errors import ProjectError
+
+
+def nothing(progress: ExportProgress) -> None:
+    """For who does not look."""
+
+
+def test_colmap_has_the_same_cameras(opened: TrainedProject, tmp_path: Path):
+    result = run(opened, CamerasJob(tmp_path / "c"), nothing)
+    found = read_rig(tmp_path / "c" / "sparse" / "0").cameras
+    assert len(found) == 4
+    for entry, camera in zip(opened.capture.layout.cameras, found, strict=True):
+        np.testing.assert_allclose(camera.world_to_camera, entry.world_to_camera, atol=1e-12)
+        np.testing.assert_allclose(camera.K, entry.K, atol=1e-12)
+    assert WORLD in result.lines
+    assert result.n_files == 3
+
+
+def test_transforms_has_a_row_per_picture(opened: TrainedProject, tmp_path: Path):
+    run(opened, CamerasJob(tmp_path / "t", "transforms"), nothing)
+    found = json.loads((tmp_path / "t" / "transforms.json").read_text())
+    assert len(found["frames"]) == 4 * 6
+    flip = np.diag([1.0, -1.0, -1.0, 1.0])
+    camera_to_world = np.array(found["frames"][0]["transform_matrix"]) @ flip
+    expected = np.linalg.inv(opened.capture.layout.cameras[0].world_to_camera)
+    np.testing.assert_allclose(camera_to_world, expected, atol=1e-12)
+    pictures = [(tmp_path / "t" / row["file_path"]).resolve() for row in found["frames"]]
+    assert all(path.is_file() for path in pictures)
+
+
+@pytest.mark.parametrize("format_", CAMERAS_FORMATS)
+def test_the_estimate_tells_the_files(opened: TrainedProject, tmp_path: Path, format_):
+    job = CamerasJob(tmp_path / "c", format_)
+    guess, result = estimate(opened, job), run(opened, job, nothing)
+    assert guess.n_files == result.n_files
+    assert 0.3 < guess.n_bytes / result.n_bytes < 3
+
+
+def test_a_folder_that_is_taken_and_a_cancelled_export(opened: TrainedProject, tmp_path: Path):
+    taken = tmp_path / "taken"
+    taken.mkdir()
+    (taken / "a").write_text("a")
+    with pytest.raises(ProjectError, match="something under this name"):
+        run(opened, CamerasJob(taken), nothing)
+
+    def cancel(progress: ExportProgress) -> None:
+        raise ExportCancelled
+
+    (tmp_path / "out").mkdir()
+    with pytest.raises(ExportCancelled):
+        run(opened, CamerasJob(tmp_path / "out" / "new"), cancel)
+    assert list((tmp_path / "out").iterdir()) == []
