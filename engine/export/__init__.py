@@ -1,0 +1,1 @@
+"""Exports: Gaussians as files of other programs, as plain arrays."""
