@@ -1,1 +1,1 @@
-"""Exports: Gaussians as files of other programs, as plain arrays."""
+"""Export: scenes in the file formats of other programs."""
