@@ -1,4 +1,4 @@
-"""A codebook of 256 numbers for many: k-means along a line, on a histogram, so that it costs the same for any number."""
+"""256 numbers that stand for many: k-means along a line, on a histogram, so that it costs the same for any number."""
 
 from __future__ import annotations
 

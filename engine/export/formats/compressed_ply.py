@@ -1,4 +1,4 @@
-"""The compressed .ply of PlayCanvas: 16 bytes per Gaussian, counted from the smallest to the largest of 256 neighbours."""
+"""The compressed .ply of PlayCanvas: 16 bytes per Gaussian, between the smallest and the largest of 256 neighbours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A binary glTF with KHR_gaussian_splatting: floats as they are, and points of the same colours for programs without it.
+"""A binary glTF with KHR_gaussian_splatting: floats as they are, and points in the same colours for other programs.
 
 In glTF y is up, so the node is turned until what is up in the scene is; the numbers themselves stay as they are.
 """

@@ -10,6 +10,7 @@ from engine.export.formats.damaged import damaged
 from engine.export.packing import as_levels
 from engine.export.splats import Splats
 
+_NO_TURN = np.array([1.0, 0.0, 0.0, 0.0], np.float32)
 _ROW = np.dtype([("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("quat", "u1", 4)])
 
 
@@ -36,7 +37,7 @@ def read(file: BinaryIO) -> Splats:
     lengths = np.linalg.norm(quats, axis=1, keepdims=True)
     return Splats(
         means=rows["mean"],
-        quats=np.where(lengths > 0.0, quats / np.maximum(lengths, 1e-9), np.float32([1.0, 0.0, 0.0, 0.0])),
+        quats=np.where(lengths > 0.0, quats / np.maximum(lengths, 1e-9), _NO_TURN),
         scales=rows["scale"],
         opacities=rows["rgba"][:, 3].astype(np.float32) / 255.0,
         colors=rows["rgba"][:, :3].astype(np.float32) / 255.0,

@@ -1,7 +1,7 @@
 """The .spz of Niantic, version 3: about 20 bytes per Gaussian before zipping, which most programs read.
 
-Nothing in a file says how its axes lie. Niantic's own tools take x right, y up, z back; SuperSplat and most viewers take
-what is stored as they take a .ply. `engine.export.world` turns the scene for the former.
+Nothing in a file says how its axes lie. Niantic's own tools take x right, y up, z back; SuperSplat and most viewers
+take what is stored as they take a .ply. `engine.export.world` turns the scene for the former.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ _QUAT_TOP = 511
 _LEAST_BYTES = 20
 _MAX_BYTES = 1 << 32
 """Of an unzipped file that is read."""
+_MANY = 0.01
+"""Share of the sides of Gaussians that are too thin from which on it is worth a word."""
 LN_SCALES = (-10.0, 255.0 / 16.0 - 10.0)
 """Logarithms of scales that can be stored."""
 
@@ -59,7 +61,7 @@ def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
         file.write(zipper.compress(plane.astype(np.uint8).tobytes()))
     file.write(zipper.compress(rotations.astype("<u4").tobytes()))
     file.write(zipper.flush())
-    return _notes(bits, ln_scales)
+    return _notes(bits, ln_scales) if len(splats) else ()
 
 
 def read(file: BinaryIO) -> Splats:
@@ -119,10 +121,13 @@ def _notes(bits: int, ln_scales: np.ndarray) -> tuple[str, ...]:
         notes.append(
             f"Positions reach beyond what SPZ stores in steps of 1/4096 units; they are stored in steps of 1/{2**bits}."
         )
-    n_beyond = int(((ln_scales < LN_SCALES[0]) | (ln_scales > LN_SCALES[1])).any(1).sum())
-    if n_beyond:
-        low, high = np.exp(LN_SCALES)
+    low, high = np.exp(LN_SCALES)
+    if (ln_scales > LN_SCALES[1]).any():
         notes.append(
-            f"{n_beyond} Gaussians have a scale outside of {low:.2g} to {high:.3g} units, which SPZ stores as that."
+            f"Some Gaussians are larger than {high:.0f} units, the largest that SPZ stores; they have that size."
+        )
+    if (ln_scales < LN_SCALES[0]).mean() > _MANY:
+        notes.append(
+            f"Many Gaussians are thinner than {low:.2g} units, the least that SPZ stores; they have that size."
         )
     return tuple(notes)

@@ -40,14 +40,22 @@ FORMATS: dict[str, Format] = {
         compressed_ply.read,
     ),
     "spz": Format(
-        ".spz", "positions to 1/4096 unit, the rest to 6 to 10 bits; small, widely read", 38.0, 14.0, spz.write, spz.read
+        ".spz",
+        "positions to 1/4096 unit, the rest to 6 to 10 bits; small, widely read",
+        38.0,
+        14.0,
+        spz.write,
+        spz.read,
     ),
     "splat": Format(
-        ".splat", "positions and scales as they are, the rest to 8 bits; older viewers", 33.0, 32.0, splat.write, splat.read
+        ".splat",
+        "positions and scales as they are, the rest to 8 bits; older viewers",
+        33.0,
+        32.0,
+        splat.write,
+        splat.read,
     ),
-    "glb": Format(
-        ".glb", "everything as it is, as glTF with KHR_gaussian_splatting", 50.0, 60.0, glb.write, glb.read
-    ),
+    "glb": Format(".glb", "everything as it is, as glTF with KHR_gaussian_splatting", 50.0, 60.0, glb.write, glb.read),
     "sog": Format(
         ".sog", "pictures in a zip file; the smallest, for PlayCanvas and SuperSplat", 38.0, 12.0, sog.write, sog.read
     ),
