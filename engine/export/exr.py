@@ -1,7 +1,7 @@
 """OpenEXR: scan lines, ZIP compression, one part, any channels of half or single precision. Written, not read.
 
 Layout: https://openexr.com/en/latest/OpenEXRFileLayout.html. A file is a header of named attributes, a table with the
-place of every block, and blocks of 16 lines each. Within a line, channels follow each other in the order of their names.
+place of every block, and blocks of 16 lines each. Within a line, channels follow each other in order of their names.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-
 
 _MAGIC = b"\x76\x2f\x31\x01\x02\x00\x00\x00"
 """Magic number, and version 2 without flags: one part of scan lines, short names."""

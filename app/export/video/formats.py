@@ -26,9 +26,11 @@ class PictureFormat:
         video_codec: FFmpeg's encoder; None where none is needed.
         sound_codec: Likewise, for sound; None where the format holds none.
         can_be_transparent: Whether pictures keep their opacity.
+        bytes_per_pixel: About how large a picture becomes.
     """
 
     label: str
+    bytes_per_pixel: float
     suffixes: tuple[str, ...] = ()
     video_codec: str | None = None
     sound_codec: str | None = None
@@ -42,10 +44,10 @@ class PictureFormat:
 
 FORMATS = MappingProxyType(
     {
-        "mp4": PictureFormat("H.264 in mp4", (".mp4", ".m4v", ".mov"), "libx264", "aac"),
-        "webm": PictureFormat("VP9 in webm", (".webm",), "libvpx-vp9", "libopus", can_be_transparent=True),
-        "png": PictureFormat("PNG files", can_be_transparent=True),
-        "exr": PictureFormat("OpenEXR files", can_be_transparent=True),
+        "mp4": PictureFormat("H.264 in mp4", 0.1, (".mp4", ".m4v", ".mov"), "libx264", "aac"),
+        "webm": PictureFormat("VP9 in webm", 0.1, (".webm",), "libvpx-vp9", "libopus", can_be_transparent=True),
+        "png": PictureFormat("PNG files", 2.0, can_be_transparent=True),
+        "exr": PictureFormat("OpenEXR files", 8.0, can_be_transparent=True),
     }
 )
 """By name, the usual one first."""

@@ -128,7 +128,7 @@ def _check_numbers(job: VideoJob) -> None:
         raise ProjectError(
             f"Supersampling is {job.supersampling}.", hint=f"Give a whole number from 1 to {MAX_SUPERSAMPLING}."
         )
-    if job.size is not None and not all(1 <= side for side in job.size):
+    if job.size is not None and not all(side >= 1 for side in job.size):
         raise ProjectError(f"The size is {job.size[0]} x {job.size[1]}; a picture has at least one pixel.")
     for what, value, (low, high) in (("The rate", job.fps, FPS_RANGE), ("The speed", job.speed, SPEED_RANGE)):
         if value is not None and not low <= value <= high:  # not a number is not in the range either
