@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import stat
 import time
 from collections.abc import Callable, Iterator
@@ -40,6 +41,30 @@ def atomic_path(path: Path | str, *, makes_parents: bool = True, is_durable: boo
     finally:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_folder(path: Path | str) -> Iterator[Path]:
+    """Fill the yielded folder; it becomes `path` when the block ends well and disappears when it does not.
+
+    Args:
+        path: Does not exist, or is an empty folder.
+    Raises:
+        FileExistsError: There is something else under this name; nothing was done.
+        OSError: The disk refused; nothing is left behind.
+    """
+    path = Path(path).absolute()
+    if path.is_symlink() or (path.exists() and not (path.is_dir() and not any(path.iterdir()))):
+        raise FileExistsError(errno.EEXIST, "there is something under this name already", str(path))
+    partial = path.with_name(f"{PARTIAL_PREFIX}{os.getpid()}-{path.name}")
+    try:
+        partial.mkdir(parents=True)
+        yield partial
+        with suppress(FileNotFoundError):
+            path.rmdir()  # empty, or filled by somebody meanwhile, which raises
+        partial.rename(path)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
 
 
 def is_left_over(path: Path, is_alive: Callable[[int], bool]) -> bool:

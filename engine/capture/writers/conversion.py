@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -18,7 +15,7 @@ from engine.capture.writers.frame_files import Frames, Report, with_frames_in
 from engine.capture.writers.point_files import write_ply
 from engine.capture.writers.transforms_json import POINTS_FILE, write_transforms
 from engine.errors import CaptureError
-from engine.storage.files import PARTIAL_PREFIX, disk_error
+from engine.storage.files import atomic_folder, disk_error
 
 Target = Literal["colmap", "transforms", "capture.json"]
 TARGETS: tuple[Target, ...] = ("colmap", "transforms", "capture.json")
@@ -57,18 +54,11 @@ def convert(
     """
     if out.exists() and not (out.is_dir() and _is_empty(out)):
         raise CaptureError("There is something under this name already.", hint="Give a new folder.", path=out)
-    partial = out.absolute().with_name(f"{PARTIAL_PREFIX}{os.getpid()}-{out.name}")
     try:
-        try:
-            partial.mkdir(parents=True)
+        with atomic_folder(out) as partial:
             lines = _write(layout, partial, target, frames=frames, is_binary=is_binary, report=report)
-            with suppress(FileNotFoundError):
-                out.rmdir()  # empty, or filled by somebody meanwhile, which raises
-            partial.rename(out)
-        except OSError as error:
-            raise disk_error(error, what="The capture", path=out) from error
-    finally:
-        shutil.rmtree(partial, ignore_errors=True)
+    except OSError as error:
+        raise disk_error(error, what="The capture", path=out) from error
     return Conversion(out, tuple(lines))
 
 
@@ -110,5 +100,4 @@ def _unsaid(layout: Layout, target: Target, frames: Frames) -> list[str]:
 
 
 def _is_empty(folder: Path) -> bool:
-    with os.scandir(folder) as entries:
-        return next(entries, None) is None
+    return not any(folder.iterdir())

@@ -1,0 +1,79 @@
+"""Where exports are written: seen to be possible before the work starts, and complete or not there at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from engine.errors import ProjectError
+from engine.storage.files import atomic_folder, atomic_path, disk_error
+
+SPARE_BYTES = 16 << 20
+"""Of the disk, which stay free whatever is written."""
+
+
+def check_target(path: Path, *, n_bytes: int = 0, is_folder: bool = False) -> None:
+    """See that an export can be written, before the work that leads to it. Makes nothing.
+
+    Args:
+        path: What is to be written: a file, which may be there already and is replaced, or a new or empty folder.
+        n_bytes: How large it becomes, as far as that is known.
+        is_folder: Which of the two it is.
+    Raises:
+        ProjectError: Something else has this name, the place may not be written to, or the disk has too little room.
+    """
+    if is_folder and (path.is_symlink() or path.exists()) and not _is_empty_folder(path):
+        raise ProjectError("There is something under this name already.", hint="Give a new folder.", path=path)
+    if not is_folder and path.is_dir():
+        raise ProjectError("This is a folder, not a file.", hint="Give the name of a file.", path=path)
+    parent = next((parent for parent in path.absolute().parents if parent.exists()), Path(path.anchor))
+    if not parent.is_dir() or not os.access(parent, os.W_OK | os.X_OK):
+        reason = "may not be written to" if parent.is_dir() else "is a file"
+        raise ProjectError(f"{parent} {reason}.", hint="Choose another place.", path=path)
+    free_bytes = shutil.disk_usage(parent).free
+    if n_bytes + SPARE_BYTES > free_bytes:
+        raise ProjectError(
+            f"About {n_bytes / 1e6:.0f} MB are to be written, but only {free_bytes / 1e6:.0f} MB are free.",
+            hint="Free some space, choose another place, or export fewer frames.",
+            path=path,
+        )
+
+
+def _is_empty_folder(path: Path) -> bool:
+    try:
+        return path.is_dir() and not path.is_symlink() and not any(path.iterdir())
+    except OSError:
+        return False
+
+
+@contextmanager
+def staged_file(path: Path, *, what: str = "The file") -> Iterator[Path]:
+    """Write to the yielded path; it becomes `path` when the block ends well, and disappears when it does not.
+
+    Args:
+        what: Names the file in a message.
+    Raises:
+        DiskError: The disk refused; nothing is left behind.
+    """
+    try:
+        with atomic_path(path) as partial:
+            yield partial
+    except OSError as error:
+        raise disk_error(error, what=what, path=path) from error
+
+
+@contextmanager
+def staged_folder(path: Path, *, what: str = "The folder") -> Iterator[Path]:
+    """Fill the yielded folder; it becomes `path`, which is new or empty, when the block ends well. See `staged_file`.
+
+    Raises:
+        DiskError: The disk refused, or something else has this name by now; nothing is left behind.
+    """
+    try:
+        with atomic_folder(path) as partial:
+            yield partial
+    except OSError as error:
+        raise disk_error(error, what=what, path=path) from error

@@ -1,0 +1,1 @@
+"""Export: scenes in the file formats of other programs."""
