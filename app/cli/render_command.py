@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import re
-from pathlib import Path
 from typing import Any
 
 from app.cli.arguments import EXIT_OK, parse_cameras, parse_range, path_argument
@@ -23,6 +22,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("project", type=path_argument, help="project folder")
     view = command.add_mutually_exclusive_group(required=True)
     view.add_argument("--camera", metavar="NAME", help="look through a camera of the capture, in its colours")
+    view.add_argument("--path", metavar="NAME", help="along a camera path of the project")
     view.add_argument("--turntable", action="store_true", help="circle around the scene")
     command.add_argument(
         "--out", type=path_argument, required=True, metavar="FILE|DIR", help="FILE.mp4, FILE.webm, or a new folder"
@@ -86,7 +86,7 @@ def _job(options: argparse.Namespace, opened: TrainedProject) -> Any:
     from app.export.video.formats import FORMATS, format_of
     from app.export.video.job import Turntable, VideoJob
 
-    capture, out = opened.capture, Path(options.out)
+    capture, out = opened.capture, options.out
     chosen = None if options.frames.strip() == ":" else options.frames
     frames = None if chosen is None else parse_range(chosen, capture.n_frames, option="--frames", what="frames")
     format_name = options.format or format_of(out)
@@ -103,9 +103,10 @@ def _job(options: argparse.Namespace, opened: TrainedProject) -> Any:
     elif circle:
         raise ProjectError("--turns, --elevation and --radius belong to --turntable.", hint="Leave them out.")
     return VideoJob(
-        out=str(out),
+        out=out,
         format=format_name,
         camera=None if options.camera is None else _camera(options.camera, "--camera", opened),
+        path=options.path,
         turntable=turntable,
         frames=None if frames is None else (frames.start, frames.stop),
         shows=options.show,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from app.export.video.formats import FORMATS
@@ -24,6 +25,7 @@ PASSES: dict[PassName, str] = {
 MAX_SUPERSAMPLING = 8
 MAX_SIDE_PX = 16_384
 """Longest side of a picture before it is reduced: what a graphics card and H.264 can take too."""
+MAX_TURNS = 100
 FPS_RANGE = (0.1, 1000.0)
 SPEED_RANGE = (0.001, 1000.0)
 
@@ -33,8 +35,8 @@ class Turntable:
     """A camera on a circle around what all cameras look at, with the up direction that they agree on.
 
     Attributes:
-        n_turns: Turns from the first picture to the one that would follow the last, so that the video can be looped;
-            negative ones go the other way round.
+        n_turns: Turns from the first picture to the one that would follow the last, so that whole turns make a loop.
+            Seen from above, positive ones go counterclockwise.
         elevation_deg: Height above the horizon, degrees.
         radius: Distance to the middle, scene units; None for the mean distance of the cameras.
     """
@@ -69,7 +71,7 @@ class VideoJob:
         features: Which features of the anchors are used, see engine.metrics.clips.features_apart.
     """
 
-    out: str
+    out: Path
     format: str
     camera: str | None = None
     path: str | None = None
@@ -81,7 +83,7 @@ class VideoJob:
     speed: float = 1.0
     hold: float | None = None
     supersampling: int = 1
-    background: tuple[int, int, int] = field(default=(0, 0, 0))
+    background: tuple[int, int, int] = (0, 0, 0)
     is_transparent: bool = False
     sound: str | None = None
     features: Features = "both"
@@ -140,8 +142,10 @@ def _check_numbers(job: VideoJob) -> None:
 
 
 def _check_turntable(turntable: Turntable) -> None:
-    if not math.isfinite(turntable.n_turns):
-        raise ProjectError("The number of turns is not a number.")
+    if not 0.0 < abs(turntable.n_turns) <= MAX_TURNS:
+        raise ProjectError(
+            f"A turntable of {turntable.n_turns:g} turns makes no sense.", hint=f"Give up to {MAX_TURNS}."
+        )
     if not -90.0 <= turntable.elevation_deg <= 90.0:
         raise ProjectError(f"The elevation is {turntable.elevation_deg:g}.", hint="Give -90 to 90 degrees.")
     if turntable.radius is not None and not 0.0 < turntable.radius < math.inf:

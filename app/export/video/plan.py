@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,12 +11,15 @@ from app.export.staging import check_target
 from app.export.video.formats import FORMATS, check_codecs
 from app.export.video.job import MAX_SIDE_PX, VideoJob
 from app.export.video.moments import Moment, moments_of, runs_of
-from app.export.video.views import ViewOf, camera_view, turntable_view
+from app.export.video.views import ViewOf, camera_view, path_view, turntable_view
 from app.export.video.writers.sequence import depth_unit
 from app.playback.view_modes import rig_distance
+from app.project.camera_paths import camera_path_named
+from engine.camera.camera_path import CameraPath
 from engine.capture.capture import Capture
 from engine.capture.sound import sound_source
 from engine.errors import ProjectError
+from engine.text import shown
 
 _DEPTH_REACH = 4.0
 """What 16 bits of depth reach, in usual distances from a camera to what all of them look at."""
@@ -71,7 +75,8 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
     capture = scene.opened.capture
     fps = capture.fps if job.fps is None else job.fps
     step = job.speed * capture.fps / fps
-    runs = _runs(job, scene)
+    path = None if job.path is None else camera_path_named(scene.opened.project.folder, job.path)
+    runs = _runs(job, scene, path)
     if not runs:
         raise ProjectError("There are no frames to render.", path=scene.opened.project.folder)
     moments = moments_of(runs, step, job.hold)
@@ -81,7 +86,7 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
             hint="Leave speed and rate out.",
         )
     size = capture.picture_size if job.size is None else job.size
-    view_of = _view_of(job, capture, size, len(moments))
+    view_of = _view_of(job, capture, path, size, len(moments))
     if max(size) * job.supersampling > MAX_SIDE_PX:
         raise ProjectError(
             f"Pictures of {size[0]} x {size[1]} with supersampling {job.supersampling} are drawn larger than "
@@ -99,7 +104,7 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
         width, height = width + width % 2, height + height % 2
     kind = FORMATS[job.format]
     n_bytes = round(kind.bytes_per_pixel * width * height * len(moments))
-    check_target(Path(job.out), n_bytes=n_bytes, is_folder=kind.is_sequence)
+    check_target(job.out, n_bytes=n_bytes, is_folder=kind.is_sequence)
     scene.check([moment.scene for moment in moments])  # last, as it reads every clip
     unit = (
         depth_unit(_DEPTH_REACH * rig_distance(capture.rig)) if job.shows == "depth" and job.format == "png" else None
@@ -107,12 +112,14 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
     return VideoPlan(moments, step, fps, view_of, (width, height), sound, unit, notes)
 
 
-def _runs(job: VideoJob, scene: SceneFrames) -> list[range]:
+def _runs(job: VideoJob, scene: SceneFrames, path: CameraPath | None) -> list[range]:
     """Frames that pictures begin at."""
     n_frames = scene.opened.capture.n_frames
     if job.hold is not None:
         scene.clip_at(job.hold)  # inside of the capture
     if job.frames is None:
+        if path is not None and len(path.keys) > 1:
+            return [_frames_of(path, None if job.hold is not None else n_frames)]
         return runs_of(range(n_frames) if job.hold is not None else scene.trained_frames)
     first, stop = job.frames
     if not 0 <= first < stop <= n_frames:
@@ -123,7 +130,27 @@ def _runs(job: VideoJob, scene: SceneFrames) -> list[range]:
     return [range(first, stop)]
 
 
-def _view_of(job: VideoJob, capture: Capture, size: tuple[int, int], n_pictures: int) -> ViewOf:
+def _frames_of(path: CameraPath, n_frames: int | None) -> range:
+    """Frames during which a path moves; of a capture of so many, or wherever they are where that is None."""
+    first, last = path.frame_range
+    start, stop = math.ceil(first), math.floor(last) + 1
+    if path.is_closed:  # back at its beginning, it has been there
+        stop = math.ceil(last)
+    if n_frames is not None:
+        start, stop = max(start, 0), min(stop, n_frames)
+    if start >= stop:
+        raise ProjectError(
+            f"The camera path {shown(path.name)} goes from {first:g} to {last:g}, where the capture has no frames.",
+            hint="Move its keys, or choose frames.",
+        )
+    return range(start, stop)
+
+
+def _view_of(
+    job: VideoJob, capture: Capture, path: CameraPath | None, size: tuple[int, int], n_pictures: int
+) -> ViewOf:
+    if path is not None:
+        return path_view(path, size)
     if job.camera is not None:
         return camera_view(capture.rig, _camera(capture, job.camera), job.size)
     assert job.turntable is not None

@@ -43,7 +43,7 @@ class WrittenVideo:
         notes: What was done otherwise than asked for, in sentences.
     """
 
-    out: str
+    out: Path
     n_pictures: int
     size: tuple[int, int]
     fps: float
@@ -74,7 +74,7 @@ def render_video(
         DiskError: The disk refused; nothing is left behind.
         JobCancelled: `is_cancelled` said so; nothing is left behind.
     """
-    scene = SceneFrames(opened, n_threads=n_threads)
+    scene = SceneFrames(opened, n_threads=n_threads, features=job.features)
     plan = plan_video(job, scene)
     painter = Painter(scene, job, plan.moments, plan.view_of, plan.step)
     n, rate = len(plan.moments), Rate()
@@ -87,16 +87,16 @@ def render_video(
             rate.update(number + 1, time.monotonic())
             left = duration_text(rate.eta_s(n - number - 1))
             report(Progress(STAGE, (number + 1) / n, f"{number + 1}/{n}, {rate.per_s:.1f}/s, {left} left"))
-    out = Path(job.out)
+    out = job.out
     files = list(out.iterdir()) if out.is_dir() else [out]
     n_bytes = sum(file.stat().st_size for file in files)
-    return WrittenVideo(str(out), n, plan.picture_size, plan.fps, n_bytes, plan.depth_unit, plan.notes)
+    return WrittenVideo(out, n, plan.picture_size, plan.fps, n_bytes, plan.depth_unit, plan.notes)
 
 
 @contextmanager
 def _writer(job: VideoJob, plan: VideoPlan) -> Iterator[Callable[[int, PassPicture], None]]:
     """Takes the number of a picture and the picture. What is written appears at the end of the block."""
-    out, kind = Path(job.out), FORMATS[job.format]
+    out, kind = job.out, FORMATS[job.format]
     if kind.is_sequence:
         with staged_folder(out, what="The folder of pictures") as folder:
             yield lambda number, picture: _write_file(folder, job, plan, number, picture)

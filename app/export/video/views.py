@@ -9,8 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.export.video.job import Turntable
-from app.playback.orbit_view import OrbitView
-from app.playback.rig_views import fitted_K
+from app.playback.rig_views import camera_fov, fitted_K, home_camera
+from app.playback.scene_axes import rig_radius
+from engine.camera import path_presets
+from engine.camera.camera_path import CameraPath
 from engine.camera.rig import CameraRig
 
 
@@ -48,19 +50,33 @@ def camera_view(rig: CameraRig, camera_index: int, size: tuple[int, int] | None)
     return lambda picture, moment: view
 
 
-def turntable_view(rig: CameraRig, turntable: Turntable, n_pictures: int, size: tuple[int, int]) -> ViewOf:
-    """A circle around what the cameras look at, beginning in front of the camera that the home view begins at."""
-    orbit = OrbitView(rig)
-    orbit.home()
-    orbit.pitch = math.radians(turntable.elevation_deg)
-    orbit.distance = orbit.radius if turntable.radius is None else turntable.radius
-    first_yaw = orbit.yaw
+def path_view(path: CameraPath, size: tuple[int, int]) -> ViewOf:
+    """A camera on a path, whose keys are moments of the capture."""
 
     def view(picture: int, moment: float) -> ViewPoint:
-        orbit.yaw = first_yaw + 2.0 * math.pi * turntable.n_turns * picture / n_pictures
-        return ViewPoint(orbit.world_to_camera(), orbit.K(*size), *size)
+        world_to_camera, fov_y_rad = path.at(moment)
+        return ViewPoint(world_to_camera, pinhole_K(fov_y_rad, size), *size)
 
     return view
+
+
+def turntable_view(rig: CameraRig, turntable: Turntable, n_pictures: int, size: tuple[int, int]) -> ViewOf:
+    """A circle around what the cameras look at, beginning in front of the camera that the home view begins at, through
+    a lens like that camera's."""
+    focus, up = rig.focus_point(), rig.up_direction()
+    camera = home_camera(rig, focus, up)
+    path = path_presets.turntable(
+        focus,
+        up,
+        rig_radius(rig) if turntable.radius is None else turntable.radius,
+        math.radians(turntable.elevation_deg),
+        (0.0, float(n_pictures)),
+        turntable.n_turns,
+        fov_y_rad=camera_fov(rig, camera),
+        start=rig.centers[camera] - focus,
+    )
+    along = path_view(path, size)
+    return lambda picture, moment: along(picture, picture)
 
 
 def pinhole_K(fov_y_rad: float, size: tuple[int, int]) -> np.ndarray:

@@ -144,6 +144,6 @@ def _spread(rgba: np.ndarray) -> np.ndarray:
     is_empty = rgba[..., 3] < 4
     if is_empty.all() or not is_empty.any():
         return rgba
-    rows, columns = ndimage.distance_transform_edt(is_empty, return_distances=False, return_indices=True)
+    rows, columns = np.asarray(ndimage.distance_transform_edt(is_empty, return_distances=False, return_indices=True))
     rgba[..., :3] = rgba[rows, columns, :3]
     return rgba
