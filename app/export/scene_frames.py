@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from app.background.kernels import use_threads
@@ -13,6 +14,7 @@ from engine.capture.clip import Clip
 from engine.errors import ProjectError
 
 if TYPE_CHECKING:
+    from engine.metrics.clips.features_apart import Features
     from engine.metrics.clips.trained_clip import TrainedClip
     from engine.model.clip_model import ClipModel
     from engine.raster.gaussians import Gaussians
@@ -28,11 +30,13 @@ class SceneFrames:
     Args:
         opened: A project opened for reading.
         n_threads: Threads to decode with; None for all.
+        features: Which features of the anchors are used, see engine.metrics.clips.features_apart.
     """
 
-    def __init__(self, opened: TrainedProject, *, n_threads: int | None = None) -> None:
+    def __init__(self, opened: TrainedProject, *, n_threads: int | None = None, features: Features = "both") -> None:
         self.opened = opened
         self._n_threads = n_threads
+        self._features: Features = features
         self._clip_of = [clip for clip in opened.clips for _ in clip.frame_indices()]
         self._loaded: TrainedClip | None = None
         self._parts: dict[Part, ClipModel] = {}
@@ -93,8 +97,11 @@ class SceneFrames:
         """
         clip = self.clip_at(frame)
         if self._loaded is None or self._loaded.clip != clip:
+            from engine.metrics.clips.features_apart import with_features
+
             use_threads(self._n_threads)
-            self._loaded, self._parts = self.opened.load(clip.clip_index), {}
+            loaded = self.opened.load(clip.clip_index)
+            self._loaded, self._parts = replace(loaded, model=with_features(loaded.model, self._features)), {}
         return self._loaded
 
     def model(self, frame: float, part: Part = "all") -> ClipModel:

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from app.playback.rig_views import camera_fov, camera_pose, fitted_K, home_camera
-from app.playback.scene_axes import UP_AXES, axis_rotation, horizontal_axes, rig_radius, rig_up
+from app.playback.scene_axes import UP_AXES, axis_rotation, horizontal_axes, rig_radius
 from app.playback.view_angles import angles_of, rotation_of
 from app.playback.view_motion import Pose, ViewMotion, between, blended
 from engine.camera.rig import CameraRig
@@ -64,7 +64,7 @@ class OrbitView:
         self.fov_y = math.radians(50.0)
         self.is_orthographic = False
         self.up_axis = "rig"
-        self.up = np.array([0.0, -1.0, 0.0]) if rig is None else rig_up(rig)
+        self.up = np.array([0.0, -1.0, 0.0]) if rig is None else rig.up_direction()
         self.look_through: int | None = None
         self.is_eased = False
         self.radius = 1.0 if rig is None or len(rig) == 0 else max(rig_radius(rig), 1e-6)
@@ -321,7 +321,7 @@ class OrbitView:
             if axis is not None:
                 self.up = np.array(axis)
             else:
-                self.up = np.array([0.0, -1.0, 0.0]) if self.rig is None else rig_up(self.rig)
+                self.up = np.array([0.0, -1.0, 0.0]) if self.rig is None else self.rig.up_direction()
             self._aim(forward)
             self.roll = 0.0
 

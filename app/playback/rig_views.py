@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from app.playback.view_motion import Pose
+from engine.camera.projection import vertical_fov
 from engine.camera.rig import CameraRig
 
 
 def camera_fov(rig: CameraRig, camera: int) -> float:
     """Vertical field of view, radians."""
-    height, focal = float(rig.image_sizes[camera, 1]), float(rig.Ks[camera, 1, 1])
-    return 2.0 * math.atan(height / (2.0 * focal))
+    return vertical_fov(float(rig.Ks[camera, 1, 1]), float(rig.image_sizes[camera, 1]))
 
 
 def fitted_K(rig: CameraRig, camera: int, width: int, height: int) -> np.ndarray:
