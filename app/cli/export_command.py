@@ -7,7 +7,7 @@ import time
 from types import ModuleType
 from typing import Any
 
-from app.cli import export_gaussians
+from app.cli import export_data, export_gaussians
 from app.cli.arguments import EXIT_OK, parse_range, path_argument
 from app.cli.terminal.progress import ProgressLine, row_progress
 from app.evaluation.headless import TrainedProject, open_trained
@@ -18,7 +18,7 @@ from engine.errors import ProjectError
 from engine.storage.json_files import json_text
 
 EXPORT_SCHEMA = 1
-KINDS: tuple[ModuleType, ...] = (export_gaussians,)
+KINDS: tuple[ModuleType, ...] = (export_gaussians, export_data)
 """Modules with `FORMATS`, names for --format with what each is; `add_arguments(command)`, options of their own; and
 `export(opened, options, frames, report)`, which writes and returns an ExportResult. frames: None where nothing was
 chosen."""
@@ -34,7 +34,13 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         choices=[name for kind in KINDS for name in kind.FORMATS],
         help=f"what to write; {'; '.join(known)}",
     )
-    command.add_argument("--out", type=path_argument, required=True, metavar="DIR", help="new or empty folder")
+    command.add_argument(
+        "--out",
+        type=path_argument,
+        required=True,
+        metavar="PATH",
+        help="new or empty folder; of figures a file",
+    )
     frames = command.add_mutually_exclusive_group()
     frames.add_argument(
         "--frames", metavar="A:B", help="frames A up to B, B not included, or one frame A (default: all trained)"

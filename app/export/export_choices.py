@@ -55,6 +55,7 @@ class ExportContext(msgspec.Struct, frozen=True):
         in_frame, out_frame: Of the timeline, both included.
         cameras: Names.
         paths: Names of the project's camera paths.
+        has_videos: Whether some camera has a video, which may have sound.
         picture_size: Width and height of a capture camera's picture.
         fps: Frames per second.
     """
@@ -70,6 +71,7 @@ class ExportContext(msgspec.Struct, frozen=True):
     picture_size: tuple[int, int]
     fps: float
     paths: tuple[str, ...] = ()
+    has_videos: bool = False
 
     def frames(self, choice: FramesChoice, step: int) -> range:
         """The frames of a choice; none where there are none."""

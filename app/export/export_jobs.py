@@ -59,6 +59,8 @@ class ExportKind(NamedTuple):
 
 
 KINDS: dict[str, ExportKind] = {
+    "gaussians": ExportKind("Gaussians", "app.export.gaussians_job"),
+    "video": ExportKind("Video", "app.export.video.video_export"),
     "metrics": ExportKind("Metrics", "app.export.metrics_job"),
     "cameras": ExportKind("Cameras", "app.export.cameras_job"),
 }

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.export.export_choices import ExportChoices, ExportContext
-from app.export.export_forms import FORMS, Answers
 from app.export.export_jobs import KINDS
+from app.export.forms.form import Answers
+from app.export.forms.table import answers_to
 from app.export.staging import check_target
 from engine.errors import EngineError
 
@@ -39,7 +40,8 @@ class ExportPlan:
 
 def plan_export(opened: TrainedProject, context: ExportContext, choices: ExportChoices) -> ExportPlan:
     """Look at what an export would do. Reads headers and asks the disk; writes nothing."""
-    form, answers = FORMS[choices.kind], Answers(context, choices)
+    answers = answers_to(context, choices)
+    form = answers.form
     problems: list[str] = []
     lines: tuple[str, ...] = ()
     n_files = n_bytes = 0
@@ -84,12 +86,17 @@ def _free_bytes(out: str) -> int | None:
         return None
 
 
+_OWN_SUFFIXES = (".mp4", ".webm", ".html")
+"""They say what a file is."""
+
+
 def suggested_out(folder: str, context: ExportContext, choices: ExportChoices) -> str:
     """A place for an export: a name of its own in a folder that was used last."""
-    suffix = Answers(context, choices).suffix
-    words = [context.name or "scene", choices.kind]
+    answers = answers_to(context, choices)
+    suffix = answers.suffix
+    words = [context.name or "scene", *([] if suffix in _OWN_SUFFIXES else [choices.kind])]
     if not suffix:
-        words += [choices.answer("format")] if choices.answer("format") else []
+        words.append(answers["format"])
     name = "-".join("".join(sign if sign.isalnum() or sign in "-_. " else "_" for sign in word) for word in words)
     base = Path(folder) if folder else Path.home()
     for number in range(1, 1000):

@@ -53,6 +53,15 @@ class SceneFrames:
         Raises:
             ProjectError: There are none, one lies outside of the capture, or in a clip that is not trained or damaged.
         """
+        for clip_index in self.check_trained(frames):
+            self.opened.load(clip_index)
+
+    def check_trained(self, frames: Iterable[float]) -> list[int]:
+        """See that all of these are trained, without reading a clip. Returns the indices of their clips.
+
+        Raises:
+            ProjectError: There are none, one lies outside of the capture, or in a clip that is not trained.
+        """
         frames = list(frames)
         if not frames:
             raise ProjectError("There are no frames to export.", path=self.opened.project.folder)
@@ -68,8 +77,7 @@ class SceneFrames:
                 hint=f"Train with `clipgstream train` first, or take what is trained: --frames {' or '.join(ranges)}.",
                 path=self.opened.project.folder,
             )
-        for clip_index in needed:
-            self.opened.load(clip_index)
+        return needed
 
     def clip_at(self, frame: float) -> Clip:
         """The clip that shows a moment: of its nearest frame, the earlier one half way.

@@ -10,18 +10,20 @@ from typing import TYPE_CHECKING, NamedTuple
 from app.background.jobs import JobContext, Jobs
 from app.background.latest import LatestWorker
 from app.export.export_choices import ExportChoices, ExportContext
-from app.export.export_forms import FORMS, Answers
 from app.export.export_jobs import ExportTask
 from app.export.export_plan import ExportPlan, plan_export, suggested_out
 from app.export.export_process import Exporter, ExportProcess
 from app.export.export_queue import ExportQueue
 from app.export.export_status import ExportStatus
+from app.export.forms.table import FORMS, answers_to
 from app.export.show_in_folder import show_in_folder
 from app.playback.timeline import Timeline
+from app.project.camera_paths import read_camera_paths
 from app.project.opened_project import OpenedProject
 from app.project.recents import project_name
 from app.session.notices import Notices
 from app.session.settings import Settings
+from engine.capture.frames import VideoFrames
 from engine.errors import EngineError, ProjectError
 
 if TYPE_CHECKING:
@@ -151,11 +153,11 @@ class Exporting:
         page, opened = self.page, self._opened
         if page is None or opened is None:
             return
-        answers = Answers(page.context, choices)
+        answers = answers_to(page.context, choices)
         capture = opened.capture
         task = ExportTask(
             kind=choices.kind,
-            job=FORMS[choices.kind].make_job(answers),
+            job=answers.form.make_job(answers),
             project=str(opened.project.folder.absolute()),
             capture=str(Path(capture.path).absolute()),
             scale=capture.scale,
@@ -234,6 +236,10 @@ class Exporting:
 def _context(opened: OpenedProject, timeline: Timeline, trained: tuple[int, ...]) -> ExportContext:
     capture = opened.capture
     first, last = timeline.in_frame, timeline.out_frame
+    try:
+        paths = tuple(path.name for path in read_camera_paths(opened.project.folder))
+    except ProjectError:  # which was said when they were read for the timeline
+        paths = ()
     return ExportContext(
         name=project_name(opened.project.folder.absolute(), opened.project.settings.capture),
         n_frames=capture.n_frames,
@@ -245,4 +251,6 @@ def _context(opened: OpenedProject, timeline: Timeline, trained: tuple[int, ...]
         cameras=tuple(capture.rig.names),
         picture_size=capture.picture_size,
         fps=capture.fps,
+        paths=paths,
+        has_videos=any(isinstance(entry.source, VideoFrames) for entry in capture.layout.cameras),
     )

@@ -1,6 +1,6 @@
 """The dialog that asks what is exported, of which frames and where, and says beforehand what will be written.
 
-Enter exports where nothing is wrong, Escape closes. What is asked comes from a table: app.export.export_forms.
+Enter exports where nothing is wrong, Escape closes. What is asked comes from a table: app.export.forms.
 """
 
 from __future__ import annotations
@@ -11,9 +11,10 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import portable_file_dialogs as native
 
 from app.export.export_choices import FRAMES_CHOICES, ExportChoices, ExportContext, FramesChoice
-from app.export.export_forms import FORMS, Option
 from app.export.export_jobs import KINDS
 from app.export.export_plan import ExportPlan
+from app.export.forms.form import Option
+from app.export.forms.table import FORMS
 from app.session.commands import CloseQuestion, Command, StartExport
 from engine.text import one_line
 from ui.panels.exports import ExportingFacts, bytes_text, files_text
@@ -193,6 +194,8 @@ class ExportDialog:
             found = context.frames(choice, 1)
             imgui.same_line(LABEL_WIDTH + 200)
             imgui.text_disabled(_frames_text(found))
+        if not FORMS[self._choices.kind].has_step:
+            return
         _label("")
         imgui.begin_disabled(self._choices.frames == "frame")
         imgui.text("One of every")
