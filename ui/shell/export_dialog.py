@@ -26,11 +26,13 @@ from ui.style import theme
 from ui.style.theme import Icon
 
 TITLE = "Export###export"
-SIZE = (860.0, 640.0)
+SIZE = (900.0, 700.0)
 BUTTON = ImVec2(170, 34)
 LABEL_WIDTH = 130.0
 BOX_WIDTH = 320.0
-PLAN_HEIGHT = 132.0
+PLAN_HEIGHT = 136.0
+PLACE_HEIGHT = 74.0
+FRAMES_WIDTH = 300.0
 MAX_RADIOS = 6
 """More answers than this go into a box."""
 REFRESH_S = 0.1
@@ -87,17 +89,18 @@ class ExportDialog:
         if page is not self._page:
             self._page, self._choices, self._suggested = page, page.choices, page.choices.out
         before = self._choices
-        height = -(BUTTON.y + PLAN_HEIGHT + 30)
+        height = -(BUTTON.y + PLAN_HEIGHT + PLACE_HEIGHT)
         if imgui.begin_child("choices", ImVec2(0, height), imgui.ChildFlags_.nav_flattened):
             self._draw_choices(page.context, ui)
         imgui.end_child()
         if keys.is_agreed:  # Enter also presses what the arrow keys are on
             self._choices = before
         self._suggest_anew(exporting, page.context, before)
+        imgui.separator()
+        self._draw_place(ui)
         plan = exporting.plan(self._choices)
         if plan is None:
             ui.redraw_within(REFRESH_S)
-        imgui.separator()
         if imgui.begin_child("plan", ImVec2(0, PLAN_HEIGHT), imgui.ChildFlags_.nav_flattened):
             _draw_plan(plan, ui)
         imgui.end_child()
@@ -143,8 +146,6 @@ class ExportDialog:
         if form.has_frames:
             imgui.spacing()
             self._draw_frames(context, ui)
-        imgui.spacing()
-        self._draw_place(ui)
 
     def _draw_option(self, option: Option, ui: UiState) -> None:
         chosen = option.chosen(self._choices)
@@ -187,13 +188,15 @@ class ExportDialog:
             "frame": "This frame",
         }
         for place, choice in enumerate(FRAMES_CHOICES):
-            _label("Frames" if place == 0 else "")
+            if place % 2:
+                imgui.same_line(LABEL_WIDTH + FRAMES_WIDTH)
+            else:
+                _label("Frames" if place == 0 else "")
             if imgui.radio_button(f"{words[choice]}##frames", self._choices.frames == choice):
                 self._choices = self._choices.changed(frames=choice)
             ui.mark(f"export.frames.{choice}")
-            found = context.frames(choice, 1)
-            imgui.same_line(LABEL_WIDTH + 200)
-            imgui.text_disabled(_frames_text(found))
+            imgui.same_line()
+            imgui.text_disabled(_frames_text(context.frames(choice, 1)))
         if not FORMS[self._choices.kind].has_step:
             return
         _label("")
