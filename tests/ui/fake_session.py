@@ -12,6 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from app.background.log_reader import LogLine
+from app.export.export_choices import ExportChoices, ExportContext
+from app.export.export_plan import ExportPlan
+from app.export.export_status import ExportStatus
 from app.playback.arrays import AnchorArrays, Picture, PointArrays
 from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
@@ -27,6 +30,7 @@ from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands
 from app.session.calibration_page import CalibrationPage
 from app.session.doctor_status import DoctorStatus
+from app.session.exporting import ExportPage
 from app.session.marking import after_marking
 from app.session.notices import Notices
 from app.session.questions import OpeningPage, Question, RetrainQuestion
@@ -142,6 +146,25 @@ class FakeSynchronising:
     progress: JobStatus | None = None
 
 
+@dataclass
+class FakeExporting:
+    """What the window reads of Exporting; `asked` are the choices that a plan was wanted for."""
+
+    page: ExportPage | None = None
+    statuses: tuple[ExportStatus, ...] = ()
+    found: ExportPlan | None = None
+    asked: list[ExportChoices] = field(default_factory=list)
+
+    def plan(self, choices: ExportChoices) -> ExportPlan | None:
+        """What was made up."""
+        self.asked.append(choices)
+        return self.found
+
+    def suggest(self, context: ExportContext, choices: ExportChoices) -> str:
+        """A name that tells what it was made of."""
+        return f"/out/{choices.kind}"
+
+
 class FakeSession:
     """See the module docstring. `has_capture=False` starts empty."""
 
@@ -162,6 +185,7 @@ class FakeSession:
         self.opening = FakeOpening()
         self.calibrating = FakeCalibrating()
         self.synchronising = FakeSynchronising()
+        self.exporting = FakeExporting()
         self.queue = QueueStatus()
         self.usage = UsageStatus(window_mb=412.0, window_cores=0.1, n_cores=2)
         self.versions: dict[int, tuple[VersionStatus, ...]] = {}

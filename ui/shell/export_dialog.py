@@ -30,8 +30,8 @@ SIZE = (900.0, 700.0)
 BUTTON = ImVec2(170, 34)
 LABEL_WIDTH = 130.0
 BOX_WIDTH = 320.0
-PLAN_HEIGHT = 136.0
-PLACE_HEIGHT = 74.0
+PLAN_HEIGHT = 112.0
+PLACE_HEIGHT = 66.0
 FRAMES_WIDTH = 300.0
 MAX_RADIOS = 6
 """More answers than this go into a box."""
@@ -211,7 +211,7 @@ class ExportDialog:
             self._choices = self._choices.changed(step=min(max(step, 1), 100_000))
 
     def _draw_place(self, ui: UiState) -> None:
-        _label("Written to")
+        _label("Written to", imgui.get_style().window_padding.x)
         self._take_native(ui)
         has_button = has_native_dialog()
         imgui.set_next_item_width(-48 if has_button else -1)
@@ -291,7 +291,7 @@ def _same_line_if_fits(words: str) -> None:
         imgui.set_cursor_pos_x(LABEL_WIDTH)
 
 
-def _label(text: str) -> None:
+def _label(text: str, indent: float = 0.0) -> None:
     imgui.align_text_to_frame_padding()
     imgui.text(text)
-    imgui.same_line(LABEL_WIDTH)
+    imgui.same_line(LABEL_WIDTH + indent)

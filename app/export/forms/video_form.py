@@ -39,14 +39,16 @@ def _options(context: ExportContext, choices: ExportChoices) -> tuple[Option, ..
     width, height = context.picture_size
     options = [format_, view, shows]
     if shows.chosen(choices) != "compare":
-        options.append(Option("size", "Size", (("", f"{width} x {height}"), *_SIZES)))
+        sizes = [size for size in _SIZES if size[0] != f"{width}x{height}"]
+        options.append(Option("size", "Size", (("", f"{width} x {height}"), *sizes)))
     options.append(Option("supersampling", "Smoothing", _SUPERSAMPLING))
     if not is_camera:
         still = f"Stands still at frame {context.frame_index}"
         options.append(Option("time", "Time", (("runs", "Runs"), ("still", still))))
     if shows.chosen(choices) != "compare":
         options.append(Option("speed", "Speed", _SPEEDS))
-        options.append(Option("fps", "Rate", (("", f"{context.fps:g} per second"), *_RATES)))
+        rates = [rate for rate in _RATES if float(rate[0]) != context.fps]
+        options.append(Option("fps", "Rate", (("", f"{context.fps:g} per second"), *rates)))
     if shows.chosen(choices) == "color":
         clear = (("clear", "Transparent"),) if chosen_format != "mp4" else ()
         names = tuple((name, name.capitalize()) for name in _BACKGROUNDS)

@@ -1,0 +1,56 @@
+"""Choices as values: they survive being kept, and name the frames they stand for."""
+
+from __future__ import annotations
+
+import msgspec
+import pytest
+
+from app.export.export_choices import ExportChoices, ExportContext
+
+CONTEXT = ExportContext(
+    name="p",
+    n_frames=10,
+    clips=((0, 4), (4, 8), (8, 10)),
+    trained=(0, 2),
+    frame_index=5,
+    in_frame=2,
+    out_frame=6,
+    cameras=("a",),
+    picture_size=(32, 24),
+    fps=30.0,
+)
+
+
+def test_answers_belong_to_a_kind_and_survive_a_file():
+    choices = ExportChoices(kind="video").with_answer("format", "webm").changed(kind="metrics")
+    assert choices.answer("format", "csv") == "csv"
+    assert choices.changed(kind="video").answer("format") == "webm"
+    kept = msgspec.json.decode(msgspec.json.encode(choices), type=ExportChoices)
+    assert kept == choices
+    assert hash(kept) == hash(choices)
+    with pytest.raises(msgspec.ValidationError):
+        msgspec.convert({"step": 0}, ExportChoices)
+
+
+@pytest.mark.parametrize(
+    ("choice", "step", "frames"),
+    [
+        ("all", 1, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]),
+        ("all", 4, [0, 4, 8]),
+        ("range", 1, [2, 3, 4, 5, 6]),
+        ("range", 3, [2, 5]),
+        ("clip", 1, [4, 5, 6, 7]),
+        ("frame", 7, [5]),
+    ],
+)
+def test_frames_of_a_choice(choice, step, frames):
+    assert list(CONTEXT.frames(choice, step)) == frames
+
+
+def test_untrained_runs():
+    assert CONTEXT.untrained(range(10)) == [(4, 7)]
+    assert CONTEXT.untrained(range(0, 4)) == []
+    assert CONTEXT.untrained(range(0, 10, 8)) == []
+    nothing = msgspec.structs.replace(CONTEXT, trained=())
+    assert nothing.untrained(range(10)) == [(0, 9)]
+    assert list(nothing.frames("all", 1)) == []

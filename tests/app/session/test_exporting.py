@@ -1,0 +1,227 @@
+"""Exports of a session: what is asked, what would be written, the queue, and what is remembered."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from app.export.export_choices import ExportChoices
+from app.export.export_messages import ExportDone, ExportFailed
+from app.export.export_plan import ExportPlan
+from app.export.export_progress import ExportResult
+from app.export.forms.table import FORMS, answers_to
+from app.playback.timeline import Timeline
+from app.project.opened_project import OpenedProject, opened_project
+from app.project.project import open_project
+from app.session import commands
+from app.session.exporting import Exporting
+from app.session.notices import Notices
+from app.session.session import Session
+from app.session.settings import Settings
+from engine.capture.capture import open_capture
+from engine.errors import ProjectError
+from tests.app.export.test_export_queue import FakeExporter
+from tests.app.residuals.conftest import make_project
+
+DEADLINE_S = 60.0
+METRICS = ExportChoices(kind="metrics", out="")
+
+
+class Bench:
+    """Exports of a made project with two clips of three frames; processes and file managers are made up."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.settings, self.notices = Settings(folder / "settings.json"), Notices()
+        project = open_project(make_project(folder), is_writable=False)
+        self.opened: OpenedProject = opened_project(open_capture(project.settings.capture), project, 1)
+        self.timeline = Timeline(self.opened.clips)
+        self.started: list[FakeExporter] = []
+        self.shown: list[Path] = []
+        self.exporting = Exporting(self.notices, self.settings, launch=self._launch, show=self._show)
+
+    def _launch(self, task: object) -> FakeExporter:
+        self.started.append(FakeExporter(task))  # type: ignore[arg-type]
+        return self.started[-1]
+
+    def _show(self, path: Path) -> None:
+        self.shown.append(path)
+        raise ProjectError("There is no file manager that could show it.", path=path)
+
+    def ask(self, trained: tuple[int, ...] = (0, 1)) -> None:
+        self.exporting.ask(self.opened, self.timeline, trained)
+
+    def plan(self, choices: ExportChoices) -> ExportPlan:
+        """Wait for it, as the window does by asking at every frame."""
+        found: list[ExportPlan] = []
+
+        def look() -> bool:
+            plan = self.exporting.plan(choices)
+            found.extend([] if plan is None else [plan])
+            return bool(found)
+
+        self.until(look)
+        return found[-1]
+
+    def until(self, is_so: Callable[[], bool]) -> None:
+        until_s = time.monotonic() + DEADLINE_S
+        while not is_so():
+            assert time.monotonic() < until_s
+            self.exporting.poll(is_training=False)
+            time.sleep(0.005)
+
+    def start(self, out: str = "m.csv") -> None:
+        self.ask()
+        self.exporting.start(METRICS.changed(out=str(self.folder / "out" / out)))
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Iterator[Bench]:
+    made = Bench(tmp_path)
+    yield made
+    made.exporting.close()
+
+
+def test_the_dialog_begins_with_what_was_chosen_last(bench: Bench):
+    bench.timeline.seek(4)
+    bench.timeline.set_range(1, 2)
+    bench.ask()
+    page = bench.exporting.page
+    assert page is not None
+    assert (page.context.clips, page.context.trained) == (((0, 3), (3, 6)), (0, 1))
+    assert (page.context.frame_index, page.context.in_frame, page.context.out_frame) == (4, 1, 2)
+    assert page.choices.kind == "gaussians"
+    assert Path(page.choices.out).parent == Path.home()
+    bench.start("first.csv")
+    assert bench.exporting.page is None
+    assert Settings(bench.settings.path).last_export.kind == "metrics"
+    bench.ask()
+    again = bench.exporting.page
+    assert again is not None
+    assert again.choices.kind == "metrics"
+    assert again.choices.out == str(bench.folder / "out" / "p-metrics.csv")
+
+
+def test_nothing_trained_is_said_and_a_damaged_memory_is_none(bench: Bench):
+    with pytest.raises(ProjectError, match="no clip is trained"):
+        bench.ask(())
+    assert bench.exporting.page is None
+    bench.settings.set_last_export(ExportChoices(kind="kites"))
+    bench.ask()
+    page = bench.exporting.page
+    assert page is not None
+    assert page.choices.kind == next(iter(FORMS))
+
+
+def test_the_plan_tells_files_bytes_and_room(bench: Bench):
+    bench.ask()
+    plan = bench.plan(METRICS.changed(out=str(bench.folder / "new" / "m.csv")))
+    assert plan.problems == ()
+    assert plan.n_files == 1
+    assert plan.n_bytes > 1000
+    assert plan.free_bytes is not None
+    assert not (bench.folder / "new").exists()
+
+
+@pytest.mark.parametrize(
+    ("out", "said"),
+    [
+        ("", "Say where"),
+        ("relative.csv", "whole path"),
+        ("{folder}/p/m.csv", "inside of the project"),
+        ("{folder}/ring/m.csv", "inside of the capture"),
+        ("{folder}/p/project.json/m.csv", "inside of the project"),
+        ("{folder}/settings.json/m.csv", "is a file"),
+        ("{folder}", "folder, not a file"),
+        ("{folder}/a\0b.csv", "cannot be written to"),
+        ("~nobody-of-this-name/m.csv", "cannot be written to"),
+    ],
+)
+def test_places_that_cannot_be_written_are_told_before(bench: Bench, out: str, said: str):
+    bench.settings.set_last_export(METRICS)
+    bench.ask()
+    plan = bench.plan(METRICS.changed(out=out.format(folder=bench.folder)))
+    assert len(plan.problems) == 1
+    assert said in plan.problems[0]
+
+
+def test_a_disk_without_room_is_told_before(bench: Bench, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("app.export.staging.SPARE_BYTES", 1 << 60)
+    bench.ask()
+    plan = bench.plan(METRICS.changed(out=str(bench.folder / "m.csv")))
+    assert "are free" in plan.problems[0]
+
+
+def test_untrained_clips_in_the_range_are_told_before(bench: Bench):
+    bench.ask((0,))
+    cameras = ExportChoices(kind="gaussians", frames="range", out=str(bench.folder / "g"))
+    assert bench.plan(cameras).problems == ("Clips of these frames are not trained: 3 to 5.",)
+    assert bench.plan(cameras.changed(frames="all")).problems == ()
+    bench.timeline.seek(5)
+    bench.ask((0,))
+    assert bench.plan(cameras.changed(frames="clip")).problems == ("Clips of these frames are not trained: 3 to 5.",)
+
+
+def test_every_answer_of_every_form_makes_a_job_or_says_why_not(bench: Bench):
+    bench.ask()
+    page = bench.exporting.page
+    assert page is not None
+    for kind, form in FORMS.items():
+        usual = ExportChoices(kind=kind, out=str(bench.folder / "new" / f"x{kind}"))
+        for option in form.options(page.context, usual):
+            for value, words in option.values:
+                assert words
+                choices = usual.with_answer(option.name, value)
+                answers = answers_to(page.context, choices)
+                choices = choices.changed(out=f"{choices.out}{answers.suffix}")
+                job = form.make_job(answers_to(page.context, choices))
+                assert job.out == Path(choices.out)
+                assert hash(job) == hash(job)  # a value
+
+
+def test_exports_run_one_after_another_and_failures_are_told(bench: Bench):
+    bench.start("a.csv")
+    bench.start("b.csv")
+    bench.exporting.poll(is_training=True)
+    assert len(bench.started) == 1
+    task = bench.started[0].task
+    assert (task.kind, task.n_threads) == ("metrics", 1)
+    assert Path(task.project) == bench.opened.project.folder
+    bench.started[0].events.append(ExportFailed("The disk is full.", "Free some space."))
+    bench.exporting.poll(is_training=False)
+    assert [(notice.title, notice.detail) for notice in bench.notices] == [
+        ("Metrics, CSV was not exported", "The disk is full.")
+    ]
+    bench.exporting.poll(is_training=False)
+    assert bench.started[1].task.n_threads is None
+    bench.exporting.cancel(2)
+    assert bench.started[1].is_cancelled
+
+
+def test_a_file_manager_that_is_missing_is_told(bench: Bench):
+    bench.start()
+    bench.exporting.poll(is_training=False)
+    bench.exporting.show(1)  # nothing there yet
+    result = ExportResult(bench.folder / "out" / "m.csv", 1, 5)
+    bench.started[0].events.append(ExportDone(result))
+    bench.exporting.poll(is_training=False)
+    bench.exporting.show(1)
+    bench.until(lambda: len(bench.notices) > 0)
+    assert bench.shown == [result.path]
+    assert "no file manager" in bench.notices[0].detail
+
+
+def test_a_session_asks_and_closes(tmp_path: Path):
+    session = Session(settings=Settings(tmp_path / "settings.json"), is_preloading=False)
+    try:
+        session.dispatch(commands.AskExport())  # nothing is open
+        assert session.exporting.page is None
+        session.dispatch(commands.CancelExport(5))
+        session.dispatch(commands.ShowExport(5))
+        session.dispatch(commands.CloseQuestion())
+        assert not list(session.notices)
+    finally:
+        session.close()
