@@ -1,0 +1,200 @@
+"""Exports in the window: what the dialog asks and tells, and what the panel lists and its buttons do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from pyglet.window import key
+
+from app.export.export_choices import ExportChoices, ExportContext
+from app.export.export_plan import ExportPlan
+from app.export.export_progress import ExportProgress, ExportResult
+from app.export.export_status import ExportStatus
+from app.session import commands
+from app.session.exporting import ExportPage
+from tests.ui.pilot import CTRL, Pilot
+from ui.panels.exports import bytes_text, ending_text, files_text, progress_text
+from ui.panels.state import EXPORTS
+
+ODD = "50 %s of it##x\n%n"
+"""A name that formats, ends a label and breaks a line, if it is let."""
+CONTEXT = ExportContext(
+    name=ODD,
+    n_frames=30,
+    clips=((0, 10), (10, 20), (20, 30)),
+    trained=(0, 1),
+    frame_index=4,
+    in_frame=0,
+    out_frame=29,
+    cameras=(ODD, *(f"cam{i:02d}" for i in range(8))),
+    picture_size=(320, 240),
+    fps=30.0,
+    paths=(f"path {ODD}",),
+)
+STATUS = ExportStatus(1, "Gaussians, PLY", Path("/out") / ODD)
+
+
+def errors(pilot: Pilot) -> list[str]:
+    return [notice.title for notice in pilot.session.notices if notice.kind == "error"]
+
+
+def ask(pilot: Pilot, choices: ExportChoices, **plan: object) -> None:
+    """Open the dialog."""
+    exporting = pilot.session.exporting
+    exporting.page = ExportPage(CONTEXT, choices)
+    exporting.found = ExportPlan(choices, 3, 5_000_000, 10**10, **plan)  # type: ignore[arg-type]
+    pilot.draw(6)
+    assert "export.start" in pilot.rects
+
+
+def asked(pilot: Pilot) -> ExportChoices:
+    return pilot.session.exporting.asked[-1]
+
+
+@pytest.mark.gl
+def test_ctrl_e_asks_and_enter_exports(pilot: Pilot) -> None:
+    pilot.key(key.E, modifiers=(CTRL,))
+    assert pilot.session.commands[-1] == commands.AskExport()
+    ask(pilot, ExportChoices(out="/out/g"))
+    pilot.key(key.ENTER)
+    assert pilot.session.commands[-1] == commands.StartExport(ExportChoices(out="/out/g"))
+    pilot.session.exporting.page = None
+    pilot.draw(4)
+    assert pilot.studio.frame.ui.rects.get("exports.ask") is not None  # the panel has come to the front
+    assert not errors(pilot)
+
+
+@pytest.mark.gl
+def test_escape_closes_and_problems_hold_it_back(pilot: Pilot) -> None:
+    ask(pilot, ExportChoices(out="/out/g"), problems=(f"The disk of {ODD} is full.",))
+    assert "export.problem" in pilot.rects
+    pilot.key(key.ENTER)
+    pilot.click("export.start")
+    assert not [one for one in pilot.session.commands if isinstance(one, commands.StartExport)]
+    pilot.key(key.ESCAPE)
+    assert pilot.session.commands[-1] == commands.CloseQuestion()
+    assert not errors(pilot)
+
+
+@pytest.mark.gl
+def test_while_it_is_looked_at_nothing_can_be_exported(pilot: Pilot) -> None:
+    ask(pilot, ExportChoices(out="/out/g"))
+    pilot.session.exporting.found = None
+    pilot.draw(2)
+    pilot.key(key.ENTER)
+    assert not [one for one in pilot.session.commands if isinstance(one, commands.StartExport)]
+
+
+@pytest.mark.gl
+def test_every_kind_is_asked_for_and_gets_a_name_unless_one_was_typed(pilot: Pilot) -> None:
+    ask(pilot, ExportChoices(out="/out/g"))
+    for kind in ("video", "metrics", "cameras", "gaussians"):
+        pilot.click(f"export.kind.{kind}")
+        pilot.draw(2)
+        assert (asked(pilot).kind, asked(pilot).out) == (kind, f"/out/{kind}")
+    pilot.click("export.out")
+    pilot.key(key.A, modifiers=(CTRL,))
+    pilot.type("/mine")
+    pilot.key(key.ENTER)  # it ends the text and nothing else
+    pilot.click("export.kind.metrics")
+    pilot.click("export.format.json")
+    pilot.click("export.frames.range")
+    pilot.draw(2)
+    assert asked(pilot) == ExportChoices("metrics", (("metrics.format", "json"),), "range", 1, "/mine")
+    assert not [one for one in pilot.session.commands if isinstance(one, commands.StartExport)]
+    assert not errors(pilot)
+
+
+@pytest.mark.gl
+def test_names_of_cameras_and_paths_are_shown_as_they_are(pilot: Pilot) -> None:
+    ask(pilot, ExportChoices(kind="video", out="/out/v"))
+    assert dict(asked(pilot).answers) == {}
+    pilot.click("export.from")
+    pilot.draw(3)
+    assert f"export.from.path:path {ODD}" in pilot.rects
+    pilot.click(f"export.from.camera:{ODD}")
+    pilot.draw(3)
+    assert asked(pilot).answer("from") == f"camera:{ODD}"
+    pilot.click("export.shows.compare")
+    pilot.draw(3)
+    assert asked(pilot).answer("shows") == "compare"
+    assert "export.size." not in pilot.rects  # pictures have the camera's size
+    assert not errors(pilot)
+
+
+@pytest.mark.gl
+def test_the_panel_lists_exports_and_its_buttons_act(pilot: Pilot) -> None:
+    result = ExportResult(Path("/out"), 2, 10, 41.5, (f"As {ODD}.",))
+    pilot.session.exporting.statuses = (
+        replace(STATUS, state="running", progress=ExportProgress(3, 12)),
+        replace(STATUS, export_id=2),
+        replace(STATUS, export_id=3),
+        replace(STATUS, export_id=4, state="done", result=result),
+        replace(STATUS, export_id=5, state="failed", message=f"It is {ODD}.", hint="Try again."),
+    )
+    pilot.studio.frame.ui.wanted_panel = EXPORTS
+    pilot.draw(8)
+    for button, command in (
+        ("cancel1", commands.CancelExport(1)),
+        ("down2", commands.MoveExport(2, 1)),
+        ("up3", commands.MoveExport(3, 0)),
+    ):
+        pilot.click(f"exports.{button}")
+        assert pilot.session.commands[-1] == command
+    pilot.session.exporting.statuses = pilot.session.exporting.statuses[3:]
+    pilot.draw(4)
+    for button, command in (
+        ("show4", commands.ShowExport(4)),
+        ("remove4", commands.RemoveExport(4)),
+        ("retry5", commands.RetryExport(5)),
+        ("clear", commands.ClearExports()),
+        ("ask", commands.AskExport()),
+    ):
+        pilot.click(f"exports.{button}")
+        assert pilot.session.commands[-1] == command
+    assert not errors(pilot)
+
+
+@pytest.mark.gl
+def test_the_panel_is_reached_and_used_by_keyboard(pilot: Pilot) -> None:
+    pilot.session.exporting.statuses = (replace(STATUS, state="failed", message="x"),)
+    for _ in range(20):
+        if pilot.studio.frame.ui.keyed_panel == EXPORTS:
+            break
+        pilot.key(key.F6)
+    pilot.draw(6)
+    assert pilot.studio.frame.ui.keyed_panel == EXPORTS
+    for _ in range(6):
+        pilot.key(key.DOWN)
+        pilot.key(key.ENTER)
+        if pilot.session.commands and pilot.session.commands[-1] == commands.RetryExport(1):
+            break
+    assert commands.RetryExport(1) in pilot.session.commands
+
+
+def test_progress_in_words() -> None:
+    assert progress_text(STATUS) == "Waits"
+    running = replace(STATUS, state="running")
+    assert progress_text(running) == "Starting"
+    assert progress_text(replace(running, progress=ExportProgress(0, 0, message="Opening"))) == "Opening"
+    far = replace(running, progress=ExportProgress(1200, 3000), per_s=3.14, eta_s=573.0)
+    assert progress_text(far) == "1,200 of 3,000 frames, 3.1 per second, 9:33 left"
+    assert progress_text(replace(far, state="stopping")) == "Stopping"
+
+
+def test_endings_in_words() -> None:
+    done = replace(STATUS, state="done", seconds=12.0, result=ExportResult(Path("/o"), 1, 1234, 41.52))
+    assert ending_text(done) == "1 file, 1 kB in 0:12; read back: 41.5 dB PSNR"
+    assert "Cancelled" in ending_text(replace(STATUS, state="cancelled"))
+    assert ending_text(replace(STATUS, state="failed", message="No.", hint="Do.")) == "No. Do."
+
+
+@pytest.mark.parametrize(
+    ("n_bytes", "text"),
+    [(0, "0 bytes"), (999, "999 bytes"), (1234, "1 kB"), (99_000, "99 kB"), (3e6, "3.0 MB"), (7.4e10, "74.0 GB")],
+)
+def test_amounts_of_data(n_bytes, text) -> None:
+    assert bytes_text(n_bytes) == text
+    assert files_text(1200, n_bytes) == f"1,200 files, {text}"
