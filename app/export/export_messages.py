@@ -36,7 +36,7 @@ Ending = ExportDone | ExportStopped | ExportFailed
 Event = ExportGoesOn | Ending
 
 CANCEL = b"cancel"
-"""All that is said to the process."""
+"""The only command there is."""
 
 _EVENTS = msgspec.json.Decoder(Event, dec_hook=lambda kind, text: Path(text) if kind is Path else text)
 

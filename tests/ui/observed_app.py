@@ -45,6 +45,7 @@ def describe(studio: Any) -> dict[str, Any]:
         "clips": [clip.state for clip in session.clip_states],
         "notices": [[notice.kind, notice.title, notice.detail, notice.hint] for notice in session.notices],
         "jobs": [job.name for job in session.jobs],
+        "exports": [[one.title, one.state, one.done, one.message] for one in session.exporting.statuses],
         "regions": [region.as_dict() for region in session.regions.regions],
         "can_mark": session.regions.can_mark,
         "sphere": None if studio.frame.ui.regions.sphere is None else studio.frame.ui.regions.sphere.as_dict(),

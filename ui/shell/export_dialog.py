@@ -75,6 +75,7 @@ class ExportDialog:
         self._choices = ExportChoices()
         self._suggested = ""
         self._native: Any = None
+        self._has_native = False
 
     def draw(self, session: HasExporting, dispatch: Dispatch, ui: UiState) -> None:
         """Draw the dialog while an export is asked for."""
@@ -88,6 +89,7 @@ class ExportDialog:
             return
         if page is not self._page:
             self._page, self._choices, self._suggested = page, page.choices, page.choices.out
+            self._has_native = has_native_dialog()
         before = self._choices
         height = -(BUTTON.y + PLAN_HEIGHT + PLACE_HEIGHT)
         if imgui.begin_child("choices", ImVec2(0, height), imgui.ChildFlags_.nav_flattened):
@@ -213,13 +215,12 @@ class ExportDialog:
     def _draw_place(self, ui: UiState) -> None:
         _label("Written to", imgui.get_style().window_padding.x)
         self._take_native(ui)
-        has_button = has_native_dialog()
-        imgui.set_next_item_width(-48 if has_button else -1)
+        imgui.set_next_item_width(-48 if self._has_native else -1)
         has_changed, out = imgui.input_text("##out", self._choices.out)
         ui.mark("export.out")
         if has_changed:
             self._choices = self._choices.changed(out=out)
-        if has_button:
+        if self._has_native:
             imgui.same_line()
             if imgui.button(f"{Icon.FOLDER}##choose", ImVec2(-1, 0)) and self._native is None:
                 folder, _, _ = self._choices.out.rpartition("/")
