@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from app.export import gaussian_sequence, read_back
 from app.export.export_progress import ExportCancelled, ExportProgress
 from app.export.gaussian_files import GaussianFile, base_name, moment_files, static_file
 from app.export.gaussians_job import GaussiansJob, estimate, run
-from app.export.scene_frames import SceneFrames
+from app.export.scene_frames import Part, SceneFrames
 from engine.errors import DiskError, ProjectError
 from engine.export.formats.table import FORMATS, Format
 from engine.export.splats import Splats
@@ -109,7 +110,7 @@ def test_what_stands_still_comes_again_where_it_changes(
     gaussians = SceneFrames.gaussians
     shown: list[str] = []
 
-    def same(self: SceneFrames, frame: float, part="all"):
+    def same(self: SceneFrames, frame: float, part: Part = "all"):
         shown.append(part)
         return gaussians(self, 0, part)
 
@@ -237,7 +238,7 @@ def test_untrained_clips_are_named_before_anything_is_made(opened: TrainedProjec
     ],
 )
 def test_bad_input_is_an_error_in_words(opened: TrainedProject, tmp_path: Path, change: dict, said: str | None):
-    job = GaussiansJob(**({"out": tmp_path / "out"} | change))
+    job = replace(GaussiansJob(tmp_path / "out"), **change)
     if said is None:
         assert any("larger than 379" in line for line in run(opened, job, quiet).lines)
         return
@@ -280,7 +281,7 @@ def test_a_part_without_gaussians_is_written_and_said(
     opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     gaussians = SceneFrames.gaussians
-    monkeypatch.setattr(SceneFrames, "gaussians", lambda self, frame, part="all": gaussians(self, frame, part)[:0])
+    monkeypatch.setattr(SceneFrames, "gaussians", lambda self, frame, part: gaussians(self, frame, part)[:0])
     for name in FORMATS:
         result = run(opened, GaussiansJob(tmp_path / name, name, range(2)), quiet)
         assert any("2 files hold no Gaussians" in line for line in result.lines)
