@@ -64,7 +64,7 @@ def test_frames_count_from_where_the_capture_begins(capture: Capture):
     store = capture.store
     sources = store.sources
     try:
-        store.sources = [ahead, *sources[1:]]
+        store.sources = (ahead, *sources[1:])
         assert sound_source(replace(capture, n_frames=28), 0, 3)[1] == pytest.approx(5 / 30)
     finally:
         store.sources = sources

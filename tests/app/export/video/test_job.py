@@ -64,7 +64,7 @@ def test_a_job_goes_through_to_another_process_as_it_is(films: Films):
     assert again == job
     assert isinstance(again, VideoJob)
     with pytest.raises(AttributeError):
-        again.speed = 2.0
+        again.speed = 2.0  # type: ignore[misc]
 
 
 def test_what_a_camera_took_has_to_be_there_for_the_comparison(films: Films):

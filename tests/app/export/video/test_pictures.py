@@ -5,7 +5,6 @@ from __future__ import annotations
 import av
 import numpy as np
 import pytest
-from PIL import Image
 
 from app.export.scene_frames import SceneFrames
 from app.export.video.drawing import draw
@@ -14,6 +13,7 @@ from app.export.video.views import camera_view, pinhole_K
 from app.project.camera_paths import write_camera_paths
 from engine.camera.camera_path import CameraKey, CameraPath
 from engine.camera.projection import vertical_fov
+from engine.camera.rig import CameraRig
 from engine.errors import ProjectError
 from engine.metrics.pictures.colors import to_levels
 from tests.app.export.video.conftest import CAMERA, Films, decoded, images_in, psnr_of
@@ -111,15 +111,44 @@ def test_slow_motion_shows_moments_between_frames_in_order(sample_films: Films):
     assert (films.folder / "fast" / "frame_000004.png").is_file()
 
 
-def test_between_two_clips_the_nearer_one_is_shown(sample_films: Films):
+def test_between_frames_what_moves_fades_over_and_is_not_seen_twice(sample_films: Films):
     films = sample_films
-    films.render("slow", "png", frames=(2, 4), speed=0.25)
-    pictures = images_in(films.folder / "slow")
-    rig = films.opened.capture.rig
-    for number, clip_index in ((2, 0), (3, 1)):  # 2.5 and 2.75
-        trained = films.opened.load(clip_index)
-        clip_time = (2 + number / 4 - trained.clip.start) / trained.clip.clip_length
-        assert psnr_of(pictures[number], to_levels(trained.picture(rig, CAMERA, clip_time))) > 50.0
+    scene = SceneFrames(films.opened)
+    model, rig = scene.trained(1.0).model, films.opened.capture.rig
+    (first, second), clip_time = (list(scene.shares(1.25)), 1.25 / 3)
+    assert (first.weight, second.weight) == pytest.approx((0.75, 0.25))
+    assert first.clip_time == second.clip_time == pytest.approx(clip_time)
+    n_both = len(model.decode(clip_time))
+    assert len(first.gaussians) < n_both  # what exists at the second frame only is not in it
+    assert len(second.gaussians) < n_both
+    before, between, after = (films.live(moment).astype(float) for moment in (1.0, 1.25, 2.0))
+    assert psnr_of(between, 0.75 * before + 0.25 * after) > 35.0
+    union = draw_all_at_once(scene, rig, 1.25)
+    assert psnr_of(union, 0.75 * before + 0.25 * after) < psnr_of(between, 0.75 * before + 0.25 * after) - 3.0
+    (whole,) = scene.shares(1.0)
+    assert (whole.weight, len(whole.gaussians)) == (1.0, len(scene.gaussians(1.0)))
+
+
+def draw_all_at_once(scene: SceneFrames, rig: CameraRig, moment: float) -> np.ndarray:
+    """A moment with everything that exists at the frame before or after it."""
+    trained = scene.trained(moment)
+    return to_levels(trained.picture(rig, CAMERA, scene.clip_time(moment)))
+
+
+def test_a_clip_fades_into_the_next_one(sample_films: Films, monkeypatch: pytest.MonkeyPatch):
+    films = sample_films
+    last, first = films.live(2.0).astype(float), films.live(3.0).astype(float)
+    for moment, weight in ((2.25, 0.25), (2.5, 0.5), (2.75, 0.75)):
+        assert psnr_of(films.live(moment), (1 - weight) * last + weight * first) > 45.0
+    loads: list[int] = []
+    load = type(films.opened).load
+    monkeypatch.setattr(type(films.opened), "load", lambda self, index: loads.append(index) or load(self, index))
+    films.render("slow", "png", frames=(1, 5), speed=0.25)
+    assert loads[:2] == [0, 1]  # looked at before the work
+    assert len(loads) <= 2 + 4
+    monkeypatch.undo()
+    monkeypatch.setattr(type(films.opened), "trained", [0])  # a clip that is not there cannot be faded into
+    assert np.array_equal(films.live(2.4), last)
 
 
 def test_supersampling_reduces_what_was_drawn_larger(sample_films: Films):
@@ -176,4 +205,4 @@ def test_features_apart_are_drawn_apart(sample_films: Films):
     both, static, dynamic = (images_in(films.folder / name) for name in ("both", "static", "dynamic"))
     assert psnr_of(static[0], dynamic[0]) < 40.0
     assert psnr_of(static[0], both[0]) < 60.0
-    assert np.array_equal(Image.fromarray(both[2]), films.live(2))
+    assert np.array_equal(both[2], films.live(2))

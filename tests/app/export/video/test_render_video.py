@@ -75,7 +75,7 @@ def test_opacity_is_kept_in_png_webm_and_exr(films: Films):
         decoder = av.CodecContext.create("libvpx-vp9", "r")  # the one that knows of opacity
         frames = [frame for packet in container.demux(video=0) for frame in decoder.decode(packet)]
     assert [frame.format.name for frame in frames] == ["yuva420p"] * 2
-    found = np.frombuffer(frames[0].planes[3], np.uint8).reshape(32, -1)[:, :48]
+    found = np.frombuffer(bytes(frames[0].planes[3]), np.uint8).reshape(32, -1)[:, :48]
     assert psnr_of(found, 255.0 * expected.alpha) > 36.0
 
 
