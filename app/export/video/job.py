@@ -23,8 +23,9 @@ PASSES: dict[PassName, str] = {
 }
 """What pictures can show."""
 MAX_SUPERSAMPLING = 8
-MAX_SIDE_PX = 16_384
-"""Longest side of a picture before it is reduced: what a graphics card and H.264 can take too."""
+MAX_SIDE_PX, MAX_PIXELS = 16_384, 1 << 27
+"""Of a picture as it is drawn, before it is reduced: as long as H.264 allows, and some gigabytes of memory."""
+MAX_PICTURES = 1_000_000
 MAX_TURNS = 100
 FPS_RANGE = (0.1, 1000.0)
 SPEED_RANGE = (0.001, 1000.0)

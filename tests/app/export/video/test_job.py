@@ -21,7 +21,8 @@ from tests.app.export.video.conftest import Films
         ("png", {"camera": "nobody"}, "no camera called nobody"),
         ("png", {"shows": "heat"}, "cannot show 'heat'"),
         ("png", {"size": (0, 10)}, "at least one pixel"),
-        ("png", {"size": (9000, 10), "supersampling": 2}, "larger than 16384"),
+        ("png", {"size": (9000, 10), "supersampling": 2}, "18000 x 20 pixels; at most 16384"),
+        ("png", {"size": (4000, 4000), "supersampling": 4}, "134 million in all"),
         ("png", {"supersampling": 0}, "whole number from 1"),
         ("png", {"fps": 0.0}, "The rate is 0"),
         ("png", {"fps": float("nan")}, "The rate is nan"),
@@ -56,6 +57,13 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(films: Films)
         with pytest.raises(EngineError, match=message):
             films.render(name, "mp4")
     assert films.names == ["file"]
+
+
+def test_a_video_without_end_is_refused(films: Films, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("app.export.video.plan.MAX_PICTURES", 100)
+    with pytest.raises(EngineError, match="That makes 501 pictures; at most 100 are written at once"):
+        films.render("out", "png", speed=0.01)
+    assert films.names == []
 
 
 def test_a_job_goes_through_to_another_process_as_it_is(films: Films):
