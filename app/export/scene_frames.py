@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from app.background.kernels import use_threads
@@ -22,6 +22,23 @@ if TYPE_CHECKING:
 Part = Literal["all", "static", "moving"]
 PARTS: tuple[Part, ...] = ("all", "static", "moving")
 _CONTENTS = {"all": "all", "static": "static", "moving": "dynamic"}
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """One of the pictures that a moment between two frames is mixed of; a frame has one only.
+
+    Attributes:
+        weight: All weights of a moment add up to 1.
+        trained: The clip, for its colours and near plane.
+        clip_time: In it.
+        gaussians: What is drawn.
+    """
+
+    weight: float
+    trained: TrainedClip
+    clip_time: float
+    gaussians: Gaussians
 
 
 class SceneFrames:
@@ -132,6 +149,44 @@ class SceneFrames:
 
         with torch.no_grad():
             return self.model(frame, part).decode(self.clip_time(frame)).detach()
+
+    def shares(self, frame: float) -> Iterator[Share]:
+        """What is shown of a moment, to be drawn one by one and mixed by weight.
+
+        Anchors of what moves stand still and exist at some frames only, and a clip ends with its last frame. Between
+        two frames the field is evaluated at the moment itself, but what exists at the frame before fades out while what
+        exists at the frame after fades in; all at once it would be seen twice. Between two clips the last frame of the
+        one fades into the first frame of the other, where both are trained.
+
+        Raises:
+            ProjectError: What `trained` raises.
+        """
+        before = math.floor(frame)
+        fraction = frame - before
+        if fraction > 0 and self.clip_at(before) != self.clip_at(before + 1):
+            weights = {before: 1.0 - fraction, before + 1: fraction}
+            finished = self.opened.trained
+            known = {at: weight for at, weight in weights.items() if self.clip_at(at).clip_index in finished}
+            is_loaded = {at: self._loaded is not None and self._loaded.clip == self.clip_at(at) for at in known}
+            for at in sorted(known, key=lambda at: not is_loaded[at]):  # each clip is loaded once
+                yield Share(known[at] / sum(known.values()), self.trained(at), self.clip_time(at), self.gaussians(at))
+            return
+        trained, clip_time = self.trained(frame), self.clip_time(frame)
+        knots = trained.model.knots(clip_time)
+        if len(knots) == 1:
+            yield Share(1.0, trained, clip_time, self.gaussians(frame))
+            return
+        for knot, weight in knots:
+            yield Share(weight, trained, clip_time, self._existing_at(trained, clip_time, knot))
+
+    def _existing_at(self, trained: TrainedClip, clip_time: float, knot: int) -> Gaussians:
+        """What exists at one of the clip's frames, at another time of the clip."""
+        import torch
+
+        model = trained.model
+        rows = {role: model.alive(role, knot / trained.clip.clip_length) for role in model.roles()}
+        with torch.no_grad():
+            return model.decode(clip_time, rows).detach()
 
 
 def _runs(frames: Sequence[int]) -> list[tuple[int, int]]:

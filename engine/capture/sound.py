@@ -97,7 +97,8 @@ class SoundReader:
         """Pieces of the track without overlaps and with silence in gaps, from the start on. [S, 2] float32"""
         stream = self._container.streams.audio[0]
         self._container.seek(max(int((self._start_s - LEAD_S) / stream.time_base), 0), stream=stream)
-        resampler = AudioResampler(format="flt", layout="stereo", rate=self._rate)
+        is_mono = stream.codec_context.layout.nb_channels == 1  # as loud on both sides: FFmpeg would halve its power
+        resampler = AudioResampler(format="flt", layout="mono" if is_mono else "stereo", rate=self._rate)
         due: int | None = None  # sample that comes next, counted from the start
         for frame in self._container.decode(stream):
             at = round((float(frame.time or 0.0) - self._start_s) * self._rate)
@@ -106,12 +107,17 @@ class SoundReader:
                 yield from _from_start(np.zeros((at - due, 2), np.float32), due)
                 due = at
             for piece in resampler.resample(frame):
-                samples = piece.to_ndarray().reshape(-1, 2)
+                samples = _stereo(piece.to_ndarray(), is_mono=is_mono)
                 yield from _from_start(samples, due)
                 due += len(samples)
         if due is not None:
             for piece in resampler.resample(None):
-                yield from _from_start(piece.to_ndarray().reshape(-1, 2), due)
+                yield from _from_start(_stereo(piece.to_ndarray(), is_mono=is_mono), due)
+
+
+def _stereo(samples: np.ndarray, *, is_mono: bool) -> np.ndarray:
+    """Samples as they are packed, [1, S] or [1, 2 S], as two channels. [S, 2] float32"""
+    return np.repeat(samples.reshape(-1, 1), 2, axis=1) if is_mono else samples.reshape(-1, 2)
 
 
 def _from_start(samples: np.ndarray, at: int) -> Iterator[np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,41 +32,50 @@ def draw(scene: SceneFrames, moment: float, view: ViewPoint, *, supersampling: i
     """Draw a moment. Looked through a camera of the capture, colours are those of the camera, otherwise the scene's.
 
     Args:
-        moment: In frames of the capture, between frames too.
+        moment: In frames of the capture; between frames see `SceneFrames.shares`.
         supersampling: Drawn so many times as large along both sides and reduced by means over squares.
     Raises:
         ProjectError: What `SceneFrames.gaussians` raises.
     """
+    shares = list(_drawn_shares(scene, moment, view, supersampling))
+    color, alpha, weighted_depth = (np.stack(parts).sum(axis=0) for parts in zip(*shares, strict=True))
+    alpha, weighted_depth = np.clip(alpha[..., 0], 0.0, 1.0), weighted_depth[..., 0]
+    depth = np.full_like(alpha, np.nan)
+    np.divide(weighted_depth, alpha, out=depth, where=alpha >= MIN_OPACITY)
+    return Drawn(np.clip(color, 0.0, 1.0), alpha, depth)
+
+
+def _drawn_shares(
+    scene: SceneFrames, moment: float, view: ViewPoint, supersampling: int
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Colours [H, W, 3], opacity [H, W, 1] and depth multiplied with it [H, W, 1] of every share, times its weight."""
     import torch
 
     from engine.raster import rasterize
 
-    trained = scene.trained(moment)
     K = view.K.copy()
     K[:2] *= supersampling  # pixel centres lie at +0.5, so everything scales alike
-    with torch.no_grad():
-        rendering = rasterize(
-            scene.gaussians(moment),
-            torch.from_numpy(view.world_to_camera.astype(np.float32))[None],
-            torch.from_numpy(K.astype(np.float32))[None],
-            view.width * supersampling,
-            view.height * supersampling,
-            backend=backend_called(),
-            near_plane=trained.base.header.near_plane,
-            want_depth=True,
+    for share in scene.shares(moment):
+        with torch.no_grad():
+            rendering = rasterize(
+                share.gaussians,
+                torch.from_numpy(view.world_to_camera.astype(np.float32))[None],
+                torch.from_numpy(K.astype(np.float32))[None],
+                view.width * supersampling,
+                view.height * supersampling,
+                backend=backend_called(),
+                near_plane=share.trained.base.header.near_plane,
+                want_depth=True,
+            )
+        assert rendering.depth is not None
+        color, alpha, weighted_depth = (
+            _reduced(values[0].numpy(), supersampling) for values in (rendering.image, rendering.alpha, rendering.depth)
         )
-    assert rendering.depth is not None
-    color, alpha, weighted_depth = (
-        _reduced(values[0].numpy(), supersampling) for values in (rendering.image, rendering.alpha, rendering.depth)
-    )
-    alpha, weighted_depth = np.clip(alpha[..., 0], 0.0, 1.0), weighted_depth[..., 0]
-    is_seen = alpha >= MIN_OPACITY
-    depth = np.full_like(alpha, np.nan)
-    np.divide(weighted_depth, alpha, out=depth, where=is_seen)
-    if view.camera_index is not None:
-        rig = scene.opened.capture.rig
-        color = trained.colors.in_camera(color, rig, view.camera_index, scene.clip_time(moment))
-    return Drawn(np.clip(color, 0.0, 1.0), alpha, depth)
+        if view.camera_index is not None:
+            rig = scene.opened.capture.rig
+            color = share.trained.colors.in_camera(color, rig, view.camera_index, share.clip_time)
+        weight = np.float32(share.weight)
+        yield weight * color, weight * alpha, weight * weighted_depth
 
 
 def _reduced(values: np.ndarray, n: int) -> np.ndarray:

@@ -23,8 +23,9 @@ PASSES: dict[PassName, str] = {
 }
 """What pictures can show."""
 MAX_SUPERSAMPLING = 8
-MAX_SIDE_PX = 16_384
-"""Longest side of a picture before it is reduced: what a graphics card and H.264 can take too."""
+MAX_SIDE_PX, MAX_PIXELS = 16_384, 1 << 27
+"""Of a picture as it is drawn, before it is reduced: as long as H.264 allows, and some gigabytes of memory."""
+MAX_PICTURES = 1_000_000
 MAX_TURNS = 100
 FPS_RANGE = (0.1, 1000.0)
 SPEED_RANGE = (0.001, 1000.0)
@@ -66,7 +67,8 @@ class VideoJob:
         hold: Moment at which the scene stands still while the camera moves on; None for none.
         supersampling: Pictures are drawn so many times as large along both sides, and reduced.
         background: Behind the scene, red, green and blue in 0..255.
-        is_transparent: Keep the opacity of the scene instead of putting a background behind it.
+        is_transparent: Keep the opacity of the scene instead of putting a background behind it, which OpenEXR does in
+            any case.
         sound: Name of the capture camera whose sound goes along; None for silence.
         features: Which features of the anchors are used, see engine.metrics.clips.features_apart.
     """
@@ -105,6 +107,11 @@ class VideoJob:
             raise ProjectError(f"{kind.label} has no transparency.", hint=f"Formats that have it are {others}.")
         if self.is_transparent and self.shows != "color":
             raise ProjectError("Only pictures in colour can be transparent.", hint="Leave one of the two out.")
+        if self.format == "exr" and self.background != (0, 0, 0):
+            raise ProjectError(
+                "OpenEXR files keep the opacity of the scene, so that nothing is behind it.",
+                hint="Leave the background out.",
+            )
         if self.sound is not None and kind.sound_codec is None:
             raise ProjectError(f"{kind.label} cannot hold sound.", hint="Write an mp4 or a webm file.")
         if self.shows == "compare" and (self.camera is None or self.hold is not None):

@@ -9,7 +9,7 @@ from pathlib import Path
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target
 from app.export.video.formats import FORMATS, check_codecs
-from app.export.video.job import MAX_SIDE_PX, VideoJob
+from app.export.video.job import MAX_PICTURES, MAX_PIXELS, MAX_SIDE_PX, VideoJob
 from app.export.video.moments import Moment, moments_of, runs_of
 from app.export.video.views import ViewOf, camera_view, path_view, turntable_view
 from app.export.video.writers.sequence import depth_unit
@@ -79,6 +79,12 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
     runs = _runs(job, scene, path)
     if not runs:
         raise ProjectError("There are no frames to render.", path=scene.opened.project.folder)
+    n_pictures = sum((len(run) - 1) / step + 1 for run in runs)
+    if n_pictures > MAX_PICTURES:
+        raise ProjectError(
+            f"That makes {n_pictures:,.0f} pictures; at most {MAX_PICTURES:,} are written at once.",
+            hint="Choose fewer frames, or a higher speed.",
+        )
     moments = moments_of(runs, step, job.hold)
     if job.shows == "compare" and not all(moment.is_whole for moment in moments):
         raise ProjectError(
@@ -86,13 +92,8 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
             hint="Leave speed and rate out.",
         )
     size = capture.picture_size if job.size is None else job.size
+    _check_size(size, job.supersampling)
     view_of = _view_of(job, capture, path, size, len(moments))
-    if max(size) * job.supersampling > MAX_SIDE_PX:
-        raise ProjectError(
-            f"Pictures of {size[0]} x {size[1]} with supersampling {job.supersampling} are drawn larger than "
-            f"{MAX_SIDE_PX} pixels.",
-            hint="Choose a smaller size, or less supersampling.",
-        )
     sound, notes = _sound(job, capture, runs)
     check_codecs(job.format, needs_sound=sound is not None)
     width, height = (3 * size[0], size[1]) if job.shows == "compare" else size
@@ -144,6 +145,17 @@ def _frames_of(path: CameraPath, n_frames: int | None) -> range:
             hint="Move its keys, or choose frames.",
         )
     return range(start, stop)
+
+
+def _check_size(size: tuple[int, int], supersampling: int) -> None:
+    """See that pictures of this size can be drawn."""
+    width, height = (side * supersampling for side in size)
+    if max(width, height) > MAX_SIDE_PX or width * height > MAX_PIXELS:
+        raise ProjectError(
+            f"Pictures of {size[0]} x {size[1]} with supersampling {supersampling} would be drawn with {width} x "
+            f"{height} pixels; at most {MAX_SIDE_PX} along a side and {MAX_PIXELS // 1_000_000} million in all can be.",
+            hint="Choose a smaller size, or less supersampling.",
+        )
 
 
 def _view_of(

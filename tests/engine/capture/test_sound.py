@@ -54,6 +54,7 @@ def test_a_click_is_heard_when_it_was(capture: Capture, frame: int):
     sound = read(path, start_s, RATE)
     assert click_s(sound) == pytest.approx(CLICK_S - frame / 30, abs=0.002)
     assert np.abs(sound).max() > 0.1
+    assert np.array_equal(sound[:, 0], sound[:, 1])  # of one microphone
     assert np.abs(sound[round((1.1 - frame / 30) * RATE) :]).max(initial=0.0) == 0.0  # behind the end of the track
 
 
@@ -64,7 +65,7 @@ def test_frames_count_from_where_the_capture_begins(capture: Capture):
     store = capture.store
     sources = store.sources
     try:
-        store.sources = [ahead, *sources[1:]]
+        store.sources = (ahead, *sources[1:])
         assert sound_source(replace(capture, n_frames=28), 0, 3)[1] == pytest.approx(5 / 30)
     finally:
         store.sources = sources

@@ -17,7 +17,9 @@ def read(path: Path) -> dict[str, np.ndarray]:
         (frame,) = container.decode(video=0)
         dtype = np.dtype(np.float16 if "f16" in frame.format.name else np.float32)
         names = "Y" if frame.format.name.startswith("gray") else "GBRA"  # FFmpeg's order of planes
-        rows = [np.frombuffer(plane, dtype).reshape(frame.height, -1)[:, : frame.width] for plane in frame.planes]
+        rows = [
+            np.frombuffer(bytes(plane), dtype).reshape(frame.height, -1)[:, : frame.width] for plane in frame.planes
+        ]
         return dict(zip(names, rows, strict=False))
 
 
