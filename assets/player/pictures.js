@@ -1,9 +1,9 @@
 // Asks the worker for pictures, one at a time, the newest wish first, and loads the clips that they need.
 
 class Pictures {
-  /** onPicture(answer), onProblem(message), onLoading(isLoading) */
-  constructor(header, blocks, workerSource, { onPicture, onProblem, onLoading }) {
-    Object.assign(this, { header, blocks, onPicture, onProblem, onLoading });
+  /** onPicture(answer); onNotice(text): what stands in the way of the wish, empty where nothing does. */
+  constructor(header, blocks, workerSource, { onPicture, onNotice }) {
+    Object.assign(this, { header, blocks, onPicture, onNotice });
     this.isReady = this.isBusy = false;
     this.wish = this.answered = null;
     this.epoch = 0; // another one after everything was forgotten
@@ -14,10 +14,10 @@ class Pictures {
     this.worker = new Worker(url);
     URL.revokeObjectURL(url);
     this.worker.onmessage = ({ data }) => this.receive(data);
-    this.worker.onerror = (event) => onProblem(`The sorter has stopped: ${event.message}`);
+    this.worker.onerror = (event) => this.stop(`The sorter has stopped: ${event.message}`);
     blocks.text("shared").then(
       (text) => this.worker.postMessage({ kind: "scene", header, text }),
-      (error) => onProblem(error.message),
+      (error) => this.stop(error.message),
     );
   }
 
@@ -27,7 +27,8 @@ class Pictures {
 
   /** Is this frame still on its way because its clip is being loaded? */
   isWaitingFor(frame) {
-    return !this.loaded.has(this.clipOf(frame));
+    const index = this.clipOf(frame);
+    return !this.loaded.has(index) && !this.failed.has(index);
   }
 
   /** A frame seen from where depths are `row`, the third row of world_to_camera. */
@@ -38,11 +39,11 @@ class Pictures {
 
   go() {
     const { wish } = this;
-    if (!this.isReady || this.isBusy || !wish || wish.key === this.answered) return;
-    const clipIndex = this.clipOf(wish.frame);
-    this.onLoading(!this.loaded.has(clipIndex));
+    if (!this.isReady || !wish) return;
+    const clipIndex = this.clipOf(wish.frame), isLoaded = this.loaded.has(clipIndex);
+    this.onNotice(this.failed.get(clipIndex) || (isLoaded ? "" : "Loading \u2026"));
     this.load(clipIndex);
-    if (!this.loaded.has(clipIndex)) return;
+    if (!isLoaded || this.isBusy || wish.key === this.answered) return;
     if (this.header.clips.length > 1) this.load((clipIndex + 1) % this.header.clips.length);
     this.isBusy = true;
     this.asked = wish.key;
@@ -51,8 +52,7 @@ class Pictures {
   }
 
   async load(index) {
-    if (this.loaded.has(index) || this.loading.has(index)) return;
-    if (this.failed.has(index)) return;
+    if (this.loaded.has(index) || this.loading.has(index) || this.failed.has(index)) return;
     this.loading.add(index);
     try {
       const text = await this.blocks.text(this.header.clips[index].name);
@@ -65,7 +65,13 @@ class Pictures {
   fail(index, message) {
     this.loading.delete(index);
     this.failed.set(index, message);
-    if (this.wish && this.clipOf(this.wish.frame) === index) this.onProblem(message);
+    this.go();
+  }
+
+  /** Nothing more can be shown. */
+  stop(message) {
+    this.isReady = false;
+    this.onNotice(message);
   }
 
   /** Nothing of what was answered is there any more. */
@@ -88,7 +94,7 @@ class Pictures {
     }
     if (answer.kind === "failed") {
       if (answer.of === "clip") this.fail(answer.index, `A clip is damaged: ${answer.message}`);
-      else this.onProblem(answer.message);
+      else this.stop(answer.message);
     }
     if (answer.kind === "picture") {
       this.isBusy = false;

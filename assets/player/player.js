@@ -16,13 +16,11 @@ class Player {
     this.renderer = new Renderer(this.canvas, shaders, header.background, lines(nStill) + lines(nMoving));
     this.timeline = new Timeline(header, nFrames, (frame) => this.go(frame));
     this.shown = null; // frame of the picture on the screen
-    this.isLost = this.isDrawn = this.isLoading = false;
-    this.problem = "";
+    this.isLost = this.isDrawn = false;
     this.scheduled = 0;
     this.pictures = new Pictures(header, new Blocks(header.folder), workerSource, {
       onPicture: (answer) => this.take(answer),
-      onProblem: (message) => this.say(message),
-      onLoading: (isLoading) => this.tellLoading(isLoading),
+      onNotice: (text) => notify(text),
     });
     this.fillControls();
     followPointer(this.canvas, this.view, () => this.changed());
@@ -30,19 +28,31 @@ class Player {
     fillKeySheet(table);
     followKeys(table);
     this.followContext();
-    new ResizeObserver(() => this.resize()).observe(this.canvas);
-    matchMedia("(resolution: 1dppx)").addEventListener("change", () => this.resize());
-    this.resize();
+    this.followSize();
+    this.changed();
   }
 
   // ---- what is shown
 
-  resize() {
+  /** Have as many pixels as the screen shows. */
+  fit() {
     const { canvas } = this, width = canvas.clientWidth, height = canvas.clientHeight;
     const ratio = Math.min(devicePixelRatio, Math.max(1, Math.sqrt(GOOD_PIXELS / Math.max(width * height, 1))));
-    canvas.width = Math.max(1, Math.round(width * ratio));
-    canvas.height = Math.max(1, Math.round(height * ratio));
-    this.changed();
+    const size = [width, height].map((length) => Math.max(1, Math.round(length * ratio)));
+    if (canvas.width === size[0] && canvas.height === size[1]) return;
+    [canvas.width, canvas.height] = size; // which clears it
+    this.isDrawn = false;
+  }
+
+  /** The size changes with the window, with zooming, and from screen to screen. */
+  followSize() {
+    const observer = new ResizeObserver(() => this.changed());
+    try {
+      observer.observe(this.canvas, { box: "device-pixel-content-box" });
+    } catch {
+      observer.observe(this.canvas); // Safari does not know that box
+      addEventListener("resize", () => this.changed());
+    }
   }
 
   /** Something that is seen has changed: draw once, soon. */
@@ -54,6 +64,7 @@ class Player {
   tick(nowMs) {
     this.scheduled = 0;
     this.clock.tell(nowMs, this.pictures.isWaitingFor(this.clock.frame));
+    this.fit();
     const lens = this.view.lens(this.canvas.width, this.canvas.height);
     this.pictures.want(this.clock.frame, lens.worldToCamera.slice(8, 12));
     if (!this.isDrawn && !this.isLost && this.shown !== null) {
@@ -86,22 +97,6 @@ class Player {
     document.getElementById("loop").setAttribute("aria-pressed", clock.isLooping);
     document.getElementById("speed").value = clock.speed;
     document.getElementById("camera").value = this.view.camera === null ? "" : this.view.camera;
-  }
-
-  tellLoading(isLoading) {
-    this.isLoading = isLoading;
-    this.tellNotice();
-  }
-
-  say(message) {
-    this.problem = message;
-    this.tellNotice();
-  }
-
-  tellNotice() {
-    const notice = document.getElementById("notice");
-    notice.textContent = this.problem || (this.isLoading ? "Loading \u2026" : "");
-    notice.hidden = !notice.textContent;
   }
 
   // ---- what the user does
@@ -202,6 +197,12 @@ function leaveWhenChosen(list, canvas) {
   list.addEventListener("change", () => isPointed && canvas.focus());
 }
 
+function notify(text) {
+  const notice = document.getElementById("notice");
+  if (notice.textContent !== text) notice.textContent = text;
+  notice.hidden = !text;
+}
+
 function missing() {
   if (typeof DecompressionStream === "undefined") return "unpack the scene (DecompressionStream)";
   if (typeof Worker === "undefined" || typeof ResizeObserver === "undefined") return "run its parts side by side";
@@ -215,9 +216,7 @@ function begin() {
     if (lacks) throw new Error(`This browser cannot ${lacks}. A version of 2023 or later can.`);
     window.clipgstreamPlayer = new Player(JSON.parse(part("header")), JSON.parse(part("shaders")), part("worker"));
   } catch (error) {
-    const notice = document.getElementById("notice");
-    notice.textContent = error.message;
-    notice.hidden = false;
+    notify(error.message);
   }
 }
 
