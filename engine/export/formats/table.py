@@ -35,7 +35,7 @@ FORMATS: dict[str, Format] = {
         ".compressed.ply",
         "positions to 1/2000 of a small block, colours to 8 bits; PlayCanvas, SuperSplat",
         38.0,
-        16.5,
+        16.3,
         compressed_ply.write,
         compressed_ply.read,
     ),
@@ -43,7 +43,7 @@ FORMATS: dict[str, Format] = {
         ".spz",
         "positions to 1/4096 unit, the rest to 6 to 10 bits; small, widely read",
         38.0,
-        14.0,
+        15.0,
         spz.write,
         spz.read,
     ),
@@ -57,7 +57,7 @@ FORMATS: dict[str, Format] = {
     ),
     "glb": Format(".glb", "everything as it is, as glTF with KHR_gaussian_splatting", 50.0, 60.0, glb.write, glb.read),
     "sog": Format(
-        ".sog", "pictures in a zip file; the smallest, for PlayCanvas and SuperSplat", 38.0, 12.0, sog.write, sog.read
+        ".sog", "pictures in a zip file; the smallest, for PlayCanvas and SuperSplat", 38.0, 12.5, sog.write, sog.read
     ),
 }
 """By the name that the command line has for it."""
