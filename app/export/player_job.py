@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 LARGEST_PAGE_BYTES = 150_000_000
 """Above this, browsers are slow to open a single file: the data goes into a folder unless one file is asked for."""
 PAGE_SUFFIXES = (".html", ".htm")
+_DESCRIBED_BYTES = 400
+"""What a page says of a clip, about."""
 _SAMPLED_CLIPS = 3
 """Clips of which a frame is packed to tell the size beforehand."""
 
@@ -60,21 +62,21 @@ def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
     scene = SceneFrames(opened)
     clips = _clips(scene, job)
     n_frames = sum(len(wanted) for _, wanted in clips)
-    packer, n_shared, n_moving = Packer(), 0, 0.0
+    packer, n_moving = Packer(), 0.0
     sampled = [clips[round(at * (len(clips) - 1) / max(_SAMPLED_CLIPS - 1, 1))] for at in range(_SAMPLED_CLIPS)]
     for _, wanted in sampled:
         block = _packed(packer, scene, [wanted[len(wanted) // 2]])
         n_moving += len(block.data) / len(sampled)
     assert packer.shared is not None
-    n_shared = len(packer.shared.data)
-    n_bytes = page_bytes() + round((n_shared + n_moving * n_frames) * 4 / 3)
+    n_bytes = round((len(packer.shared.data) + n_moving * n_frames) * 4 / 3)  # as base64
+    n_bytes += page_bytes(scene_header(scene, clips[0][1][0], step=1)) + _DESCRIBED_BYTES * len(clips)
     has_folder = n_bytes > LARGEST_PAGE_BYTES if job.has_folder is None else job.has_folder
     lines = [f"About {n_bytes / 1e6:.1f} MB for {n_frames} frames."]
     if has_folder:
         lines.append(f"The clips go into the folder {job.folder.name}, which has to stay beside the page.")
         check_target(job.folder, n_bytes=n_bytes, is_folder=True)
     check_target(job.out, n_bytes=n_bytes)
-    return ExportEstimate(len(clips) + 1 if has_folder else 1, n_bytes, tuple(lines))
+    return ExportEstimate(len(clips) + 2 if has_folder else 1, n_bytes, tuple(lines))
 
 
 def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:

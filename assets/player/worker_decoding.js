@@ -5,7 +5,8 @@ const OTHERS = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
 const PLANES = { largest: 0, quats: 1, scales: 4, opacity: 7, colors: 8, n: 11 }; // of bytes, after the positions
 
 async function inflated(text, nBytes) {
-  const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const letters = atob(text), packed = new Uint8Array(letters.length);
+  for (let i = 0; i < letters.length; i++) packed[i] = letters.charCodeAt(i);
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
   const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
   if (bytes.length !== nBytes) throw new Error(`a block has ${bytes.length} bytes instead of ${nBytes}`);

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import io
 import json
 import re
 from collections.abc import Iterator
@@ -83,9 +84,12 @@ def page_writer(stream: TextIO, header: dict[str, Any], *, folder: Path | None =
     stream.write(_filled(after, {**parts, "header": json_for_html({"format": FORMAT, "version": VERSION, **header})}))
 
 
-def page_bytes() -> int:
-    """How large the page is without the scene."""
-    return sum(len(_asset(name)) for name in ("player.html", "style.css", *SCRIPTS, *WORKER_SCRIPTS)) + 12_000
+def page_bytes(header: dict[str, Any]) -> int:
+    """How large the page is without its blocks."""
+    stream = io.StringIO()
+    with page_writer(stream, header):
+        pass
+    return len(stream.getvalue().encode())
 
 
 def json_for_html(value: Any) -> str:
