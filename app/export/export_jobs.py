@@ -61,6 +61,7 @@ class ExportKind(NamedTuple):
 KINDS: dict[str, ExportKind] = {
     "gaussians": ExportKind("Gaussians", "app.export.gaussians_job"),
     "video": ExportKind("Video", "app.export.video.video_export"),
+    "player": ExportKind("Player", "app.export.player_job"),
     "metrics": ExportKind("Metrics", "app.export.metrics_job"),
     "cameras": ExportKind("Cameras", "app.export.cameras_job"),
 }

@@ -6,9 +6,10 @@ from app.export.export_choices import ExportChoices, ExportContext
 from app.export.forms.data_forms import CAMERAS, METRICS
 from app.export.forms.form import Answers, Form
 from app.export.forms.gaussians_form import GAUSSIANS
+from app.export.forms.player_form import PLAYER
 from app.export.forms.video_form import VIDEO
 
-FORMS: dict[str, Form] = {form.kind: form for form in (GAUSSIANS, VIDEO, METRICS, CAMERAS)}
+FORMS: dict[str, Form] = {form.kind: form for form in (GAUSSIANS, VIDEO, PLAYER, METRICS, CAMERAS)}
 """By kind."""
 
 

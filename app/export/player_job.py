@@ -1,0 +1,140 @@
+"""The job that writes a player: trained frames as one HTML page, or as a page with a folder of data."""
+
+from __future__ import annotations
+
+import os
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report
+from app.export.player_scene import scene_header
+from app.export.scene_frames import SceneFrames
+from app.export.staging import check_target, staged_file, staged_folder
+from engine.capture.clip import Clip
+from engine.errors import ProjectError
+from engine.export.player.blocks import Block, Packer
+from engine.export.player.page import page_bytes, page_writer
+from engine.export.splats import Splats
+
+if TYPE_CHECKING:
+    from app.evaluation.headless import TrainedProject
+
+LARGEST_PAGE_BYTES = 150_000_000
+"""Above this, browsers are slow to open a single file: the data goes into a folder unless one file is asked for."""
+PAGE_SUFFIXES = (".html", ".htm")
+_DESCRIBED_BYTES = 400
+"""What a page says of a clip, about."""
+_SAMPLED_CLIPS = 3
+"""Clips of which a frame is packed to tell the size beforehand."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlayerJob:
+    """What to write.
+
+    Attributes:
+        out: The page.
+        frames: Of the capture, every n-th where the range has a step; None for all that are trained.
+        has_folder: Whether clips go into a folder beside the page; None for what fits the size.
+    """
+
+    out: Path
+    frames: range | None = None
+    has_folder: bool | None = None
+
+    @property
+    def folder(self) -> Path:
+        """Where clips go if not into the page."""
+        return self.out.with_name(f"{self.out.stem}_data")
+
+
+def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
+    """What will be written. Packs a frame of a few clips, which takes about a second.
+
+    Raises:
+        ProjectError: The target cannot be written, or a frame is not trained.
+    """
+    if job.out.suffix.lower() not in PAGE_SUFFIXES:
+        raise ProjectError("A player is an HTML page.", hint="Give a name that ends in .html.", path=job.out)
+    scene = SceneFrames(opened)
+    clips = _clips(scene, job)
+    n_frames = sum(len(wanted) for _, wanted in clips)
+    packer, n_moving = Packer(), 0.0
+    sampled = [clips[round(at * (len(clips) - 1) / max(_SAMPLED_CLIPS - 1, 1))] for at in range(_SAMPLED_CLIPS)]
+    for _, wanted in sampled:
+        block = _packed(packer, scene, [wanted[len(wanted) // 2]])
+        n_moving += len(block.data) / len(sampled)
+    assert packer.shared is not None
+    n_bytes = round((len(packer.shared.data) + n_moving * n_frames) * 4 / 3)  # as base64
+    n_bytes += page_bytes(scene_header(scene, clips[0][1][0], step=1)) + _DESCRIBED_BYTES * len(clips)
+    has_folder = n_bytes > LARGEST_PAGE_BYTES if job.has_folder is None else job.has_folder
+    lines = [f"About {n_bytes / 1e6:.1f} MB for {n_frames} frames."]
+    if has_folder:
+        lines.append(f"The clips go into the folder {job.folder.name}, which has to stay beside the page.")
+        check_target(job.folder, n_bytes=n_bytes, is_folder=True)
+    check_target(job.out, n_bytes=n_bytes)
+    return ExportEstimate(len(clips) + 2 if has_folder else 1, n_bytes, tuple(lines))
+
+
+def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
+    """Write the player, clip by clip.
+
+    Raises:
+        ProjectError: What `estimate` raises.
+        DiskError: The disk refused; nothing is left behind.
+        ExportCancelled: From `report`; nothing is left behind.
+    """
+    report(ExportProgress(0, 0, message="Looking at the clips"))
+    expected = estimate(opened, job)
+    has_folder = expected.n_files > 1
+    scene = SceneFrames(opened)
+    clips = _clips(scene, job)
+    n_frames = sum(len(wanted) for _, wanted in clips)
+    header: dict[str, Any] = scene_header(scene, clips[0][1][0], step=job.frames.step if job.frames else 1)
+    header["folder"] = quote(os.fsencode(job.folder.name)) if has_folder else None
+    packer, n_done, n_bytes = Packer(), 0, 0
+    with ExitStack() as stack:
+        page = stack.enter_context(staged_file(job.out, what="The player"))
+        folder = stack.enter_context(staged_folder(job.folder, what="The player's data")) if has_folder else None
+        stream = stack.enter_context(page.open("w", encoding="utf-8", newline="\n"))
+        with page_writer(stream, header, folder=folder) as writer:
+            for clip, wanted in clips:
+                report(ExportProgress(n_done, n_frames, message=f"Packing clip {clip.clip_index}"))
+                block = _packed(packer, scene, wanted)
+                name = f"clip{clip.clip_index:05d}"
+                place = {"clip_index": clip.clip_index, "name": name, "first": n_done, "frame_index": wanted[0]}
+                header["clips"].append(place)
+                place.update(block.description)
+                writer.block(name, block)
+                n_done += len(wanted)
+            assert packer.shared is not None
+            header["shared"] = packer.shared.description
+            writer.block("shared", packer.shared)
+        stream.flush()
+        n_bytes = writer.n_bytes_of_blocks * has_folder + page.stat().st_size
+        report(ExportProgress(n_frames, n_frames))
+    return ExportResult(job.out, len(header["clips"]) + 2 if has_folder else 1, n_bytes)
+
+
+def _clips(scene: SceneFrames, job: PlayerJob) -> list[tuple[Clip, list[int]]]:
+    """Clips with the frames of each that are wanted. Raises ProjectError where one is not trained."""
+    frames = scene.trained_frames if job.frames is None else job.frames
+    scene.check(frames)
+    clips: list[tuple[Clip, list[int]]] = []
+    for frame in frames:
+        clip = scene.clip_at(frame)
+        if not clips or clips[-1][0] != clip:
+            clips.append((clip, []))
+        clips[-1][1].append(frame)
+    return clips
+
+
+def _packed(packer: Packer, scene: SceneFrames, wanted: list[int]) -> Block:
+    return packer.clip(
+        len(wanted),
+        still=lambda frame: Splats.of(scene.gaussians(wanted[frame], "static")),
+        moving=lambda frame: Splats.of(scene.gaussians(wanted[frame], "moving")),
+    )
