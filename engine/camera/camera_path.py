@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -102,7 +103,7 @@ class CameraPath:
             raise ValueError("a camera path has no name")
         object.__setattr__(self, "keys", tuple(self.keys))
         frames = [key.frame for key in self.keys]
-        for before, after in zip(frames, frames[1:], strict=False):
+        for before, after in pairwise(frames):
             if after - before < MIN_SPACING_FRAMES:
                 raise ValueError(f"keys of the path are not in order or too close: {before:g} and {after:g}")
 
@@ -195,16 +196,18 @@ class _Curves:
         self._centers = np.stack([key.center for key in used])  # [P + 1, 3]
         self._log_fovs = np.log([[key.fov_y_rad] for key in used])  # [P + 1, 1]
         # camera to world: a rotation vector from one key to the next is then in the axes of the camera
-        self._rotations = Rotation.from_matrix(np.stack([key.world_to_camera[:3, :3].T for key in used]))
+        rotations = Rotation.from_matrix(np.stack([key.world_to_camera[:3, :3].T for key in used]))
+        self._quats = rotations.as_quat()  # [P + 1, 4] xyzw, as scipy has them
         if len(used) < 2:
             return
-        steps = (self._rotations[:-1].inv() * self._rotations[1:]).as_rotvec()
+        between = rotations[:-1].inv() * rotations[1:]
+        steps = between.as_rotvec()
         self._turn_rates = self._tangents(steps, is_loop)
         self._speeds = self._tangents(np.diff(self._centers, axis=0), is_loop)
         self._log_fov_rates = self._tangents(np.diff(self._log_fovs, axis=0), is_loop)
         first = Rotation.from_rotvec(self._turn_rates[:-1] * self._lengths[:, None] / 3.0)
         last = Rotation.from_rotvec(self._turn_rates[1:] * self._lengths[:, None] / 3.0)
-        middle = first.inv() * self._rotations[:-1].inv() * self._rotations[1:] * last.inv()
+        middle = first.inv() * between * last.inv()
         self._turns = np.stack([first.as_rotvec(), middle.as_rotvec(), last.as_rotvec()])  # [3, P, 3]
 
     def _tangents(self, steps: np.ndarray, is_loop: bool) -> np.ndarray:
@@ -241,8 +244,8 @@ class _Curves:
     def rotation(self, piece: np.ndarray, share: np.ndarray) -> np.ndarray:
         """World to camera: the cubic Bezier curve on the sphere of rotations with the turn rates of its ends, written
         as three turns one after the other (Kim, Kim and Shin 1995). [F, 3, 3]"""
-        start = self._rotations[piece]
-        if len(self._rotations) < 2:
+        start = Rotation.from_quat(self._quats[piece])
+        if len(self._quats) < 2:
             return start.inv().as_matrix()
         t = share
         weights = (1 - (1 - t) ** 3, t * t * (3 - 2 * t), t**3)
