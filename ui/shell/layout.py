@@ -9,10 +9,10 @@ from collections.abc import Mapping
 
 from imgui_bundle import ImVec2, imgui
 
-from ui.panels.state import CAPTURE, DOCTOR, LAYOUTS, LOG, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT
+from ui.panels.state import CAPTURE, DOCTOR, LAYOUTS, LOG, PATHS, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT
 
 SIDE = (236.0, 0.0)
-SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: SIDE, REGIONS: SIDE, RESIDUALS: SIDE, TIMELINE: (0.0, 140.0)}
+SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: SIDE, REGIONS: SIDE, RESIDUALS: SIDE, PATHS: SIDE, TIMELINE: (0.0, 140.0)}
 """Width and height of docked panels, units. The timeline has its buttons, ruler and bands at this height."""
 SMALLEST_PICTURE = (300.0, 150.0)
 TALL_TIMELINE = 0.4
@@ -22,7 +22,8 @@ WIDE_UNITS = 1240.0
 
 
 def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
-    """Capture left, training, regions and residuals right, timeline, log and doctor below, the picture in the rest.
+    """Capture left, training, regions, residuals and camera path right, timeline, log and doctor below, the picture in
+    the rest.
 
     Args:
         name: One of LAYOUTS; others are laid out as the first.
@@ -47,6 +48,7 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
         (TRAINING, right),
         (REGIONS, right),
         (RESIDUALS, right),
+        (PATHS, right),
         (TIMELINE, bottom),
         (LOG, bottom),
         (DOCTOR, bottom),
