@@ -49,6 +49,8 @@ class TimeCameraKey:
     index: int
     frame: float
     gesture: int = 0
+    is_whole: bool = True
+    """Whether only to whole frames of the capture."""
 
 
 @dataclass(frozen=True, slots=True)

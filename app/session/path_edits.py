@@ -12,7 +12,7 @@ from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.session import path_commands as c
 from app.session.edit_status import PathsStatus
-from engine.camera.camera_path import CameraKey, CameraPath
+from engine.camera.camera_path import MIN_SPACING_FRAMES, CameraKey, CameraPath
 from engine.camera.path_presets import fly_through, turntable
 from engine.errors import ProjectError
 
@@ -78,9 +78,9 @@ def edited(status: PathsStatus, command: c.PathEdit, view: OrbitView, timeline: 
             keys = (*path.keys[:index], *path.keys[index + 1 :])
             following = min(index, len(keys) - 1) if keys else None
             return replace(_with_path(status, replace(path, keys=keys), "delete camera key"), chosen_key=following)
-        case c.TimeCameraKey(index=index, frame=frame, gesture=gesture):
+        case c.TimeCameraKey(index=index, frame=frame, gesture=gesture, is_whole=is_whole):
             path, key = _checked_key(status, index)
-            moved = key.at_frame(held_frame(path, index, frame, timeline.last_frame))
+            moved = key.at_frame(held_frame(path, index, frame, timeline.last_frame, is_whole=is_whole))
             return _with_changed_key(status, index, moved, "move camera key in time", gesture)
         case c.PlaceCameraKey(index=index, center=center, gesture=gesture):
             _, key = _checked_key(status, index)
@@ -114,15 +114,23 @@ def key_at(path: CameraPath | None, frame_index: int) -> int | None:
     return number if away < SAME_FRAME else None
 
 
-def held_frame(path: CameraPath, index: int, frame: float, last_frame: int) -> float:
-    """Where a key may be moved in time: to a whole frame of the capture between its neighbours; where there is none it
-    stays."""
-    keys = path.keys
-    low = math.floor(keys[index - 1].frame) + 1 if index > 0 else 0
-    high = math.ceil(keys[index + 1].frame) - 1 if index + 1 < len(keys) else last_frame
+def held_frame(path: CameraPath, index: int, frame: float, last_frame: int, *, is_whole: bool) -> float:
+    """Where a key may be moved in time: into the capture, between its neighbours; where there is no room it stays.
+
+    Args:
+        is_whole: Only to whole frames.
+    """
+    keys, gap = path.keys, 2 * MIN_SPACING_FRAMES
+    low, high = 0.0, float(last_frame)
+    if index > 0:
+        before = keys[index - 1].frame
+        low = max(math.floor(before) + 1.0 if is_whole else before + gap, low)
+    if index + 1 < len(keys):
+        after = keys[index + 1].frame
+        high = min(math.ceil(after) - 1.0 if is_whole else after - gap, high)
     if not math.isfinite(frame) or low > high:
         return keys[index].frame
-    return float(min(max(round(frame), low), high))
+    return float(min(max(round(frame) if is_whole else frame, low), high))
 
 
 def free_name(status: PathsStatus, wanted: str) -> str:

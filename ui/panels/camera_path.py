@@ -36,7 +36,9 @@ from ui.style.theme import Icon
 MOST_PATH_ROWS, LEAST_KEY_ROWS = 5, 4
 FOV_DEG = (2.0, 150.0)
 """What the slider of the lens offers."""
-LABEL_WIDTH = 54.0
+LABEL_WIDTH, BUTTON_WIDTH = 54.0, 36.0
+ROWS_BELOW = 4.4
+"""What stands below the list of keys, in rows of buttons."""
 
 
 class PathPanelNeeds(Protocol):
@@ -85,7 +87,6 @@ def _draw_making(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
     imgui.set_item_tooltip(
         f"A key of the path {words}" if status.path is not None else "Begins a path with a key at the playhead (C)"
     )
-    third = (width - 2 * imgui.get_style().item_spacing.x) / 3
     made = (
         ("new", "New path", NewCameraPath(), "A path with a key at the playhead, from this view"),
         (
@@ -97,12 +98,20 @@ def _draw_making(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
         ("fly_through", "Fly-through", MakeFlyThrough(), "From camera to camera, while the played frames go by"),
     )
     for name, label, command, note in made:
-        if imgui.button(label, ImVec2(third, 0)):
+        if _flowing_button(label):
             dispatch(command)
         ui.mark(f"paths.{name}")
         imgui.set_item_tooltip(note)
+
+
+def _flowing_button(label: str, *, is_first: bool = False) -> bool:
+    """A button beside the one before, or in the next line where there is no room for it."""
+    style = imgui.get_style()
+    right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
+    width = imgui.calc_text_size(label, True).x + 2 * style.frame_padding.x
+    if not is_first and imgui.get_item_rect_max().x + style.item_spacing.x + width <= right:
         imgui.same_line()
-    imgui.new_line()
+    return imgui.button(label)
 
 
 def _draw_list(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
@@ -132,7 +141,7 @@ def _draw_path(status: PathsStatus, path: CameraPath, dispatch: Dispatch, ui: Ui
     """Its name, and what belongs to all of it."""
     imgui.begin_disabled(not status.can_edit)
     width = imgui.get_content_region_avail().x
-    imgui.set_next_item_width(width - imgui.get_frame_height() - imgui.get_style().item_spacing.x)
+    imgui.set_next_item_width(width - BUTTON_WIDTH - imgui.get_style().item_spacing.x)
     flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
     shown = path.name if ui.paths.renamed is None else ui.paths.renamed
     is_entered, typed = imgui.input_text("##name", shown, flags)
@@ -147,7 +156,7 @@ def _draw_path(status: PathsStatus, path: CameraPath, dispatch: Dispatch, ui: Ui
         if name and name != path.name and not is_left:
             dispatch(RenameCameraPath(name))
     imgui.same_line()
-    if imgui.button(f"{Icon.TRASH}##path", ImVec2(imgui.get_frame_height(), 0)):
+    if imgui.button(f"{Icon.TRASH}##path", ImVec2(BUTTON_WIDTH, 0)):
         dispatch(DeleteCameraPath())
     ui.mark("paths.delete")
     imgui.end_disabled()
@@ -172,7 +181,7 @@ def _draw_keys(status: PathsStatus, path: CameraPath, dispatch: Dispatch, ui: Ui
         text_wrapped_dim("The path has no keys yet.")
         return
     line = imgui.get_text_line_height_with_spacing()
-    room = imgui.get_content_region_avail().y - 6.5 * imgui.get_frame_height_with_spacing()
+    room = imgui.get_content_region_avail().y - ROWS_BELOW * imgui.get_frame_height_with_spacing()
     height = min(max(room, LEAST_KEY_ROWS * line), len(path.keys) * line + 6)
     if imgui.begin_child("keys", ImVec2(0, height)):
         clipper = imgui.ListClipper()
@@ -211,12 +220,12 @@ def _draw_key(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
     imgui.text("Frame")
     imgui.same_line(LABEL_WIDTH)
     imgui.set_next_item_width(-1)
-    is_edited, frame = imgui.drag_float("##frame", key.frame, 0.2, 0.0, 0.0, "%.0f")
+    entering = imgui.InputTextFlags_.enter_returns_true
+    is_edited, frame = imgui.input_float("##frame", key.frame, 1.0, 10.0, "%.2f", entering)
     ui.mark("paths.frame")
-    _follow_gesture(ui)
-    if is_edited:
-        dispatch(TimeCameraKey(index, frame, ui.paths.gesture))
-    imgui.set_item_tooltip("Drag, or double-click and type (Alt+Shift+Left, Alt+Shift+Right)")
+    if is_edited and frame != key.frame:
+        dispatch(TimeCameraKey(index, frame, is_whole=False))
+    imgui.set_item_tooltip("Enter takes what is typed (Alt+Shift+Left, Alt+Shift+Right)")
     imgui.align_text_to_frame_padding()
     imgui.text("Lens")
     imgui.same_line(LABEL_WIDTH)
@@ -228,19 +237,16 @@ def _draw_key(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
     if is_edited:
         dispatch(SetCameraKeyFov(index, math.radians(fov_deg), ui.paths.gesture))
     imgui.set_item_tooltip("Vertical field of view")
-    third = (imgui.get_content_region_avail().x - 2 * imgui.get_style().item_spacing.x) / 3
-    if imgui.button("Take view", ImVec2(third, 0)):
+    if _flowing_button("Take view", is_first=True):
         dispatch(AimCameraKey(index))
     ui.mark("paths.aim")
     imgui.set_item_tooltip("The key takes place, direction and lens of this view, at its own frame (Shift+C)")
-    imgui.same_line()
-    if imgui.button("Delete", ImVec2(third, 0)):
+    if _flowing_button("Delete"):
         dispatch(DeleteCameraKey(index))
     ui.mark("paths.remove")
     imgui.set_item_tooltip("Delete")
     imgui.end_disabled()
-    imgui.same_line()
-    if imgui.button("Go there", ImVec2(third, 0)):
+    if _flowing_button("Go there"):
         choose_key(dispatch, ui, index, is_going=True)
     ui.mark("paths.go")
 

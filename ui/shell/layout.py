@@ -12,7 +12,14 @@ from imgui_bundle import ImVec2, imgui
 from ui.panels.state import CAPTURE, DOCTOR, LAYOUTS, LOG, PATHS, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT
 
 SIDE = (236.0, 0.0)
-SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: SIDE, REGIONS: SIDE, RESIDUALS: SIDE, PATHS: SIDE, TIMELINE: (0.0, 140.0)}
+SMALLEST = {
+    CAPTURE: (176.0, 0.0),
+    TRAINING: SIDE,
+    REGIONS: SIDE,
+    RESIDUALS: SIDE,
+    PATHS: (176.0, 0.0),
+    TIMELINE: (0.0, 140.0),
+}
 """Width and height of docked panels, units. The timeline has its buttons, ruler and bands at this height."""
 SMALLEST_PICTURE = (300.0, 150.0)
 TALL_TIMELINE = 0.4
@@ -22,8 +29,8 @@ WIDE_UNITS = 1240.0
 
 
 def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
-    """Capture left, training, regions, residuals and camera path right, timeline, log and doctor below, the picture in
-    the rest.
+    """Capture and camera path left, training, regions and residuals right, timeline, log and doctor below, the
+    picture in the rest.
 
     Args:
         name: One of LAYOUTS; others are laid out as the first.
@@ -44,11 +51,11 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
     _, right, middle = internal.dock_builder_split_node_py(rest, imgui.Dir.right, right_share)
     for title, node_id in (
         (VIEWPORT, middle),
+        (PATHS, left),
         (CAPTURE, left),
         (TRAINING, right),
         (REGIONS, right),
         (RESIDUALS, right),
-        (PATHS, right),
         (TIMELINE, bottom),
         (LOG, bottom),
         (DOCTOR, bottom),

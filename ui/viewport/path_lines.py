@@ -14,8 +14,8 @@ from ui.gl.lines import frusta_lines
 from ui.style.colors import PATH, Color
 from ui.viewport.frusta import camera_under
 
-SAMPLES_PER_PIECE, MOST_SAMPLES = 24, 4000
-"""Straight pieces between two keys, and of a whole path."""
+SAMPLES, MOST_PER_PIECE, LEAST_PER_PIECE = 256, 24, 6
+"""Straight pieces of a whole path, and at least and at most between two keys: very short ones would look like beads."""
 PICTURE_SIZE = (160, 90)
 """Shape of the pictures at the keys."""
 MOST_PYRAMIDS = 400
@@ -29,7 +29,7 @@ def path_line(path: CameraPath) -> np.ndarray:
     frames = [key.frame for key in path.keys]
     if path.is_closed:
         frames.append(path.frame_range[1])
-    per_piece = max(min(SAMPLES_PER_PIECE, MOST_SAMPLES // (len(frames) - 1)), 1)
+    per_piece = min(max(SAMPLES // (len(frames) - 1), LEAST_PER_PIECE), MOST_PER_PIECE)
     steps = np.arange(per_piece) / per_piece
     times = np.concatenate([start + (stop - start) * steps for start, stop in pairwise(frames)])
     # the way is sampled up to the very last frame, where a loop is back at its first key
