@@ -37,7 +37,7 @@ MOST_PATH_ROWS, LEAST_KEY_ROWS = 5, 4
 FOV_DEG = (2.0, 150.0)
 """What the slider of the lens offers."""
 LABEL_WIDTH, BUTTON_WIDTH = 54.0, 36.0
-ROWS_BELOW = 4.4
+ROWS_BELOW = 5.5
 """What stands below the list of keys, in rows of buttons."""
 
 
