@@ -180,7 +180,7 @@ def test_presets_fill_what_is_played_and_begin_where_one_looks(session):
     assert [path.name for path in session.paths.paths] == ["Turntable", "Fly-through", "Turntable 2"]
     session.timeline.set_range(3, 3)
     session.dispatch(p.MakeFlyThrough())
-    assert "more than one frame" in session.notices[-1].detail
+    assert "of 1 frame" in session.notices[-1].detail
     assert len(on_disk(session)) == 3
 
 
