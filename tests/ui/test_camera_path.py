@@ -277,7 +277,8 @@ def test_thousands_of_keys_cost_no_more_rows_than_are_seen(open_pilot: Callable[
     assert len(session.notices) == 0
 
 
-def p_path(session: FakeSession):
+def begun_path(session: FakeSession) -> CameraPath:
+    """A path with one key."""
     session.dispatch(p.NewCameraPath())
     assert session.paths.path is not None
     return session.paths.path

@@ -26,13 +26,15 @@ class PathTool:
     Attributes:
         gesture: Number of the present one; see app.session.path_commands.
         dragged: Number of the key that is dragged in a picture; None while none is.
-        timed: Number of the key that is dragged on the timeline; None while none is.
+        timed: Number of the key that is pressed on the timeline; None while none is.
+        timed_from: Where it was pressed, units of the screen; None once that has become a drag.
         renamed: The name that is being written; None while it is that of the path.
     """
 
     gesture: int = 0
     dragged: int | None = None
     timed: int | None = None
+    timed_from: float | None = None
     renamed: str | None = None
     _pressed_s: float = -1e9
 

@@ -19,6 +19,8 @@ from ui.style import theme
 HALF, CHOSEN_HALF = 5.0, 6.5
 MIN_KEY_DISTANCE = 3.0
 """Keys closer to each other than this are drawn as one."""
+DRAG_FROM = 3.0
+"""A press that moves less than this chooses a key and leaves it where it is."""
 EASY = 2.0
 """By how much a diamond is easier to hit than it looks."""
 
@@ -87,6 +89,7 @@ def handle_keys_of_path(stage: Stage, session: TimelineNeeds, dispatch: Dispatch
         tool.timed = key_at(stage, session)
         if tool.timed is not None:
             tool.begin_gesture()
+            tool.timed_from = imgui.get_io().mouse_pos.x
             stage.ui.regions.highlighted = None
             dispatch(ChooseCameraKey(tool.timed, is_going=imgui.is_mouse_double_clicked(imgui.MouseButton_.left)))
             return True
@@ -95,9 +98,11 @@ def handle_keys_of_path(stage: Stage, session: TimelineNeeds, dispatch: Dispatch
     if tool.timed is None or not is_held:
         tool.timed = None
         return False
-    path = status.path
-    if path is not None and tool.timed < len(path.keys) and status.can_edit and imgui.is_mouse_dragging(0, 2.0):
-        frame = stage.scale.position_at(imgui.get_io().mouse_pos.x) - 0.5
+    path, x = status.path, imgui.get_io().mouse_pos.x
+    if tool.timed_from is not None and abs(x - tool.timed_from) >= DRAG_FROM:
+        tool.timed_from = None
+    if path is not None and tool.timed < len(path.keys) and status.can_edit and tool.timed_from is None:
+        frame = stage.scale.position_at(x) - 0.5
         if round(frame) != path.keys[tool.timed].frame:
             dispatch(TimeCameraKey(tool.timed, frame, tool.gesture))
     return True
