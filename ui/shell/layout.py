@@ -9,7 +9,19 @@ from collections.abc import Mapping
 
 from imgui_bundle import ImVec2, imgui
 
-from ui.panels.state import CAPTURE, DOCTOR, EXPORTS, LAYOUTS, LOG, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT
+from ui.panels.state import (
+    CAPTURE,
+    DOCTOR,
+    EXPORTS,
+    LAYOUTS,
+    LOG,
+    PATHS,
+    REGIONS,
+    RESIDUALS,
+    TIMELINE,
+    TRAINING,
+    VIEWPORT,
+)
 
 SIDE = (236.0, 0.0)
 SMALLEST = {
@@ -17,6 +29,7 @@ SMALLEST = {
     TRAINING: SIDE,
     REGIONS: SIDE,
     RESIDUALS: SIDE,
+    PATHS: (176.0, 0.0),
     TIMELINE: (0.0, 140.0),
 }
 """Width and height of docked panels, units. The timeline has its buttons, ruler and bands at this height."""
@@ -28,7 +41,7 @@ WIDE_UNITS = 1240.0
 
 
 def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
-    """Capture left, training, regions and residuals right, the others below, the picture in the rest.
+    """Capture and camera path left, training, regions and residuals right, the others below, the picture in the rest.
 
     Args:
         name: One of LAYOUTS; others are laid out as the first.
@@ -49,6 +62,7 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
     _, right, middle = internal.dock_builder_split_node_py(rest, imgui.Dir.right, right_share)
     for title, node_id in (
         (VIEWPORT, middle),
+        (PATHS, left),
         (CAPTURE, left),
         (TRAINING, right),
         (REGIONS, right),

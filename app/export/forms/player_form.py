@@ -9,7 +9,7 @@ from app.export.forms.form import Answers, Form, Option
 _DATA = (("", "As the size needs"), ("file", "In the page"), ("folder", "In a folder beside it"))
 _DATA_TIPS = {
     "": "In the page up to 150 MB, in a folder above that",
-    "folder": "Loaded clip by clip, from a web server",
+    "folder": "Loaded clip by clip as it plays; the folder has to stay beside the page",
 }
 
 

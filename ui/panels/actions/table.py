@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from ui.panels.actions import (
     bookmarks,
+    camera_path,
     compare,
     doctor,
     exporting,
@@ -33,6 +34,7 @@ ACTIONS: tuple[Action, ...] = (
     *modes.ACTIONS,
     *heat.ACTIONS,
     *marking.ACTIONS,
+    *camera_path.ACTIONS,
     *training.ACTIONS,
     *doctor.ACTIONS,
     *exporting.ACTIONS,
