@@ -18,7 +18,6 @@ from app.export.export_status import ExportStatus
 from app.export.forms.table import FORMS, answers_to
 from app.export.show_in_folder import show_in_folder
 from app.playback.timeline import Timeline
-from app.project.camera_paths import read_camera_paths
 from app.project.opened_project import OpenedProject
 from app.project.recents import project_name
 from app.session.notices import Notices
@@ -98,9 +97,18 @@ class Exporting:
 
     # ---- the dialog
 
-    def ask(self, opened: OpenedProject | None, timeline: Timeline, trained: tuple[int, ...]) -> None:
+    def ask(
+        self,
+        opened: OpenedProject | None,
+        timeline: Timeline,
+        trained: tuple[int, ...],
+        paths: tuple[str, ...] = (),
+    ) -> None:
         """Open the dialog.
 
+        Args:
+            trained: Indices of the clips that are finished.
+            paths: Names of the camera paths, as they are on the disk.
         Raises:
             ProjectError: Nothing is trained yet.
         """
@@ -108,7 +116,7 @@ class Exporting:
             return
         if not trained:
             raise ProjectError("There is nothing to export yet: no clip is trained.", hint="Train a clip first.")
-        context = _context(opened, timeline, trained)
+        context = _context(opened, timeline, trained, paths)
         last = self._settings.last_export
         if last.kind not in FORMS:
             last = last.changed(kind=next(iter(FORMS)))
@@ -233,13 +241,11 @@ class Exporting:
         return plan_export(self._read[1], wish.context, wish.choices)
 
 
-def _context(opened: OpenedProject, timeline: Timeline, trained: tuple[int, ...]) -> ExportContext:
+def _context(
+    opened: OpenedProject, timeline: Timeline, trained: tuple[int, ...], paths: tuple[str, ...]
+) -> ExportContext:
     capture = opened.capture
     first, last = timeline.in_frame, timeline.out_frame
-    try:
-        paths = tuple(path.name for path in read_camera_paths(opened.project.folder))
-    except ProjectError:  # which was said when they were read for the timeline
-        paths = ()
     return ExportContext(
         name=project_name(opened.project.folder.absolute(), opened.project.settings.capture),
         n_frames=capture.n_frames,

@@ -153,7 +153,8 @@ def test_what_ended_long_ago_is_forgotten(bench: Bench):
 
 
 def test_closing_ends_what_runs_and_begins_nothing(bench: Bench):
-    bench.add("a"), bench.add("b")
+    bench.add("a")
+    bench.add("b")
     bench.queue.poll()
     bench.queue.close()
     bench.queue.poll()
