@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Protocol
 import moderngl
 import numpy as np
 
-from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
+from app.playback.views import Views
 from app.session.edit_status import PathsStatus
 from app.status import Overlays
 from engine.camera.camera_path import CameraKey, CameraPath
@@ -47,7 +47,7 @@ class PathNeeds(Protocol):
     def rig(self) -> CameraRig: ...
 
     @property
-    def view(self) -> OrbitView: ...
+    def views(self) -> Views: ...
 
     @property
     def overlays(self) -> Overlays: ...
@@ -57,7 +57,7 @@ class PathNeeds(Protocol):
 
 
 class PathLayer:
-    """Draws the chosen path. Nothing while one looks along it: the camera stands on it then.
+    """Draws the chosen path; not in the view that goes along it.
 
     Attributes:
         pointed_key: The key under the pointer, which stands out; None without one.
@@ -82,7 +82,8 @@ class PathLayer:
         """The path that is drawn; None where there is none to be seen."""
         status = session.paths
         path = status.path
-        if path is None or not path.keys or status.is_along or not session.overlays.show_paths:
+        is_on_it = status.along == session.views.current_index  # the camera stands on the line then
+        if path is None or not path.keys or is_on_it or not session.overlays.show_paths:
             return None
         return path
 
