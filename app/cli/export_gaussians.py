@@ -7,8 +7,8 @@ import argparse
 from app.evaluation.headless import TrainedProject
 from app.export.export_progress import ExportResult, Report
 from app.export.gaussian_files import WRITTEN_PARTS
-from engine.export.world import AXES
 
+_AXES = ("x", "y", "z")
 FORMATS = {
     "ply": "floats, for nearly all programs",
     "compressed-ply": "a third of that",
@@ -29,9 +29,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         default="all",
         help="all of the scene, what stands still (once), what moves (per frame), or split: both apart (default: all)",
     )
-    own.add_argument(
-        "--up", choices=sorted(AXES), help="turn the scene so that this axis is up (default: as in the capture)"
+    turn = own.add_mutually_exclusive_group()
+    turn.add_argument(
+        "--up", choices=_AXES, help="turn the scene so that this axis points up (default: as in the capture)"
     )
+    turn.add_argument("--down", choices=_AXES, help="turn the scene so that this axis points down")
     own.add_argument(
         "--scale", type=float, default=1.0, metavar="S", help="units of the files per unit of the capture (default: 1)"
     )
@@ -52,7 +54,7 @@ def export(opened: TrainedProject, options: argparse.Namespace, frames: range | 
         format=options.format,
         frames=frames,
         part=options.part,
-        up=options.up,
+        up=f"+{options.up}" if options.up else f"-{options.down}" if options.down else None,
         scale=options.scale,
         axes=options.axes,
     )

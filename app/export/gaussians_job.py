@@ -18,7 +18,7 @@ from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_folder
 from engine.clip_files.clip_header import ClipHeader
 from engine.errors import ProjectError
-from engine.export.formats.table import FORMATS
+from engine.export.formats.table import FORMATS, Format
 from engine.export.world import AXES, World, world
 from engine.storage.json_files import json_text
 
@@ -69,7 +69,8 @@ def estimate(opened: TrainedProject, job: GaussiansJob) -> ExportEstimate:
         if job.part != "static":
             n_gaussians += n_frames * (n_moving + (n_static if job.part == "all" else 0.0))
     n_files = (0 if job.part == "static" else len(frames)) + (len(by_clip) if job.part in ("static", "split") else 0)
-    return ExportEstimate(n_files + 1, round(n_gaussians * FORMATS[job.format].bytes_each), (_world(opened, job).text,))
+    text = f"Coordinates: {_world(opened, job).text}."
+    return ExportEstimate(n_files + 1, round(n_gaussians * _kind(job).bytes_each), (text,))
 
 
 def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResult:
@@ -84,7 +85,7 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
     started_s = time.monotonic()
     scene = SceneFrames(opened)
     frames = _frames(scene, job)
-    sequence = GaussianSequence(scene, frames, job.part, FORMATS[job.format], _world(opened, job))
+    sequence = GaussianSequence(scene, frames, job.part, _kind(job), _world(opened, job))
     check_target(job.out, is_folder=True)
     scene.check(frames)
     check_target(job.out, n_bytes=estimate(opened, job).n_bytes, is_folder=True)
@@ -107,10 +108,14 @@ def _frames(scene: SceneFrames, job: GaussiansJob) -> list[int]:
     return frames
 
 
-def _world(opened: TrainedProject, job: GaussiansJob) -> World:
-    """Where the scene lies in the files. Raises ProjectError where that cannot be."""
+def _kind(job: GaussiansJob) -> Format:
     if job.format not in FORMATS:
         raise ProjectError(f"There is no format '{job.format}'.", hint=f"Formats are {', '.join(FORMATS)}.")
+    return FORMATS[job.format]
+
+
+def _world(opened: TrainedProject, job: GaussiansJob) -> World:
+    """Where the scene lies in the files. Raises ProjectError where that cannot be."""
     if job.up is not None and job.up not in AXES:
         raise ProjectError(f"There is no axis '{job.up}'.", hint=f"Axes are {', '.join(AXES)}.")
     if not _SCALES[0] <= job.scale <= _SCALES[1]:

@@ -25,7 +25,7 @@ _KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 
 
 def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
-    """One node with one mesh of points; a node without one where there are no Gaussians, as glTF has no empty mesh."""
+    """One node with one mesh of points; an empty scene where there are no Gaussians, as glTF has no empty mesh."""
     columns = _columns(splats) if len(splats) else {}
     document = _document(splats, columns)
     text = json.dumps(document, separators=(",", ":")).encode("ascii")
@@ -83,12 +83,10 @@ def _columns(splats: Splats) -> dict[str, np.ndarray]:
 
 def _document(splats: Splats, columns: dict[str, np.ndarray]) -> dict[str, Any]:
     rotation = quat_of_rotation(rotation_between(np.array(splats.up), np.array(_Y_UP)))
-    node: dict[str, Any] = {"name": "Gaussians", "rotation": [float(rotation[i]) for i in (1, 2, 3, 0)]}
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "ClipGStream Studio"},
         "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [node],
+        "scenes": [{}],
     }
     if not columns:
         return document
@@ -115,7 +113,8 @@ def _document(splats: Splats, columns: dict[str, np.ndarray]) -> dict[str, Any]:
     }
     return document | {
         "extensionsUsed": [EXTENSION],
-        "nodes": [node | {"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"name": "Gaussians", "rotation": [float(rotation[i]) for i in (1, 2, 3, 0)], "mesh": 0}],
         "meshes": [{"primitives": [primitive]}],
         "buffers": [{"byteLength": at}],
         "bufferViews": views,

@@ -44,12 +44,12 @@ def round_trip(kind: Format, splats: Splats) -> Splats:
 
 def order_of(found: Splats, splats: Splats) -> np.ndarray:
     """The row of `splats` that each row of `found` was: some formats change the order. Nearest centre and size."""
-    from scipy.spatial import cKDTree
+    from scipy.spatial import KDTree
 
     keys = [
         np.concatenate([s.means.astype(float), 0.1 * np.log(s.scales.astype(float))], axis=1) for s in (splats, found)
     ]
-    return cKDTree(keys[0]).query(keys[1])[1]
+    return np.asarray(KDTree(keys[0]).query(keys[1])[1])
 
 
 def angles_deg(a: np.ndarray, b: np.ndarray) -> np.ndarray:

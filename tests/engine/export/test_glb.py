@@ -125,8 +125,8 @@ def test_the_scene_stands_upright_in_gltf(up: str | None):
     np.testing.assert_allclose(np.linalg.norm(node["rotation"]), 1.0, atol=1e-9)
 
 
-def test_no_gaussians_are_a_node_without_a_mesh():
+def test_no_gaussians_are_an_empty_scene():
     document, data = taken_apart(chance_splats(0))
     assert data == b""
-    assert not {"meshes", "accessors", "bufferViews", "buffers", "extensionsUsed"} & set(document)
-    assert document["scenes"] == [{"nodes": [0]}]
+    assert not {"nodes", "meshes", "accessors", "bufferViews", "buffers", "extensionsUsed"} & set(document)
+    assert document["scenes"] == [{}]
