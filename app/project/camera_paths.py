@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, Struct, to_builtins
 
 from app.project.kept_json import read_kept, write_kept
 from engine.camera.camera_path import CameraKey, CameraPath
@@ -28,8 +27,7 @@ _HINT = "Correct or remove the file; nothing else of the project depends on it."
 _Row = Annotated[tuple[float, ...], Meta(min_length=4, max_length=4)]
 
 
-@dataclass(frozen=True, slots=True)
-class _StoredKey:
+class _StoredKey(Struct, frozen=True, forbid_unknown_fields=True):
     """See CameraKey."""
 
     frame: float
@@ -37,8 +35,7 @@ class _StoredKey:
     fov_y_rad: float
 
 
-@dataclass(frozen=True, slots=True)
-class _StoredPath:
+class _StoredPath(Struct, frozen=True, forbid_unknown_fields=True):
     """See CameraPath."""
 
     name: Annotated[str, Meta(min_length=1, max_length=MAX_NAME_CHARACTERS)]
@@ -46,8 +43,7 @@ class _StoredPath:
     keys: tuple[_StoredKey, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Stored:
+class _Stored(Struct, frozen=True, forbid_unknown_fields=True):
     """The file."""
 
     schema: int
@@ -68,13 +64,6 @@ def read_camera_paths(folder: Path) -> tuple[CameraPath, ...]:
         raise ProjectError(
             f"The camera paths have schema {content.get('schema')!r:.60}, this version reads {SCHEMA}.",
             hint="Use the version that wrote them, or remove the file.",
-            path=path,
-        )
-    unknown = content.keys() - {"schema", "paths"}
-    if unknown:
-        raise ProjectError(
-            f"The file of the camera paths has unknown entries: {', '.join(sorted(unknown)):.200}.",
-            hint=_HINT,
             path=path,
         )
     try:
@@ -112,7 +101,7 @@ def write_camera_paths(folder: Path, paths: Sequence[CameraPath]) -> None:
         )
         for path in paths
     )
-    write_kept(folder / CAMERA_PATHS_FILE, asdict(_Stored(SCHEMA, stored)))
+    write_kept(folder / CAMERA_PATHS_FILE, to_builtins(_Stored(SCHEMA, stored)))
 
 
 def camera_path_named(folder: Path, name: str) -> CameraPath:

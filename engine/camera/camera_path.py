@@ -14,12 +14,20 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from engine.camera.projection import camera_center
+from engine.camera.rotations import (
+    inverse_quats,
+    matrices_of,
+    quat_product,
+    quats_of,
+    quats_of_turns,
+    turns_of_quats,
+)
 from engine.errors import ProjectError
 
 MIN_SPACING_FRAMES = 1e-3
@@ -102,7 +110,7 @@ class CameraPath:
             raise ValueError("a camera path has no name")
         object.__setattr__(self, "keys", tuple(self.keys))
         frames = [key.frame for key in self.keys]
-        for before, after in zip(frames, frames[1:], strict=False):
+        for before, after in pairwise(frames):
             if after - before < MIN_SPACING_FRAMES:
                 raise ValueError(f"keys of the path are not in order or too close: {before:g} and {after:g}")
 
@@ -195,17 +203,17 @@ class _Curves:
         self._centers = np.stack([key.center for key in used])  # [P + 1, 3]
         self._log_fovs = np.log([[key.fov_y_rad] for key in used])  # [P + 1, 1]
         # camera to world: a rotation vector from one key to the next is then in the axes of the camera
-        self._rotations = Rotation.from_matrix(np.stack([key.world_to_camera[:3, :3].T for key in used]))
+        self._quats = quats_of(np.stack([key.world_to_camera[:3, :3].T for key in used]))  # [P + 1, 4]
         if len(used) < 2:
             return
-        steps = (self._rotations[:-1].inv() * self._rotations[1:]).as_rotvec()
-        self._turn_rates = self._tangents(steps, is_loop)
+        between = quat_product(inverse_quats(self._quats[:-1]), self._quats[1:])
+        self._turn_rates = self._tangents(turns_of_quats(between), is_loop)
         self._speeds = self._tangents(np.diff(self._centers, axis=0), is_loop)
         self._log_fov_rates = self._tangents(np.diff(self._log_fovs, axis=0), is_loop)
-        first = Rotation.from_rotvec(self._turn_rates[:-1] * self._lengths[:, None] / 3.0)
-        last = Rotation.from_rotvec(self._turn_rates[1:] * self._lengths[:, None] / 3.0)
-        middle = first.inv() * self._rotations[:-1].inv() * self._rotations[1:] * last.inv()
-        self._turns = np.stack([first.as_rotvec(), middle.as_rotvec(), last.as_rotvec()])  # [3, P, 3]
+        first = self._turn_rates[:-1] * self._lengths[:, None] / 3.0
+        last = self._turn_rates[1:] * self._lengths[:, None] / 3.0
+        middle = quat_product(quats_of_turns(-first), quat_product(between, quats_of_turns(-last)))
+        self._turns = np.stack([first, turns_of_quats(middle), last])  # [3, P, 3]
 
     def _tangents(self, steps: np.ndarray, is_loop: bool) -> np.ndarray:
         """Change per frame at every key, from the steps [P, D] between them. [P + 1, D]"""
@@ -241,14 +249,14 @@ class _Curves:
     def rotation(self, piece: np.ndarray, share: np.ndarray) -> np.ndarray:
         """World to camera: the cubic Bezier curve on the sphere of rotations with the turn rates of its ends, written
         as three turns one after the other (Kim, Kim and Shin 1995). [F, 3, 3]"""
-        start = self._rotations[piece]
-        if len(self._rotations) < 2:
-            return start.inv().as_matrix()
+        turned = self._quats[piece]
+        if len(self._quats) < 2:
+            return matrices_of(inverse_quats(turned))
         t = share
         weights = (1 - (1 - t) ** 3, t * t * (3 - 2 * t), t**3)
         for weight, turn in zip(weights, self._turns, strict=True):
-            start = start * Rotation.from_rotvec(weight[:, None] * turn[piece])
-        return start.inv().as_matrix()
+            turned = quat_product(turned, quats_of_turns(weight[:, None] * turn[piece]))
+        return matrices_of(inverse_quats(turned))
 
 
 def _inner_tangents(slopes: np.ndarray, lengths: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ MAX_ELEVATION_RAD = math.radians(89.0)
 DEFAULT_FOV_Y_RAD = math.radians(50.0)
 _MAX_TURNS = 100.0
 _MIN_STEP_SHARE = 0.01
+"""From one camera to the next takes at least this share of the mean time, however close they stand."""
 
 
 def turntable(
@@ -82,8 +83,9 @@ def fly_through(rig: CameraRig, frames: tuple[float, float], *, name: str = "Fly
         raise ValueError("a fly-through needs a camera and an ascending range of frames")
     order = visiting_order(rig.centers)
     steps = np.linalg.norm(np.diff(rig.centers[order], axis=0), axis=1)
-    steps = np.maximum(steps, _MIN_STEP_SHARE * max(float(steps.sum()), 1e-9) / max(len(steps), 1))
-    shares = np.concatenate([[0.0], np.cumsum(steps)]) / max(float(steps.sum()), 1e-9)
+    mean = float(steps.mean()) if len(steps) else 0.0
+    steps = np.maximum(steps, _MIN_STEP_SHARE * mean) if mean > 0 else np.ones(len(steps))
+    shares = np.concatenate([[0.0], np.cumsum(steps)]) / max(float(steps.sum()), 1e-12)
     up = rig.up_direction()
     keys = [
         CameraKey(frames[0] + share * (frames[1] - frames[0]), *_upright(rig, camera, up))
@@ -133,7 +135,7 @@ def _shorter(order: list[int], distances: np.ndarray) -> list[int] | None:
 
 
 def _level(direction: np.ndarray | None, up: np.ndarray) -> np.ndarray:
-    """The level part of a direction as a unit vector; any level one where there is none. [3]"""
+    """The level part of a direction as a unit vector; that of an axis of the world where there is none. [3]"""
     for candidate in ([] if direction is None else [np.asarray(direction, dtype=np.float64)]) + [*np.eye(3)]:
         level = candidate - float(candidate @ up) * up
         length = float(np.linalg.norm(level))
