@@ -76,7 +76,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     if written.depth_unit is not None:
         line.say(f"One level of the 16 bits is {written.depth_unit:g} scene units; 0 is where nothing is.")
     width, height = written.size
-    pictures = f"{written.n_pictures} pictures of {width} x {height}"
+    pictures = f"{written.n_pictures} picture{'' if written.n_pictures == 1 else 's'} of {width} x {height}"
     line.say(f"{pictures}, {written.fps:g} per second, {written.n_bytes / 1e6:.1f} MB, in {written.out}")
     return EXIT_OK
 

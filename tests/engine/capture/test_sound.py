@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,12 +12,11 @@ import numpy as np
 import pytest
 
 from engine.capture.capture import Capture, open_capture
-from engine.capture.frames import IndexedFrames
+from engine.capture.frames import FrameSource, ImageFrames, IndexedFrames
 from engine.capture.sound import SoundReader, sound_source
 from engine.errors import CaptureError
 from engine.synthetic import make_scene
 from engine.synthetic.writing import cameras_document
-from tests.app import fakes
 from tests.engine.synchronisation.made_recordings import write_sound_video
 
 RATE = 48_000
@@ -62,13 +63,17 @@ def test_frames_count_from_where_the_capture_begins(capture: Capture):
     part = capture.resized(1.0, (9, 30))
     assert sound_source(part, 0, 3)[1] == pytest.approx(12 / 30)
     ahead = IndexedFrames(capture.store.sources[0], np.arange(2, 30))
-    store = capture.store
-    sources = store.sources
-    try:
-        store.sources = (ahead, *sources[1:])
+    with camera_of(capture, ahead):
         assert sound_source(replace(capture, n_frames=28), 0, 3)[1] == pytest.approx(5 / 30)
-    finally:
-        store.sources = sources
+
+
+@contextmanager
+def camera_of(capture: Capture, source: FrameSource) -> Iterator[None]:
+    """While its first camera has other frames."""
+    sources = capture.store.sources
+    capture.store.sources = (source, *sources[1:])
+    yield
+    capture.store.sources = sources
 
 
 def test_before_a_track_begins_there_is_silence(capture: Capture):
@@ -81,6 +86,5 @@ def test_before_a_track_begins_there_is_silence(capture: Capture):
 def test_cameras_without_sound_say_so(capture: Capture, tmp_path: Path):
     with pytest.raises(CaptureError, match="its file holds no sound track"):
         sound_source(capture, 1, 0)
-    images = open_capture(fakes.write_capture(tmp_path / "ring"))
-    with pytest.raises(CaptureError, match="its frames are image files"):
-        sound_source(images, 0, 0)
+    with camera_of(capture, ImageFrames(tmp_path, [])), pytest.raises(CaptureError, match="frames are image files"):
+        sound_source(capture, 0, 0)

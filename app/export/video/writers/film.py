@@ -68,7 +68,8 @@ class FilmWriter:
         muxer, options = _MUXER[self._format]
         kind = FORMATS[self._format]
         assert kind.video_codec is not None
-        self._container = av.open(str(self._path), "w", format=muxer, options=options)
+        # "file:" because a name with a colon is a protocol to FFmpeg
+        self._container = av.open(f"file:{self._path}", "w", format=muxer, options=options)
         self._stack.callback(self._container.close)
         self._video = self._container.add_stream(kind.video_codec, rate=self._rate)
         self._video.options = dict(_OPTIONS[kind.video_codec])

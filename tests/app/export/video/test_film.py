@@ -29,6 +29,13 @@ def test_every_colour_comes_back_within_two_levels(tmp_path: Path, format_name: 
         assert np.abs(picture.astype(int) - color).max() <= 2, color
 
 
+def test_a_name_with_a_colon_is_a_file_and_not_a_protocol(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    with FilmWriter(Path("http:a.mp4"), "mp4", fps=25.0) as film:
+        film.write(PassPicture(np.zeros((4, 4, 3), np.float32), np.ones((4, 4), np.float32), None))
+    assert len(decoded(tmp_path / "http:a.mp4")) == 1
+
+
 def test_the_format_is_chosen_by_the_name():
     names = {"a.mp4": "mp4", "a.MOV": "mp4", "b.webm": "webm", "folder": "png"}
     assert {name: format_of(Path(name)) for name in names} == names

@@ -138,6 +138,9 @@ def test_what_is_cancelled_or_fails_half_way_leaves_nothing(films: Films, name: 
     assert [progress.done for progress in seen] == pytest.approx([1 / 6, 2 / 6, 3 / 6])
     assert "3/6" in seen[-1].message
 
+    with pytest.raises(JobCancelled):
+        render_video(job, films.opened, is_cancelled=lambda: True)
+
     def interrupt(progress: Progress) -> None:
         raise KeyboardInterrupt
 
