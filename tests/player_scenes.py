@@ -10,7 +10,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from engine.export.player.blocks import Packer
+from engine.export.player.blocks import Packer, joined
 from engine.export.player.page import page_writer
 from engine.export.splats import Splats
 
@@ -60,12 +60,6 @@ def moving(clip: int, frame: int) -> Splats:
 def places() -> list[tuple[int, int]]:
     """Clip and frame of the clip of each frame."""
     return [(clip, frame) for clip, length in enumerate(LENGTHS) for frame in range(length)]
-
-
-def joined(*parts: Splats) -> Splats:
-    """Rows after rows."""
-    names = ("means", "quats", "scales", "opacities", "colors")
-    return Splats(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
 
 def in_light(splats: Splats, factor: float) -> Splats:
