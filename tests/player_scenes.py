@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
 import numpy as np
 
@@ -110,7 +109,7 @@ def write_page(path: Path, about: dict[str, Any], *, folder: Path | None = None)
     """The page of the made scene. folder: Where clips go instead."""
     if folder is not None:
         folder.mkdir()
-        about["folder"] = quote(folder.name)
+        about["folder"] = folder.as_uri().rpartition("/")[2]
     packer, first = Packer(), 0
     with path.open("w", encoding="utf-8", newline="\n") as stream, page_writer(stream, about, folder=folder) as writer:
         for index, length in enumerate(LENGTHS):
