@@ -170,7 +170,7 @@ class Browser:
 
     def key(self, key: str, *, text: str = "", code: str = "", modifiers: int = 0) -> None:
         """Press a key: its name as in KeyboardEvent.key. modifiers: 1 Alt, 2 Ctrl, 8 Shift"""
-        down = {"text": text} if text else {}
+        down: dict[str, Any] = {"text": text} if text else {}
         self.call("Input.dispatchKeyEvent", type="keyDown", key=key, code=code, modifiers=modifiers, **down)
         self.call("Input.dispatchKeyEvent", type="keyUp", key=key, code=code, modifiers=modifiers)
 

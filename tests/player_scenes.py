@@ -6,11 +6,10 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
 import numpy as np
 
-from engine.export.player.blocks import Packer
+from engine.export.player.blocks import Packer, joined
 from engine.export.player.page import page_writer
 from engine.export.splats import Splats
 
@@ -62,12 +61,6 @@ def places() -> list[tuple[int, int]]:
     return [(clip, frame) for clip, length in enumerate(LENGTHS) for frame in range(length)]
 
 
-def joined(*parts: Splats) -> Splats:
-    """Rows after rows."""
-    names = ("means", "quats", "scales", "opacities", "colors")
-    return Splats(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
-
-
 def in_light(splats: Splats, factor: float) -> Splats:
     """As bright as the factor says."""
     return Splats(splats.means, splats.quats, splats.scales, splats.opacities, splats.colors * np.float32(factor))
@@ -116,7 +109,7 @@ def write_page(path: Path, about: dict[str, Any], *, folder: Path | None = None)
     """The page of the made scene. folder: Where clips go instead."""
     if folder is not None:
         folder.mkdir()
-        about["folder"] = quote(folder.name)
+        about["folder"] = folder.as_uri().rpartition("/")[2]
     packer, first = Packer(), 0
     with path.open("w", encoding="utf-8", newline="\n") as stream, page_writer(stream, about, folder=folder) as writer:
         for index, length in enumerate(LENGTHS):

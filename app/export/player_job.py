@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
-from urllib.parse import quote
 
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report
 from app.export.player_scene import scene_header
@@ -94,7 +92,7 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
     clips = _clips(scene, job)
     n_frames = sum(len(wanted) for _, wanted in clips)
     header: dict[str, Any] = scene_header(scene, clips[0][1][0], step=job.frames.step if job.frames else 1)
-    header["folder"] = quote(os.fsencode(job.folder.name)) if has_folder else None
+    header["folder"] = _relative_url(job.folder.name) if has_folder else None
     packer, n_done, n_bytes = Packer(), 0, 0
     with ExitStack() as stack:
         page = stack.enter_context(staged_file(job.out, what="The player"))
@@ -117,6 +115,11 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
         n_bytes = writer.n_bytes_of_blocks * has_folder + page.stat().st_size
         report(ExportProgress(n_frames, n_frames))
     return ExportResult(job.out, len(header["clips"]) + 2 if has_folder else 1, n_bytes)
+
+
+def _relative_url(name: str) -> str:
+    """A name in the page's own folder, as plain letters."""
+    return PurePosixPath("/", name).as_uri().removeprefix("file:///")
 
 
 def _clips(scene: SceneFrames, job: PlayerJob) -> list[tuple[Clip, list[int]]]:

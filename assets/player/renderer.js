@@ -34,7 +34,8 @@ class Renderer {
     const id = gl.getAttribLocation(this.splats.program, "splat_id");
     gl.enableVertexAttribArray(id);
     gl.vertexAttribIPointer(id, 1, gl.UNSIGNED_INT, 0, 0);
-    gl.vertexAttribDivisor(id, 1);
+    this.corners = gl.createBuffer(); // two triangles for each Gaussian, in plain triangles: instances are slow in software
+    this.nCorners = 0;
     this.nothing = gl.createVertexArray();
     gl.disable(gl.DEPTH_TEST);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 4);
@@ -72,7 +73,17 @@ class Renderer {
     const { gl } = this;
     gl.bindBuffer(gl.ARRAY_BUFFER, this.order);
     gl.bufferData(gl.ARRAY_BUFFER, answer.order, gl.DYNAMIC_DRAW);
-    this.nDrawn = answer.order.length;
+    this.nDrawn = answer.order.length / 4;
+    this.holdCorners(this.nDrawn);
+  }
+
+  holdCorners(n) {
+    if (n <= this.nCorners) return;
+    const { gl } = this, corners = new Uint32Array(6 * (this.nCorners = Math.ceil(1.25 * n)));
+    for (let i = 0; i < this.nCorners; i++) corners.set([4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 2, 4 * i + 1, 4 * i + 3], 6 * i);
+    gl.bindVertexArray(this.quads);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.corners);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
   }
 
   texture(format, width, height) {
@@ -131,7 +142,7 @@ class Renderer {
       gl.uniform2f(splats.at("size_px"), width, height);
       gl.uniform1f(splats.at("near"), near);
       gl.bindVertexArray(this.quads);
-      gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.nDrawn);
+      gl.drawElements(gl.TRIANGLES, 6 * this.nDrawn, gl.UNSIGNED_INT, 0);
     }
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.disable(gl.BLEND);

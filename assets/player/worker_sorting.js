@@ -1,6 +1,7 @@
 // In the worker: the order in which Gaussians are drawn, farthest first, exact.
 
 const RADIX = 1 << 16;
+const CORNERS = 4; // every Gaussian is drawn as four, each of which has its number
 
 class DepthSorter {
   constructor() {
@@ -49,8 +50,11 @@ class DepthSorter {
       this.halfKeys[place] = keys[i];
       this.halfIds[place] = ids[i];
     }
-    const order = new Uint32Array(n);
-    for (let i = 0; i < n; i++) order[high[this.halfKeys[i] >>> 16]++] = this.halfIds[i];
+    const order = new Uint32Array(CORNERS * n);
+    for (let i = 0; i < n; i++) {
+      const place = CORNERS * high[this.halfKeys[i] >>> 16]++;
+      order[place] = order[place + 1] = order[place + 2] = order[place + 3] = this.halfIds[i];
+    }
     return order;
   }
 }

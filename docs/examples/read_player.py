@@ -96,9 +96,8 @@ class Page:
             still = joined(still, block.rows(clip["own"]["n"], clip["own"]["rounding"]))
         if clip["light"] is not None:
             still["colors"] = lit(block, clip["light"], still["levels"], in_clip)
-        for n in clip["moving"]["n"][: in_clip + 1]:
-            moving = block.rows(n, clip["moving"]["rounding"])
-        return joined(still, moving)
+        moving = [block.rows(n, clip["moving"]["rounding"]) for n in clip["moving"]["n"][: in_clip + 1]]
+        return joined(still, moving[-1])
 
 
 def lit(block: Block, light: dict[str, Any], levels: np.ndarray, frame: int) -> np.ndarray:

@@ -45,7 +45,7 @@ class Packer:
         """
         part = still_part(n_frames, lambda frame: seen(still(frame)))
         if part is None:  # then all of it is stored for every frame
-            frames = [_joined(seen(still(frame)), seen(moving(frame))) for frame in range(n_frames)]
+            frames = [joined(seen(still(frame)), seen(moving(frame))) for frame in range(n_frames)]
             part = StillPart(frames[0][:0], {0: frames[0].colors[:0]})
         else:
             frames = [seen(moving(frame)) for frame in range(n_frames)]
@@ -74,9 +74,7 @@ class Packer:
         rounding = fitting_rounding([own])
         if len(own):
             pieces.append(encoded_rows(own, rounding))
-        before = np.concatenate(
-            [self._shared_colors[found[~is_own]], rounded_colors(own.colors, rounding.color_max)]
-        )
+        before = np.concatenate([self._shared_colors[found[~is_own]], rounded_colors(own.colors, rounding.color_max)])
         return {
             "hides": bool(is_hidden.any()),
             "own": {"n": len(own), "rounding": rounding.described()} if len(own) else None,
@@ -113,9 +111,11 @@ def seen(splats: Splats) -> Splats:
     return splats[np.flatnonzero(splats.opacities > ALPHA_MIN)]
 
 
-def _joined(some: Splats, others: Splats) -> Splats:
+def joined(*parts: Splats) -> Splats:
+    """Rows after rows."""
     names = ("means", "quats", "scales", "opacities", "colors")
-    return replace(some, **{name: np.concatenate([getattr(some, name), getattr(others, name)]) for name in names})
+    columns: dict[str, Any] = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return replace(parts[0], **columns)
 
 
 def deflated(pieces: Sequence[bytes], description: dict[str, Any]) -> Block:

@@ -5,12 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
 from engine.backends.table import backend_called
+from engine.export.player.blocks import joined
 from engine.raster.rasterize import rasterize
 from tests.browser import Browser, chromium
 from tests.player_scenes import (
@@ -21,7 +23,6 @@ from tests.player_scenes import (
     SIZE,
     camera,
     header,
-    joined,
     moving,
     places,
     still,
@@ -117,7 +118,7 @@ def label(browser: Browser) -> str:
     return browser.value("document.getElementById('time').textContent")
 
 
-def state(browser: Browser, expression: str) -> object:
+def state(browser: Browser, expression: str) -> Any:
     return browser.value(f"clipgstreamPlayer.{expression}")
 
 

@@ -12,12 +12,12 @@ import pytest
 
 from engine.assets import asset_path
 from engine.conventions import ALPHA_MIN
-from engine.export.player.blocks import Packer
+from engine.export.player.blocks import Packer, joined
 from engine.export.player.page import json_for_html, web_shader
 from engine.export.player.row_coding import POSITION_SHARE, differences, fitting_rounding
 from engine.export.player.still_part import shared_rows, still_part
 from engine.export.splats import Splats
-from tests.player_scenes import LENGTHS, N_FRAMES, header, joined, made_splats, moving, places, still, write_page
+from tests.player_scenes import LENGTHS, N_FRAMES, header, made_splats, moving, places, still, write_page
 
 READER = Path(__file__).resolve().parents[3] / "docs/examples/read_player.py"
 
