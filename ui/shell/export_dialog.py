@@ -76,6 +76,7 @@ class ExportDialog:
         self._suggested = ""
         self._native: Any = None
         self._has_native = False
+        self._is_box_open = False
 
     def draw(self, session: HasExporting, dispatch: Dispatch, ui: UiState) -> None:
         """Draw the dialog while an export is asked for."""
@@ -90,12 +91,14 @@ class ExportDialog:
         if page is not self._page:
             self._page, self._choices, self._suggested = page, page.choices, page.choices.out
             self._has_native = has_native_dialog()
+        has_keys, self._is_box_open = not self._is_box_open, False  # an open box of answers takes Enter and Escape
+        is_agreed, is_left = keys.is_agreed and has_keys, keys.is_left and has_keys
         before = self._choices
         height = -(BUTTON.y + PLAN_HEIGHT + PLACE_HEIGHT)
         if imgui.begin_child("choices", ImVec2(0, height), imgui.ChildFlags_.nav_flattened):
             self._draw_choices(page.context, ui)
         imgui.end_child()
-        if keys.is_agreed:  # Enter also presses what the arrow keys are on
+        if is_agreed:  # Enter also presses what the arrow keys are on
             self._choices = before
         self._suggest_anew(exporting, page.context, before)
         imgui.separator()
@@ -107,8 +110,8 @@ class ExportDialog:
             _draw_plan(plan, ui)
         imgui.end_child()
         imgui.separator()
-        answer = self._draw_buttons(plan, ui, is_agreed=keys.is_agreed)
-        if answer is None and (keys.is_left or keys.is_closed):
+        answer = self._draw_buttons(plan, ui, is_agreed=is_agreed)
+        if answer is None and (is_left or keys.is_closed):
             answer = CloseQuestion()
         if answer is not None:
             imgui.close_current_popup()
@@ -156,6 +159,7 @@ class ExportDialog:
         if len(option.values) > MAX_RADIOS:
             imgui.set_next_item_width(BOX_WIDTH)
             if imgui.begin_combo("##box", one_line(dict(option.values)[chosen])):
+                self._is_box_open = True
                 for place, (value, words) in enumerate(option.values):
                     imgui.push_id(place)
                     is_clicked = imgui.selectable("##answer", value == chosen)[0]

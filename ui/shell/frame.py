@@ -98,6 +98,7 @@ class FrameNeeds(
     TimelineNeeds,
     MenuNeeds,
     PaletteNeeds,
+    HasExporting,
     StatusNeeds,
     QuestionNeeds,
     HasOpening,
@@ -108,7 +109,6 @@ class FrameNeeds(
     LogNeeds,
     ResidualsNeeds,
     DoctorNeeds,
-    HasExporting,
     PathPanelNeeds,
     Protocol,
 ):

@@ -10,6 +10,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from app.session.notices import Notices
 from app.status import JobStatus, ProjectStatus, QueueStatus, TrainingStatus, UsageStatus
 from engine.text import duration_text
+from ui.panels.exports import ExportingFacts
 from ui.panels.queue import clips_text, usage_text
 from ui.panels.state import UiState
 from ui.panels.widgets import elided
@@ -44,6 +45,9 @@ class StatusNeeds(Protocol):
 
     @property
     def queue(self) -> QueueStatus: ...
+
+    @property
+    def exporting(self) -> ExportingFacts: ...
 
 
 def draw_status_bar(session: StatusNeeds, ui: UiState, *, is_software: bool) -> None:
@@ -87,9 +91,18 @@ def status_text(session: StatusNeeds) -> str:
     return "" if session.project_status is None else session.project_status.trained_text
 
 
+def _exports_text(session: StatusNeeds) -> str:
+    """How far the export is that runs, and that others wait; empty where none does."""
+    left = [status for status in session.exporting.statuses if not status.is_over]
+    if not left:
+        return ""
+    more = f" (1 of {len(left)})" if len(left) > 1 else ""
+    return f"{Icon.DROP} {100 * left[0].done:.0f} %{more}    "
+
+
 def _right_text(session: StatusNeeds, *, is_software: bool) -> str:
     worst = [notice for notice in session.notices if notice.kind != "info"]
     notices = f"{Icon.WARNING} {len(worst)}    " if worst else ""
     usage = usage_text(session.usage)
     usage = f"{usage}    " if usage else ""
-    return f"{notices}{usage}{'software drawing' if is_software else 'graphics card'}"
+    return f"{notices}{_exports_text(session)}{usage}{'software drawing' if is_software else 'graphics card'}"

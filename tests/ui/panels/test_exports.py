@@ -125,6 +125,25 @@ def test_names_of_cameras_and_paths_are_shown_as_they_are(pilot: Pilot) -> None:
 
 
 @pytest.mark.gl
+def test_a_box_of_answers_takes_enter_and_escape_for_itself(pilot: Pilot) -> None:
+    ask(pilot, ExportChoices(kind="video", out="/out/v"))
+    pilot.click("export.from")
+    pilot.draw(3)
+    for _ in range(3):
+        pilot.key(key.DOWN)
+    pilot.key(key.ENTER)
+    pilot.draw(2)
+    assert asked(pilot).answer("from").startswith("camera:")
+    pilot.click("export.from")
+    pilot.draw(3)
+    pilot.key(key.ESCAPE)
+    pilot.draw(2)
+    assert not [one for one in pilot.session.commands if isinstance(one, commands.StartExport | commands.CloseQuestion)]
+    pilot.key(key.ENTER)
+    assert [one for one in pilot.session.commands if isinstance(one, commands.StartExport)]
+
+
+@pytest.mark.gl
 def test_the_panel_lists_exports_and_its_buttons_act(pilot: Pilot) -> None:
     result = ExportResult(Path("/out"), 2, 10, 41.5, (f"As {ODD}.",))
     pilot.session.exporting.statuses = (
