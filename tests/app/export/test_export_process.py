@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -96,15 +97,31 @@ def test_a_cancelled_process_ends_and_leaves_nothing(start: Start, tmp_path: Pat
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_polling_never_blocks(start: Start):
+def test_nothing_waits_for_a_process_that_does_not_start(start: Start, monkeypatch: pytest.MonkeyPatch):
+    may_go_on = threading.Event()
+
+    def refuse(process: object) -> None:
+        assert may_go_on.wait(DEADLINE_S)
+        raise OSError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr("multiprocessing.context.SpawnProcess.start", refuse)
     process = start()
-    began_s = time.process_time()
-    for _ in range(1000):  # while it is being started
-        process.poll()
-    assert time.process_time() - began_s < 1.0
+    assert process.poll() == []
+    process.cancel()
+    process.end(timeout_s=0.0)
+    assert process.poll() == []
+    may_go_on.set()
+    ending = until(process, is_over)[-1]
+    assert isinstance(ending, ExportFailed)
+    assert "Resource temporarily unavailable" in ending.message
+
+
+def test_ending_it_leaves_nothing(start: Start, tmp_path: Path):
+    process = start()
     process.end()
     process.end()
     assert isinstance(until(process, is_over)[-1], ExportStopped)
+    assert list((tmp_path / "out").iterdir()) == []
 
 
 def test_what_cannot_be_written_is_told_in_words(start: Start, tmp_path: Path):
