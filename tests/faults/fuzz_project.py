@@ -45,7 +45,7 @@ OLD = "old-"
 
 
 def make_project(folder: Path) -> None:
-    """Two trained clips, a checkpoint, a live snapshot, curves, regions, paths, caches; beside them files of the user."""
+    """Two trained clips, checkpoint, live snapshot, curves, regions, paths, caches; beside them files of the user."""
     from app.evaluation.kept_figures import KeptFigures
     from app.project.project import create_project
     from app.project.project_files import ProjectSettings
