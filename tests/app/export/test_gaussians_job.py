@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from engine.errors import DiskError, ProjectError
 from engine.export.formats.table import FORMATS, Format
 from engine.export.splats import Splats
 from tests.engine.export.scenes import order_of
+from tests.faults.full_disk import can_mount, full_disk
 
 
 def quiet(progress: ExportProgress) -> None:
@@ -211,6 +213,26 @@ def test_a_disk_that_fills_up_leaves_nothing(opened: TrainedProject, tmp_path: P
     with pytest.raises(DiskError, match="No space left on device"):
         run(opened, GaussiansJob(tmp_path / "out"), quiet)
     assert names(tmp_path) == before
+
+
+@pytest.mark.skipif(not can_mount(), reason="needs root, to mount a small disk")
+def test_a_real_disk_that_somebody_fills_meanwhile(opened: TrainedProject, tmp_path: Path):
+    (tmp_path / "disk").mkdir()
+    with full_disk(tmp_path / "disk", 20_000) as disk:
+
+        def fill() -> None:
+            with suppress(OSError), (disk / "other").open("wb", buffering=0) as file:
+                while file.write(bytes(1 << 12)):
+                    pass
+
+        with pytest.raises(DiskError, match="No space left on device"):
+            run(opened, GaussiansJob(disk / "out"), at_frame(3, fill))
+        assert names(disk) == ["other"]
+        with pytest.raises(ProjectError, match="are free"):
+            run(opened, GaussiansJob(disk / "out"), quiet)
+        (disk / "other").unlink()
+        run(opened, GaussiansJob(disk / "out"), quiet)
+        assert len(names(disk / "out")) == 7
 
 
 def test_untrained_clips_are_named_before_anything_is_made(opened: TrainedProject, tmp_path: Path):
