@@ -1,4 +1,4 @@
-"""CameraPaths: the camera paths of the open project, which of them is edited, and the view that goes along it."""
+"""CameraPaths: the camera paths of the open project, which of them is edited, and a view that goes along it."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class CameraPaths:
         )
         self._chosen: int | None = None
         self._key: int | None = None
-        self._is_along = False
-        self._led: tuple[OrbitView, ViewPlace, Any] | None = None
+        self._along: tuple[int, OrbitView] | None = None  # the view that goes along, and its index
+        self._led: tuple[ViewPlace, Any] | None = None  # where it was put, and for what
 
     def status(self) -> PathsStatus:
         """Everything as one value."""
@@ -46,7 +46,8 @@ class CameraPaths:
         chosen = None if not paths else min(self._chosen or 0, len(paths) - 1)
         n_keys = 0 if chosen is None else len(paths[chosen].keys)
         key = None if self._key is None or self._key >= n_keys else self._key
-        return PathsStatus(paths, chosen, key, self._is_along, not why_not, why_not)
+        along = None if self._along is None else self._along[0]
+        return PathsStatus(paths, chosen, key, along, not why_not, why_not)
 
     def apply(self, command: PathCommand, views: Views, timeline: Timeline) -> None:
         """Carry out a command on what the current view shows.
@@ -67,7 +68,7 @@ class CameraPaths:
                     key = status.path.keys[index]
                     view.stand(key.world_to_camera, key.fov_y_rad, is_jump=True)
             case LookAlongPath(is_on=is_on):
-                self._look_along(status, is_on)
+                self._look_along(status, views, is_on)
             case _:
                 self.document.checked()
                 result = edited(status, command, view, timeline)
@@ -81,10 +82,11 @@ class CameraPaths:
             raise ProjectError(f"There is no key {index + 1} on the camera path; it has {n_keys}.")
         self._key = index
 
-    def _look_along(self, status: PathsStatus, is_on: bool) -> None:
+    def _look_along(self, status: PathsStatus, views: Views, is_on: bool) -> None:
         if is_on and (status.path is None or not status.path.keys):
             raise ProjectError("There is no camera path with keys to look along.", hint="Add a key first.")
-        self._is_along, self._led = is_on, None
+        self._along = (views.current_index, views.current.view) if is_on else None
+        self._led = None
 
     @contextmanager
     def showing_change(self) -> Iterator[None]:
@@ -97,27 +99,28 @@ class CameraPaths:
             self._chosen = changed[0]
 
     def lead(self, views: Views, timeline: Timeline) -> bool:
-        """Bring the active view to where the path is at the playhead, while one looks along it. That ends when the
-        view is moved by somebody else, and when the path is gone.
+        """Bring the view that goes along to where the path is at the playhead. It goes along no more when somebody
+        else has moved it, when it is not shown any more, and when the path is gone.
 
         Returns:
             Whether the view was moved, or that has ended.
         """
-        if not self._is_along:
+        if self._along is None:
             return False
-        path, view = self.status().path, views.shown[views.active_index].view
-        is_left = self._led is not None and (self._led[0] is not view or self._led[1] != ViewPlace.of(view))
-        if path is None or not path.keys or is_left:
-            self._is_along, self._led = False, None
+        path, (before, view) = self.status().path, self._along
+        index = next((index for index, look in enumerate(views.shown) if look.view is view), None)
+        is_moved = self._led is not None and self._led[0] != ViewPlace.of(view)
+        if index is None or path is None or not path.keys or is_moved:
+            self._along = self._led = None
             return True
+        self._along = (index, view)
         due = (timeline.frame_index, path)
-        if self._led is not None and self._led[2] == due:
-            return False
+        if self._led is not None and self._led[1] == due:
+            return index != before
         view.stand(*path.at(timeline.frame_index))
-        self._led = (view, ViewPlace.of(view), due)
+        self._led = (ViewPlace.of(view), due)
         return True
 
     def leave(self) -> None:
         """Another project is opened: nothing is chosen in it yet."""
-        self._chosen = self._key = self._led = None
-        self._is_along = False
+        self._chosen = self._key = self._along = self._led = None

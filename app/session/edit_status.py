@@ -27,7 +27,7 @@ class PathsStatus:
         paths: In the user's order.
         chosen: Row of the path that is shown and edited; None without paths.
         chosen_key: Number of the key of that path that stands out; None without one.
-        is_along: Whether the view goes along the chosen path with the playhead.
+        along: Index of the view that goes along the chosen path with the playhead; None while none does.
         can_edit: Whether paths can be changed now.
         why_not: The reason if they cannot, and what to do.
     """
@@ -35,9 +35,14 @@ class PathsStatus:
     paths: tuple[CameraPath, ...] = ()
     chosen: int | None = None
     chosen_key: int | None = None
-    is_along: bool = False
+    along: int | None = None
     can_edit: bool = False
     why_not: str = ""
+
+    @property
+    def is_along(self) -> bool:
+        """Whether a view goes along the path."""
+        return self.along is not None
 
     @property
     def path(self) -> CameraPath | None:

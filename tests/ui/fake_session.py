@@ -322,7 +322,7 @@ class FakeSession:
             case path_commands.ChooseCameraPath(row=row):
                 self.paths = replace(self.paths, chosen=row, chosen_key=None)
             case path_commands.LookAlongPath(is_on=is_on):
-                self.paths = replace(self.paths, is_along=is_on)
+                self.paths = replace(self.paths, along=self.views.current_index if is_on else None)
             case _ if isinstance(command, path_commands.PathEdit):
                 result = edited(self.paths, command, self.view, self.timeline)
                 self.paths = PathsStatus(result.paths, result.chosen, result.chosen_key, can_edit=True)

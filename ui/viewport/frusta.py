@@ -27,7 +27,6 @@ def camera_under(
     *,
     near: float,
     reach_px: float = 6.0,
-    size: float | None = None,
 ) -> int | None:
     """The camera whose pyramid lies under a pixel; of several the one whose lines are nearest to it there.
 
@@ -36,9 +35,8 @@ def camera_under(
         K: Of the picture in which x and y are pixels. [3, 3]
         near: What is nearer than this is not drawn, scene units.
         reach_px: How near to a line the pointer has to be.
-        size: Length of a pyramid, scene units; that of the rig's own when None.
     """
-    corners = frusta_lines(rig, frustum_size(rig) if size is None else size)[0].astype(np.float64)  # two per line
+    corners = frusta_lines(rig, frustum_size(rig))[0].astype(np.float64)  # two per line
     points = to_camera(corners, world_to_camera)
     is_before = (points[:, 2] > near).reshape(-1, 2).all(axis=1)
     starts, ends = to_pixels(points, K).reshape(-1, 2, 2).swapaxes(0, 1)  # [L, 2] each

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Protocol
 import moderngl
 import numpy as np
 
-from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
+from app.playback.views import Views
 from app.session.edit_status import PathsStatus
 from app.status import Overlays
 from engine.camera.camera_path import CameraKey, CameraPath
@@ -28,10 +28,10 @@ LINE, HALO = 2.2, 2.6
 """Width of lines, and by how much the dark ones below are wider; units."""
 DIAMOND, CHOSEN_DIAMOND, RIM = 9.0, 13.0, 1.2
 """Diameters of the points at keys, and the width of their dark rim; units."""
-POINT_REACH, LINE_REACH = 10.0, 5.0
-"""How near to the point or the pyramid of a key the pointer has to be; units."""
-PYRAMID_SHARE = 0.7
-"""Length of a key's pyramid, of that of a capture camera's."""
+REACH = 10.0
+"""How near to the point of a key the pointer has to be; units."""
+PYRAMID_SHARE, HERE_SHARE = 0.7, 0.6
+"""Length of a key's pyramid, of that of a capture camera's; and of the camera at the playhead, of that of a key."""
 DARK = np.array([0.03, 0.04, 0.05, 1.0], np.float32)
 HERE: Color = (1.0, 1.0, 1.0, 1.0)
 """The camera at the playhead."""
@@ -47,7 +47,7 @@ class PathNeeds(Protocol):
     def rig(self) -> CameraRig: ...
 
     @property
-    def view(self) -> OrbitView: ...
+    def views(self) -> Views: ...
 
     @property
     def overlays(self) -> Overlays: ...
@@ -57,7 +57,7 @@ class PathNeeds(Protocol):
 
 
 class PathLayer:
-    """Draws the chosen path. Nothing while one looks along it: the camera stands on it then.
+    """Draws the chosen path; not in the view that goes along it.
 
     Attributes:
         pointed_key: The key under the pointer, which stands out; None without one.
@@ -71,6 +71,7 @@ class PathLayer:
         self._points, self._chosen = PointRenderer(ctx), PointRenderer(ctx)
         self._held: Hashable = None
         self._path: CameraPath | None = None  # of what is held; keeps its identity from being given away
+        self._held_here: int | None = None
 
     def release(self) -> None:
         """Free every GL object."""
@@ -81,7 +82,8 @@ class PathLayer:
         """The path that is drawn; None where there is none to be seen."""
         status = session.paths
         path = status.path
-        if path is None or not path.keys or status.is_along or not session.overlays.show_paths:
+        is_on_it = status.along == session.views.current_index  # the camera stands on the line then
+        if path is None or not path.keys or is_on_it or not session.overlays.show_paths:
             return None
         return path
 
@@ -96,31 +98,28 @@ class PathLayer:
             return None
         standing_out = session.paths.chosen_key if self.pointed_key is None else self.pointed_key
         standing_out = None if standing_out is None or standing_out >= len(path.keys) else standing_out
-        key = (id(path), id(session.rig), standing_out, session.timeline.frame_index, self.pixels_per_unit)
+        key = (id(path), id(session.rig), standing_out)
         if key != self._held or path is not self._path:
-            self._held, self._path = key, path
             self._set(path, session, standing_out)
-        return key
+            self._held, self._path, self._held_here = key, path, None
+        if session.timeline.frame_index != self._held_here:
+            self._held_here = session.timeline.frame_index
+            here = CameraKey(0.0, *path.at(self._held_here))
+            size = HERE_SHARE * PYRAMID_SHARE * frustum_size(session.rig)
+            self._here.set(*key_pyramids((here,), size, color=HERE))
+        return (*key, self._held_here, self.pixels_per_unit)
 
     def _set(self, path: CameraPath, session: PathNeeds, standing_out: int | None) -> None:
-        size = self.key_size(session)
         line = path_line(path)
-        vertices, colors = key_pyramids(path.keys, size, chosen=standing_out)
-        path_colors = np.tile(np.array(PATH, np.float32), (len(line), 1))
-        vertices, colors = np.concatenate([line, vertices]), np.concatenate([path_colors, colors])
+        pyramids, colors = key_pyramids(path.keys, PYRAMID_SHARE * frustum_size(session.rig), chosen=standing_out)
+        vertices = np.concatenate([line, pyramids])
         self._halo.set(vertices, DARK)
-        self._lines.set(vertices, colors)
-        world_to_camera, fov_y_rad = path.at(session.timeline.frame_index)
-        here = CameraKey(0.0, world_to_camera, fov_y_rad)
-        self._here.set(*key_pyramids((here,), 0.6 * size, color=HERE))
+        line_colors = np.tile(np.array(PATH, np.float32), (len(line), 1))
+        self._lines.set(vertices, np.concatenate([line_colors, colors]))
         centers = np.stack([key.center for key in path.keys])
         self._points.set(centers, np.array(PATH, np.float32))
-        chosen = centers[standing_out : standing_out + 1] if standing_out is not None else centers[:0]
+        chosen = centers[:0] if standing_out is None else centers[standing_out : standing_out + 1]
         self._chosen.set(chosen, np.array(CHOSEN, np.float32))
-
-    def key_size(self, session: PathNeeds) -> float:
-        """Length of a key's pyramid, scene units."""
-        return PYRAMID_SHARE * frustum_size(session.rig)
 
     def key_under(self, session: PathNeeds, view: SceneView, x: float, y: float) -> int | None:
         """Number of the key under a pixel of the view; None where none is shown."""
@@ -128,15 +127,7 @@ class PathLayer:
         if path is None:
             return None
         return key_under(
-            path.keys,
-            self.key_size(session),
-            view.world_to_camera,
-            view.K,
-            x,
-            y,
-            near=max(NEAR, view.near),
-            point_reach_px=POINT_REACH * unit,
-            line_reach_px=LINE_REACH * unit,
+            path.keys, view.world_to_camera, view.K, x, y, near=max(NEAR, view.near), reach_px=REACH * unit
         )
 
     def draw(self, target: Target, view: SceneView, session: PathNeeds) -> None:

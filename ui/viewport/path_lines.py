@@ -12,7 +12,6 @@ from engine.camera.projection import to_camera, to_pixels
 from engine.camera.rig import CameraRig
 from ui.gl.lines import frusta_lines
 from ui.style.colors import PATH, Color
-from ui.viewport.frusta import camera_under
 
 SAMPLES, MOST_PER_PIECE, LEAST_PER_PIECE = 256, 24, 6
 """Straight pieces of a whole path, and at least and at most between two keys: very short ones would look like beads."""
@@ -67,24 +66,21 @@ def _has_pyramid(number: int | None) -> bool:
 
 def key_under(
     keys: tuple[CameraKey, ...],
-    size: float,
     world_to_camera: np.ndarray,
     K: np.ndarray,
     x: float,
     y: float,
     *,
     near: float,
-    point_reach_px: float,
-    line_reach_px: float,
+    reach_px: float,
 ) -> int | None:
-    """Number of the key under a pixel: the one whose point is nearest to it, else the one whose pyramid is.
+    """Number of the key whose point is nearest to a pixel. Its pyramid does not count: a drag there turns the view.
 
     Args:
-        size: Length of a pyramid, scene units.
         world_to_camera: Of the view. [4, 4]
         K: Of the picture in which x and y are pixels. [3, 3]
         near: What is nearer than this is not drawn, scene units.
-        point_reach_px, line_reach_px: How near to a point or a line the pointer has to be.
+        reach_px: How near to the point the pointer has to be.
     """
     if not keys:
         return None
@@ -92,7 +88,4 @@ def key_under(
     away = np.linalg.norm(to_pixels(points, K) - np.array([x, y]), axis=1)
     away = np.where(points[:, 2] > near, away, np.inf)
     nearest = int(np.argmin(away))
-    if away[nearest] <= point_reach_px:
-        return nearest
-    rig = key_rig(keys[:MOST_PYRAMIDS])
-    return camera_under(rig, world_to_camera, K, x, y, near=near, reach_px=line_reach_px, size=size)
+    return nearest if away[nearest] <= reach_px else None

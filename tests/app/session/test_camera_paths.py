@@ -206,6 +206,23 @@ def test_the_view_goes_along_until_it_is_moved(session):
     assert np.allclose(session.view.world_to_camera(), moved)
 
 
+def test_one_of_several_views_goes_along_while_the_others_look_on(session):
+    add_keys(session, 0, 5)
+    session.dispatch(c.ShowViews(2))
+    session.dispatch(p.LookAlongPath())
+    assert session.paths.along == 0
+    session.dispatch(c.ActivateView(1))
+    session.view.orbit(50.0, 0.0)
+    onlooker = session.view.world_to_camera()
+    session.dispatch(c.SetFrame(2))
+    assert np.allclose(session.views.shown[0].view.world_to_camera(), session.paths.path.at(2)[0], atol=1e-9)
+    assert np.allclose(session.view.world_to_camera(), onlooker)
+    assert session.paths.along == 0
+    session.dispatch(c.ShowViews(1))  # the active one stays, the one that goes along is gone
+    assert not session.paths.is_along
+    assert np.allclose(session.view.world_to_camera(), onlooker)
+
+
 def test_looking_along_ends_with_the_path_and_needs_keys(session):
     session.dispatch(p.LookAlongPath())
     assert "no camera path with keys" in session.notices[-1].detail

@@ -138,4 +138,4 @@ def test_keys_do_not_share_memory_with_those_who_made_them():
     assert one.center[0] == 0.0
     with pytest.raises(ValueError, match="read-only"):
         one.world_to_camera[0, 3] = 1.0
-    assert np.allclose(one.at_center((1, 2, 3)).center, (1, 2, 3))
+    assert np.allclose(one.at_center(np.array([1.0, 2.0, 3.0])).center, (1, 2, 3))
