@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from app.evaluation.headless import TrainedProject
-from app.export.export_progress import ExportEstimate, ExportResult, Report, written
+from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
 from app.export.gaussian_files import SIDECAR, WrittenPart
 from app.export.gaussian_sequence import GaussianSequence
 from app.export.scene_frames import SceneFrames
@@ -87,6 +87,7 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
     frames = _frames(scene, job)
     sequence = GaussianSequence(scene, frames, job.part, _kind(job), _world(opened, job))
     check_target(job.out, is_folder=True)
+    report(ExportProgress(0, len(frames), message="Checking the clips"))
     scene.check(frames)
     check_target(job.out, n_bytes=estimate(opened, job).n_bytes, is_folder=True)
     with staged_folder(job.out, what="The export") as folder:

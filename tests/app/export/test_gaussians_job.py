@@ -168,7 +168,7 @@ def test_frames_are_told_as_they_are_done_and_few_scenes_are_kept(
     monkeypatch.setattr(gaussian_sequence, "_MOST_WRITERS", 1)
     told: list[ExportProgress] = []
     run(opened, GaussiansJob(tmp_path / "out", "ply"), told.append)
-    assert [(progress.n_done, progress.n_all) for progress in told] == [(n, 6) for n in range(7)]
+    assert [(progress.n_done, progress.n_all) for progress in told] == [(n, 6) for n in (0, *range(7))]
 
 
 # ---------------------------------------------------------------- what goes wrong
@@ -292,6 +292,13 @@ def test_a_file_that_does_not_look_like_the_scene_is_a_warning(
     assert 10 < result.psnr_db < 50
     (warning,) = [line for line in result.lines if line.startswith("Warning")]
     assert "At least 50 dB were expected of .ply" in warning
+
+
+def test_many_measured_files_are_one_line(opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(gaussian_sequence, "_MOST_LINES", 2)
+    lines = run(opened, GaussiansJob(tmp_path / "out"), quiet).lines
+    assert len(lines) == 2
+    assert lines[1].startswith("3 files were read back; the worst is p_0000.ply: 100.0 dB")
 
 
 def test_large_pictures_are_compared_smaller(opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
