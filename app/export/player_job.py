@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -58,6 +58,7 @@ def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
     """
     if job.out.suffix.lower() not in PAGE_SUFFIXES:
         raise ProjectError("A player is an HTML page.", hint="Give a name that ends in .html.", path=job.out)
+    check_target(job.out)
     scene = SceneFrames(opened)
     clips = _clips(scene, job)
     n_frames = sum(len(wanted) for _, wanted in clips)
@@ -94,8 +95,9 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
         stream = stack.enter_context(page.open("w", encoding="utf-8", newline="\n"))
         with page_writer(stream, header, folder=folder) as writer:
             for clip, wanted in clips:
-                report(ExportProgress(n_done, n_frames, message=f"Packing clip {clip.clip_index}"))
-                block = _packed(packer, scene, wanted)
+                block = _packed(
+                    packer, scene, wanted, lambda done, n=n_done: report(ExportProgress(n + done, n_frames))
+                )
                 name = f"clip{clip.clip_index:05d}"
                 place = {"clip_index": clip.clip_index, "name": name, "first": n_done, "frame_index": wanted[0]}
                 header["clips"].append(place)
@@ -145,9 +147,13 @@ def _clips(scene: SceneFrames, job: PlayerJob) -> list[tuple[Clip, list[int]]]:
     return clips
 
 
-def _packed(packer: Packer, scene: SceneFrames, wanted: list[int]) -> Block:
-    return packer.clip(
-        len(wanted),
-        still=lambda frame: Splats.of(scene.gaussians(wanted[frame], "static")),
-        moving=lambda frame: Splats.of(scene.gaussians(wanted[frame], "moving")),
-    )
+def _packed(
+    packer: Packer, scene: SceneFrames, wanted: list[int], told: Callable[[int], None] = lambda n_done: None
+) -> Block:
+    """A clip's block. told: Of each frame, before it is made, how many there are."""
+
+    def moving(frame: int) -> Splats:
+        told(frame)
+        return Splats.of(scene.gaussians(wanted[frame], "moving"))
+
+    return packer.clip(len(wanted), lambda frame: Splats.of(scene.gaussians(wanted[frame], "static")), moving)
