@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -13,7 +14,7 @@ from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_file, staged_folder
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
-from engine.export.player.blocks import Block, Packer
+from engine.export.player.blocks import Block, Packer, moving_bytes
 from engine.export.player.page import page_bytes, page_writer
 from engine.export.splats import Splats
 
@@ -26,7 +27,7 @@ PAGE_SUFFIXES = (".html", ".htm")
 _DESCRIBED_BYTES = 400
 """What a page says of a clip, about."""
 _SAMPLED_CLIPS = 3
-"""Clips of which a frame is packed to tell the size beforehand."""
+"""Clips of which two frames are packed to tell the size beforehand."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,24 +51,18 @@ class PlayerJob:
 
 
 def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
-    """What will be written. Packs a frame of a few clips, which takes about a second.
+    """What will be written. Packs two frames of a few clips, which takes some seconds.
 
     Raises:
         ProjectError: The target cannot be written, or a frame is not trained.
     """
     if job.out.suffix.lower() not in PAGE_SUFFIXES:
         raise ProjectError("A player is an HTML page.", hint="Give a name that ends in .html.", path=job.out)
+    check_target(job.out)
     scene = SceneFrames(opened)
     clips = _clips(scene, job)
     n_frames = sum(len(wanted) for _, wanted in clips)
-    packer, n_moving = Packer(), 0.0
-    sampled = [clips[round(at * (len(clips) - 1) / max(_SAMPLED_CLIPS - 1, 1))] for at in range(_SAMPLED_CLIPS)]
-    for _, wanted in sampled:
-        block = _packed(packer, scene, [wanted[len(wanted) // 2]])
-        n_moving += len(block.data) / len(sampled)
-    assert packer.shared is not None
-    n_bytes = round((len(packer.shared.data) + n_moving * n_frames) * 4 / 3)  # as base64
-    n_bytes += page_bytes(scene_header(scene, clips[0][1][0], step=1)) + _DESCRIBED_BYTES * len(clips)
+    n_bytes = _expected_bytes(scene, clips)
     has_folder = n_bytes > LARGEST_PAGE_BYTES if job.has_folder is None else job.has_folder
     lines = [f"About {n_bytes / 1e6:.1f} MB for {n_frames} frames."]
     if has_folder:
@@ -100,8 +95,9 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
         stream = stack.enter_context(page.open("w", encoding="utf-8", newline="\n"))
         with page_writer(stream, header, folder=folder) as writer:
             for clip, wanted in clips:
-                report(ExportProgress(n_done, n_frames, message=f"Packing clip {clip.clip_index}"))
-                block = _packed(packer, scene, wanted)
+                block = _packed(
+                    packer, scene, wanted, lambda done, n=n_done: report(ExportProgress(n + done, n_frames))
+                )
                 name = f"clip{clip.clip_index:05d}"
                 place = {"clip_index": clip.clip_index, "name": name, "first": n_done, "frame_index": wanted[0]}
                 header["clips"].append(place)
@@ -115,6 +111,22 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
         n_bytes = writer.n_bytes_of_blocks * has_folder + page.stat().st_size
         report(ExportProgress(n_frames, n_frames))
     return ExportResult(job.out, len(header["clips"]) + 2 if has_folder else 1, n_bytes)
+
+
+def _expected_bytes(scene: SceneFrames, clips: Sequence[tuple[Clip, list[int]]]) -> int:
+    """Of page and blocks together, from two frames of a few clips."""
+    n_frames = sum(len(wanted) for _, wanted in clips)
+    n_packed, packer = 0.0, Packer()
+    sampled = [clips[round(at * (len(clips) - 1) / max(_SAMPLED_CLIPS - 1, 1))] for at in range(_SAMPLED_CLIPS)]
+    for _, wanted in sampled:
+        ends = wanted if len(wanted) < 2 else [wanted[0], wanted[-1]]
+        block = _packed(packer, scene, ends)
+        n_moving = moving_bytes([Splats.of(scene.gaussians(frame, "moving")) for frame in ends])
+        n_packed += (len(block.data) - n_moving) * len(clips) / len(sampled)  # what stands still: once per clip
+        n_packed += n_moving / len(ends) * n_frames / len(sampled)
+    assert packer.shared is not None
+    n_bytes = round((len(packer.shared.data) + n_packed) * 4 / 3)  # as base64
+    return n_bytes + page_bytes(scene_header(scene, clips[0][1][0], step=1)) + _DESCRIBED_BYTES * len(clips)
 
 
 def _relative_url(name: str) -> str:
@@ -135,9 +147,13 @@ def _clips(scene: SceneFrames, job: PlayerJob) -> list[tuple[Clip, list[int]]]:
     return clips
 
 
-def _packed(packer: Packer, scene: SceneFrames, wanted: list[int]) -> Block:
-    return packer.clip(
-        len(wanted),
-        still=lambda frame: Splats.of(scene.gaussians(wanted[frame], "static")),
-        moving=lambda frame: Splats.of(scene.gaussians(wanted[frame], "moving")),
-    )
+def _packed(
+    packer: Packer, scene: SceneFrames, wanted: list[int], told: Callable[[int], None] = lambda n_done: None
+) -> Block:
+    """A clip's block. told: Of each frame, before it is made, how many there are."""
+
+    def moving(frame: int) -> Splats:
+        told(frame)
+        return Splats.of(scene.gaussians(wanted[frame], "moving"))
+
+    return packer.clip(len(wanted), lambda frame: Splats.of(scene.gaussians(wanted[frame], "static")), moving)

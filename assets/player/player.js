@@ -1,6 +1,8 @@
 // Ties it together: what is wanted, what is shown, and the words that say so. The label belongs to the picture that is
 // shown, never to the playhead.
 
+const SLOW_MS = 60; // where a picture takes longer, as in software, half as many lines are drawn while something moves
+const REST_MS = 250; // after so long without a move a picture is drawn in full
 const GOOD_PIXELS = 3 << 20; // more of them are not drawn on screens with very small ones
 
 class Player {
@@ -15,15 +17,18 @@ class Player {
     this.clock = new Clock(nFrames, header.fps / header.step);
     this.renderer = new Renderer(this.canvas, shaders, header.background, lines(nStill) + lines(nMoving));
     this.timeline = new Timeline(header, nFrames, (frame) => this.go(frame));
-    this.shown = null; // frame of the picture on the screen
+    this.shown = null; // frame that the renderer holds
+    this.onScreen = null; // frame of the picture on the screen
     this.isLost = this.isDrawn = false;
+    this.share = 1; // of the screen's pixels, along a side
+    this.movedMs = -REST_MS;
     this.scheduled = 0;
     this.pictures = new Pictures(header, new Blocks(header.folder), workerSource, {
       onPicture: (answer) => this.take(answer),
       onNotice: (text) => notify(text),
     });
     this.fillControls();
-    followPointer(this.canvas, this.view, () => this.changed());
+    followPointer(this.canvas, this.view, () => this.moved());
     const table = keyTable(this);
     fillKeySheet(table);
     followKeys(table);
@@ -37,7 +42,8 @@ class Player {
   /** Have as many pixels as the screen shows. */
   fit() {
     const { canvas } = this, width = canvas.clientWidth, height = canvas.clientHeight;
-    const ratio = Math.min(devicePixelRatio, Math.max(1, Math.sqrt(GOOD_PIXELS / Math.max(width * height, 1))));
+    const sharp = Math.max(1, Math.sqrt(GOOD_PIXELS / Math.max(width * height, 1)));
+    const ratio = this.share * Math.min(devicePixelRatio, sharp);
     const size = [width, height].map((length) => Math.max(1, Math.round(length * ratio)));
     if (canvas.width === size[0] && canvas.height === size[1]) return;
     [canvas.width, canvas.height] = size; // which clears it
@@ -58,21 +64,40 @@ class Player {
   /** Something that is seen has changed: draw once, soon. */
   changed() {
     this.isDrawn = false;
+    this.schedule();
+  }
+
+  schedule() {
     if (!this.scheduled) this.scheduled = requestAnimationFrame((nowMs) => this.tick(nowMs));
+  }
+
+  /** The same, by somebody who goes on moving. */
+  moved() {
+    this.movedMs = performance.now();
+    this.changed();
   }
 
   tick(nowMs) {
     this.scheduled = 0;
     this.clock.tell(nowMs, this.pictures.isWaitingFor(this.clock.frame));
-    this.fit();
+    const isReady = this.renderer.isDone();
+    if (isReady) {
+      const isMoving = this.clock.isPlaying || performance.now() - this.movedMs < REST_MS;
+      this.share = isMoving && this.renderer.fullMs > SLOW_MS ? 0.5 : 1;
+      this.fit();
+    }
     const lens = this.view.lens(this.canvas.width, this.canvas.height);
     this.pictures.want(this.clock.frame, lens.worldToCamera.slice(8, 12));
-    if (!this.isDrawn && !this.isLost && this.shown !== null) {
-      this.renderer.draw(lens, this.header.near_plane);
+    const isWanted = !this.isDrawn && !this.isLost && this.shown !== null;
+    if (isWanted && isReady) {
+      this.renderer.draw(lens, this.header.near_plane, this.share === 1);
       this.isDrawn = true;
+      this.onScreen = this.shown;
     }
     this.tell();
-    if (this.clock.isPlaying && !this.scheduled) this.scheduled = requestAnimationFrame((ms) => this.tick(ms));
+    clearTimeout(this.rest);
+    if (this.clock.isPlaying || (isWanted && !isReady) || !this.renderer.isDone()) this.schedule();
+    else if (this.share < 1) this.rest = setTimeout(() => this.changed(), REST_MS);
   }
 
   take(answer) {
@@ -84,7 +109,7 @@ class Player {
 
   /** Words and marks about what is on the screen. */
   tell() {
-    const { shown, header, clock } = this;
+    const { onScreen: shown, header, clock } = this;
     const number = (frame) => {
       const clip = header.clips[this.pictures.clipOf(frame)];
       return clip.frame_index + (frame - clip.first) * header.step;
@@ -103,7 +128,7 @@ class Player {
 
   go(frame) {
     this.clock.go(frame);
-    this.changed();
+    this.moved();
   }
 
   goToClip(steps) {
@@ -178,7 +203,7 @@ class Player {
     this.canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault();
       this.isLost = true;
-      this.shown = null;
+      this.shown = this.onScreen = null;
     });
     this.canvas.addEventListener("webglcontextrestored", () => {
       this.isLost = false;

@@ -1,5 +1,7 @@
 // Draws Gaussians with the shaders of the window: assets/shaders/splat.vert and splat.frag, translated for WebGL 2.
 
+const HIDDEN_MS = 5000; // nobody looked meanwhile, as in a tab in the background
+
 class Renderer {
   /** shaders: sources by name; nLines: of the textures, for the largest frame. Throws where the browser cannot do it; begin() again after the context was restored. */
   constructor(canvas, shaders, background, nLines) {
@@ -24,7 +26,8 @@ class Renderer {
     this.present = this.program("resolve.vert", "present.frag");
     this.geometry = this.texture(gl.RGBA32F, TEXELS_PER_ROW * ROWS_PER_LINE, this.nLines);
     this.colors = this.texture(gl.RGBA32F, ROWS_PER_LINE, this.nLines);
-    this.target = null;
+    this.target = this.fence = null;
+    this.fullMs = 0;
     this.nDrawn = 0;
     this.size = [0, 0];
     this.order = gl.createBuffer();
@@ -117,8 +120,22 @@ class Renderer {
     this.target = { texture, framebuffer };
   }
 
-  /** lens: {worldToCamera: 16 numbers by rows, focal: [2], center: [2]} in pixels of the canvas; near: scene units. */
-  draw(lens, near) {
+  /** Is the last picture finished? What comes before that only waits. */
+  isDone() {
+    const { gl, fence } = this;
+    if (!fence || gl.isContextLost()) return true;
+    if (gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
+    gl.deleteSync(fence);
+    this.fence = null;
+    const tookMs = performance.now() - this.begunMs;
+    if (this.isFull && tookMs < HIDDEN_MS) this.fullMs = tookMs;
+    return true;
+  }
+
+  /**
+   * lens: {worldToCamera: 16 numbers by rows, focal: [2], center: [2]} in pixels of the canvas; near: scene units;
+   * isFull: whether the canvas has all pixels of the screen, so that fullMs is how long such a picture takes. */
+  draw(lens, near, isFull = true) {
     const { gl, splats, present } = this;
     this.resize();
     const [width, height] = this.size;
@@ -153,5 +170,9 @@ class Renderer {
     gl.uniform1i(present.at("height"), height);
     gl.bindVertexArray(this.nothing);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 4);
+    this.isFull = isFull;
+    this.begunMs = performance.now();
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
   }
 }

@@ -36,15 +36,15 @@ def still_part(n_frames: int, at: Callable[[int], Splats]) -> StillPart | None:
         at: Gaussians by the number of a frame in the clip.
     """
     first, last = at(0), at(n_frames - 1)
-    between = [at(frame) for frame in range(1, n_frames - 1)]
-    if not all(_has_same_shapes(first, other) for other in [*between, last]):
-        return None
-    change = last.colors - first.colors
-    for frame, other in enumerate(between, start=1):
-        expected = first.colors + change * np.float32(frame / (n_frames - 1))
-        if _differs(other.colors, expected):
-            everything = [first, *between, last]
-            return StillPart(first, {frame: splats.colors for frame, splats in enumerate(everything)})
+    is_even = True  # whether colours are linear in time
+    for frame in range(1, n_frames):
+        other = last if frame == n_frames - 1 else at(frame)
+        if not _has_same_shapes(first, other):
+            return None
+        share = np.float32(frame / (n_frames - 1))
+        is_even = is_even and not _differs(other.colors, first.colors + (last.colors - first.colors) * share)
+    if not is_even:
+        return StillPart(first, {frame: at(frame).colors for frame in range(n_frames)})
     if _differs(first.colors, last.colors):
         return StillPart(first, {0: first.colors, n_frames - 1: last.colors})
     return StillPart(first, {0: first.colors})

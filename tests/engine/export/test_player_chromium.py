@@ -41,7 +41,7 @@ SCALE = 3
 """Pictures are drawn so many times as large as the cameras' own."""
 PICTURE = (SCALE * SIZE[0], SCALE * SIZE[1])
 SETTLED = (
-    "(p => p && p.isDrawn && p.shown === p.clock.frame && !p.pictures.isBusy"
+    "(p => p && p.isDrawn && p.share === 1 && p.onScreen === p.clock.frame && !p.pictures.isBusy"
     " && p.pictures.answered === p.pictures.wish.key)(window.clipgstreamPlayer)"
 )
 EVIL = "</script><img src=x onerror=\"document.title='pwned'\">"
