@@ -19,7 +19,7 @@ from app.session.commands import CloseQuestion, Command, StartExport
 from engine.text import one_line
 from ui.panels.exports import ExportingFacts, bytes_text, files_text
 from ui.panels.state import EXPORTS, Dispatch, UiState
-from ui.panels.widgets import primary_button, segment, text_wrapped, text_wrapped_dim
+from ui.panels.widgets import elided, primary_button, segment, text_wrapped, text_wrapped_dim
 from ui.shell.dialogs import has_native_dialog
 from ui.shell.modal import Modal
 from ui.style import theme
@@ -157,8 +157,7 @@ class ExportDialog:
         _label(option.label)
         imgui.push_id(option.name)
         if len(option.values) > MAX_RADIOS:
-            imgui.set_next_item_width(BOX_WIDTH)
-            if imgui.begin_combo("##box", one_line(dict(option.values)[chosen])):
+            if _begin_box(one_line(dict(option.values)[chosen])):
                 self._is_box_open = True
                 for place, (value, words) in enumerate(option.values):
                     imgui.push_id(place)
@@ -259,6 +258,16 @@ class ExportDialog:
         if is_cancelled:
             return CloseQuestion()
         return StartExport(self._choices) if is_possible and (is_clicked or is_agreed) else None
+
+
+def _begin_box(words: str) -> bool:
+    """A box of answers with any words in it; ImGui itself would leave out what follows "##"."""
+    draw, corner, padding = imgui.get_window_draw_list(), imgui.get_cursor_screen_pos(), imgui.get_style().frame_padding
+    imgui.set_next_item_width(BOX_WIDTH)
+    is_open = imgui.begin_combo("##box", "")
+    width = BOX_WIDTH - imgui.get_frame_height() - 2 * padding.x
+    draw.add_text(ImVec2(corner.x + padding.x, corner.y + padding.y), theme.u32(theme.TEXT), elided(words, width))
+    return is_open
 
 
 def _draw_plan(plan: ExportPlan | None, ui: UiState) -> None:
