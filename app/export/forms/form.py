@@ -26,12 +26,14 @@ class Option:
         label: In front of the answers.
         values: Value and words of each answer; the first is the usual one.
         tips: What the answers mean, by value; none where the words are enough.
+        has_names: Whether words have names in them that the user or the capture gave.
     """
 
     name: str
     label: str
     values: tuple[tuple[str, str], ...]
     tips: dict[str, str] = field(default_factory=dict)
+    has_names: bool = False
 
     def chosen(self, choices: ExportChoices) -> str:
         """The answer, the usual one where there is none or it is none of the values."""
