@@ -102,7 +102,7 @@ def run_child(
     with said.open("wb") as errors:
         try:
             # the child holds the other end of this pipe: it ends by itself when nobody holds ours any more
-            child = subprocess.Popen(
+            child: subprocess.Popen[bytes] = subprocess.Popen(
                 command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=errors, **_APART
             )
         except OSError as error:
