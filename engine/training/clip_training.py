@@ -166,7 +166,7 @@ class ClipTraining:
 
     # ---------------------------------------------------------------- steps
 
-    def _start_phase(self, index: int, steps_in_phase: int) -> None:
+    def _start_phase(self, index: int, steps_in_phase: int, reaches: dict[str, Tensor] | None = None) -> None:
         name, n_steps = self.phases[index]
         has_gains = bool((self.gains != 1.0).any())  # all 1 where the cameras do not differ: nothing to learn
         self.gains.requires_grad_(self.reference is None and has_gains)
@@ -179,7 +179,8 @@ class ClipTraining:
         n_items = len(self.camera_indices) if name == "static" else len(self.pictures)
         self._order = ShuffledOrder(n_items, seed=self.seed + index)
         self._phase_index = index
-        self._sight = Sight(self.model, self._training_views, reach=self._reach)  # a set may have become dynamic
+        # a set may have become dynamic
+        self._sight = Sight(self.model, self._training_views, reach=self._reach, reaches=reaches)
         has_rest = name == "source" and self.method.has_active_tiles and not self.gains.requires_grad
         has_rest = has_rest and ActiveTiles.applies(self.model)
         self._valid = ValidPixels(self.pictures.is_valid, self.backend.device)
@@ -352,7 +353,8 @@ class ClipTraining:
         )
         state = self._state_of(self._trained or self.model)
         state = ClipState(state.arrays | self._optimizer.arrays(), state.header)
-        write_checkpoint(path, Checkpoint(state, host_array(self.gains).copy(), self.backgrounds, place))
+        reaches = {role: host_array(reach) for role, reach in self._sight.reaches.items()}
+        write_checkpoint(path, Checkpoint(state, host_array(self.gains).copy(), self.backgrounds, place, reaches))
 
     def restore_checkpoint(self, path: Path | str) -> None:
         """Go on from a checkpoint instead of `prepare`.
@@ -400,7 +402,8 @@ class ClipTraining:
         self._take(parts)
         self.phases = list(place.phases)
         self.steps_done = header.step
-        self._start_phase(place.phase_index, place.steps_in_phase)
+        reaches = {role: self._tensor(reach) for role, reach in kept.reaches.items()}
+        self._start_phase(place.phase_index, place.steps_in_phase, reaches)
         self._optimizer.restore(kept.state.arrays, place.steps_in_phase)
         self._order.restore(place.order)
         self._generator.set_state(torch.tensor(place.generator, dtype=torch.uint8))
