@@ -26,16 +26,16 @@ class Checkpoint:
     Attributes:
         state: The clip, with the optimiser's arrays beside its own.
         gains: Of the training cameras, learned so far. [C, 3] float32
-        cameras: What their poses and focal lengths have learned; None where these do not learn. [C, 7] float32
         backgrounds: Of the training cameras.
         place: Where the training stands.
+        cameras: What their poses and focal lengths have learned; None where these do not learn. [C, 7] float32
     """
 
     state: ClipState
     gains: np.ndarray
-    cameras: np.ndarray | None
     backgrounds: Backgrounds
     place: Place
+    cameras: np.ndarray | None = None
 
 
 def write_checkpoint(path: Path | str, checkpoint: Checkpoint) -> None:
@@ -88,7 +88,7 @@ def read_checkpoint(path: Path | str, *, clip_index: int, camera_names: Sequence
     odd = [name for name, array in floats.items() if not np.isfinite(array).all()]
     if odd:  # training on from here could only fail again
         raise damaged_checkpoint(ValueError(f"{odd[0]} holds numbers that are not finite"), path)
-    return Checkpoint(kept, gains.copy(), kept.arrays.get("resume.cameras"), Backgrounds(images, stable), place)
+    return Checkpoint(kept, gains.copy(), Backgrounds(images, stable), place, kept.arrays.get("resume.cameras"))
 
 
 def damaged_checkpoint(error: Exception, path: Path | str) -> ProjectError:

@@ -365,7 +365,7 @@ class ClipTraining:
         state = self._state_of(self._trained or self.model)
         state = ClipState(state.arrays | self._optimizer.arrays(), state.header)
         write_checkpoint(
-            path, Checkpoint(state, host_array(self.gains).copy(), self._cameras.kept, self.backgrounds, place)
+            path, Checkpoint(state, host_array(self.gains).copy(), self.backgrounds, place, self._cameras.kept)
         )
 
     def restore_checkpoint(self, path: Path | str) -> None:
