@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import engine
 from engine.storage.files import disk_error
@@ -25,6 +26,11 @@ from engine.storage.files import disk_error
 STALL_S = 300.0
 """A child that has used no processor time for so long hangs."""
 POLL_S = 0.2
+_APART: dict[str, Any] = (
+    {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP} if sys.platform == "win32" else {"process_group": 0}
+)
+"""Ctrl+C in a terminal reaches the processes of the parent's group: a child that it ends while it still starts fails
+like one that cannot do its work, and the parent would keep that for a result."""
 
 
 @contextmanager
@@ -96,8 +102,8 @@ def run_child(
     with said.open("wb") as errors:
         try:
             # the child holds the other end of this pipe: it ends by itself when nobody holds ours any more
-            child = subprocess.Popen(
-                command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=errors
+            child: subprocess.Popen[bytes] = subprocess.Popen(
+                command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=errors, **_APART
             )
         except OSError as error:
             return f"{what} could not be started ({error})", True
