@@ -194,7 +194,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
     color_head_lr: Annotated[float, _rate("the head of colours")] = 4e-3
     offset_head_lr: Annotated[float, _rate("the head of offsets")] = 4e-3
     gain_lr: Annotated[float, _rate("the cameras' colour gains in the reference clip")] = 3e-4
-    camera_lr: Annotated[float, _rate("corrections of cameras, in pixels at the working size,")] = 5e-3
+    camera_lr: Annotated[float, _rate("corrections of cameras, in pixels at the working size,")] = 0.015
     final_lr_ratio: Annotated[
         float,
         setting(

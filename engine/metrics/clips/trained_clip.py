@@ -82,9 +82,13 @@ class TrainedClip:
         """How far Gaussians are expected from their anchors, scene units."""
         return REACH_SPACINGS * self.base.header.spacing
 
+    def rig(self, rig: CameraRig) -> CameraRig:
+        """The capture's cameras as the clip was trained with them; the same object where none was corrected."""
+        return corrected(rig, self.base.header.camera_names, self.base.corrections)
+
     def view(self, rig: CameraRig, camera: int) -> View:
         """What a camera of the capture's rig looks at, corrected where it was refined in training."""
-        rig = corrected(rig, self.base.header.camera_names, self.base.corrections)
+        rig = self.rig(rig)
         width, height = (int(v) for v in rig.image_sizes[camera])
         near_plane = self.base.header.near_plane
         return View.from_arrays(

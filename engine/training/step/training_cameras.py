@@ -144,7 +144,7 @@ def correction_gradient(gaussians: Gaussians, pose: np.ndarray, values: np.ndarr
     """
     tensors = (gaussians.means, gaussians.quats, gaussians.scales)
     means, quats, scales = (host_array(tensor).astype(np.float64) for tensor in tensors)
-    by_mean, by_quat, by_scale = (host_array(tensor.grad).astype(np.float64) for tensor in tensors)
+    by_mean, by_quat, by_scale = (_gradient(tensor) for tensor in tensors)
     rotation, translation = pose[:3, :3], pose[:3, 3]
     force = rotation @ by_mean.sum(0)
     # camera coordinates by gradients in camera axes, summed; without BLAS, whose sums depend on its threads
@@ -158,6 +158,11 @@ def correction_gradient(gaussians: Gaussians, pose: np.ndarray, values: np.ndarr
     gradient[TRANSLATION] = force
     gradient[LOG_FOCAL] = moments[0, 0] + moments[1, 1] + (scales * by_scale).sum()
     return gradient
+
+
+def _gradient(tensor: Tensor) -> np.ndarray:
+    """Of a tensor that was drawn; zeros where no pixel showed it. float64"""
+    return np.zeros(tensor.shape) if tensor.grad is None else host_array(tensor.grad).astype(np.float64)
 
 
 def _units(rig: CameraRig) -> np.ndarray:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from engine.clip_files.array_names import CORRECTIONS
 from engine.clip_files.clip_state import ClipState
@@ -36,7 +37,7 @@ def test_corrections_are_stored_small_and_in_the_gauge(own_tiny: Tiny) -> None:
     assert found is not None
     assert found.shape == (len(own_tiny.reference.header.camera_names), 7)
     assert 1e-5 < np.abs(found[:, :3]).max() < 0.1
-    assert abs(found[:, 6].mean()) < 1e-6
+    assert abs(found[:, 6].mean()) < 0.02 * np.abs(found[:, 6]).max()  # each counts by its focal length
 
 
 def test_without_the_setting_nothing_is_stored(tiny: Tiny) -> None:
@@ -44,14 +45,22 @@ def test_without_the_setting_nothing_is_stored(tiny: Tiny) -> None:
     assert tiny.reference.corrections is None
 
 
-def test_the_same_seed_gives_the_same_cameras_also_after_a_stop_in_either_phase(own_tiny: Tiny, tmp_path: Path) -> None:
+def test_the_same_seed_gives_the_same_cameras(own_tiny: Tiny) -> None:
     assert same_arrays(finish(refining(own_tiny)).arrays, own_tiny.reference.arrays)
-    for n_steps in (5, 17):  # of 12 static and 12 joint ones
-        stopped = take_steps(refining(own_tiny), n_steps)
-        stopped.write_checkpoint(tmp_path / "kept.safetensors")
-        resumed = own_tiny.training(0, is_source=False, refine_cameras="on", camera_lr=0.05)
-        resumed.restore_checkpoint(tmp_path / "kept.safetensors")
-        assert same_arrays(finish(resumed).arrays, own_tiny.reference.arrays)
+
+
+@pytest.mark.parametrize("n_steps", [5, 17])  # of 12 static and 12 joint ones
+def test_cameras_go_on_from_a_checkpoint_bit_for_bit(own_tiny: Tiny, tmp_path: Path, n_steps: int) -> None:
+    stopped = take_steps(refining(own_tiny), n_steps)
+    stopped.write_checkpoint(tmp_path / "kept.safetensors")
+    resumed = own_tiny.training(0, is_source=False, refine_cameras="on", camera_lr=0.05)
+    resumed.restore_checkpoint(tmp_path / "kept.safetensors")
+    for _ in range(2):
+        assert torch.equal(resumed._cameras.pixels, stopped._cameras.pixels)
+        assert same_arrays(resumed._optimizer.arrays(), stopped._optimizer.arrays())
+        assert same_arrays(resumed.state().arrays, stopped.state().arrays)
+        take_steps(stopped, 1)
+        take_steps(resumed, 1)
 
 
 def test_a_checkpoint_without_corrections_is_refused_where_cameras_learn(tiny: Tiny, tmp_path: Path) -> None:
