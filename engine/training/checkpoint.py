@@ -32,6 +32,7 @@ class Checkpoint:
         place: Where the training stands.
         reaches: How far Gaussians of each anchor were expected when the phase began, scene units, by role; none in
             checkpoints of earlier versions. [A] float32 each
+        cameras: What their poses and focal lengths have learned; None where these do not learn. [C, 7] float32
     """
 
     state: ClipState
@@ -39,6 +40,7 @@ class Checkpoint:
     backgrounds: Backgrounds
     place: Place
     reaches: dict[str, np.ndarray]
+    cameras: np.ndarray | None = None
 
 
 def write_checkpoint(path: Path | str, checkpoint: Checkpoint) -> None:
@@ -50,6 +52,8 @@ def write_checkpoint(path: Path | str, checkpoint: Checkpoint) -> None:
     backgrounds = checkpoint.backgrounds
     arrays = dict(checkpoint.state.arrays)
     arrays["resume.gains"] = checkpoint.gains
+    if checkpoint.cameras is not None:
+        arrays["resume.cameras"] = checkpoint.cameras
     arrays["resume.backgrounds"] = backgrounds.images
     arrays["resume.is_stable"] = np.packbits(backgrounds.is_stable, axis=-1)
     arrays |= {f"{_REACH}{role}": reach for role, reach in checkpoint.reaches.items()}
@@ -91,7 +95,8 @@ def read_checkpoint(path: Path | str, *, clip_index: int, camera_names: Sequence
     if odd:  # training on from here could only fail again
         raise damaged_checkpoint(ValueError(f"{odd[0]} holds numbers that are not finite"), path)
     reaches = {name.removeprefix(_REACH): array.copy() for name, array in floats.items() if name.startswith(_REACH)}
-    return Checkpoint(kept, gains.copy(), Backgrounds(images, stable), place, reaches)
+    cameras = kept.arrays.get("resume.cameras")
+    return Checkpoint(kept, gains.copy(), Backgrounds(images, stable), place, reaches, cameras)
 
 
 def damaged_checkpoint(error: Exception, path: Path | str) -> ProjectError:
