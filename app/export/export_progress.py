@@ -1,0 +1,69 @@
+"""What an export tells while it runs, and what it leaves behind: plain values."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class ExportProgress:
+    """How far an export is.
+
+    Attributes:
+        n_done, n_all: In units; nothing is known while n_all is 0.
+        unit: What is counted, in the plural: "frames".
+        message: What it does now, where that is more than writing units; may be empty.
+    """
+
+    n_done: int
+    n_all: int
+    unit: str = "frames"
+    message: str = ""
+
+
+Report = Callable[[ExportProgress], None]
+"""Told how far an export is. May raise ExportCancelled, which has to pass through."""
+
+
+class ExportCancelled(Exception):
+    """The export is not wanted any more: leave nothing behind."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExportResult:
+    """What an export has written.
+
+    Attributes:
+        path: The file, or the folder that was filled.
+        n_files, n_bytes: All of them.
+        psnr_db: What was read back and rendered, against the live pictures; None where nothing is to be measured.
+        lines: Sentences about what the user should know.
+    """
+
+    path: Path
+    n_files: int
+    n_bytes: int
+    psnr_db: float | None = None
+    lines: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ExportEstimate:
+    """What an export will write.
+
+    Attributes:
+        n_files, n_bytes: As far as they can be told beforehand; bytes are an estimate, 0 where there is none.
+        lines: Sentences about what the user should know.
+    """
+
+    n_files: int
+    n_bytes: int
+    lines: tuple[str, ...] = ()
+
+
+def written(path: Path, *, psnr_db: float | None = None, lines: tuple[str, ...] = ()) -> ExportResult:
+    """The result of a file or folder that is complete."""
+    files = [path] if path.is_file() else [found for found in path.rglob("*") if found.is_file()]
+    return ExportResult(path, len(files), sum(found.stat().st_size for found in files), psnr_db, lines)

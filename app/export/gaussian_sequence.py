@@ -1,0 +1,201 @@
+"""GaussianSequence: the files of one export of Gaussians, written a few at a time and measured."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.export.export_progress import ExportProgress, Report
+from app.export.gaussian_files import GaussianFile, WrittenPart, base_name, moment_files, static_file
+from app.export.read_back import ReadBack
+from app.export.scene_frames import SceneFrames
+from engine.export.formats.table import Format
+from engine.export.splats import Splats
+from engine.export.world import World
+from engine.parallel import n_cores
+from engine.raster.gaussians import Gaussians
+
+SCHEMA = 1
+_MOST_WRITERS = 4
+_MOST_LINES = 6
+"""Files that are named one by one."""
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenFile:
+    """A file that is there; psnr_db: by camera, None where it was not read back."""
+
+    file: GaussianFile
+    n_gaussians: int
+    n_dropped: int
+    n_bytes: int
+    notes: tuple[str, ...]
+    psnr_db: dict[str, float] | None = None
+
+
+class GaussianSequence:
+    """Files of some frames of a scene.
+
+    Args:
+        scene: Where frames come from.
+        frames: Of the capture, at least one.
+        part: What is written of each.
+        kind: The format.
+        placement: Where the scene lies in the files.
+    """
+
+    def __init__(
+        self, scene: SceneFrames, frames: Sequence[int], part: WrittenPart, kind: Format, placement: World
+    ) -> None:
+        self.name = base_name(scene.opened.project.folder.resolve().name)
+        self.files: list[WrittenFile] = []
+        self._scene, self._frames, self._kind, self._placement = scene, frames, kind, placement
+        self._part: WrittenPart = part
+        self._n_frames = scene.opened.capture.n_frames
+
+    # ---------------------------------------------------------------- writing
+
+    def write(self, folder: Path, report: Report) -> None:
+        """Write every file into a folder. The first, one in the middle and the last are read back, and every file of
+        what stands still.
+
+        Raises:
+            ProjectError: A clip is damaged, or a value does not fit the format.
+            OSError: The disk refused.
+        """
+        check = ReadBack(self._scene, self._kind.read, self._placement)
+        middle_too = {self._frames[0], self._frames[len(self._frames) // 2], self._frames[-1]}
+        n_writers = min(_MOST_WRITERS, n_cores())
+        figures: dict[GaussianFile, dict[str, float]] = {}
+        pending: deque[Future[WrittenFile]] = deque()
+        pool = ThreadPoolExecutor(n_writers, thread_name_prefix="export")
+        try:
+            for file, live in self._contents(report):
+                future = pool.submit(self._write_file, folder, file, self._placement.placed(Splats.of(live)))
+                pending.append(future)
+                if file.part == "static" or file.frame in middle_too:
+                    future.result()
+                    figures[file] = check.psnr_db(folder / file.name, file.frame, live)
+                while len(pending) > n_writers:  # so many scenes are in memory at most
+                    self.files.append(pending.popleft().result())
+            self.files += [future.result() for future in pending]
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+        self.files = [replace(written, psnr_db=figures.get(written.file)) for written in self.files]
+        self._name_the_only_static(folder)
+        report(ExportProgress(len(self._frames), len(self._frames)))
+
+    def _contents(self, report: Report) -> Iterator[tuple[GaussianFile, Gaussians]]:
+        """Each file and what it holds. What stands still comes again only where it is another than before."""
+        suffix, n_frames = self._kind.suffix, self._n_frames
+        moments = {file.frame: file for file in moment_files(self.name, suffix, self._frames, self._part, n_frames)}
+        still: Gaussians | None = None
+        clip_index = -1
+        for n_done, frame in enumerate(self._frames):
+            report(ExportProgress(n_done, len(self._frames)))
+            clip = self._scene.clip_at(frame)
+            if self._part in ("static", "split") and clip.clip_index != clip_index:
+                clip_index = clip.clip_index
+                found = self._scene.gaussians(frame, "static")
+                if still is None or not _are_same(still, found):
+                    still = found
+                    yield static_file(self.name, suffix, frame, n_frames), found
+            if frame in moments:
+                yield moments[frame], self._scene.gaussians(frame, moments[frame].part)
+
+    def _write_file(self, folder: Path, file: GaussianFile, splats: Splats) -> WrittenFile:
+        path = folder / file.name
+        with path.open("wb") as stream:
+            notes = self._kind.write(splats, stream)
+        return WrittenFile(file, len(splats), splats.n_dropped, path.stat().st_size, notes)
+
+    def _name_the_only_static(self, folder: Path) -> None:
+        """Without a number where it holds for all frames."""
+        static = [index for index, written in enumerate(self.files) if written.file.part == "static"]
+        if len(static) == 1:
+            written = self.files[static[0]]
+            only = static_file(self.name, self._kind.suffix, None, self._n_frames)
+            (folder / written.file.name).rename(folder / only.name)
+            self.files[static[0]] = replace(written, file=replace(only, frame=written.file.frame))
+
+    # ---------------------------------------------------------------- what was written
+
+    @property
+    def psnr_db(self) -> float | None:
+        """The lowest figure of all files and cameras."""
+        return min((value for written in self.files for value in (written.psnr_db or {}).values()), default=None)
+
+    def document(self) -> dict[str, Any]:
+        """What is written beside the files."""
+        return {
+            "schema": SCHEMA,
+            "program": "ClipGStream Studio",
+            "project": self._scene.opened.project.folder.resolve().name,
+            "first_frame": min(self._frames),
+            "last_frame": max(self._frames),
+            "n_frames": len(self._frames),
+            "fps": self._scene.opened.capture.fps,
+            "axes": self._placement.text,
+            "up": [round(value, 6) for value in self._placement.up],
+            "scale": self._placement.scale,
+            "psnr_db": self.psnr_db,
+            "min_psnr_db": self._kind.min_psnr_db,
+            "lines": list(self.lines()),
+            "files": [
+                {
+                    "file": written.file.name,
+                    "part": written.file.part,
+                    "frame": written.file.frame,
+                    "n_gaussians": written.n_gaussians,
+                    "n_dropped": written.n_dropped,
+                    "n_bytes": written.n_bytes,
+                    "psnr_db": written.psnr_db,
+                }
+                for written in self.files
+            ],
+        }
+
+    def lines(self) -> tuple[str, ...]:
+        """What the user should know: where the scene lies, how near files come, and what was left out."""
+        lines = [f"Coordinates: {self._placement.text}."]
+        lines += self._measured_lines()
+        for note, n in Counter(note for written in self.files for note in written.notes).items():
+            lines.append(note if n == 1 else f"{note} So in {n} files.")
+        n_dropped = sum(written.n_dropped for written in self.files)
+        if n_dropped:
+            lines.append(f"{n_dropped:,} Gaussians that cannot be drawn were left out.")
+        n_empty = sum(written.n_gaussians == 0 for written in self.files)
+        if n_empty:
+            files = "One file holds" if n_empty == 1 else f"{n_empty} files hold"
+            lines.append(f"{files} no Gaussians: nothing is in this part of the scene.")
+        return tuple(lines)
+
+    def _measured_lines(self) -> list[str]:
+        """The lowest figure of each file that was read back, or of all where they are many; bad ones as warnings."""
+        lowest = {written.file.name: min(written.psnr_db.values()) for written in self.files if written.psnr_db}
+        good = {name: value for name, value in lowest.items() if value >= self._kind.min_psnr_db}
+        bad = {name: value for name, value in lowest.items() if name not in good}
+        said = "to the live picture, of the worst of the cameras it was looked at from"
+        if len(good) > _MOST_LINES:
+            name = min(good, key=good.__getitem__)
+            lines = [f"{len(good)} files were read back; the worst is {name}: {good[name]:.1f} dB {said}."]
+        else:
+            lines = [f"{name}: {value:.1f} dB {said}." for name, value in good.items()]
+        for name, value in list(bad.items())[:_MOST_LINES]:
+            lines.append(
+                f"Warning: {name}: {value:.1f} dB {said}. At least {self._kind.min_psnr_db:.0f} dB were expected of "
+                f"{self._kind.suffix}; look at it before you use it."
+            )
+        return lines
+
+
+def _are_same(a: Gaussians, b: Gaussians) -> bool:
+    return len(a) == len(b) and all(
+        np.array_equal(one.numpy(), other.numpy()) for one, other in zip(a.tensors(), b.tensors(), strict=True)
+    )

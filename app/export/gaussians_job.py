@@ -1,0 +1,137 @@
+"""Frames of a trained project as files of Gaussians: a folder with a file per frame, read back and measured, and a
+document beside them that says what they are."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from app.evaluation.headless import TrainedProject
+from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
+from app.export.gaussian_files import SIDECAR, WrittenPart
+from app.export.gaussian_sequence import GaussianSequence
+from app.export.scene_frames import SceneFrames
+from app.export.staging import check_target, staged_folder
+from app.playback.scene_axes import rig_up
+from engine.clip_files.clip_header import ClipHeader
+from engine.errors import ProjectError
+from engine.export.formats.table import FORMATS, Format
+from engine.export.world import AXES, World, world
+from engine.storage.json_files import json_text
+
+FileAxes = Literal["ply", "rub"]
+_SCALES = (1e-6, 1e6)
+_SHOWN_MOVING = 0.3
+"""Of the Gaussians of moving anchors, those that show at a moment; for the estimate."""
+
+
+@dataclass(frozen=True, slots=True)
+class GaussiansJob:
+    """What is asked for.
+
+    Attributes:
+        out: A new or empty folder.
+        format: One of `engine.export.formats.table.FORMATS`.
+        frames: Of the capture; None for all that are trained.
+        part: What is written; "static" once as long as it stays the same, "moving" per frame, "split" both.
+        up: Axis of the files that the scene's up is turned to, one of `engine.export.world.AXES`; None leaves it.
+        scale: Units of the files per scene unit.
+        axes: "ply" as they are; "rub" turned by 180 degrees about x, for programs of Niantic.
+        scene_up: Which way is up in the capture; None for what its cameras agree on. [3]
+    """
+
+    out: Path
+    format: str = "ply"
+    frames: range | None = None
+    part: WrittenPart = "all"
+    up: str | None = None
+    scale: float = 1.0
+    axes: FileAxes = "ply"
+    scene_up: tuple[float, float, float] | None = None
+
+
+def estimate(opened: TrainedProject, job: GaussiansJob) -> ExportEstimate:
+    """How many files and bytes, of the headers of the clips. Raises ProjectError where a frame is not trained."""
+    scene = SceneFrames(opened)
+    frames = _frames(scene, job)
+    by_clip: dict[int, int] = {}
+    for frame in frames:
+        clip_index = scene.clip_at(frame).clip_index
+        by_clip[clip_index] = by_clip.get(clip_index, 0) + 1
+    n_gaussians = 0.0
+    for clip_index, n_frames in by_clip.items():
+        n_static, n_moving = _counts(opened, opened.header(clip_index))
+        if job.part in ("static", "split"):
+            n_gaussians += n_static
+        if job.part != "static":
+            n_gaussians += n_frames * (n_moving + (n_static if job.part == "all" else 0.0))
+    n_files = (0 if job.part == "static" else len(frames)) + (len(by_clip) if job.part in ("static", "split") else 0)
+    text = f"Coordinates: {_world(opened, job).text}."
+    return ExportEstimate(n_files + 1, round(n_gaussians * _kind(job).bytes_each), (text,))
+
+
+def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResult:
+    """Write the files; memory does not grow with the number of frames.
+
+    Args:
+        report: Told how far it is; what it raises ends the work, and then nothing is left.
+    Raises:
+        ProjectError: A frame is not trained, the folder is taken, or a value does not fit the format.
+        DiskError: The disk refused.
+    """
+    started_s = time.monotonic()
+    scene = SceneFrames(opened)
+    frames = _frames(scene, job)
+    sequence = GaussianSequence(scene, frames, job.part, _kind(job), _world(opened, job))
+    check_target(job.out, is_folder=True)
+    report(ExportProgress(0, len(frames), message="Checking the clips"))
+    scene.check(frames)
+    check_target(job.out, n_bytes=estimate(opened, job).n_bytes, is_folder=True)
+    with staged_folder(job.out, what="The export") as folder:
+        sequence.write(folder, report)
+        document = sequence.document() | {
+            "settings": {"format": job.format, "part": job.part, "axes": job.axes, "up": job.up, "scale": job.scale},
+            "seconds": round(time.monotonic() - started_s, 2),
+        }
+        (folder / f"{sequence.name}{SIDECAR}").write_text(json_text(document, indent=1) + "\n", encoding="utf-8")
+    return written(job.out, psnr_db=sequence.psnr_db, lines=sequence.lines())
+
+
+def _frames(scene: SceneFrames, job: GaussiansJob) -> list[int]:
+    frames = scene.trained_frames if job.frames is None else list(job.frames)
+    for frame in frames:
+        scene.clip_at(frame)
+    if not frames:
+        raise ProjectError("There are no frames to export.", path=scene.opened.project.folder)
+    return frames
+
+
+def _kind(job: GaussiansJob) -> Format:
+    if job.format not in FORMATS:
+        raise ProjectError(f"There is no format '{job.format}'.", hint=f"Formats are {', '.join(FORMATS)}.")
+    return FORMATS[job.format]
+
+
+def _world(opened: TrainedProject, job: GaussiansJob) -> World:
+    """Where the scene lies in the files. Raises ProjectError where that cannot be."""
+    if job.up is not None and job.up not in AXES:
+        raise ProjectError(f"There is no axis '{job.up}'.", hint=f"Axes are {', '.join(AXES)}.")
+    if not _SCALES[0] <= job.scale <= _SCALES[1]:
+        raise ProjectError(f"The scale is {job.scale:g}.", hint=f"Give a number from {_SCALES[0]} to {_SCALES[1]:.0f}.")
+    scene_up = rig_up(opened.capture.rig) if job.scene_up is None else np.array(job.scene_up)
+    return world(scene_up, up=job.up, scale=job.scale, is_rub=job.axes == "rub")
+
+
+def _counts(opened: TrainedProject, header: ClipHeader) -> tuple[float, float]:
+    """About how many Gaussians stand still and move at a moment of a clip."""
+    n_anchors = [header.n_anchors]
+    if header.role == "source" and opened.reference is not None:
+        n_anchors.append(opened.reference.header.n_anchors)
+    n_each = header.decoder.gaussians_per_anchor
+    n_static = sum(counts.get("static", 0) for counts in n_anchors)
+    n_all = sum(sum(counts.values()) for counts in n_anchors)
+    return float(n_each * n_static), n_each * (n_all - n_static) * _SHOWN_MOVING

@@ -1,0 +1,66 @@
+"""ReadBack: an exported file of Gaussians is read again and looked at beside the live scene, from capture cameras."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+import torch
+
+from app.export.scene_frames import SceneFrames
+from engine.camera.rig import CameraRig
+from engine.export.splats import Splats
+from engine.export.world import World
+from engine.images.psnr import psnr
+from engine.model.clip_view import render_gaussians
+from engine.raster.gaussians import Gaussians
+from engine.storage.files import open_regular
+
+N_CAMERAS = 3
+LONGEST_SIDE_PX = 960
+"""Pictures are compared at this size at most, so that measuring takes less time than writing."""
+
+
+class ReadBack:
+    """Measures files of one export.
+
+    Args:
+        scene: Where its frames came from.
+        read: Of the format.
+        world: How the scene was placed in the file; undone here.
+    """
+
+    def __init__(self, scene: SceneFrames, read: Callable[[BinaryIO], Splats], world: World) -> None:
+        self._scene, self._read, self._world = scene, read, world
+        rig = scene.opened.capture.rig
+        self._rig = _reduced(rig.subset(np.unique(np.linspace(0, len(rig) - 1, N_CAMERAS).round().astype(int))))
+
+    def psnr_db(self, path: Path, frame: int, live: Gaussians) -> dict[str, float]:
+        """PSNR of the file's picture against the live one, by the name of the camera. Nothing but Gaussians: black
+        behind them, and no camera's own colours.
+
+        Raises:
+            ProjectError: The file is not what was written.
+            OSError: It cannot be read.
+        """
+        with open_regular(path) as file:
+            found = self._world.returned(self._read(file)).gaussians()
+        trained = self._scene.trained(frame)
+        figures = {}
+        for camera, name in enumerate(self._rig.names):
+            view = trained.view(self._rig, camera)
+            with torch.no_grad():
+                image, truth = (
+                    render_gaussians(shown, view, backend=trained.model.backend).image[0].numpy()
+                    for shown in (found, live)
+                )
+            figures[name] = round(psnr(image, np.clip(truth, 0.0, 1.0)), 2)
+        return figures
+
+
+def _reduced(rig: CameraRig) -> CameraRig:
+    longest = rig.image_sizes.max(1, keepdims=True)
+    sizes = np.round(rig.image_sizes * np.minimum(1.0, LONGEST_SIDE_PX / longest)).astype(np.int64)
+    return rig.resized(np.maximum(sizes, 1))
