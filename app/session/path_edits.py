@@ -12,7 +12,7 @@ from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.session import path_commands as c
 from app.session.edit_status import PathsStatus
-from engine.camera.camera_path import MIN_SPACING_FRAMES, CameraKey, CameraPath
+from engine.camera.camera_path import MAX_DISTANCE, MAX_FOV_RAD, MIN_FOV_RAD, MIN_SPACING_FRAMES, CameraKey, CameraPath
 from engine.camera.path_presets import fly_through, turntable
 from engine.errors import ProjectError
 
@@ -84,15 +84,15 @@ def edited(status: PathsStatus, command: c.PathEdit, view: OrbitView, timeline: 
             return _with_changed_key(status, index, moved, "move camera key in time", gesture)
         case c.PlaceCameraKey(index=index, center=center, gesture=gesture):
             _, key = _checked_key(status, index)
-            if not np.isfinite(center).all():
-                raise ProjectError("The place of a camera key is not a number.")
+            if not (np.abs(center) <= MAX_DISTANCE / 2).all():  # NaN is not
+                raise ProjectError("A camera key cannot stand there.")
             return _with_changed_key(status, index, key.at_center(np.array(center)), "move camera key", gesture)
         case c.AimCameraKey(index=index):
             _, key = _checked_key(status, index)
             return _with_changed_key(status, index, view_key(view, key.frame), "set camera key to the view")
         case c.SetCameraKeyFov(index=index, fov_y_rad=fov_y_rad, gesture=gesture):
             _, key = _checked_key(status, index)
-            if not 0.0 < fov_y_rad < math.pi:
+            if not MIN_FOV_RAD <= fov_y_rad <= MAX_FOV_RAD:
                 raise ProjectError(f"A field of view of {math.degrees(fov_y_rad):g} degrees cannot be.")
             return _with_changed_key(status, index, replace(key, fov_y_rad=fov_y_rad), "lens of camera key", gesture)
 

@@ -34,6 +34,9 @@ MIN_SPACING_FRAMES = 1e-3
 """Keys of one path are at least this far apart in time."""
 MAX_FRAME = 1e9
 """Times of keys lie between plus and minus this."""
+MAX_DISTANCE = 1e12
+"""No camera stands farther from the origin, scene units."""
+MIN_FOV_RAD, MAX_FOV_RAD = 1e-3, 3.14
 _RIGID_TOLERANCE = 1e-5
 _MAX_SLOPE = 2.0
 """A tangent is at most so many times as fast as the slower of the two pieces at its key; up to 3 nothing turns back."""
@@ -46,7 +49,7 @@ class CameraKey:
     Attributes:
         frame: When, in frames of the capture; may lie between two frames.
         world_to_camera: Rigid map, OpenCV axes, scene units. [4, 4] float64
-        fov_y_rad: Vertical field of view, in (0, pi).
+        fov_y_rad: Vertical field of view, from MIN_FOV_RAD to MAX_FOV_RAD.
 
     Raises:
         ValueError: A value makes no sense; says which.
@@ -60,9 +63,11 @@ class CameraKey:
         matrix = np.array(self.world_to_camera, dtype=np.float64)
         if not (math.isfinite(self.frame) and abs(self.frame) <= MAX_FRAME):
             raise ValueError(f"the frame of a key is {self.frame!r}")
-        if not 0.0 < self.fov_y_rad < math.pi:
-            raise ValueError(f"the field of view of a key is {self.fov_y_rad!r} rad, not between 0 and pi")
-        if matrix.shape != (4, 4) or not np.isfinite(matrix).all() or not _is_rigid(matrix):
+        if not MIN_FOV_RAD <= self.fov_y_rad <= MAX_FOV_RAD:
+            raise ValueError(
+                f"the field of view of a key is {self.fov_y_rad!r} rad, not from {MIN_FOV_RAD} to {MAX_FOV_RAD}"
+            )
+        if matrix.shape != (4, 4) or not _is_rigid(matrix):
             raise ValueError("the pose of a key is not a rotation and a translation")
         matrix.flags.writeable = False
         object.__setattr__(self, "frame", float(self.frame))
@@ -279,6 +284,8 @@ def _inner_tangents(slopes: np.ndarray, lengths: np.ndarray) -> np.ndarray:
 
 def _is_rigid(matrix: np.ndarray) -> bool:
     rotation = matrix[:3, :3]
+    if not (np.abs(rotation) < 2.0).all() or not (np.abs(matrix[:3, 3]) <= MAX_DISTANCE).all():  # NaN is neither
+        return False
     return (
         bool(np.abs(rotation @ rotation.T - np.eye(3)).max() < _RIGID_TOLERANCE)
         and float(np.linalg.det(rotation)) > 0

@@ -37,7 +37,7 @@ MOST_PATH_ROWS, LEAST_KEY_ROWS = 5, 4
 FOV_DEG = (2.0, 150.0)
 """What the slider of the lens offers."""
 LABEL_WIDTH, BUTTON_WIDTH = 54.0, 36.0
-ROWS_BELOW = 5.5
+ROWS_BELOW = 4.5
 """What stands below the list of keys, in rows of buttons."""
 
 
@@ -143,7 +143,8 @@ def _draw_path(status: PathsStatus, path: CameraPath, dispatch: Dispatch, ui: Ui
     width = imgui.get_content_region_avail().x
     imgui.set_next_item_width(width - BUTTON_WIDTH - imgui.get_style().item_spacing.x)
     flags = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
-    shown = path.name if ui.paths.renamed is None else ui.paths.renamed
+    present = one_line(path.name)  # the box has one
+    shown = present if ui.paths.renamed is None else ui.paths.renamed
     is_entered, typed = imgui.input_text("##name", shown, flags)
     ui.mark("paths.name")
     imgui.set_item_tooltip("The name of the path")
@@ -153,7 +154,7 @@ def _draw_path(status: PathsStatus, path: CameraPath, dispatch: Dispatch, ui: Ui
         ui.paths.renamed = None
         name = typed.strip()[:MAX_NAME_CHARACTERS]
         is_left = imgui.is_key_pressed(imgui.Key.escape, False)
-        if name and name != path.name and not is_left:
+        if name and name != present and not is_left:
             dispatch(RenameCameraPath(name))
     imgui.same_line()
     if imgui.button(f"{Icon.TRASH}##path", ImVec2(BUTTON_WIDTH, 0)):
@@ -161,14 +162,14 @@ def _draw_path(status: PathsStatus, path: CameraPath, dispatch: Dispatch, ui: Ui
     ui.mark("paths.delete")
     imgui.end_disabled()
     imgui.set_item_tooltip("Delete this path; Undo brings it back")
-    half = (width - imgui.get_style().item_spacing.x) / 2
-    if segment(f"{Icon.EYE}  Look along", status.is_along, half):
+    room = width - imgui.get_style().item_spacing.x
+    if segment("Look along", status.is_along, 0.56 * room):
         dispatch(LookAlongPath(not status.is_along))
     ui.mark("paths.along")
     imgui.set_item_tooltip("The view goes along the path with the playhead, until you move it (P)")
     imgui.same_line()
     imgui.begin_disabled(not status.can_edit)
-    if segment(f"{Icon.LOOP}  Loop", path.is_closed, half):
+    if segment(f"{Icon.LOOP}  Loop", path.is_closed, 0.44 * room):
         dispatch(CloseCameraPath(not path.is_closed))
     ui.mark("paths.loop")
     imgui.end_disabled()
@@ -246,9 +247,10 @@ def _draw_key(status: PathsStatus, dispatch: Dispatch, ui: UiState) -> None:
     ui.mark("paths.remove")
     imgui.set_item_tooltip("Delete")
     imgui.end_disabled()
-    if _flowing_button("Go there"):
+    if _flowing_button("Go"):
         choose_key(dispatch, ui, index, is_going=True)
     ui.mark("paths.go")
+    imgui.set_item_tooltip("Look from there, at its frame")
 
 
 def _follow_gesture(ui: UiState) -> None:

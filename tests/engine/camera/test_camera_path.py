@@ -118,7 +118,9 @@ def test_what_is_not_a_key_or_not_a_path_is_refused():
     skewed = np.eye(4)
     skewed[0, 1] = 0.1
     mirrored = np.diag([1.0, 1.0, -1.0, 1.0])
-    for matrix in (skewed, mirrored, np.eye(3), np.full((4, 4), np.nan), np.zeros((4, 4))):
+    far = np.eye(4)
+    far[0, 3] = 1e300
+    for matrix in (skewed, mirrored, far, 1e200 * skewed, np.eye(3), np.full((4, 4), np.nan), np.zeros((4, 4))):
         with pytest.raises(ValueError, match="pose"):
             CameraKey(0.0, matrix, 0.8)
     for frame, fov in ((math.nan, 0.8), (math.inf, 0.8), (0.0, 0.0), (0.0, 4.0), (0.0, math.nan)):
