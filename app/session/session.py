@@ -491,6 +491,10 @@ class Session:
         has_changed |= self.residuals.poll(is_busy=is_training or is_attended)
         self._tell_failures()
         self.playback.work_ahead(self.timeline, is_busy=self.live_training.is_busy)
+        rig = self.playback.rig(self.timeline)
+        if rig is not None and rig is not self.view.rig:  # a view that looks through a camera follows it
+            self.views.correct(rig)
+            has_changed = True
         seen = self._news_key()
         has_changed |= seen != self._seen
         self._seen = seen
