@@ -32,7 +32,7 @@ CAMERA, PATH, TURNTABLE = "camera:", "path:", "turntable"
 def _options(context: ExportContext, choices: ExportChoices) -> tuple[Option, ...]:
     paths = [(PATH + name, f"Camera path: {name}") for name in context.paths]
     cameras = [(CAMERA + name, f"Camera {name}") for name in context.cameras]
-    view = Option("from", "Seen from", (*paths, (TURNTABLE, "Turntable around the scene"), *cameras))
+    view = Option("from", "Seen from", (*paths, (TURNTABLE, "Turntable around the scene"), *cameras), has_names=True)
     format_ = Option("format", "Format", _FORMATS)
     chosen_format, is_camera = format_.chosen(choices), view.chosen(choices).startswith(CAMERA)
     shows = Option("shows", "Shows", _SHOWS if is_camera else _SHOWS[:-1], _SHOWS_TIPS)
@@ -54,9 +54,8 @@ def _options(context: ExportContext, choices: ExportChoices) -> tuple[Option, ..
         names = tuple((name, name.capitalize()) for name in _BACKGROUNDS)
         options.append(Option("background", "Background", (*names, *clear)))
     if chosen_format in ("mp4", "webm") and context.has_videos:
-        options.append(
-            Option("sound", "Sound", (("", "None"), *((name, f"Camera {name}") for name in context.cameras)))
-        )
+        recorded = tuple((name, f"Camera {name}") for name in context.cameras)
+        options.append(Option("sound", "Sound", (("", "None"), *recorded), has_names=True))
     return tuple(options)
 
 
