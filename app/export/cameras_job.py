@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
+
+import numpy as np
 
 from app.evaluation.headless import TrainedProject
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
 from app.export.staging import check_target
+from engine.camera.corrections import corrected_camera
+from engine.capture.format_result import CameraEntry, Layout
 from engine.capture.frames import ImageFrames
 from engine.capture.writers.conversion import Target, convert
 
@@ -47,6 +51,31 @@ def run(opened: TrainedProject, job: CamerasJob, report: Report) -> ExportResult
     n_cameras = len(opened.capture.layout.cameras)
     check_target(job.out, n_bytes=estimate(opened, job).n_bytes, is_folder=True)
     report(ExportProgress(0, n_cameras, "cameras"))
-    done = convert(opened.capture.layout, job.out, _TARGETS[job.format])
+    layout, lines = _as_trained(opened)
+    done = convert(layout, job.out, _TARGETS[job.format])
     report(ExportProgress(n_cameras, n_cameras, "cameras"))
-    return written(job.out, lines=(WORLD, *done.lines))
+    return written(job.out, lines=(WORLD, *lines, *done.lines))
+
+
+def _as_trained(opened: TrainedProject) -> tuple[Layout, tuple[str, ...]]:
+    """The capture with its cameras as the reference clip refined them, and a sentence where it did."""
+    layout, reference = opened.capture.layout, opened.reference
+    corrections = None if reference is None else reference.corrections
+    if reference is None or corrections is None:
+        return layout, ()
+    found = dict(zip(reference.header.camera_names, corrections.astype(np.float64), strict=True))
+    cameras = tuple(
+        _corrected(entry, found[entry.name]) if entry.name in found and found[entry.name].any() else entry
+        for entry in layout.cameras
+    )
+    n_corrected = sum(new is not old for new, old in zip(cameras, layout.cameras, strict=True))
+    if not n_corrected:
+        return layout, ()
+    which = "1 camera was" if n_corrected == 1 else f"{n_corrected} cameras were"
+    said = f"{which} refined in training and written so; all others are as in the capture."
+    return replace(layout, cameras=cameras), (said,)
+
+
+def _corrected(entry: CameraEntry, values: np.ndarray) -> CameraEntry:
+    world_to_camera, K = corrected_camera(entry.world_to_camera, entry.K, values)
+    return replace(entry, world_to_camera=world_to_camera, K=K)

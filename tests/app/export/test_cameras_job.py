@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,10 @@ import pytest
 from app.evaluation.headless import TrainedProject
 from app.export.cameras_job import CAMERAS_FORMATS, WORLD, CamerasJob, estimate, run
 from app.export.export_progress import ExportCancelled, ExportProgress
+from engine.camera.corrections import N_VALUES, corrected
 from engine.capture.colmap.model_cameras import read_rig
+from engine.clip_files.array_names import CORRECTIONS
+from engine.clip_files.clip_state import ClipState
 from engine.errors import ProjectError
 
 
@@ -40,6 +44,23 @@ def test_transforms_has_a_row_per_picture(opened: TrainedProject, tmp_path: Path
     np.testing.assert_allclose(camera_to_world, expected, atol=1e-12)
     pictures = [(tmp_path / "t" / row["file_path"]).resolve() for row in found["frames"]]
     assert all(path.is_file() for path in pictures)
+
+
+def test_cameras_that_training_has_moved_are_where_it_saw_them(opened: TrainedProject, tmp_path: Path):
+    assert opened.reference is not None
+    corrections = np.zeros((3, N_VALUES), np.float32)
+    corrections[1] = [0.01, -0.02, 0.03, 0.1, 0.2, -0.1, 0.05]  # of camera 2; 0 is held out
+    arrays = {**opened.reference.arrays, CORRECTIONS: corrections}
+    refined = replace(opened, reference=ClipState(arrays, opened.reference.header))
+    result = run(refined, CamerasJob(tmp_path / "c"), nothing)
+    assert "1 camera was refined in training and written so; all others are as in the capture." in result.lines
+    found = read_rig(tmp_path / "c" / "sparse" / "0").cameras
+    expected = corrected(opened.capture.layout.rig(), ("1", "2", "3"), corrections)
+    for row, camera in enumerate(found):
+        np.testing.assert_allclose(camera.world_to_camera, expected.world_to_camera[row], atol=1e-9)
+        np.testing.assert_allclose(camera.K, expected.Ks[row], atol=1e-9)
+    moved = opened.capture.layout.cameras[2].world_to_camera
+    assert np.abs(found[2].world_to_camera - moved).max() > 0.05
 
 
 @pytest.mark.parametrize("format_", CAMERAS_FORMATS)
