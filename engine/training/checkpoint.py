@@ -6,8 +6,8 @@ backgrounds as they are by now, and in its header where the training stands.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -39,7 +39,7 @@ class Checkpoint:
     gains: np.ndarray
     backgrounds: Backgrounds
     place: Place
-    reaches: dict[str, np.ndarray]
+    reaches: Mapping[str, np.ndarray] = field(default_factory=dict)
     cameras: np.ndarray | None = None
 
 
