@@ -19,6 +19,7 @@ OVERLAY_NAMES = (
     "show_regions",
     "show_coverage",
     "show_trails",
+    "show_paths",
 )
 COMPARE_MODES = ("off", "wipe", "side", "blink")
 CAPTURED = "captured"
@@ -48,6 +49,7 @@ class Overlays:
         show_cloud: The point cloud in place of the picture of a trained clip.
         show_coverage: The space that inherited anchors cover, and how far residual anchors lie from it.
         show_trails: The ways that Gaussians took over the last frames.
+        show_paths: The chosen camera path and its keys.
         compare: "off", "wipe", "side" or "blink": another picture over, beside or in turn with the rendered one.
         compare_with: The other picture: CAPTURED, the name of a mode (app.playback.view_modes), or that of an earlier
             version of the clip, see `version_name`.
@@ -69,6 +71,7 @@ class Overlays:
     show_regions: bool = True
     show_coverage: bool = False
     show_trails: bool = False
+    show_paths: bool = True
     compare: str = "off"
     compare_with: str = CAPTURED
     blink_hz: float = 1.0
@@ -353,16 +356,12 @@ class RegionsStatus:
         regions: As they are kept in the project; later ones overrule earlier ones.
         can_mark: Whether a region can be marked or removed now.
         why_not: The reason if it cannot, and what to do.
-        can_undo: Whether there is a mark or a removal to take back.
-        can_redo: Whether there is one that was taken back and can be done again.
         effect: In which clips they take effect.
     """
 
     regions: tuple[GateRegion, ...] = ()
     can_mark: bool = False
     why_not: str = ""
-    can_undo: bool = False
-    can_redo: bool = False
     effect: str = ""
 
 

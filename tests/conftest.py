@@ -10,11 +10,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from tests.built_once import BuiltOnce
 
 SEED = 20_240
 TORCH_THREADS = 2  # what the smallest machine has; more would make sums, and so results, depend on the machine
+
+
+settings.register_profile("studio", deadline=None)  # a busy machine is not a fault
+settings.load_profile("studio")
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -54,9 +54,9 @@ COMMANDS = {
         "The result was not written.",
     ),
     "render": Command(
-        "render a camera of the capture, as video or PNG files",
+        "render the scene as a video or a sequence of pictures",
         "app.cli.render_command",
-        "A video was not written; single pictures that were finished are there.",
+        "Nothing was written.",
     ),
     "export": Command(
         "write trained frames as files of Gaussians for other programs",

@@ -1,16 +1,13 @@
-"""The jobs without a window: train clips, open what was trained, render a camera. Prints nothing."""
+"""The jobs without a window: train clips, open what was trained. Prints nothing."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from app.background.kernels import use_threads
 from app.project.opening import open_capture_of
 from app.project.project import Project
 from app.status import TrainingStatus
@@ -24,7 +21,6 @@ from engine.clip_files.clip_state import ClipState, DamagedClip, look_at_clip, r
 from engine.errors import ProjectError
 
 if TYPE_CHECKING:
-    from engine.metrics.clips.features_apart import Features
     from engine.metrics.clips.trained_clip import TrainedClip
 
 TRAIN_SCHEMA = 1
@@ -237,55 +233,6 @@ def open_trained(project: Project, capture: Capture | None = None) -> TrainedPro
         )
     reference = read_clip_state(project.reference_path) if has_reference else None
     return TrainedProject(project, capture, clips, reference)
-
-
-def _runs(ranges: Sequence[range]) -> list[tuple[int, int]]:
-    """Ranges of frames in their order, those that follow each other joined. First and beyond-last frames."""
-    runs: list[tuple[int, int]] = []
-    for frames in ranges:
-        if runs and runs[-1][1] == frames.start:
-            runs[-1] = (runs[-1][0], frames.stop)
-        else:
-            runs.append((frames.start, frames.stop))
-    return runs
-
-
-def render_frames(
-    opened: TrainedProject, *, camera_index: int, frame_indices: Sequence[int], features: Features = "both"
-) -> Iterator[tuple[int, np.ndarray]]:
-    """Frames as a capture camera would see them, in that camera's colours. Yields (frame_index, [H, W, 3] uint8).
-
-    Args:
-        features: Which features of the anchors are used, see engine.metrics.clips.features_apart.
-    Raises:
-        ProjectError: A frame lies in a clip that is not trained or damaged; said before the first picture.
-    """
-    use_threads(None)
-    from engine.metrics.clips.features_apart import with_features
-    from engine.metrics.pictures.colors import to_levels
-
-    rig = opened.capture.rig
-    clip_of = {frame: clip for clip in opened.clips for frame in clip.frame_indices()}
-    needed = list(dict.fromkeys(clip_of[frame].clip_index for frame in frame_indices))
-    missing = [clip_index for clip_index in needed if clip_index not in opened.trained]
-    if missing:
-        first = next(frame for frame in frame_indices if clip_of[frame].clip_index in missing)
-        ranges = [f"{start}:{stop}" for start, stop in _runs([opened.clips[i].frame_indices() for i in opened.trained])]
-        raise ProjectError(
-            f"Frame {first} lies in clip {clip_of[first].clip_index}, which is not trained; of the {len(needed)} clips "
-            f"asked for {len(missing)} {'is' if len(missing) == 1 else 'are'} not.",
-            hint=f"Train with `clipgstream train` first, or render what is trained: --frames {' or '.join(ranges)}.",
-            path=opened.project.folder,
-        )
-    for clip_index in needed:  # a damaged one is found before anything is written; only one at a time is kept
-        opened.load(clip_index)
-    loaded: TrainedClip | None = None
-    for frame_index in frame_indices:
-        clip = clip_of[frame_index]
-        if loaded is None or loaded.clip != clip:
-            loaded = opened.load(clip.clip_index)
-            loaded = replace(loaded, model=with_features(loaded.model, features))
-        yield frame_index, to_levels(loaded.picture(rig, camera_index, clip.clip_time(frame_index)))
 
 
 def train_document(project: Project, capture: Capture, outcomes: Sequence[ClipOutcome]) -> dict[str, Any]:

@@ -23,6 +23,8 @@ from engine.raster.gaussians import Gaussians
 
 SCHEMA = 1
 _MOST_WRITERS = 4
+_MOST_LINES = 6
+"""Files that are named one by one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,10 +164,7 @@ class GaussianSequence:
     def lines(self) -> tuple[str, ...]:
         """What the user should know: where the scene lies, how near files come, and what was left out."""
         lines = [f"Coordinates: {self._placement.text}."]
-        for written in self.files:
-            if written.psnr_db is not None:
-                worst = min(written.psnr_db, key=lambda name: (written.psnr_db or {})[name])
-                lines.append(self._measured_line(written.file.name, written.psnr_db[worst], worst))
+        lines += self._measured_lines()
         for note, n in Counter(note for written in self.files for note in written.notes).items():
             lines.append(note if n == 1 else f"{note} So in {n} files.")
         n_dropped = sum(written.n_dropped for written in self.files)
@@ -173,17 +172,27 @@ class GaussianSequence:
             lines.append(f"{n_dropped:,} Gaussians that cannot be drawn were left out.")
         n_empty = sum(written.n_gaussians == 0 for written in self.files)
         if n_empty:
-            lines.append(f"{n_empty} files hold no Gaussians: nothing is in this part of the scene.")
+            files = "One file holds" if n_empty == 1 else f"{n_empty} files hold"
+            lines.append(f"{files} no Gaussians: nothing is in this part of the scene.")
         return tuple(lines)
 
-    def _measured_line(self, name: str, psnr_db: float, camera: str) -> str:
-        said = f"{name}: {psnr_db:.1f} dB to the live picture, of the worst of three cameras"
-        if psnr_db >= self._kind.min_psnr_db:
-            return f"{said}."
-        return (
-            f"Warning: {said} ({camera}). At least {self._kind.min_psnr_db:.0f} dB were expected of "
-            f"{self._kind.suffix}; look at it before you use it, or take .ply."
-        )
+    def _measured_lines(self) -> list[str]:
+        """The lowest figure of each file that was read back, or of all where they are many; bad ones as warnings."""
+        lowest = {written.file.name: min(written.psnr_db.values()) for written in self.files if written.psnr_db}
+        good = {name: value for name, value in lowest.items() if value >= self._kind.min_psnr_db}
+        bad = {name: value for name, value in lowest.items() if name not in good}
+        said = "to the live picture, of the worst of the cameras it was looked at from"
+        if len(good) > _MOST_LINES:
+            name = min(good, key=good.__getitem__)
+            lines = [f"{len(good)} files were read back; the worst is {name}: {good[name]:.1f} dB {said}."]
+        else:
+            lines = [f"{name}: {value:.1f} dB {said}." for name, value in good.items()]
+        for name, value in list(bad.items())[:_MOST_LINES]:
+            lines.append(
+                f"Warning: {name}: {value:.1f} dB {said}. At least {self._kind.min_psnr_db:.0f} dB were expected of "
+                f"{self._kind.suffix}; look at it before you use it."
+            )
+        return lines
 
 
 def _are_same(a: Gaussians, b: Gaussians) -> bool:

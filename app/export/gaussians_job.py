@@ -11,12 +11,11 @@ from typing import Literal
 import numpy as np
 
 from app.evaluation.headless import TrainedProject
-from app.export.export_progress import ExportEstimate, ExportResult, Report, written
+from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
 from app.export.gaussian_files import SIDECAR, WrittenPart
 from app.export.gaussian_sequence import GaussianSequence
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_folder
-from app.playback.scene_axes import rig_up
 from engine.clip_files.clip_header import ClipHeader
 from engine.errors import ProjectError
 from engine.export.formats.table import FORMATS, Format
@@ -88,6 +87,7 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
     frames = _frames(scene, job)
     sequence = GaussianSequence(scene, frames, job.part, _kind(job), _world(opened, job))
     check_target(job.out, is_folder=True)
+    report(ExportProgress(0, len(frames), message="Checking the clips"))
     scene.check(frames)
     check_target(job.out, n_bytes=estimate(opened, job).n_bytes, is_folder=True)
     with staged_folder(job.out, what="The export") as folder:
@@ -121,7 +121,7 @@ def _world(opened: TrainedProject, job: GaussiansJob) -> World:
         raise ProjectError(f"There is no axis '{job.up}'.", hint=f"Axes are {', '.join(AXES)}.")
     if not _SCALES[0] <= job.scale <= _SCALES[1]:
         raise ProjectError(f"The scale is {job.scale:g}.", hint=f"Give a number from {_SCALES[0]} to {_SCALES[1]:.0f}.")
-    scene_up = rig_up(opened.capture.rig) if job.scene_up is None else np.array(job.scene_up)
+    scene_up = opened.capture.rig.up_direction() if job.scene_up is None else np.array(job.scene_up)
     return world(scene_up, up=job.up, scale=job.scale, is_rub=job.axes == "rub")
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from app.background.kernels import use_threads
@@ -13,6 +14,7 @@ from engine.capture.clip import Clip
 from engine.errors import ProjectError
 
 if TYPE_CHECKING:
+    from engine.metrics.clips.features_apart import Features
     from engine.metrics.clips.trained_clip import TrainedClip
     from engine.model.clip_model import ClipModel
     from engine.raster.gaussians import Gaussians
@@ -22,17 +24,36 @@ PARTS: tuple[Part, ...] = ("all", "static", "moving")
 _CONTENTS = {"all": "all", "static": "static", "moving": "dynamic"}
 
 
+@dataclass(frozen=True, slots=True)
+class Share:
+    """One of the pictures that a moment between two frames is mixed of; a frame has one only.
+
+    Attributes:
+        weight: All weights of a moment add up to 1.
+        trained: The clip, for its colours and near plane.
+        clip_time: In it.
+        gaussians: What is drawn.
+    """
+
+    weight: float
+    trained: TrainedClip
+    clip_time: float
+    gaussians: Gaussians
+
+
 class SceneFrames:
     """Gaussians of a project's frames, one loaded clip at a time: memory does not grow with the number of frames.
 
     Args:
         opened: A project opened for reading.
         n_threads: Threads to decode with; None for all.
+        features: Which features of the anchors are used, see engine.metrics.clips.features_apart.
     """
 
-    def __init__(self, opened: TrainedProject, *, n_threads: int | None = None) -> None:
+    def __init__(self, opened: TrainedProject, *, n_threads: int | None = None, features: Features = "both") -> None:
         self.opened = opened
         self._n_threads = n_threads
+        self._features: Features = features
         self._clip_of = [clip for clip in opened.clips for _ in clip.frame_indices()]
         self._loaded: TrainedClip | None = None
         self._parts: dict[Part, ClipModel] = {}
@@ -93,8 +114,11 @@ class SceneFrames:
         """
         clip = self.clip_at(frame)
         if self._loaded is None or self._loaded.clip != clip:
+            from engine.metrics.clips.features_apart import with_features
+
             use_threads(self._n_threads)
-            self._loaded, self._parts = self.opened.load(clip.clip_index), {}
+            loaded = self.opened.load(clip.clip_index)
+            self._loaded, self._parts = replace(loaded, model=with_features(loaded.model, self._features)), {}
         return self._loaded
 
     def model(self, frame: float, part: Part = "all") -> ClipModel:
@@ -117,6 +141,44 @@ class SceneFrames:
 
         with torch.no_grad():
             return self.model(frame, part).decode(self.clip_time(frame)).detach()
+
+    def shares(self, frame: float) -> Iterator[Share]:
+        """What is shown of a moment, to be drawn one by one and mixed by weight.
+
+        Anchors of what moves stand still and exist at some frames only, and a clip ends with its last frame. Between
+        two frames the field is evaluated at the moment itself, but what exists at the frame before fades out while what
+        exists at the frame after fades in; all at once it would be seen twice. Between two clips the last frame of the
+        one fades into the first frame of the other, where both are trained.
+
+        Raises:
+            ProjectError: What `trained` raises.
+        """
+        before = math.floor(frame)
+        fraction = frame - before
+        if fraction > 0 and self.clip_at(before) != self.clip_at(before + 1):
+            weights = {before: 1.0 - fraction, before + 1: fraction}
+            finished = self.opened.trained
+            known = {at: weight for at, weight in weights.items() if self.clip_at(at).clip_index in finished}
+            is_loaded = {at: self._loaded is not None and self._loaded.clip == self.clip_at(at) for at in known}
+            for at in sorted(known, key=lambda at: not is_loaded[at]):  # each clip is loaded once
+                yield Share(known[at] / sum(known.values()), self.trained(at), self.clip_time(at), self.gaussians(at))
+            return
+        trained, clip_time = self.trained(frame), self.clip_time(frame)
+        knots = trained.model.knots(clip_time)
+        if len(knots) == 1:
+            yield Share(1.0, trained, clip_time, self.gaussians(frame))
+            return
+        for knot, weight in knots:
+            yield Share(weight, trained, clip_time, self._existing_at(trained, clip_time, knot))
+
+    def _existing_at(self, trained: TrainedClip, clip_time: float, knot: int) -> Gaussians:
+        """What exists at one of the clip's frames, at another time of the clip."""
+        import torch
+
+        model = trained.model
+        rows = {role: model.alive(role, knot / trained.clip.clip_length) for role in model.roles()}
+        with torch.no_grad():
+            return model.decode(clip_time, rows).detach()
 
 
 def _runs(frames: Sequence[int]) -> list[tuple[int, int]]:

@@ -15,8 +15,8 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from app.playback.rig_views import camera_fov, camera_pose, fitted_K, home_camera
-from app.playback.scene_axes import UP_AXES, axis_rotation, horizontal_axes, rig_radius, rig_up
+from app.playback.rig_views import camera_fov, camera_pose, fitted_K, free_pose, home_camera
+from app.playback.scene_axes import UP_AXES, axis_rotation, horizontal_axes, rig_radius
 from app.playback.view_angles import angles_of, rotation_of
 from app.playback.view_motion import Pose, ViewMotion, between, blended
 from engine.camera.rig import CameraRig
@@ -64,7 +64,7 @@ class OrbitView:
         self.fov_y = math.radians(50.0)
         self.is_orthographic = False
         self.up_axis = "rig"
-        self.up = np.array([0.0, -1.0, 0.0]) if rig is None else rig_up(rig)
+        self.up = np.array([0.0, -1.0, 0.0]) if rig is None else rig.up_direction()
         self.look_through: int | None = None
         self.is_eased = False
         self.radius = 1.0 if rig is None or len(rig) == 0 else max(rig_radius(rig), 1e-6)
@@ -90,10 +90,17 @@ class OrbitView:
         """Where the free view seems to stand, scene units. [3]"""
         return self.pivot - self.distance * self.forward
 
+    def pose(self) -> Pose:
+        """Where the view is going, which may not be shown yet."""
+        if self.look_through is not None and self.rig is not None:
+            return camera_pose(self.rig, self.look_through, otherwise=self.distance)
+        eye_distance = max(FLAT_SHARE * self.radius, self.distance) if self.is_orthographic else self.distance
+        return Pose(self.rotation, self.pivot, self.distance, eye_distance, self.fov_y)
+
     @property
     def shown_pose(self) -> Pose:
         """The pose that is shown, on the way to where the view is going."""
-        pose = self._pose()
+        pose = self.pose()
         return pose if self._motion is None else blended(self._motion.start, pose, self._motion.share)
 
     @property
@@ -261,6 +268,21 @@ class OrbitView:
             self._leave()
             self.look_through = camera_index
 
+    def stand(self, world_to_camera: np.ndarray, fov_y: float, *, is_jump: bool = False) -> None:
+        """Stand freely where a camera stands, turned as it is; the pivot lies ahead of it as far away as the scene.
+
+        Args:
+            world_to_camera: Rigid map. [4, 4]
+            fov_y: Vertical field of view, radians.
+            is_jump: Show the way there as other jumps; else be there at once.
+        """
+        pose = free_pose(self.rig, world_to_camera, fov_y, otherwise=self.distance)
+        with self.jump():
+            self.look_through, self.is_orthographic = None, False
+            self._stay(pose)
+        if not is_jump:
+            self._motion = None
+
     def look_along(self, name: str) -> None:
         """Look at the pivot along an axis, see app.playback.scene_axes.AXIS_VIEWS.
 
@@ -321,7 +343,7 @@ class OrbitView:
             if axis is not None:
                 self.up = np.array(axis)
             else:
-                self.up = np.array([0.0, -1.0, 0.0]) if self.rig is None else rig_up(self.rig)
+                self.up = np.array([0.0, -1.0, 0.0]) if self.rig is None else self.rig.up_direction()
             self._aim(forward)
             self.roll = 0.0
 
@@ -334,15 +356,8 @@ class OrbitView:
 
     # ---------------------------------------------------------------- arithmetic
 
-    def _pose(self) -> Pose:
-        """Where the view is going."""
-        if self.look_through is not None and self.rig is not None:
-            return camera_pose(self.rig, self.look_through, otherwise=self.distance)
-        eye_distance = max(FLAT_SHARE * self.radius, self.distance) if self.is_orthographic else self.distance
-        return Pose(self.rotation, self.pivot, self.distance, eye_distance, self.fov_y)
-
     def _shown_K(self, width: int, height: int) -> np.ndarray:
-        K = self._K_of(self._pose(), self.look_through, width, height)
+        K = self._K_of(self.pose(), self.look_through, width, height)
         if self._motion is None:
             return K
         start = self._K_of(self._motion.start, self._motion.camera, width, height)

@@ -27,6 +27,7 @@ from app.playback.view_modes import PLAIN, ShownAs, decoded_as
 from app.project.opened_project import OpenedProject
 from app.status import WantedFrame
 from app.training.service import ShownState
+from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
 
 StateOf = Callable[[int], ShownState | None]
@@ -69,6 +70,7 @@ class Playback:
         self._inherited: dict[int, Path | None] = {}
         self._compared: dict[tuple[int, int], bool] = {}  # camera and width, asked for since the last turn
         self._planned_compared: object = None
+        self._rig: tuple[object, CameraRig] | None = None
 
     def start(self) -> None:
         """Start the threads now rather than with the first request, and load what they need."""
@@ -293,6 +295,17 @@ class Playback:
             return None
         cloud = self.clouds.cloud(opened, self._state_of(opened.reference_index))
         return None if cloud is None or (cloud.is_hint and view.look_through is not None) else cloud
+
+    def rig(self, timeline: Timeline) -> CameraRig | None:
+        """The cameras as the clip at the playhead was trained with them; None until that is loaded."""
+        opened, request = self._opened, self._request(timeline)
+        loaded = None if request is None else self.decoder.loaded(request)
+        if opened is None or request is None or loaded is None or loaded.trained is None:
+            return None
+        key = opened.generation, request.model_key
+        if self._rig is None or self._rig[0] != key:
+            self._rig = key, loaded.trained.rig(opened.rig)
+        return self._rig[1]
 
     def captured_picture(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None:
         """The captured picture, at most `max_width` pixels wide; None until it was decoded."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from app.playback.arrays import GaussianArrays
 from engine.camera.projection import camera_center
+from engine.camera.rotations import matrices_of
 from engine.conventions import ALPHA_MAX, ALPHA_MIN
 
 SEEN_TRANSMITTANCE = 0.5
@@ -55,11 +55,13 @@ def seen_point(gaussians: GaussianArrays, origin: np.ndarray, direction: np.ndar
     a, b, c = gaussians.scales.T  # several times faster than max(axis=1)
     reach = REACH * np.maximum(np.maximum(a, b), c)
     rows = np.flatnonzero((along > gaussians.near_plane) & (across_squared < reach * reach))  # NaN is never near
-    norms = np.linalg.norm(gaussians.quats[rows], axis=1)
-    rows = rows[(norms > 0.0) & np.isfinite(norms)]
+    quats = gaussians.quats[rows].astype(np.float64)
+    norms = np.linalg.norm(quats, axis=1)
+    is_sound = (norms > 0.0) & np.isfinite(norms)
+    rows = rows[is_sound]
     if len(rows) == 0:
         return None
-    to_own_axes = Rotation.from_quat(gaussians.quats[rows], scalar_first=True).as_matrix().swapaxes(1, 2)
+    to_own_axes = matrices_of(quats[is_sound] / norms[is_sound, None]).swapaxes(1, 2)
     scales = np.maximum(gaussians.scales[rows].astype(np.float64), 1e-9)
     means = (to_own_axes @ offsets[rows].astype(np.float64)[:, :, None])[:, :, 0] / scales
     steps = (to_own_axes @ direction) / scales  # in units of standard deviations per scene unit

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from app.playback.view_motion import Pose
+from engine.camera.projection import camera_center, vertical_fov
 from engine.camera.rig import CameraRig
 
 
 def camera_fov(rig: CameraRig, camera: int) -> float:
     """Vertical field of view, radians."""
-    height, focal = float(rig.image_sizes[camera, 1]), float(rig.Ks[camera, 1, 1])
-    return 2.0 * math.atan(height / (2.0 * focal))
+    return vertical_fov(float(rig.Ks[camera, 1, 1]), float(rig.image_sizes[camera, 1]))
 
 
 def fitted_K(rig: CameraRig, camera: int, width: int, height: int) -> np.ndarray:
@@ -33,10 +31,16 @@ def camera_pose(rig: CameraRig, camera: int, *, otherwise: float) -> Pose:
     Args:
         otherwise: Distance of the pivot where the scene does not lie ahead, scene units.
     """
-    eye, rotation = rig.centers[camera], rig.world_to_camera[camera, :3, :3]
-    ahead = float((rig.focus_point() - eye) @ rotation[2])
+    return free_pose(rig, rig.world_to_camera[camera], camera_fov(rig, camera), otherwise=otherwise)
+
+
+def free_pose(rig: CameraRig | None, world_to_camera: np.ndarray, fov_y: float, *, otherwise: float) -> Pose:
+    """Any camera as a pose about what lies ahead of it as far away as what the rig looks at. See `camera_pose`."""
+    eye, rotation = camera_center(world_to_camera), world_to_camera[:3, :3]
+    focus = eye if rig is None or not len(rig) else rig.focus_point()
+    ahead = float((focus - eye) @ rotation[2])
     distance = ahead if ahead > 1e-3 else otherwise
-    return Pose(rotation, eye + distance * rotation[2], distance, distance, camera_fov(rig, camera))
+    return Pose(rotation, eye + distance * rotation[2], distance, distance, fov_y)
 
 
 def home_camera(rig: CameraRig, focus: np.ndarray, up: np.ndarray) -> int:

@@ -25,13 +25,6 @@ AXIS_VIEWS = ("front", "back", "right", "left", "top", "bottom")
 """Views along an axis, named by where one stands."""
 
 
-def rig_up(rig: CameraRig) -> np.ndarray:
-    """The world direction that the cameras agree is up: the mean of their -y axes, unit length. [3]"""
-    up = -rig.world_to_camera[:, 1, :3].mean(0) if len(rig) else np.zeros(3)
-    length = float(np.linalg.norm(up))
-    return up / length if length > 1e-6 else np.array([0.0, -1.0, 0.0])
-
-
 def rig_radius(rig: CameraRig) -> float:
     """Mean distance of the cameras from what they look at, scene units."""
     return float(np.linalg.norm(rig.centers - rig.focus_point(), axis=1).mean())

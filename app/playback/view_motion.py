@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+
+from engine.camera.rotations import matrices_of, quats_of, quats_of_turns, turns_of_quats
 
 EASE_S = 0.2
 """How long a move takes."""
@@ -59,9 +60,9 @@ def blended(start: Pose, stop: Pose, share: float) -> Pose:
     """The pose that is this share of the way from one to another; exactly one of them at 0 and 1."""
     if share <= 0.0 or share >= 1.0:
         return start if share <= 0.0 else stop
-    turn = Rotation.from_matrix(stop.rotation @ start.rotation.T).as_rotvec()
+    turn = turns_of_quats(quats_of(stop.rotation @ start.rotation.T))
     return Pose(
-        rotation=Rotation.from_rotvec(share * turn).as_matrix() @ start.rotation,
+        rotation=matrices_of(quats_of_turns(share * turn)) @ start.rotation,
         pivot=(1.0 - share) * start.pivot + share * stop.pivot,
         distance=between(start.distance, stop.distance, share),
         eye_distance=between(start.eye_distance, stop.eye_distance, share),

@@ -95,6 +95,11 @@ class Views:
         for look in self._looks:
             look.view = OrbitView(rig)
 
+    def correct(self, rig: CameraRig) -> None:
+        """Show the same cameras as a training has corrected them; free views stay where they are."""
+        for look in self._looks:
+            look.view.rig = rig
+
     def _copied(self, look: Look) -> Look:
         view = copy.copy(look.view)  # a rig is shared, the pose is not
         view.pivot, view.up = look.view.pivot.copy(), look.view.up.copy()

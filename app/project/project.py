@@ -2,6 +2,7 @@
 
 project.json                 settings, see ProjectSettings
 gate.json                    regions in which the user overrules the gate, where there are any
+camera_paths.json            camera paths, where there are any, see CameraPath
 clips/0000.safetensors       finished clips
 versions/0000/               what was trained before it was trained again
 checkpoints/0000.safetensors unfinished clips: everything needed to go on
@@ -22,6 +23,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from app.project.camera_paths import CAMERA_PATHS_FILE, read_camera_paths, write_camera_paths
 from app.project.header_cache import HeaderCache
 from app.project.lock import ProcessLock, is_process_alive
 from app.project.project_files import (
@@ -33,6 +35,7 @@ from app.project.project_files import (
     write_regions,
     write_settings,
 )
+from engine.camera.camera_path import CameraPath
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
@@ -187,6 +190,23 @@ class Project:
         self.check_writable()
         write_regions(self.folder / GATE_FILE, regions)
 
+    def camera_paths(self) -> tuple[CameraPath, ...]:
+        """Camera paths in the user's order.
+
+        Raises:
+            ProjectError: The file is damaged or holds something that is not a camera path.
+        """
+        return read_camera_paths(self.folder)
+
+    def set_camera_paths(self, paths: Sequence[CameraPath]) -> None:
+        """Replace the camera paths, on disk.
+
+        Raises:
+            ProjectError: The project is read-only, or the disk refused.
+        """
+        self.check_writable()
+        write_camera_paths(self.folder, paths)
+
     def discard_progress(self, clip_index: int) -> None:
         """Forget the unfinished training of a clip; a finished clip and its curves stay."""
         for path in (self.checkpoint_path(clip_index), self.unfinished_metrics_path(clip_index)):
@@ -212,7 +232,7 @@ class Project:
         """Take back a project that has learned nothing: its own files and folders go, other things stay."""
         for name in ("clips", "versions", "checkpoints", "live", "prep", "metrics", "logs"):
             shutil.rmtree(self.folder / name, ignore_errors=True)
-        for name in (PROJECT_FILE, GATE_FILE):
+        for name in (PROJECT_FILE, GATE_FILE, CAMERA_PATHS_FILE):
             (self.folder / name).unlink(missing_ok=True)
 
 

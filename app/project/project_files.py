@@ -14,19 +14,12 @@ from typing import Annotated, Any
 
 from msgspec import Meta
 
+from app.project.kept_json import read_kept, write_kept
 from engine.capture.clip import Clip, split_clips
 from engine.clip_files.clip_header import SettingValue
 from engine.errors import ProjectError
 from engine.gate.regions import GateRegion, parse_region
-from engine.storage.files import disk_error
-from engine.storage.json_files import (
-    HAND_EDITED,
-    ChecksumError,
-    JsonError,
-    read_checked_json,
-    read_checked_lines,
-    write_checked_json,
-)
+from engine.storage.json_files import HAND_EDITED, read_checked_lines
 from engine.storage.typed_json import EntryError, to_type
 from engine.training.config import TrainConfig, config_of
 from engine.training.retired_settings import without_retired
@@ -36,8 +29,6 @@ logger = logging.getLogger(__name__)
 SCHEMA = 1
 PROJECT_FILE = "project.json"
 GATE_FILE = "gate.json"
-MAX_BYTES = 4 << 20
-"""Of settings and of regions; both take some kilobytes."""
 _MAX_COUNT = 2**31
 """Frames and clips are fewer."""
 
@@ -87,18 +78,15 @@ def read_settings(folder: Path) -> ProjectSettings:
         ProjectError: It is missing, damaged, of a newer schema, or holds unknown or ill-typed values.
     """
     path = folder / PROJECT_FILE
-    try:
-        content = read_checked_json(path, max_bytes=MAX_BYTES)
-    except FileNotFoundError as error:
+    content = read_kept(path, "The project file", hint="Restore it from a copy.")
+    if content is None:
         if not folder.exists():
-            raise ProjectError("There is no such folder.", hint="Check the path.", path=folder) from error
+            raise ProjectError("There is no such folder.", hint="Check the path.", path=folder)
         raise ProjectError(
             f"This is not a project folder: it has no {PROJECT_FILE}.",
             hint="Train a capture first, or open the folder that holds that file.",
             path=folder,
-        ) from error
-    except (OSError, JsonError) as error:
-        raise _unreadable("The project file", error, "Restore it from a copy.", path) from error
+        )
     if content.get("schema") != SCHEMA or type(content["schema"]) is not int:
         raise ProjectError(
             f"The project has schema {content.get('schema')!r:.60}, this version reads {SCHEMA}.",
@@ -129,7 +117,7 @@ def write_settings(folder: Path, settings: ProjectSettings) -> None:
     Raises:
         DiskError: The disk refused.
     """
-    _write(folder / PROJECT_FILE, asdict(settings))
+    write_kept(folder / PROJECT_FILE, asdict(settings))
 
 
 def read_regions(path: Path) -> tuple[GateRegion, ...]:
@@ -139,12 +127,9 @@ def read_regions(path: Path) -> tuple[GateRegion, ...]:
         ProjectError: The file is damaged or holds something that is not a region.
     """
     hint = "Correct or remove the file."
-    try:
-        content = read_checked_json(path, max_bytes=MAX_BYTES)
-    except FileNotFoundError:
+    content = read_kept(path, "The file of the gate's regions", hint=hint)
+    if content is None:
         return ()
-    except (OSError, JsonError) as error:
-        raise _unreadable("The file of the gate's regions", error, hint, path) from error
     if content.keys() != {"regions"} or not isinstance(content["regions"], list):
         raise ProjectError('The file holds something else than a list "regions".', hint=hint, path=path)
     try:
@@ -159,7 +144,7 @@ def write_regions(path: Path, regions: Sequence[GateRegion]) -> None:
     Raises:
         DiskError: The disk refused.
     """
-    _write(path, {"regions": [region.as_dict() for region in regions]})
+    write_kept(path, {"regions": [region.as_dict() for region in regions]})
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:
@@ -176,17 +161,3 @@ def read_metrics(path: Path) -> list[dict[str, Any]]:
     if n_damaged:
         logger.warning("%d damaged rows of curves were left out - %s", n_damaged, path)
     return good
-
-
-def _write(path: Path, content: dict[str, Any]) -> None:
-    try:
-        write_checked_json(path, content, makes_parents=False, is_durable=True)
-    except OSError as error:
-        raise disk_error(error, what="The project", path=path) from error
-
-
-def _unreadable(what: str, error: Exception, hint: str, path: Path) -> ProjectError:
-    reason = error.strerror if isinstance(error, OSError) else str(error)
-    return ProjectError(
-        f"{what} cannot be read ({reason}).", hint=HAND_EDITED if isinstance(error, ChecksumError) else hint, path=path
-    )

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from app.calibration.job import CalibrationRequest
 from app.project.opening_answers import OpeningAnswers
+from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
 
@@ -228,13 +229,13 @@ class RemoveRegion:
 
 
 @dataclass(frozen=True, slots=True)
-class UndoMark:
-    """Take back the last region that was marked or removed since the project was opened."""
+class Undo:
+    """Take back the last change of the project's content since it was opened: of regions or of camera paths."""
 
 
 @dataclass(frozen=True, slots=True)
-class RedoMark:
-    """Do again what UndoMark took back last; a new mark or removal ends that."""
+class Redo:
+    """Do again what Undo took back last; another change ends that."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -351,8 +352,8 @@ class StopCalibration:
     """End the calibration that runs; nothing is written."""
 
 
-EditCommand = MarkRegion | RemoveRegion | UndoMark | RedoMark
-"""What changes the project's content, and can be taken back."""
+MarkCommand = MarkRegion | RemoveRegion
+"""What changes the marked regions, and can be taken back."""
 
 SettingCommand = SetHoldout | SetClipLength | SetTrainSetting | SetPreset
 """What changes settings that all clips share."""
@@ -407,7 +408,10 @@ Command = (
     | ToggleOverlay
     | ShowHeat
     | SettingCommand
-    | EditCommand
+    | MarkCommand
+    | PathCommand
+    | Undo
+    | Redo
     | CalibrationCommand
     | SynchronisationCommand
     | HomeView

@@ -2,14 +2,15 @@
 finished work in. Belongs to one thread; nothing here blocks. Draws nothing.
 
 It composes: `playback` prepares what is shown, `live_training` trains, `residuals` compares with what the cameras took,
-`marking` holds the edits, `recent` what was opened before. What is open is one immutable value that each of them is
-handed.
+`marking` and `camera_paths` hold what is edited, `edits` the way back, `recent` what was opened before. What is open is
+one immutable value that each of them is handed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import get_args
 
 from app.background.jobs import Jobs
 from app.background.log_reader import LogLine, LogView
@@ -34,11 +35,14 @@ from app.residuals.residuals import Residuals
 from app.session import commands
 from app.session.attention import Attention
 from app.session.calibrating import Calibrating
+from app.session.camera_paths import CameraPaths
 from app.session.capture_doctor import CaptureDoctor
 from app.session.capture_opening import CaptureOpening
 from app.session.clip_versions import Versions
 from app.session.doctor_status import DoctorStatus
+from app.session.edit_status import HistoryStatus, PathsStatus
 from app.session.following import follow_training
+from app.session.history import History
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
 from app.session.notices import Notices
@@ -82,8 +86,9 @@ class Session:
     Attributes:
         opened: What is open; None before.
         timeline, views, bookmarks: What the user looks at; the window may change them directly.
-        training, queue, clip_states, plan, regions, usage, project_status: Status values, remade by `poll` and
-            `dispatch`. The plan is that of the next clip; None while something trains or nothing is left to train.
+        training, queue, clip_states, plan, regions, paths, history, usage, project_status: Status values, remade by
+            `poll` and `dispatch`. The plan is that of the next clip; None while something trains or nothing is left to
+            train.
         versions: What clips were before they were trained again.
         log: What program and training have said.
         question: What the user has to answer; None while there is nothing to ask.
@@ -142,8 +147,12 @@ class Session:
         self._usage, self.log = UsageMeter(), LogView()
         self.playback = Playback(self.live_training.state_of)
         self.residuals = Residuals(self.playback)
-        self.marking = Marking()
+        self.edits = History()
+        self.marking, self.camera_paths = Marking(self.edits), CameraPaths(self.edits)
+        self._documents = (self.marking.document, self.camera_paths.document)
         self.regions: RegionsStatus = self.marking.status([])
+        self.paths: PathsStatus = self.camera_paths.status()
+        self.history = HistoryStatus()
         self.recent = RecentProjects(settings)
         self.opener = ProjectOpener(
             self._jobs,
@@ -330,8 +339,13 @@ class Session:
                 self.question = None if is_confirmed else self.doctor.question(corrections, words)
                 if is_confirmed:
                     self.doctor.correct(corrections)
-            case _ if isinstance(command, commands.EditCommand):
+            case _ if isinstance(command, commands.MarkCommand):
                 self.marking.apply(command)
+            case _ if isinstance(command, commands.PathCommand):
+                self.camera_paths.apply(command, self.views, self.timeline)
+            case commands.Undo() | commands.Redo():
+                with self.camera_paths.showing_change():
+                    (self.edits.undo if isinstance(command, commands.Undo) else self.edits.redo)()
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
@@ -385,7 +399,9 @@ class Session:
         self._keep_recent()  # the one that is left
         generation = 1 if self.opened is None else self.opened.generation + 1
         opened = opened_project(found.capture, found.project, generation)
-        self.marking.open(found.project)  # first: keeps what was marked in the project that is left
+        for document in self._documents:  # first: they keep what was edited in the project that is left
+            document.open(found.project)
+        self.camera_paths.leave()
         self._show(opened)
         self.live_training.open(opened, found.catalog)
         self.versions.open(opened)
@@ -420,7 +436,7 @@ class Session:
         self.notices.add_failure(f"{job_name} has failed", error)
 
     def _launch_worker(self, job: TrainJob, project: Project) -> Worker:
-        self.marking.settle()  # a region marked a moment ago is meant to count
+        self.marking.document.settle()  # a region marked a moment ago is meant to count
         return self._launch(job, project)
 
     # ---------------------------------------------------------------- letting finished work in
@@ -434,7 +450,8 @@ class Session:
         if any(isinstance(event, ENDINGS) for event in events):
             self._keep_recent()
         self._release_snapshot()
-        has_changed |= bool(events) | self.marking.poll()
+        has_changed |= bool(events) | any([document.poll() for document in self._documents])
+        has_changed |= self.lead_view()
         is_training = self.live_training.is_busy and self.training.state != "paused"
         is_attended = self._attention.follow((self.view.look_key, self.timeline.frame_index))
         if self._is_preloading:
@@ -442,6 +459,10 @@ class Session:
         has_changed |= self.residuals.poll(is_busy=is_training or is_attended)
         self._tell_failures()
         self.playback.work_ahead(self.timeline, is_busy=self.live_training.is_busy)
+        rig = self.playback.rig(self.timeline)
+        if rig is not None and rig is not self.view.rig:  # a view that looks through a camera follows it
+            self.views.correct(rig)
+            has_changed = True
         seen = self._news_key()
         has_changed |= seen != self._seen
         self._seen = seen
@@ -484,9 +505,8 @@ class Session:
             if failure.is_of_clip:
                 self.live_training.note_damage(failure.error)
             told.append((failure.title, failure.error))
-        unkept = self.marking.take_error()
-        if unkept is not None:
-            told.append(("The marked regions could not be read or kept", unkept[1]))
+        unkept = [(document.what, document.take_error()) for document in self._documents]
+        told += [(f"The {what} could not be read or kept", error) for what, error in unkept if error is not None]
         for title, error in told:
             if not self.notices.has_told(error):
                 self.notices.add_failure(title, error)
@@ -499,6 +519,8 @@ class Session:
         self.training = live.status(None if clip is None else clip.clip_index)
         self.clip_states = live.clip_states()
         self.regions = self.marking.status(self.clip_states)
+        self.lead_view()
+        self.paths, self.history = self.camera_paths.status(), self.edits.status()
         self.plan, self.queue = live.plan(), live.queue()
         self.usage = self._usage.sample(None if live.service is None else live.service.worker_pid)
         if opened is not None:
@@ -517,7 +539,8 @@ class Session:
         if self._is_closed:
             return
         self._is_closed = True
-        self.marking.close()
+        for document in self._documents:
+            document.close()
         self.live_training.close()
         self._keep_recent()
         if self.project is not None:
@@ -560,6 +583,14 @@ class Session:
         return self.log.lines(clip_index, project.log_path(clip_index))
 
     # ---------------------------------------------------------------- pictures and arrays
+
+    def lead_view(self) -> bool:
+        """Let the view go along the camera path, where that is wanted, after the playhead has moved. Whether anything
+        changed."""
+        has_changed = self.camera_paths.lead(self.views, self.timeline)
+        if has_changed:
+            self.paths = self.camera_paths.status()
+        return has_changed
 
     def wanted_frame(self) -> WantedFrame | None:
         """What ought to be on screen; None without a capture. What is there says itself what it is."""
@@ -653,7 +684,8 @@ _TITLES: dict[type, str] = {
     commands.SynchroniseCameras: "The cameras cannot be synchronised",
     commands.MarkRegion: "The region cannot be marked",
     commands.RemoveRegion: "The region cannot be removed",
-    commands.UndoMark: "The last mark cannot be taken back",
-    commands.RedoMark: "The mark cannot be made again",
+    commands.Undo: "The last change cannot be taken back",
+    commands.Redo: "The change cannot be made again",
+    **dict.fromkeys(get_args(commands.PathCommand), "That cannot be done with the camera path"),
     commands.CorrectCapture: "The capture cannot be corrected",
 }

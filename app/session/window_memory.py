@@ -177,6 +177,7 @@ def view_of(session: Viewed) -> dict[str, Any]:
         **ViewPlace.of(view).values(),
         "bookmarks": session.bookmarks.values(),
         "shown": [name for name in OVERLAY_NAMES if getattr(overlays, name)],
+        "hidden": [name for name in OVERLAY_NAMES if not getattr(overlays, name)],
         "compare": overlays.compare,
         "wipe_position": float(overlays.wipe_position),
     }
@@ -193,10 +194,12 @@ def show_again(session: Viewed, kept: dict[str, Any]) -> None:
     if place is not None:
         place.show(view)
     session.bookmarks.items = read_bookmarks(kept.get("bookmarks")).items
-    shown = kept.get("shown")
-    if isinstance(shown, list):
+    for key, is_shown in (("shown", True), ("hidden", False)):
+        found = kept.get(key)
+        names = found if isinstance(found, list) else []
         for name in OVERLAY_NAMES:
-            setattr(overlays, name, name in shown)
+            if name in names:  # what an older version did not know of stays as it is
+                setattr(overlays, name, is_shown)
     if kept.get("compare") in COMPARE_MODES:
         overlays.compare = kept["compare"]
     wipe_position = _number(kept.get("wipe_position"), 0.0, 1.0)

@@ -5,6 +5,8 @@ OpenCV axes (x right, y down, z forward); pixel centres lie at +0.5; depths are 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from engine.camera.rig import CameraRig
@@ -35,6 +37,11 @@ def to_pixels(points_camera: np.ndarray, K: np.ndarray) -> np.ndarray:
 def focal_px(Ks: np.ndarray) -> np.ndarray:
     """One focal length per camera: the geometric mean of fx and fy, px. [...]"""
     return np.sqrt(Ks[..., 0, 0] * Ks[..., 1, 1])
+
+
+def vertical_fov(focal_px: float, height_px: float) -> float:
+    """Vertical field of view of a picture, radians."""
+    return 2.0 * math.atan(height_px / (2.0 * focal_px))
 
 
 def relative_homography(rig: CameraRig, camera: int, other: int) -> tuple[np.ndarray, np.ndarray]:

@@ -38,6 +38,12 @@ class CameraRig:
         """Unit viewing directions in world space. [C, 3]"""
         return self.world_to_camera[:, 2, :3].copy()
 
+    def up_direction(self) -> np.ndarray:
+        """The world direction that the cameras agree is up: the mean of their -y axes, unit length. [3]"""
+        up = -self.world_to_camera[:, 1, :3].mean(0) if len(self) else np.zeros(3)
+        length = float(np.linalg.norm(up))
+        return up / length if length > 1e-6 else np.array([0.0, -1.0, 0.0])
+
     def subset(self, camera_indices: list[int] | np.ndarray) -> Self:
         """The same rig with only these cameras, in this order."""
         index = np.asarray(camera_indices, dtype=np.int64)

@@ -25,6 +25,10 @@ from engine.storage.files import disk_error
 STALL_S = 300.0
 """A child that has used no processor time for so long hangs."""
 POLL_S = 0.2
+_IS_POSIX = os.name == "posix"
+_NEW_GROUP = 0 if _IS_POSIX else getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
+"""Ctrl+C in a terminal reaches the processes of the parent's group: a child that it ends while it still starts fails
+like one that cannot do its work, and the parent would keep that for a result. So each child has a group of its own."""
 
 
 @contextmanager
@@ -97,7 +101,13 @@ def run_child(
         try:
             # the child holds the other end of this pipe: it ends by itself when nobody holds ours any more
             child = subprocess.Popen(
-                command, env=environment, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=errors
+                command,
+                env=environment,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=errors,
+                process_group=0 if _IS_POSIX else None,
+                creationflags=_NEW_GROUP,
             )
         except OSError as error:
             return f"{what} could not be started ({error})", True

@@ -9,6 +9,8 @@ DECODER, FIELD, TABLES = "decoder.", "field.", "field.tables."
 """How the names of the decoder's arrays begin, of the field's, and of the field's tables."""
 GAINS = "gains"
 """Of the training cameras, in a clip that inherits nothing."""
+CORRECTIONS = "camera_corrections"
+"""Of the training cameras, in a clip that inherits nothing; missing where they were not refined."""
 LOG_DRIFT = "log_drift"
 """Log of the training cameras' exposure against the reference clip's, frame by frame; missing where none changes."""
 

@@ -21,8 +21,9 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
+from engine.camera.corrections import N_VALUES
 from engine.clip_files.anchor_record import AnchorRecord, RecordError, read_records
-from engine.clip_files.array_names import LOG_DRIFT
+from engine.clip_files.array_names import CORRECTIONS, LOG_DRIFT
 from engine.clip_files.clip_header import ClipHeader, NewerSchema, header_text, parse_header
 from engine.clip_files.coding import CodedArray, CodingError, decode_array
 from engine.errors import ProjectError
@@ -72,6 +73,25 @@ class ClipState:
                 hint="Train this clip again.",
             )
         return np.exp(logs)
+
+    @property
+    def corrections(self) -> np.ndarray | None:
+        """Of the training cameras, see engine.camera.corrections; None where they were not refined. [C, 7] float32
+
+        Raises:
+            ProjectError: The array does not fit the clip.
+        """
+        values = self.arrays.get(CORRECTIONS)
+        if values is None:
+            return None
+        shape = (len(self.header.camera_names), N_VALUES)
+        if values.shape != shape or values.dtype != np.float32 or not np.isfinite(values).all():
+            raise ProjectError(
+                f"The corrections of the cameras in clip {self.header.clip_index} are {values.dtype} "
+                f"{list(values.shape)}, not float32 {list(shape)} and finite.",
+                hint="Train this clip again.",
+            )
+        return values
 
     @property
     def is_reference(self) -> bool:

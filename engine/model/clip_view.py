@@ -75,7 +75,7 @@ class View:
         return is_inside & (z > self.near_plane - reach)
 
 
-def reaches(anchors: AnchorSet, reach: float) -> Tensor:
+def reaches_of(anchors: AnchorSet, reach: float) -> Tensor:
     """How far from its anchor each one's Gaussians are expected, scene units: those of a backdrop are large. [A]
 
     Args:
@@ -90,7 +90,7 @@ def visible_rows(model: ClipModel, view: View, clip_time: float, *, reach: float
     for role in model.roles():
         alive = model.alive(role, clip_time)
         anchors = model.anchor_set(role)
-        rows[role] = alive[view.sees(anchors.positions[alive], reach=reaches(anchors, reach)[alive])]
+        rows[role] = alive[view.sees(anchors.positions[alive], reach=reaches_of(anchors, reach)[alive])]
     return rows
 
 

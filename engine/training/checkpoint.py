@@ -18,6 +18,8 @@ from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_
 from engine.errors import ProjectError
 from engine.training.preparation.cloud_preparation import Backgrounds
 
+_REACH = "resume.reach."
+
 
 @dataclass(frozen=True, slots=True)
 class Checkpoint:
@@ -28,12 +30,17 @@ class Checkpoint:
         gains: Of the training cameras, learned so far. [C, 3] float32
         backgrounds: Of the training cameras.
         place: Where the training stands.
+        reaches: How far Gaussians of each anchor were expected when the phase began, scene units, by role; none in
+            checkpoints of earlier versions. [A] float32 each
+        cameras: What their poses and focal lengths have learned; None where these do not learn. [C, 7] float32
     """
 
     state: ClipState
     gains: np.ndarray
     backgrounds: Backgrounds
     place: Place
+    reaches: dict[str, np.ndarray]
+    cameras: np.ndarray | None = None
 
 
 def write_checkpoint(path: Path | str, checkpoint: Checkpoint) -> None:
@@ -45,8 +52,11 @@ def write_checkpoint(path: Path | str, checkpoint: Checkpoint) -> None:
     backgrounds = checkpoint.backgrounds
     arrays = dict(checkpoint.state.arrays)
     arrays["resume.gains"] = checkpoint.gains
+    if checkpoint.cameras is not None:
+        arrays["resume.cameras"] = checkpoint.cameras
     arrays["resume.backgrounds"] = backgrounds.images
     arrays["resume.is_stable"] = np.packbits(backgrounds.is_stable, axis=-1)
+    arrays |= {f"{_REACH}{role}": reach for role, reach in checkpoint.reaches.items()}
     header = replace(checkpoint.state.header, resume=checkpoint.place)
     write_clip_state(path, ClipState(arrays, header), is_durable=True)
 
@@ -84,7 +94,9 @@ def read_checkpoint(path: Path | str, *, clip_index: int, camera_names: Sequence
     odd = [name for name, array in floats.items() if not np.isfinite(array).all()]
     if odd:  # training on from here could only fail again
         raise damaged_checkpoint(ValueError(f"{odd[0]} holds numbers that are not finite"), path)
-    return Checkpoint(kept, gains.copy(), Backgrounds(images, stable), place)
+    reaches = {name.removeprefix(_REACH): array.copy() for name, array in floats.items() if name.startswith(_REACH)}
+    cameras = kept.arrays.get("resume.cameras")
+    return Checkpoint(kept, gains.copy(), Backgrounds(images, stable), place, reaches, cameras)
 
 
 def damaged_checkpoint(error: Exception, path: Path | str) -> ProjectError:

@@ -19,7 +19,7 @@ from engine.camera.depth_range import near_plane
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.anchor_record import AnchorRecord
-from engine.clip_files.array_names import GAINS, LOG_DRIFT
+from engine.clip_files.array_names import CORRECTIONS, GAINS, LOG_DRIFT
 from engine.clip_files.clip_header import SCHEMA, ClipHeader, Place
 from engine.clip_files.clip_state import ClipState, fingerprint_of
 from engine.clip_files.compact import CompactClip, compact_clip
@@ -43,6 +43,7 @@ from engine.training.step.active_tiles import ActivePicture, ActiveTiles
 from engine.training.step.losses import photometric_loss
 from engine.training.step.nonfinite import gradient_not_finite, loss_not_finite
 from engine.training.step.order import ShuffledOrder
+from engine.training.step.training_cameras import TrainingCameras
 from engine.training.step.valid_pixels import ValidPixels
 from engine.training.step.visible_anchors import Sight, camera_views
 
@@ -102,7 +103,13 @@ class ClipTraining:
         self.steps_done = 0
         self._generator = torch.Generator().manual_seed(seed)
         self._views = camera_views(capture.rig, near_plane=self.near_plane)
-        self._training_views = [self._views[camera] for camera in self.camera_indices]
+        self._cameras = TrainingCameras(
+            self.rig,
+            near_plane=self.near_plane,
+            start=None if self._base is None else self._base.corrections,
+            is_learning=config.refine_cameras == "on" and self._base is None,
+            like=torch.zeros((), dtype=backend.dtype, device=backend.device),
+        )
         self._preparation = ClipPreparation(
             capture,
             clip,
@@ -110,7 +117,7 @@ class ClipTraining:
             method,
             backend=backend,
             camera_indices=self.camera_indices,
-            views=self._training_views,
+            cameras=self._cameras,
             base=self._base,
             previous=previous,
             regions=self.regions,
@@ -166,11 +173,11 @@ class ClipTraining:
 
     # ---------------------------------------------------------------- steps
 
-    def _start_phase(self, index: int, steps_in_phase: int) -> None:
+    def _start_phase(self, index: int, steps_in_phase: int, reaches: dict[str, Tensor] | None = None) -> None:
         name, n_steps = self.phases[index]
         has_gains = bool((self.gains != 1.0).any())  # all 1 where the cameras do not differ: nothing to learn
         self.gains.requires_grad_(self.reference is None and has_gains)
-        parameters = named_parameters(self.model, self.gains, self.config)
+        parameters = named_parameters(self.model, self.gains, self.config, self._cameras.pixels)
         ratios = self.method.final_ratios(parameters, self.config)
         self._optimizer = PhaseOptimizer(
             parameters, n_steps=n_steps, config=self.config, final_ratios=ratios, backend=self.backend
@@ -179,7 +186,8 @@ class ClipTraining:
         n_items = len(self.camera_indices) if name == "static" else len(self.pictures)
         self._order = ShuffledOrder(n_items, seed=self.seed + index)
         self._phase_index = index
-        self._sight = Sight(self.model, self._training_views, reach=self._reach)  # a set may have become dynamic
+        # a set may have become dynamic
+        self._sight = Sight(self.model, self._cameras.first_views, reach=self._reach, reaches=reaches)
         has_rest = name == "source" and self.method.has_active_tiles and not self.gains.requires_grad
         has_rest = has_rest and ActiveTiles.applies(self.model)
         self._valid = ValidPixels(self.pictures.is_valid, self.backend.device)
@@ -207,8 +215,9 @@ class ClipTraining:
             camera_row, frame = divmod(item, self.clip.n_frames)
             clip_time = frame / self.clip.clip_length
             truth, is_counted = self.pictures.picture(camera_row, frame), self._valid.of(camera_row)
-        view = self._training_views[camera_row]
+        view = self._cameras.view(camera_row)
         active = self._active_picture(camera_row, view, clip_time)
+        self._cameras.watch(active.gaussians)
         image = render_gaussians(active.gaussians, view, backend=self.backend, tile_mask=active.tile_mask).image[0]
         pixels = self._tensor(truth)
         compared = photometric_loss(
@@ -236,6 +245,7 @@ class ClipTraining:
             raise loss_not_finite(image=image.detach(), **terms, where=where, config=self.config)
         if loss.requires_grad:
             loss.backward()
+            self._cameras.take_gradient(camera_row)
         try:
             gradient_norm = self._optimizer.step()
         except NonFiniteLoss as error:
@@ -243,6 +253,7 @@ class ClipTraining:
         if self.gains.requires_grad:  # a step moves all cameras a little together; what is unseen stays at gain 1
             with torch.no_grad():
                 self.gains.copy_(self._tensor(in_gauge(host_array(self.gains))))
+        self._cameras.settle()
         self.steps_done += 1
         return StepStats(
             step=self.steps_done,
@@ -293,6 +304,8 @@ class ClipTraining:
             arrays |= AnchorRecord(reasons=codes).arrays(role)
         if self.reference is None:
             arrays[GAINS] = host_array(self.gains).copy()
+            if self._cameras.corrections is not None:
+                arrays[CORRECTIONS] = self._cameras.corrections
         if (self.drift != 1.0).any():
             arrays[LOG_DRIFT] = np.log(self.drift)
         header = ClipHeader(
@@ -337,7 +350,7 @@ class ClipTraining:
         entries = None if self.method.keeps_unread_entries else self.model.entries_in_use()
         compact = compact_clip(state, entries)
         self.model = load_clip_model(compact.state, self.reference, backend=self.backend, is_learning=True)
-        self._sight = Sight(self.model, self._training_views, reach=self._reach)
+        self._sight = Sight(self.model, self._cameras.first_views, reach=self._reach)
         return compact
 
     def write_checkpoint(self, path: Path | str) -> None:
@@ -352,7 +365,9 @@ class ClipTraining:
         )
         state = self._state_of(self._trained or self.model)
         state = ClipState(state.arrays | self._optimizer.arrays(), state.header)
-        write_checkpoint(path, Checkpoint(state, host_array(self.gains).copy(), self.backgrounds, place))
+        reaches = {role: host_array(reach) for role, reach in self._sight.reaches.items()}
+        gains = host_array(self.gains).copy()
+        write_checkpoint(path, Checkpoint(state, gains, self.backgrounds, place, reaches, self._cameras.kept))
 
     def restore_checkpoint(self, path: Path | str) -> None:
         """Go on from a checkpoint instead of `prepare`.
@@ -387,6 +402,7 @@ class ClipTraining:
         if drift is None:
             drift = np.ones((len(self.rig), self.clip.n_frames, 3), np.float32)
         self.pictures.remove_drift(drift)
+        self._cameras.restore(kept.cameras)
         parts = ClipParts(
             load_clip_model(kept.state, self.reference, backend=self.backend, is_learning=True),
             nn.Parameter(torch.from_numpy(kept.gains).to(self.backend.device, self.backend.dtype)),
@@ -400,7 +416,8 @@ class ClipTraining:
         self._take(parts)
         self.phases = list(place.phases)
         self.steps_done = header.step
-        self._start_phase(place.phase_index, place.steps_in_phase)
+        reaches = {role: self._tensor(reach) for role, reach in kept.reaches.items()}
+        self._start_phase(place.phase_index, place.steps_in_phase, reaches)
         self._optimizer.restore(kept.state.arrays, place.steps_in_phase)
         self._order.restore(place.order)
         self._generator.set_state(torch.tensor(place.generator, dtype=torch.uint8))

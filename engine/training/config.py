@@ -15,7 +15,7 @@ from engine.backends.table import BACKENDS, DEFAULT
 from engine.errors import ProjectError
 from engine.training.setting import Value, setting, settings_of
 
-MODEL, CLOUDS, COLORS, LENGTH = "Model", "Point clouds", "Camera colours", "Length of the training"
+MODEL, CLOUDS, COLORS, CAMERAS, LENGTH = "Model", "Point clouds", "Camera colours", "Cameras", "Length of the training"
 RATES, LOSS, GATE, STEP, SHARING = "Learning rates", "Loss", "Gate", "Training step", "What a source clip takes over"
 
 
@@ -151,6 +151,16 @@ class TrainConfig(msgspec.Struct, frozen=True):
         ),
     ] = "auto"
 
+    refine_cameras: Annotated[
+        str,
+        _choice(
+            CAMERAS,
+            "Poses and focal lengths of the training cameras while a reference clip trains; later clips keep what was "
+            "learned. Cameras held out stay as they are.",
+            {"off": "as the capture has them", "on": "small corrections are learned"},
+        ),
+    ] = "off"
+
     static_steps: Annotated[
         int,
         _steps(
@@ -184,6 +194,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
     color_head_lr: Annotated[float, _rate("the head of colours")] = 4e-3
     offset_head_lr: Annotated[float, _rate("the head of offsets")] = 4e-3
     gain_lr: Annotated[float, _rate("the cameras' colour gains in the reference clip")] = 3e-4
+    camera_lr: Annotated[float, _rate("corrections of cameras, in pixels at the working size,")] = 0.015
     final_lr_ratio: Annotated[
         float,
         setting(

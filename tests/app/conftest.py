@@ -22,7 +22,7 @@ from engine.capture.capture import open_capture
 from tests.app.fakes import make_fake, write_capture
 from tests.app.inline_worker import InlineWorker
 
-DEADLINE_S = 30.0
+DEADLINE_S = 120.0
 
 
 @pytest.fixture(scope="session")

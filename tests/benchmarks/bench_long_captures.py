@@ -31,11 +31,15 @@ from scipy.ndimage import binary_dilation
 
 from app.cli.cli import main as clipgstream
 from app.evaluation.evaluation import evaluate_project
-from app.evaluation.headless import TrainedProject, open_trained, render_frames
+from app.evaluation.headless import TrainedProject, open_trained
+from app.export.scene_frames import SceneFrames
+from app.export.video.drawing import draw
+from app.export.video.views import camera_view
 from app.project.project import open_project
 from engine.images.psnr import psnr
 from engine.metrics.clips.flicker import flicker_figures
 from engine.metrics.clips.summary import mean_of
+from engine.metrics.pictures.colors import to_levels
 from engine.storage.json_files import json_text
 from engine.synthetic.raycast import make_truth
 from engine.synthetic.scene import SyntheticScene
@@ -144,10 +148,12 @@ def still_psnr(opened: TrainedProject, scene: SyntheticScene, clip_indices: Sequ
     """PSNR of pixels that show nothing that moves, mean over held-out cameras and frames, dB."""
     frames = [frame for i in clip_indices for frame in opened.clips[i].frame_indices()][::STILL_EVERY]
     found: list[float | None] = []
+    made = SceneFrames(opened)
     for camera in opened.capture.camera_indices(opened.project.settings.holdout):
-        for frame, levels in render_frames(opened, camera_index=camera, frame_indices=frames):
+        view = camera_view(opened.capture.rig, camera, None)(0, 0.0)
+        for frame in frames:
             truth = opened.capture.frame(camera, frame) / 255.0
-            found.append(psnr(levels / 255.0, truth, is_still(scene, camera, frame)))
+            found.append(psnr(to_levels(draw(made, frame, view).color) / 255.0, truth, is_still(scene, camera, frame)))
     return mean_of(found)
 
 

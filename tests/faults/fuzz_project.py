@@ -45,12 +45,13 @@ OLD = "old-"
 
 
 def make_project(folder: Path) -> None:
-    """Two trained clips, a checkpoint, a live snapshot, curves, regions, caches; beside them the files of the user."""
+    """Two trained clips, checkpoint, live snapshot, curves, regions, paths, caches; beside them files of the user."""
     from app.evaluation.kept_figures import KeptFigures
     from app.project.project import create_project
     from app.project.project_files import ProjectSettings
     from app.project.recents import RecentProject
     from app.session.settings import Settings
+    from engine.camera.path_presets import turntable
     from engine.clip_files.clip_state import write_clip_state
     from engine.clip_files.compact import compact_clip, write_compact_clip
     from engine.gate.regions import parse_region
@@ -63,6 +64,7 @@ def make_project(folder: Path) -> None:
     settings = ProjectSettings("nowhere", "abc", holdout=("b",), clip_length=N_FRAMES, overrides={"passes": 6.0})
     project = create_project(folder, settings)
     project.set_gate_regions([parse_region({"treat": "dynamic", "box": [[0, 0, 0], [1, 2, 3]]})])
+    project.set_camera_paths([turntable(np.zeros(3), np.array([0.0, 0.0, 1.0]), 2.0, 0.3, (0, 9))])
     project.close()
     project.clip_path(0).parent.mkdir()
     write_compact_clip(project.clip_path(0), reference)
@@ -181,6 +183,15 @@ def _read_regions(project: Path, path: Path) -> Any:
     return read_regions(path)
 
 
+def _read_camera_paths(project: Path, path: Path) -> Any:
+    from app.project.camera_paths import read_camera_paths
+
+    return [
+        (path.name, path.is_closed, [(key.frame, key.fov_y_rad, key.world_to_camera.tolist()) for key in path.keys])
+        for path in read_camera_paths(project)
+    ]
+
+
 def _read_curves(project: Path, path: Path) -> Any:
     from app.training.curves import read_curves
 
@@ -214,6 +225,7 @@ FILES: dict[str, tuple[str, Read, int]] = {
     "checkpoint": ("checkpoints/0001.safetensors", _read_checkpoint, 6),
     "project.json": ("project.json", _read_settings, 5),
     "gate.json": ("gate.json", _read_regions, 4),
+    "camera_paths.json": ("camera_paths.json", _read_camera_paths, 3),
     "curves": ("metrics/0000.jsonl", _read_curves, 4),
     "backgrounds": ("prep/backgrounds.safetensors", _read_backgrounds, 3),
     "first cloud": ("prep/first_cloud.safetensors", _read_cloud, 2),

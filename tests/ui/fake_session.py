@@ -24,11 +24,13 @@ from app.project.opening_answers import OpeningAnswers
 from app.project.recents import RecentProject
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
-from app.session import commands
+from app.session import commands, path_commands
 from app.session.calibration_page import CalibrationPage
 from app.session.doctor_status import DoctorStatus
+from app.session.edit_status import HistoryStatus, PathsStatus
 from app.session.marking import after_marking
 from app.session.notices import Notices
+from app.session.path_edits import edited
 from app.session.questions import OpeningPage, Question, RetrainQuestion
 from app.session.synchronisation_page import SynchronisationPage
 from app.status import (
@@ -195,6 +197,7 @@ class FakeSession:
             own_reasons=np.full(300, 255, np.uint8),
         )
         self.regions = RegionsStatus(why_not="Open a capture first.")
+        self.paths, self.history = PathsStatus(why_not="Open a capture first."), HistoryStatus()
         self.capture: FakeCapture | None = None
         self.rig: CameraRig = NO_CAMERAS
         self.clips: list[Clip] = []
@@ -272,6 +275,7 @@ class FakeSession:
         self.project_status = ProjectStatus("juggling", Path("/projects/juggling"), 1, len(self.clips))
         self.timeline = Timeline(self.clips, fps=capture.fps)
         self.views.look_at(capture.rig)
+        self.paths, self.history = PathsStatus(can_edit=True), HistoryStatus()
         self.regions = RegionsStatus(can_mark=True, effect="Marks apply to clips whose training starts from now on.")
 
     def dispatch(self, command: commands.Command) -> None:
@@ -313,6 +317,16 @@ class FakeSession:
                 self._set_regions(after_marking(self.regions.regions, [sphere]))
             case commands.RemoveRegion(index=index):
                 self._set_regions((*self.regions.regions[:index], *self.regions.regions[index + 1 :]))
+            case path_commands.ChooseCameraKey(index=index):
+                self.paths = replace(self.paths, chosen_key=index)
+            case path_commands.ChooseCameraPath(row=row):
+                self.paths = replace(self.paths, chosen=row, chosen_key=None)
+            case path_commands.LookAlongPath(is_on=is_on):
+                self.paths = replace(self.paths, along=self.views.current_index if is_on else None)
+            case _ if isinstance(command, path_commands.PathEdit):
+                result = edited(self.paths, command, self.view, self.timeline)
+                self.paths = PathsStatus(result.paths, result.chosen, result.chosen_key, can_edit=True)
+                self.history = HistoryStatus(undo=result.name)
             case commands.TrainClip(clip_index=clip_index, is_confirmed=False):
                 if self.clip_states[clip_index].state == "trained":
                     self.question = RetrainQuestion(clip_index, False, "", 29.7, (), None, True, None, None)
@@ -325,10 +339,15 @@ class FakeSession:
                 self.notices.dismiss(command.index)
 
     def _set_regions(self, regions: tuple[GateRegion, ...]) -> None:
-        self.regions = replace(self.regions, regions=regions, can_undo=True)
+        self.regions = replace(self.regions, regions=regions)
+        self.history = HistoryStatus(undo="mark a region")
 
     def poll(self) -> bool:
         """Nothing happens by itself here."""
+        return False
+
+    def lead_view(self) -> bool:
+        """The view goes nowhere by itself here."""
         return False
 
     def wake_by(self, wake: Callable[[], None]) -> None:

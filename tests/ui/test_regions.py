@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from pyglet.window import key
 
 from app.playback.scene_axes import rig_radius
-from app.session.commands import LookThrough, MarkRegion, RedoMark, RemoveRegion, UndoMark
+from app.session.commands import LookThrough, MarkRegion, Redo, RemoveRegion, Undo
+from app.session.edit_status import HistoryStatus
 from app.status import ClipStatus
 from tests.ui.fake_session import FakeSession, make_rig
 from tests.ui.pilot import CTRL, SHIFT, Pilot
@@ -139,15 +139,15 @@ def test_the_whole_job_by_keys_alone(pilot: Pilot) -> None:
     pilot.key(key.DELETE)
     assert pilot.sent(RemoveRegion) == [RemoveRegion(0)]
     pilot.key(key.Z, modifiers=(CTRL,))
-    assert len(pilot.sent(UndoMark)) == 1
+    assert len(pilot.sent(Undo)) == 1
     pilot.key(key.Z, modifiers=(CTRL, SHIFT))
-    assert pilot.sent(RedoMark) == [], "nothing was taken back yet"
-    pilot.session.regions = replace(pilot.session.regions, can_redo=True)
+    assert pilot.sent(Redo) == [], "nothing was taken back yet"
+    pilot.session.history = HistoryStatus(undo="mark a region", redo="mark a region")
     pilot.key(key.Z, modifiers=(CTRL, SHIFT))
     pilot.key(key.Y, modifiers=(CTRL,))
     pilot.click("regions.redo")
-    assert len(pilot.sent(RedoMark)) == 3
-    assert len(pilot.sent(UndoMark)) == 1
+    assert len(pilot.sent(Redo)) == 3
+    assert len(pilot.sent(Undo)) == 1
 
 
 def test_escape_leaves_without_marking_and_keys_of_choosing_do_nothing_then(pilot: Pilot) -> None:
@@ -226,7 +226,7 @@ def test_buttons_and_slider_of_the_panel(pilot: Pilot) -> None:
     pilot.draw(2)
     assert len(pilot.sent(MarkRegion)) == 1
     pilot.click("regions.undo")
-    assert len(pilot.sent(UndoMark)) == 1
+    assert len(pilot.sent(Undo)) == 1
 
 
 def test_the_list_highlights_and_removes(pilot: Pilot) -> None:
@@ -248,10 +248,11 @@ def test_the_list_highlights_and_removes(pilot: Pilot) -> None:
 
 def test_where_nothing_can_be_marked_it_says_why(pilot: Pilot, monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
-    monkeypatch.setattr("ui.panels.regions._warning", said.append)
+    monkeypatch.setattr("ui.panels.regions.text_warning", said.append)
     session = pilot.session
     session.dispatch(MarkRegion("static", (0.0, 0.0, 0.0), 0.2))
-    session.regions = dataclasses.replace(session.regions, can_mark=False, can_undo=False, why_not="It is locked.")
+    session.regions = dataclasses.replace(session.regions, can_mark=False, why_not="It is locked.")
+    session.history = HistoryStatus()
     session.commands.clear()
     begin(pilot)
     pilot.draw(2)

@@ -14,7 +14,7 @@ from engine.camera.rig import CameraRig
 from ui.gl.camera import NEAR, clip_matrix, uniform_matrix
 from ui.gl.shaders import load_program
 from ui.gl.targets import Target
-from ui.style.colors import CHOSEN, HELD_OUT
+from ui.style.colors import CHOSEN, HELD_OUT, Color
 
 LINES_PER_FRUSTUM = 10
 TRAINING_CAMERA_COLOR = (0.82, 0.85, 0.89, 1.0)
@@ -25,7 +25,12 @@ _FLOATS_PER_LINE = 14
 
 
 def frusta_lines(
-    rig: CameraRig, size: float, held_out: Collection[int] = (), *, chosen: int | None = None
+    rig: CameraRig,
+    size: float,
+    held_out: Collection[int] = (),
+    *,
+    chosen: int | None = None,
+    color: Color = TRAINING_CAMERA_COLOR,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Pyramids at the cameras, with a small roof above the picture's upper edge.
 
@@ -35,6 +40,7 @@ def frusta_lines(
             longer lenses are drawn longer and not wider, so that all pyramids look about equally large.
         held_out: Rows of the rig drawn in purple.
         chosen: Row drawn in yellow, whatever else it is.
+        color: Of all others.
     Returns:
         vertices: Two per line. [C * LINES_PER_FRUSTUM * 2, 3] float32
         colors: RGBA. [C * LINES_PER_FRUSTUM * 2, 4] float32
@@ -61,7 +67,7 @@ def frusta_lines(
     points = np.concatenate([rig.centers[:, None, :], points], axis=1)  # [C, 6, 3], 0 the centre, 5 the tip
     pairs = [(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1), (1, 5), (5, 2)]
     vertices = points[:, np.array(pairs).reshape(-1)]  # [C, 20, 3]
-    camera_colors = np.tile(np.array(TRAINING_CAMERA_COLOR, dtype=np.float32), (n_cameras, 1))
+    camera_colors = np.tile(np.array(color, dtype=np.float32), (n_cameras, 1))
     camera_colors[sorted(held_out)] = HELD_OUT_CAMERA_COLOR
     if chosen is not None:
         camera_colors[chosen] = CHOSEN_CAMERA_COLOR

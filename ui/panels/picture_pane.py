@@ -18,6 +18,8 @@ from ui.panels.comparison import covered_share, is_held, kind_words, missing_wor
 from ui.panels.gizmo import draw_gizmo, gizmo_rect
 from ui.panels.heat_overlay import HeatNeeds, HeatOverlay
 from ui.panels.hud import Hud, HudNeeds
+from ui.panels.key_grip import KeyGrip
+from ui.panels.key_words import key_words
 from ui.panels.panes import Panes, arrange
 from ui.panels.pointer import MOVING_S, Pointer
 from ui.panels.regions import draw_chosen_sphere
@@ -42,6 +44,7 @@ class PicturePane:
     def __init__(self, scene: Scene, heat: HeatOverlay) -> None:
         self.scene, self.heat = scene, heat
         self.pointer = Pointer()
+        self.keys = KeyGrip()
         self.hud = Hud()
         self._aimed_at = (0.0, 0.0)
         self._captured_frame: int | None = None
@@ -124,7 +127,8 @@ class PicturePane:
             ui.mark_rect("viewport.rendered", pane)
         density = imgui.get_io().display_framebuffer_scale.x
         view = self._scene_view(session, pane)
-        self.scene.marks.pixels_per_unit = density
+        self.scene.marks.pixels_per_unit = self.scene.path.pixels_per_unit = density
+        self.keys.follow(session, dispatch, ui, self.scene.path, self.pointer, view, pane, density)
         self._point_at_camera(session, ui, view, pane, density)
         if is_active:
             self._aim(session, ui, view, pane, density)
@@ -140,8 +144,11 @@ class PicturePane:
         if self.pointer.is_moving:
             ui.redraw_within(MOVING_S)
         elif imgui.is_item_hovered() and self.pointer.drag is None and not tool.is_active:
-            camera = self.scene.marks.pointed_camera
-            if camera is not None:
+            camera, key = self.scene.marks.pointed_camera, self.scene.path.pointed_key
+            if key is not None:
+                words = f"{key_words(session.paths, key)}\nDrag moves it, with Ctrl along the view"
+                _tooltip_beside(f"{words}; a double click goes there", area)
+            elif camera is not None:
                 is_held_out = " (held out)" if camera in session.holdout else ""
                 _tooltip_beside(f"Camera {session.rig.names[camera]}{is_held_out}\nClick to look through it", area)
             else:
@@ -187,7 +194,7 @@ class PicturePane:
 
     def _point_at_camera(self, session: PictureNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """The camera under the pointer stands out; one that was pressed is remembered for the click."""
-        is_free = imgui.is_item_hovered() and not ui.regions.is_active
+        is_free = imgui.is_item_hovered() and not ui.regions.is_active and self.scene.path.pointed_key is None
         is_pressing = imgui.is_item_activated() and self.pointer.button == imgui.MouseButton_.left
         marks = self.scene.marks
         if is_free and (is_pressing or (self.pointer.drag is None and not self.pointer.is_moving)):

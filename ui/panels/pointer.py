@@ -47,8 +47,8 @@ class Pointer:
     """The press and drag in progress over one picture.
 
     Attributes:
-        drag: What is being dragged: "view", "wipe", "gizmo", "nothing" after a double click, or "turn" once a press
-            that could have been a click has moved; None while nothing is.
+        drag: What is being dragged: "view", "wipe", "gizmo", "nothing" after a double click, "turn" once a press
+            that could have been a click has moved, or what somebody else took the press for; None while nothing is.
         button: imgui.MouseButton_ of the press.
         pressed_at: Where it was pressed, logical pixels.
         pressed_camera: The camera whose pyramid was pressed, until the release or a drag.
@@ -77,6 +77,11 @@ class Pointer:
     def note_moved(self) -> None:
         """The view was changed, by the pointer or by something else."""
         self._moved_s = time.perf_counter()
+
+    def take_press(self, drag: str) -> None:
+        """The press of this frame was on something that somebody else drags; nor is a second click meant for what lies
+        behind that."""
+        self.drag, self.pressed_camera, self._is_click_taken = drag, None, True
 
     def take_click(self) -> bool:
         """Was a place clicked? Once."""
@@ -202,9 +207,9 @@ class Pointer:
             session.overlays.wipe_position = min(max(share, 0.0), 1.0)
             imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
             return
-        if self.drag == "nothing":
+        if self.drag not in ("view", "gizmo", "turn"):
             return
-        if self.drag == "gizmo" and not self._is_beyond_click():
+        if self.drag == "gizmo" and not self.is_beyond_click():
             rect = gizmo_rect(area)
             tip = None if rect is None else tip_under(session.view, rect, *self.pressed_at)
             if is_over and tip is not None:
@@ -212,21 +217,21 @@ class Pointer:
                 self._show_move(ui)
             return
         if self.pressed_camera is not None:
-            if not self._is_beyond_click():
+            if not self.is_beyond_click():
                 if is_over:
                     self._is_click_taken = True
                     dispatch(LookThrough(self.pressed_camera))
                 return
             self.pressed_camera = None  # it became a drag
         if tool.is_active and self.button == int(imgui.MouseButton_.left) and self.drag == "view":
-            if not self._is_beyond_click():
+            if not self.is_beyond_click():
                 self.is_click = is_over
                 return
             self.drag = "turn"  # from here on it is not a click, even if it comes back
         if io.mouse_delta.x != 0.0 or io.mouse_delta.y != 0.0:
             self._move_view(session, dispatch, ui, pick, io.mouse_delta.x, io.mouse_delta.y)
 
-    def _is_beyond_click(self) -> bool:
+    def is_beyond_click(self) -> bool:
         """Has the press become a drag? It stays one when it comes back."""
         pointer, (x, y) = imgui.get_io().mouse_pos, self.pressed_at
         self._has_moved |= max(abs(pointer.x - x), abs(pointer.y - y)) >= CLICK_PX

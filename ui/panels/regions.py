@@ -7,11 +7,13 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.session.commands import RedoMark, RemoveRegion, UndoMark
+from app.session.commands import RemoveRegion
+from app.session.edit_status import HistoryStatus
 from app.status import RegionsStatus
 from engine.gate.regions import GateRegion
+from ui.panels.history_buttons import draw_history
 from ui.panels.state import REGIONS, Dispatch, Rect, UiState
-from ui.panels.widgets import chip, primary_button, text_right, text_wrapped_dim
+from ui.panels.widgets import chip, primary_button, text_right, text_warning, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
 from ui.style.palette import Palette
@@ -30,6 +32,9 @@ class RegionsNeeds(Protocol):
 
     @property
     def regions(self) -> RegionsStatus: ...
+
+    @property
+    def history(self) -> HistoryStatus: ...
 
 
 def begin_choosing(session: RegionsNeeds, ui: UiState) -> None:
@@ -57,33 +62,15 @@ def draw_regions(session: RegionsNeeds, dispatch: Dispatch, ui: UiState) -> None
         imgui.end_disabled()
         imgui.set_item_tooltip("M")
         if status.why_not:
-            _warning(status.why_not)
+            text_warning(status.why_not)
     imgui.spacing()
     _draw_list(status, dispatch, ui)
-    imgui.begin_disabled(not status.can_undo)
-    if imgui.button(f"{Icon.UNDO}  Undo"):
-        dispatch(UndoMark())
-    ui.mark("regions.undo")
-    imgui.end_disabled()
-    imgui.set_item_tooltip("Takes back the last mark or removal (Ctrl+Z)")
-    imgui.same_line()
-    imgui.begin_disabled(not status.can_redo)
-    if imgui.button(f"{Icon.LOOP}  Redo"):
-        dispatch(RedoMark())
-    ui.mark("regions.redo")
-    imgui.end_disabled()
-    imgui.set_item_tooltip("Does again what was taken back (Ctrl+Shift+Z or Ctrl+Y)")
+    draw_history(session.history, dispatch, ui, "regions")
     imgui.spacing()
     if status.effect:
         text_wrapped_dim(status.effect)
         if "again" in status.effect:
             text_wrapped_dim("To train a clip again, right-click it in the timeline.")
-
-
-def _warning(text: str) -> None:
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text_colored(ImVec4(*theme.ORANGE), f"{Icon.WARNING}  {text}")
-    imgui.pop_text_wrap_pos()
 
 
 def _draw_choice(ui: UiState) -> None:

@@ -21,11 +21,12 @@ from ui.panels.timeline.view_state import TimelineView
 from ui.panels.wishes import Wishes
 from ui.style.fonts import Fonts
 from ui.style.ui_scale import UiScale
+from ui.viewport.path_tool import PathTool
 from ui.viewport.region_tool import RegionTool
 
 VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
-RESIDUALS, LOG, DOCTOR = "Residuals", "Log", "Capture doctor"
-PANELS = (CAPTURE, TRAINING, REGIONS, RESIDUALS, TIMELINE, LOG, DOCTOR)
+RESIDUALS, LOG, DOCTOR, PATHS = "Residuals", "Log", "Capture doctor", "Camera path"
+PANELS = (CAPTURE, TRAINING, REGIONS, RESIDUALS, PATHS, TIMELINE, LOG, DOCTOR)
 """Titles of the panels around the picture."""
 LAYOUT_WORDS = {"Standard": "as in the beginning", "Long capture": "with a tall timeline, for long captures"}
 LAYOUTS = tuple(LAYOUT_WORDS)
@@ -72,6 +73,7 @@ class UiState:
         keyed_panel: Title of the panel that arrow keys, Enter and Space belong to, or None.
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
         regions: The region that is being chosen, and the one that stands out.
+        paths: What is being done to the keys of the camera path.
         navigation: What mouse and keys do over a picture.
         curves: What the plots of the training panel show.
         queue_chosen: The waiting clip that keys move; None without one.
@@ -94,6 +96,7 @@ class UiState:
     wishes: Wishes = field(default_factory=Wishes)
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
+    paths: PathTool = field(default_factory=PathTool)
     navigation: Navigation = field(default_factory=Navigation)
     pointed_anchor: np.ndarray | None = None
     is_view_popup_wanted: bool = False

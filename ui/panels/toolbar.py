@@ -121,6 +121,7 @@ def _draw_overlay_menu(session: ToolbarNeeds, dispatch: Dispatch, ui: UiState) -
         ("show_regions", "Marked regions", "5"),
         ("show_coverage", "Covered by inherited anchors", "9"),
         ("show_trails", "Trails of what moves", "0"),
+        ("show_paths", "Camera path", "Shift+P"),
     )
     for name, label, key_label in rows:
         if imgui.menu_item(label, key_label, bool(getattr(session.overlays, name)), True)[0]:

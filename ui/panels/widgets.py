@@ -36,6 +36,13 @@ def text_wrapped(text: str) -> None:
     imgui.pop_text_wrap_pos()
 
 
+def text_warning(text: str) -> None:
+    """What is in the way, wrapped at the panel's edge."""
+    imgui.push_text_wrap_pos(0.0)
+    imgui.text_colored(ImVec4(*theme.ORANGE), f"{theme.Icon.WARNING}  {text}")
+    imgui.pop_text_wrap_pos()
+
+
 def primary_button(label: str, size: ImVec2, ui: UiState) -> bool:
     """The one button of a panel that the user most likely wants."""
     imgui.push_style_color(imgui.Col_.button, ImVec4(*theme.SKY))

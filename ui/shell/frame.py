@@ -21,6 +21,7 @@ from app.session.window_memory import WindowMemory
 from ui.gl import ImageTexture, free_dropped, n_changes
 from ui.panels.actions.key_map import KeyMap
 from ui.panels.actions.table import ACTIONS, handle_keys
+from ui.panels.camera_path import PathPanelNeeds, draw_paths
 from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.doctor.panel import DoctorNeeds, DoctorPanel
 from ui.panels.heat_overlay import HeatOverlay
@@ -36,6 +37,7 @@ from ui.panels.state import (
     DOCTOR,
     LAYOUTS,
     LOG,
+    PATHS,
     REGIONS,
     RESIDUALS,
     TIMELINE,
@@ -103,6 +105,7 @@ class FrameNeeds(
     LogNeeds,
     ResidualsNeeds,
     DoctorNeeds,
+    PathPanelNeeds,
     Protocol,
 ):
     """Everything that the window and its panels use of a session."""
@@ -110,6 +113,8 @@ class FrameNeeds(
     def dispatch(self, command: Command) -> None: ...
 
     def poll(self) -> bool: ...
+
+    def lead_view(self) -> bool: ...
 
 
 def _recover(stack: imgui.internal.ErrorRecoveryState) -> None:
@@ -198,6 +203,7 @@ class Frame:
             (TRAINING, draw_training, True),
             (REGIONS, draw_regions, True),
             (RESIDUALS, self.residuals.draw, True),
+            (PATHS, draw_paths, True),
             (TIMELINE, draw_timeline, True),
             (LOG, self.log.draw, True),
             (DOCTOR, self.doctor.draw, True),
@@ -231,6 +237,7 @@ class Frame:
             session.dispatch(SetFrameMemory(self._cache_mb))
         self.remembering.follow(session)
         has_news |= session.timeline.tick(min(dt_s, MAX_TICK_S), is_shown=self.viewport.shows_playhead(session))
+        has_news |= session.lead_view()
         self._has_news |= has_news or self.viewport.has_news(session)
         if not self._redraw.is_due and (self.backend.needs_follow_up or self._is_news_due()):
             self._redraw.request(1)

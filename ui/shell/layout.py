@@ -9,10 +9,17 @@ from collections.abc import Mapping
 
 from imgui_bundle import ImVec2, imgui
 
-from ui.panels.state import CAPTURE, DOCTOR, LAYOUTS, LOG, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT
+from ui.panels.state import CAPTURE, DOCTOR, LAYOUTS, LOG, PATHS, REGIONS, RESIDUALS, TIMELINE, TRAINING, VIEWPORT
 
 SIDE = (236.0, 0.0)
-SMALLEST = {CAPTURE: (176.0, 0.0), TRAINING: SIDE, REGIONS: SIDE, RESIDUALS: SIDE, TIMELINE: (0.0, 140.0)}
+SMALLEST = {
+    CAPTURE: (176.0, 0.0),
+    TRAINING: SIDE,
+    REGIONS: SIDE,
+    RESIDUALS: SIDE,
+    PATHS: (176.0, 0.0),
+    TIMELINE: (0.0, 140.0),
+}
 """Width and height of docked panels, units. The timeline has its buttons, ruler and bands at this height."""
 SMALLEST_PICTURE = (300.0, 150.0)
 TALL_TIMELINE = 0.4
@@ -22,7 +29,8 @@ WIDE_UNITS = 1240.0
 
 
 def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
-    """Capture left, training, regions and residuals right, timeline, log and doctor below, the picture in the rest.
+    """Capture and camera path left, training, regions and residuals right, timeline, log and doctor below, the
+    picture in the rest.
 
     Args:
         name: One of LAYOUTS; others are laid out as the first.
@@ -43,6 +51,7 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
     _, right, middle = internal.dock_builder_split_node_py(rest, imgui.Dir.right, right_share)
     for title, node_id in (
         (VIEWPORT, middle),
+        (PATHS, left),
         (CAPTURE, left),
         (TRAINING, right),
         (REGIONS, right),

@@ -34,5 +34,7 @@ REGION_COLORS = {"static": SKY, "dynamic": VERMILLION}
 """Regions that the user marks, like the anchors they make; drawn with whole lines and with dashes."""
 HELD_OUT = PURPLE
 """Cameras that training never sees."""
+PATH: Color = rgb(64, 201, 143)
+"""The camera path that is edited; its keys are diamonds."""
 CHOSEN = YELLOW
 """The camera that is looked through, and anchors in a region that is being chosen."""

@@ -1,5 +1,5 @@
 """What the viewport shows, drawn off screen into one texture: splats, or the CPU rasterizer's picture, or the cloud,
-with camera frusta and anchors on top.
+with camera frusta, anchors, regions and the camera path on top.
 
 On a graphics card the Gaussians are drawn as splats. On software GL the session's own rasterizer is several times
 faster, so its picture is uploaded instead. Redrawn only when the key of what it shows changes. Knows no ImGui.
@@ -36,6 +36,7 @@ from ui.viewport.anchor_marks import nearest_under
 from ui.viewport.explaining_layer import ExplainingLayer, ExplainingNeeds
 from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
 from ui.viewport.mark_layer import AnchorCounts, MarkLayer, MarkNeeds
+from ui.viewport.path_layer import PathLayer, PathNeeds
 from ui.viewport.picture_size import MAX_PICTURE_WIDTH, MovingSize, picture_size
 from ui.viewport.region_layer import RegionLayer, ShownRegions
 
@@ -47,7 +48,7 @@ _CLOUD_KINDS = {"static": CLOUD, "moment": FIRST_CLOUD, "pictures": HINT}
 NO_REGIONS = ShownRegions()
 
 
-class SceneNeeds(MarkNeeds, AnchorHeatNeeds, ExplainingNeeds, Protocol):
+class SceneNeeds(MarkNeeds, AnchorHeatNeeds, ExplainingNeeds, PathNeeds, Protocol):
     """What the picture is made from."""
 
     @property
@@ -147,6 +148,7 @@ class Scene:
         self._cloud = PointRenderer(ctx)
         self.marks = MarkLayer(ctx)
         self.regions = RegionLayer(ctx)
+        self.path = PathLayer(ctx)
         self._anchor_heat = AnchorHeatLayer(ctx)
         self.explaining = ExplainingLayer(ctx)
         self._drawn_key: Hashable = None
@@ -173,6 +175,7 @@ class Scene:
             self._cloud,
             self.marks,
             self.regions,
+            self.path,
             self._anchor_heat,
             self.explaining,
         )
@@ -251,7 +254,14 @@ class Scene:
             # Nothing to draw over it: each pass over all pixels that is saved is milliseconds without a graphics card.
             self._drawn_key = self._held = None
             return Composed(self._picture.texture, shown)
-        over_key = (marks_key, regions_key, explaining_key, heat_key, session.overlays.heat_opacity)
+        over_key = (
+            marks_key,
+            regions_key,
+            explaining_key,
+            heat_key,
+            self.path.take(session),
+            session.overlays.heat_opacity,
+        )
         key = (view.key, base_key, points_key, captured_key, over_key)
         if key != self._drawn_key or self._splats.is_order_stale:
             self._drawn_key, self._held = key, held
@@ -263,7 +273,7 @@ class Scene:
     def _has_no_marks(self, session: SceneNeeds, regions: ShownRegions) -> bool:
         """Is nothing to be drawn over the picture?"""
         are_empty = regions.is_empty and self.explaining.is_empty and self._anchor_heat.is_empty
-        return are_empty and self.marks.is_empty(session)
+        return are_empty and self.marks.is_empty(session) and self.path.is_empty(session)
 
     def captured(self, session: SceneNeeds, width_px: int) -> CapturedPicture | None:
         """What the camera looked through took at the playhead's frame, or at another one until that was decoded; None
@@ -446,6 +456,7 @@ class Scene:
         self.explaining.draw(target, view, self.marks.pixels_per_unit)
         self.marks.draw(target, view, session)
         self.regions.draw(target, view.camera)
+        self.path.draw(target, view, session)
         target.resolve(BACKGROUND)
 
     def _cloud_point_px(self, view: SceneView) -> float:

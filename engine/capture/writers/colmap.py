@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from engine.camera.rotations import quats_of
 from engine.capture.colmap.camera_models import MODELS, model_of
 from engine.capture.format_result import Layout
 from engine.capture.frames import ImageFrames
@@ -41,9 +42,7 @@ def write_colmap(layout: Layout, folder: Path, points: CapturePoints | None, *, 
     model_folder = folder / MODEL_FOLDER
     model_folder.mkdir(parents=True, exist_ok=True)
     names = _image_names(layout, folder)
-    poses = [
-        (rotation_quaternion(entry.world_to_camera[:3, :3]), entry.world_to_camera[:3, 3]) for entry in layout.cameras
-    ]
+    poses = [(quats_of(entry.world_to_camera[:3, :3]), entry.world_to_camera[:3, 3]) for entry in layout.cameras]
     if is_binary:
         _write_binary(model_folder, layout, cameras, poses, names)
     else:
@@ -51,25 +50,6 @@ def write_colmap(layout: Layout, folder: Path, points: CapturePoints | None, *, 
     cloud = points or CapturePoints(np.zeros((0, 3)), None)
     write_colmap_points(model_folder, cloud, is_binary=is_binary)
     return model_folder
-
-
-def rotation_quaternion(rotation: np.ndarray) -> np.ndarray:
-    """Unit quaternion w x y z, w not negative, of a rotation [3, 3]. [4]"""
-    diagonal = np.diag(rotation)
-    squares = 1.0 + np.array([diagonal.sum(), *(2.0 * diagonal - diagonal.sum())])
-    largest = int(squares.argmax())  # divided by: never a small one
-    (_, xy, xz), (yx, _, yz), (zx, zy, _) = rotation
-    products = np.array(
-        [
-            [squares[0], zy - yz, xz - zx, yx - xy],
-            [zy - yz, squares[1], xy + yx, xz + zx],
-            [xz - zx, xy + yx, squares[2], yz + zy],
-            [yx - xy, xz + zx, yz + zy, squares[3]],
-        ]
-    )
-    quaternion = products[largest] / (2.0 * np.sqrt(squares[largest]))
-    quaternion /= np.linalg.norm(quaternion)
-    return -quaternion if quaternion[0] < 0 else quaternion
 
 
 def _image_names(layout: Layout, folder: Path) -> list[str]:

@@ -11,6 +11,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from engine.errors import ProjectError
 from engine.export.formats.damaged import damaged
 from engine.export.packing import as_levels
 from engine.export.splats import Splats, colors_of
@@ -21,13 +22,22 @@ _MAGIC, _VERSION, _JSON, _BIN = 0x46546C67, 2, 0x4E4F534A, 0x004E4942
 _FLOAT, _BYTE, _ARRAY_BUFFER, _POINTS = 5126, 5121, 34962, 0
 _Y_UP = (0.0, 1.0, 0.0)
 _MAX_JSON_BYTES = 1 << 20
+_MOST_BYTES = (1 << 32) - _MAX_JSON_BYTES - 64
 _KINDS = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 
 
 def write(splats: Splats, file: BinaryIO) -> tuple[str, ...]:
-    """One node with one mesh of points; an empty scene where there are no Gaussians, as glTF has no empty mesh."""
+    """One node with one mesh of points; an empty scene where there are no Gaussians, as glTF has no empty mesh.
+
+    Raises:
+        ProjectError: More than 4 GiB.
+    """
     columns = _columns(splats) if len(splats) else {}
     document = _document(splats, columns)
+    if sum(column.nbytes for column in columns.values()) > _MOST_BYTES:
+        raise ProjectError(
+            f"{len(splats):,} Gaussians are more than a .glb holds.", hint="Export a part, or choose another format."
+        )
     text = json.dumps(document, separators=(",", ":")).encode("ascii")
     text += b" " * (-len(text) % 4)
     data = b"".join(np.ascontiguousarray(column).tobytes() for column in columns.values())

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from engine.camera.corrections import corrected
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
-from engine.clip_files.array_names import GAINS
+from engine.clip_files.array_names import CORRECTIONS, GAINS
 from engine.clip_files.clip_state import ClipState
 from engine.model.camera_colors import CameraColors
 from engine.model.clip_model import ClipModel
@@ -47,7 +48,8 @@ class TrainedClip:
         gains = base.arrays.get(GAINS)
         if gains is None or len(gains) != len(base.header.camera_names):
             return None
-        return cls(clip, model, ClipState({GAINS: gains}, base.header), state.drift)  # the rest of it is not needed
+        needed = {name: base.arrays[name] for name in (GAINS, CORRECTIONS) if name in base.arrays}
+        return cls(clip, model, ClipState(needed, base.header), state.drift)
 
     @property
     def colors(self) -> CameraColors:
@@ -80,8 +82,13 @@ class TrainedClip:
         """How far Gaussians are expected from their anchors, scene units."""
         return REACH_SPACINGS * self.base.header.spacing
 
+    def rig(self, rig: CameraRig) -> CameraRig:
+        """The capture's cameras as the clip was trained with them; the same object where none was corrected."""
+        return corrected(rig, self.base.header.camera_names, self.base.corrections)
+
     def view(self, rig: CameraRig, camera: int) -> View:
-        """What a camera of the rig looks at."""
+        """What a camera of the capture's rig looks at, corrected where it was refined in training."""
+        rig = self.rig(rig)
         width, height = (int(v) for v in rig.image_sizes[camera])
         near_plane = self.base.header.near_plane
         return View.from_arrays(

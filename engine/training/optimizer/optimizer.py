@@ -22,12 +22,12 @@ _HEADS = ("opacity", "color", "shape", "offset")
 
 
 def named_parameters(
-    model: ClipModel, gains: nn.Parameter, config: TrainConfig
+    model: ClipModel, gains: nn.Parameter, config: TrainConfig, corrections: nn.Parameter | None = None
 ) -> dict[str, tuple[nn.Parameter, float]]:
     """Trainable parameters by name with their initial rate; frozen ones are left out altogether."""
     chosen: dict[str, tuple[nn.Parameter, float]] = {}
 
-    def add(name: str, parameter: Tensor, rate: float) -> None:
+    def add(name: str, parameter: Tensor | None, rate: float) -> None:
         if isinstance(parameter, nn.Parameter) and parameter.requires_grad and parameter.numel():
             chosen[name] = (parameter, rate)
 
@@ -45,6 +45,7 @@ def named_parameters(
         add("field.hidden", model.field.hidden.weight, config.field_mlp_lr)
         add("field.out", model.field.out.weight, config.field_mlp_lr)
     add("gains", gains, config.gain_lr)
+    add("cameras", corrections, config.camera_lr)
     return chosen
 
 

@@ -58,6 +58,7 @@ from engine.training.preparation.light import brightness_in, measure_light
 from engine.training.preparation.method import Method
 from engine.training.preparation.stages import Stages
 from engine.training.preparation.training_pictures import TrainingPictures
+from engine.training.step.training_cameras import TrainingCameras
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +96,7 @@ class ClipPreparation:
         method: All decisions.
         backend: What the model is made for and drawn with.
         camera_indices: Training cameras, in capture numbering.
-        views: Of these cameras.
+        cameras: The same, as they are by now.
         base: What the clip inherits from; None for a reference clip.
         previous: The clip before, finished, for a method that goes on from it.
         regions: Where the user overrules the gate.
@@ -114,7 +115,7 @@ class ClipPreparation:
         *,
         backend: Backend,
         camera_indices: Sequence[int],
-        views: Sequence[View],
+        cameras: TrainingCameras,
         base: ClipState | None,
         previous: ClipState | None,
         regions: Sequence[GateRegion],
@@ -124,8 +125,7 @@ class ClipPreparation:
         report: ReportProgress,
     ) -> None:
         self._capture, self._clip, self._config, self._method = capture, clip, config, method
-        self._camera_indices, self._views = list(camera_indices), list(views)
-        self._rig = capture.rig.subset(self._camera_indices)
+        self._camera_indices, self._cameras = list(camera_indices), cameras
         self._base, self._previous, self._regions = base, previous, tuple(regions)
         self._seed, self._generator = seed, generator
         self._backend, self._prep_dir, self._report = backend, prep_dir, report
@@ -139,7 +139,7 @@ class ClipPreparation:
         """
         self._report(Progress("Reading pictures", 0.0))
         pictures = TrainingPictures(self._capture, self._clip, self._camera_indices)
-        view = self._views[0]
+        view = self._cameras.first_views[0]
         size_mb = len(pictures) * view.width * view.height * 3 / 1e6
         self._say("Reading pictures", f"{len(pictures)} pictures, {size_mb:.0f} MB")
         return pictures
@@ -180,7 +180,7 @@ class ClipPreparation:
             ProjectError: The reference was trained with other cameras, or the field before cannot go on.
         """
         gains = self._gains(reference.arrays["gains"].copy(), is_learning=False)
-        if reference.header.camera_names != list(self._rig.names):
+        if reference.header.camera_names != list(self._cameras.rig.names):
             raise ProjectError(
                 "The training cameras differ from those of the reference clip.",
                 hint="Use the same hold-out for every clip of a project.",
@@ -198,7 +198,7 @@ class ClipPreparation:
             model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing)
-        measure_light(model, pictures, self._rig, backgrounds, exposures, self._report)
+        measure_light(model, pictures, self._cameras.rig, backgrounds, exposures, self._report)
         cloud, moving_spacing = self._moving_cloud(parts, pictures, self._motion_masks(parts, pictures))
         coverage = add_residual(model, cloud, self._config, self._method.choose_residual)
         self._method.adapt(model, self._config)
@@ -229,8 +229,8 @@ class ClipPreparation:
 
         return {
             "capture": self._capture.part_key,
-            "size": [int(side) for side in self._rig.image_sizes[0]],
-            "cameras": list(self._rig.names),
+            "size": [int(side) for side in self._cameras.rig.image_sizes[0]],
+            "cameras": list(self._cameras.rig.names),
             "came_along": came_along(self._capture.layout),
             "frames": [self._clip.start, self._clip.n_frames, self._clip.clip_length],
             "config": self._config.difference(),
@@ -291,7 +291,7 @@ class ClipPreparation:
 
     def _render_static(self, model: ClipModel, gains: nn.Parameter) -> Callable[[int], np.ndarray]:
         """Camera row to the static anchors alone in that camera's colours. [H, W, 3] float32 in 0..1"""
-        return lambda camera_row: _render_static(model, self._views[camera_row], gains[camera_row])
+        return lambda camera_row: _render_static(model, self._cameras.view(camera_row), gains[camera_row])
 
     def _key_of_corrected(self) -> dict:
         return key_of_corrected(self._capture, self._camera_indices, self._config)
@@ -299,7 +299,7 @@ class ClipPreparation:
     def _static_cloud(self, backgrounds: Backgrounds, keep: Keep) -> StaticCloud:
         is_valid = self._capture.valid_of(self._camera_indices)
         layout = self._capture.layout
-        cloud = static_cloud(backgrounds, self._rig, is_valid, self._config, self._report, keep, layout)
+        cloud = static_cloud(backgrounds, self._cameras.rig, is_valid, self._config, self._report, keep, layout)
         if len(cloud.points) == 0:
             raise PreparationError(
                 "No static point was found by any two cameras.",
@@ -313,7 +313,7 @@ class ClipPreparation:
     def _motion_masks(self, parts: ClipParts, pictures: TrainingPictures) -> np.ndarray:
         """What moves in each picture. [M, C, H, W] bool"""
         keep = self._keep_after(parts.model, parts.gains, parts.backgrounds)
-        brightness = brightness_in(parts.model, self._views) if parts.model.has_light else None
+        brightness = brightness_in(parts.model, self._cameras.views) if parts.model.has_light else None
         return motion_masks(pictures, parts.backgrounds, brightness, self._report, keep)
 
     def _moving_cloud(
@@ -327,7 +327,7 @@ class ClipPreparation:
         cloud = moving_cloud(
             pictures,
             masks,
-            self._rig,
+            self._cameras.rig,
             gains,
             static_points,
             self._config,

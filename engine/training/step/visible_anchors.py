@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import torch
 from torch import Tensor
 
 from engine.camera.rig import CameraRig
 from engine.model.clip_model import ClipModel
-from engine.model.clip_view import View, reaches
+from engine.model.clip_view import View, reaches_of
 
 
 def camera_views(rig: CameraRig, *, near_plane: float) -> list[View]:
@@ -28,10 +28,25 @@ class Sight:
         model: Its sets must stay as they are; another one is needed where anchors come, go or become dynamic.
         views: Of the training cameras.
         reach: How far beyond its anchor a Gaussian may lie, scene units; farther where anchors are larger.
+        reaches: The same anchor by anchor, where that was decided before: sizes are learned, and what a camera can see
+            stays as it was when a phase began. By role, [A] each; those that do not fit the model are decided anew.
     """
 
-    def __init__(self, model: ClipModel, views: Sequence[View], *, reach: float) -> None:
-        self._model, self._views, self._reach = model, list(views), reach
+    def __init__(
+        self,
+        model: ClipModel,
+        views: Sequence[View],
+        *,
+        reach: float,
+        reaches: Mapping[str, Tensor] | None = None,
+    ) -> None:
+        self._model, self._views = model, list(views)
+        self.reaches: dict[str, Tensor] = {}
+        for role in model.roles():
+            anchors, known = model.anchor_set(role), (reaches or {}).get(role)
+            if known is None or known.shape != (len(anchors),):
+                known = reaches_of(anchors, reach)
+            self.reaches[role] = known
         self._seen: dict[tuple[str, int], Tensor] = {}  # rows of static sets, flags of dynamic ones
         self._present: dict[str, Tensor] = {}  # of dynamic sets, a row a frame; [M, A]
 
@@ -41,8 +56,7 @@ class Sight:
         for role in self._model.roles():
             key, anchors = (role, camera_row), self._model.anchor_set(role)
             if key not in self._seen:
-                reach = reaches(anchors, self._reach)
-                is_seen = self._views[camera_row].sees(anchors.positions, reach=reach)
+                is_seen = self._views[camera_row].sees(anchors.positions, reach=self.reaches[role])
                 self._seen[key] = is_seen if anchors.is_dynamic else is_seen.nonzero()[:, 0]
             rows[role] = self._seen[key]
             if anchors.presence is not None:

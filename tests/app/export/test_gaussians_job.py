@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +22,7 @@ from engine.errors import DiskError, ProjectError
 from engine.export.formats.table import FORMATS, Format
 from engine.export.splats import Splats
 from tests.engine.export.scenes import order_of
+from tests.faults.full_disk import can_mount, full_disk
 
 
 def quiet(progress: ExportProgress) -> None:
@@ -166,7 +168,7 @@ def test_frames_are_told_as_they_are_done_and_few_scenes_are_kept(
     monkeypatch.setattr(gaussian_sequence, "_MOST_WRITERS", 1)
     told: list[ExportProgress] = []
     run(opened, GaussiansJob(tmp_path / "out", "ply"), told.append)
-    assert [(progress.n_done, progress.n_all) for progress in told] == [(n, 6) for n in range(7)]
+    assert [(progress.n_done, progress.n_all) for progress in told] == [(n, 6) for n in (0, *range(7))]
 
 
 # ---------------------------------------------------------------- what goes wrong
@@ -211,6 +213,26 @@ def test_a_disk_that_fills_up_leaves_nothing(opened: TrainedProject, tmp_path: P
     with pytest.raises(DiskError, match="No space left on device"):
         run(opened, GaussiansJob(tmp_path / "out"), quiet)
     assert names(tmp_path) == before
+
+
+@pytest.mark.skipif(not can_mount(), reason="needs root, to mount a small disk")
+def test_a_real_disk_that_somebody_fills_meanwhile(opened: TrainedProject, tmp_path: Path):
+    (tmp_path / "disk").mkdir()
+    with full_disk(tmp_path / "disk", 20_000) as disk:
+
+        def fill() -> None:
+            with suppress(OSError), (disk / "other").open("wb", buffering=0) as file:
+                while file.write(bytes(1 << 12)):
+                    pass
+
+        with pytest.raises(DiskError, match="No space left on device"):
+            run(opened, GaussiansJob(disk / "out"), at_frame(3, fill))
+        assert names(disk) == ["other"]
+        with pytest.raises(ProjectError, match="are free"):
+            run(opened, GaussiansJob(disk / "out"), quiet)
+        (disk / "other").unlink()
+        run(opened, GaussiansJob(disk / "out"), quiet)
+        assert len(names(disk / "out")) == 7
 
 
 def test_untrained_clips_are_named_before_anything_is_made(opened: TrainedProject, tmp_path: Path):
@@ -270,6 +292,13 @@ def test_a_file_that_does_not_look_like_the_scene_is_a_warning(
     assert 10 < result.psnr_db < 50
     (warning,) = [line for line in result.lines if line.startswith("Warning")]
     assert "At least 50 dB were expected of .ply" in warning
+
+
+def test_many_measured_files_are_one_line(opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(gaussian_sequence, "_MOST_LINES", 2)
+    lines = run(opened, GaussiansJob(tmp_path / "out"), quiet).lines
+    assert len(lines) == 2
+    assert lines[1].startswith("3 files were read back; the worst is p_0000.ply: 100.0 dB")
 
 
 def test_large_pictures_are_compared_smaller(opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

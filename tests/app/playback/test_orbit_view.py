@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.playback.orbit_view import OrbitView
-from app.playback.scene_axes import rig_up
 from engine.camera.rig import CameraRig
 from tests.app.fakes import look_at, ring
 
@@ -84,7 +83,7 @@ def test_home_is_level_for_a_dome():
 
 
 def test_up_comes_from_the_cameras():
-    assert np.allclose(rig_up(make_rig()), [0, 0, 1], atol=1e-12)
+    assert np.allclose(make_rig().up_direction(), [0, 0, 1], atol=1e-12)
 
 
 def test_panning_moves_the_pivot_with_the_pointer():

@@ -30,7 +30,7 @@ def ready(session):
 
 
 def on_disk(session) -> tuple[GateRegion, ...]:
-    session.marking.settle()
+    session.marking.document.settle()
     return open_project(session.project.folder, is_writable=False).gate_regions()
 
 
@@ -99,47 +99,47 @@ def test_regions_come_back_when_the_project_is_opened_again(make_session):
     first.close()  # right away: nothing marked may be lost
     again = ready(make_session())
     assert again.regions.regions == (BALL,)
-    assert not again.regions.can_undo
+    assert not again.history.undo
 
 
 def test_removing_and_taking_back(make_session):
     session = ready(make_session())
-    session.dispatch(c.UndoMark())  # nothing to take back
+    session.dispatch(c.Undo())  # nothing to take back
     for command, expected in (
         (MARK_BALL, (BALL,)),
         (MARK_OTHER, (BALL, OTHER)),
         (c.RemoveRegion(0), (OTHER,)),
-        (c.UndoMark(), (BALL, OTHER)),
-        (c.UndoMark(), (BALL,)),
+        (c.Undo(), (BALL, OTHER)),
+        (c.Undo(), (BALL,)),
         (MARK_OTHER, (BALL, OTHER)),
-        (c.UndoMark(), (BALL,)),
-        (c.UndoMark(), ()),
+        (c.Undo(), (BALL,)),
+        (c.Undo(), ()),
     ):
-        assert session.regions.can_undo == (command != MARK_BALL)
+        assert bool(session.history.undo) == (command != MARK_BALL)
         session.dispatch(command)
         assert session.regions.regions == expected
         assert on_disk(session) == expected
-    assert not session.regions.can_undo
+    assert not bool(session.history.undo)
     assert len(session.notices) == 0
 
 
 def test_what_was_taken_back_is_done_again_until_something_else_is(make_session):
     session = ready(make_session())
-    session.dispatch(c.RedoMark())  # nothing was taken back
+    session.dispatch(c.Redo())  # nothing was taken back
     for command, expected, can_redo in (
         (MARK_BALL, (BALL,), False),
         (MARK_OTHER, (BALL, OTHER), False),
-        (c.UndoMark(), (BALL,), True),
-        (c.UndoMark(), (), True),
-        (c.RedoMark(), (BALL,), True),
-        (c.RedoMark(), (BALL, OTHER), False),
-        (c.UndoMark(), (BALL,), True),
+        (c.Undo(), (BALL,), True),
+        (c.Undo(), (), True),
+        (c.Redo(), (BALL,), True),
+        (c.Redo(), (BALL, OTHER), False),
+        (c.Undo(), (BALL,), True),
         (c.RemoveRegion(0), (), False),
-        (c.UndoMark(), (BALL,), True),
+        (c.Undo(), (BALL,), True),
     ):
         session.dispatch(command)
         assert session.regions.regions == expected
-        assert session.regions.can_redo == can_redo
+        assert bool(session.history.redo) == can_redo
         assert on_disk(session) == expected
     assert len(session.notices) == 0
 
@@ -199,7 +199,7 @@ def test_a_damaged_file_is_told_and_not_written_over(make_session):
     assert not session.regions.can_mark
     assert "is not a region" in session.regions.why_not
     session.dispatch(MARK_BALL)
-    session.marking.settle()
+    session.marking.document.settle()
     assert path.read_text() == '{"regions": [{"treat": "static"}]}'
 
 
@@ -244,7 +244,7 @@ def test_another_capture_brings_its_own_regions(make_session, tmp_path, capture_
     session.dispatch(c.OpenProject(folder))
     poll_until(session, lambda: session.project.folder == folder and session.regions.can_mark, what="the other one")
     assert session.regions.regions == (OTHER,)
-    assert not session.regions.can_undo
+    assert not bool(session.history.undo)
     assert open_project(tmp_path / "p", is_writable=False).gate_regions() == (BALL,)
 
 

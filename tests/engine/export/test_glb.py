@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from engine.errors import ProjectError
 from engine.export.formats import glb
 from engine.export.splats import Splats
 from engine.export.world import AXES, world
@@ -123,6 +124,12 @@ def test_the_scene_stands_upright_in_gltf(up: str | None):
     turned = Rotation.from_quat(node["rotation"]).apply(splats.up)
     np.testing.assert_allclose(turned, [0.0, 1.0, 0.0], atol=1e-6)
     np.testing.assert_allclose(np.linalg.norm(node["rotation"]), 1.0, atol=1e-9)
+
+
+def test_more_than_4_gib_are_an_error(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(glb, "_MOST_BYTES", 5000)
+    with pytest.raises(ProjectError, match="100 Gaussians are more than"):
+        glb.write(chance_splats(100), io.BytesIO())
 
 
 def test_no_gaussians_are_an_empty_scene():

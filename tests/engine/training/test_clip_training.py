@@ -20,6 +20,7 @@ from engine.metrics.clips.evaluate import Evaluation
 from engine.metrics.clips.summary import means
 from engine.metrics.clips.trained_clip import TrainedClip
 from engine.model.clip_model import load_clip_model
+from engine.model.clip_view import reaches_of
 from engine.training.checkpoint import read_checkpoint
 from engine.training.clip_training import ClipTraining
 from engine.training.config import TrainConfig
@@ -318,3 +319,19 @@ def test_gate_off_gives_every_anchor_a_dynamic_feature_at_every_time(setting, tm
     n_anchors = sum(len(model.anchor_set(role)) for role in model.roles())
     assert len(model.decode(0.0)) == n_anchors * config.gaussians_per_anchor
     assert torch.isfinite(model.decode(0.0).means).all()
+
+
+def test_what_cameras_can_see_stays_as_it_was_when_the_phase_began(source, tmp_path):
+    """Sizes of anchors are learned: asked again after a restart, a camera would see others."""
+    training = source()
+    training.prepare()
+    before = {role: reach.clone() for role, reach in training._sight.reaches.items()}
+    role = max(before, key=lambda role: len(before[role]))
+    with torch.no_grad():
+        training.model.anchor_set(role).log_offset_scales += 2.0
+    training.write_checkpoint(tmp_path / "kept.safetensors")
+    resumed = source()
+    resumed.restore_checkpoint(tmp_path / "kept.safetensors")
+    assert resumed._sight.reaches.keys() == before.keys()
+    assert all(torch.equal(resumed._sight.reaches[role], before[role]) for role in before)
+    assert not torch.equal(reaches_of(training.model.anchor_set(role), training._reach), before[role])

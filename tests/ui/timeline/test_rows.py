@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from ui.panels.timeline.rows import (
     CACHE,
+    CAMERA,
     CLIPS,
     HEIGHTS,
     KEPT_FIRST,
@@ -46,7 +47,7 @@ def test_rows_give_way_one_after_the_other():
         if not seen or seen[-1] != names:
             seen.append(names)
     gone = [({*before} - {*after}).pop() for before, after in itertools.pairwise(seen)]
-    assert gone == [*reversed(KEPT_FIRST)] == [QUALITY, MARKERS, CACHE, SEAMS, OVERVIEW]
+    assert gone == [*reversed(KEPT_FIRST)] == [QUALITY, MARKERS, CACHE, CAMERA, SEAMS, OVERVIEW]
 
 
 def test_what_is_left_over_makes_clips_and_quality_larger():

@@ -12,13 +12,14 @@ from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.playback.views import Views
+from app.session.edit_status import HistoryStatus, PathsStatus
 from app.status import Overlays, QueueStatus, TrainingStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
 
 TIME, PLAY, VIEW, COMPARE = "Time", "Play and timeline", "View", "Show and compare"
-MARK, TRAIN, WINDOW = "Mark regions", "Train", "Window"
+MARK, PATH, TRAIN, WINDOW = "Mark regions", "Camera path", "Train", "Window"
 NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
@@ -39,6 +40,12 @@ class ActionNeeds(RegionsNeeds, Protocol):
 
     @property
     def overlays(self) -> Overlays: ...
+
+    @property
+    def paths(self) -> PathsStatus: ...
+
+    @property
+    def history(self) -> HistoryStatus: ...
 
     @property
     def rig(self) -> CameraRig: ...
@@ -67,6 +74,7 @@ class Action:
             Empty where it has none.
         needs_capture: Ignored until a capture is open.
         needs_choosing: Ignored unless a region is being chosen.
+        moves_keys: Not ignored either where a key of the camera path is chosen.
         repeats: Holding the key repeats the action.
         is_in_help: Shown on the help sheet; of a row of keys that do alike, one is enough there.
         is_on: Of what can be on or off, whether it is; menus show a tick.
@@ -81,6 +89,7 @@ class Action:
     keys: tuple[str, ...] = ()
     needs_capture: bool = True
     needs_choosing: bool = False
+    moves_keys: bool = False
     repeats: bool = False
     is_on: Callable[[ActionNeeds], bool] | None = None
     lacks: Callable[[ActionNeeds], str] | None = None
@@ -96,5 +105,8 @@ class Action:
         if self.needs_capture and session.capture is None:
             return "Open a capture or a project first."
         if self.needs_choosing and not ui.regions.is_active:
-            return "Only while a region is being chosen."
+            if not self.moves_keys:
+                return "Only while a region is being chosen."
+            if session.paths.key is None:
+                return "Only while a region is being chosen, or a key of the camera path."
         return "" if self.lacks is None else self.lacks(session)

@@ -150,4 +150,5 @@ ACTIONS = (
     _overlay("show_regions", "Show or hide marked regions", "5"),
     _overlay("show_coverage", "Show or hide what inherited anchors cover", "9"),
     _overlay("show_trails", "Show or hide the trails of what moves", "0"),
+    _overlay("show_paths", "Show or hide the camera path", "Shift+P"),
 )

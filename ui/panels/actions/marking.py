@@ -1,11 +1,13 @@
-"""Actions on regions that are marked as static or as moving."""
+"""Actions on regions that are marked as static or as moving, and on what is chosen or was done, whatever it is."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from app.session.commands import RedoMark, RemoveRegion, UndoMark
+from app.session.commands import Redo, RemoveRegion, Undo
+from app.session.path_commands import DeleteCameraKey
 from ui.panels.actions.action import MARK, Action, ActionNeeds, Run
+from ui.panels.actions.camera_path import nudge_key
 from ui.panels.regions import begin_choosing
 from ui.panels.state import REGIONS, Dispatch, UiState
 from ui.viewport.region_tool import GROWTH
@@ -32,7 +34,10 @@ def _grow_by(factor: float) -> Run:
 
 def _shift_by(right: float, down: float, forward: float) -> Run:
     def shift(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-        ui.regions.shift(session.view.world_to_camera(), right, down, forward)
+        if ui.regions.is_active:
+            ui.regions.shift(session.view.world_to_camera(), right, down, forward)
+        else:
+            nudge_key(session, dispatch, ui, (right, down, forward))
 
     return shift
 
@@ -42,52 +47,92 @@ def _next_region(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.regions.highlight_next(len(session.regions.regions))
 
 
-def _remove_region(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    if ui.regions.highlighted is not None and session.regions.can_mark:
-        dispatch(RemoveRegion(ui.regions.highlighted))
+def _remove_chosen(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """The region that stands out; a camera key where none does."""
+    if ui.regions.highlighted is not None:
+        if session.regions.can_mark:
+            dispatch(RemoveRegion(ui.regions.highlighted))
+    elif session.paths.chosen_key is not None and session.paths.can_edit:
+        dispatch(DeleteCameraKey(session.paths.chosen_key))
 
 
-def _undo_mark(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    if session.regions.can_undo:
-        dispatch(UndoMark())
+def _undo(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    if session.history.undo:
+        dispatch(Undo())
 
 
-def _redo_mark(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    if session.regions.can_redo:
-        dispatch(RedoMark())
+def _redo(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    if session.history.redo:
+        dispatch(Redo())
 
 
-def _cannot_mark(session: ActionNeeds) -> str:
-    return "" if session.regions.can_mark else session.regions.why_not or "Regions cannot be marked now."
+def _cannot_remove(session: ActionNeeds) -> str:
+    if session.regions.can_mark or session.paths.can_edit:
+        return ""
+    return session.regions.why_not or "Regions cannot be removed now."
 
 
-def _no_undo(session: ActionNeeds) -> str:
-    return "" if session.regions.can_undo else "There is no mark to take back."
-
-
-_STEERING: dict[str, Any] = {"needs_choosing": True, "repeats": True}
+_SIZING: dict[str, Any] = {"needs_choosing": True, "repeats": True}
+_STEERING: dict[str, Any] = _SIZING | {"moves_keys": True}
 
 ACTIONS = (
     Action("mark.choose", "Mark a sphere as static or moving; again to switch", MARK, _choose_region, keys=("M",)),
     Action("mark.accept", "Mark the chosen sphere", MARK, _mark_chosen, keys=("Enter",), needs_choosing=True),
     Action("mark.leave", "Leave without marking", MARK, _leave_choosing, keys=("Escape",), needs_choosing=True),
-    Action("mark.smaller", "Smaller sphere", MARK, _grow_by(1 / GROWTH), keys=("-",), **_STEERING),
-    Action("mark.larger", "Larger sphere", MARK, _grow_by(GROWTH), keys=("+",), **_STEERING),
-    Action("mark.left", "Sphere to the left", MARK, _shift_by(-1, 0, 0), keys=("Ctrl+Left",), **_STEERING),
-    Action("mark.right", "Sphere to the right", MARK, _shift_by(1, 0, 0), keys=("Ctrl+Right",), **_STEERING),
-    Action("mark.up", "Sphere up", MARK, _shift_by(0, -1, 0), keys=("Ctrl+Up",), **_STEERING),
-    Action("mark.down", "Sphere down", MARK, _shift_by(0, 1, 0), keys=("Ctrl+Down",), **_STEERING),
-    Action("mark.farther", "Sphere farther away", MARK, _shift_by(0, 0, 1), keys=("Page Up",), **_STEERING),
-    Action("mark.nearer", "Sphere nearer", MARK, _shift_by(0, 0, -1), keys=("Page Down",), **_STEERING),
+    Action("mark.smaller", "Smaller sphere", MARK, _grow_by(1 / GROWTH), keys=("-",), **_SIZING),
+    Action("mark.larger", "Larger sphere", MARK, _grow_by(GROWTH), keys=("+",), **_SIZING),
+    Action(
+        "mark.left",
+        "Chosen sphere or camera key to the left",
+        MARK,
+        _shift_by(-1, 0, 0),
+        keys=("Ctrl+Left",),
+        **_STEERING,
+    ),
+    Action(
+        "mark.right",
+        "Chosen sphere or camera key to the right",
+        MARK,
+        _shift_by(1, 0, 0),
+        keys=("Ctrl+Right",),
+        **_STEERING,
+    ),
+    Action("mark.up", "Chosen sphere or camera key up", MARK, _shift_by(0, -1, 0), keys=("Ctrl+Up",), **_STEERING),
+    Action("mark.down", "Chosen sphere or camera key down", MARK, _shift_by(0, 1, 0), keys=("Ctrl+Down",), **_STEERING),
+    Action(
+        "mark.farther",
+        "Chosen sphere or camera key farther away",
+        MARK,
+        _shift_by(0, 0, 1),
+        keys=("Page Up",),
+        **_STEERING,
+    ),
+    Action(
+        "mark.nearer", "Chosen sphere or camera key nearer", MARK, _shift_by(0, 0, -1), keys=("Page Down",), **_STEERING
+    ),
     Action("mark.highlight_next", "Highlight the next marked region", MARK, _next_region, keys=("N",)),
-    Action("mark.remove", "Remove the highlighted region", MARK, _remove_region, keys=("Delete",), lacks=_cannot_mark),
-    Action("mark.undo", "Take back the last mark or removal", MARK, _undo_mark, keys=("Ctrl+Z",), lacks=_no_undo),
+    Action(
+        "mark.remove",
+        "Remove the highlighted region, or the chosen camera key",
+        MARK,
+        _remove_chosen,
+        keys=("Delete",),
+        lacks=_cannot_remove,
+    ),
+    Action(
+        "mark.undo",
+        "Undo: take back what was done last to regions or camera paths",
+        MARK,
+        _undo,
+        keys=("Ctrl+Z",),
+        lacks=lambda session: "" if session.history.undo else "There is nothing to take back.",
+    ),
     Action(
         "mark.redo",
-        "Do again what was taken back",
+        "Redo: do again what was taken back",
         MARK,
-        _redo_mark,
+        _redo,
         keys=("Ctrl+Shift+Z", "Ctrl+Y"),
-        lacks=lambda session: "" if session.regions.can_redo else "Nothing was taken back.",
+        lacks=lambda session: "" if session.history.redo else "Nothing was taken back.",
     ),
 )

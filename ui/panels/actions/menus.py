@@ -14,6 +14,7 @@ from ui.panels.actions.action import (
     MARK,
     MODE,
     NAVIGATE,
+    PATH,
     PLAY,
     TIME,
     TRAIN,
@@ -25,9 +26,17 @@ from ui.panels.actions.table import ACTIONS
 
 MOST_ITEMS = 24
 """As many fit into the smallest window."""
-MENUS = ("File", "View", "Time", "Train", "Mark", "Window")
+MENUS = ("File", "View", "Time", "Train", "Mark", "Camera", "Window")
 """From left to right; others follow before the last."""
-_MENU_OF_GROUP = {TIME: "Time", VIEW: "View", COMPARE: "View", MARK: "Mark", TRAIN: "Train", WINDOW: "Window"}
+_MENU_OF_GROUP = {
+    TIME: "Time",
+    VIEW: "View",
+    COMPARE: "View",
+    MARK: "Mark",
+    PATH: "Camera",
+    TRAIN: "Train",
+    WINDOW: "Window",
+}
 _MENU_OF_GROUP |= {NAVIGATE: "View/Navigate", BOOKMARKS: "View/Bookmarks", MODE: "View/Mode", PLAY: "Time/Play"}
 _MENU_OF_TOPIC = {
     "compare": "View/Compare",

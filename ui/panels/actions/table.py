@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 
 from ui.panels.actions import (
     bookmarks,
+    camera_path,
     compare,
     doctor,
     heat,
@@ -32,6 +33,7 @@ ACTIONS: tuple[Action, ...] = (
     *modes.ACTIONS,
     *heat.ACTIONS,
     *marking.ACTIONS,
+    *camera_path.ACTIONS,
     *training.ACTIONS,
     *doctor.ACTIONS,
     *window.ACTIONS,

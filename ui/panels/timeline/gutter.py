@@ -6,7 +6,7 @@ from imgui_bundle import ImVec2, imgui
 
 from ui.panels.state import Rect, UiState
 from ui.panels.timeline.needs import TimelineNeeds
-from ui.panels.timeline.rows import CACHE, CLIPS, LANES, MARKERS, OVERVIEW, QUALITY, RULER, SEAMS
+from ui.panels.timeline.rows import CACHE, CAMERA, CLIPS, LANES, MARKERS, OVERVIEW, QUALITY, RULER, SEAMS
 from ui.panels.timeline.stage import SMALL_TEXT, small_text, small_width
 from ui.panels.timeline.units import unit_note
 from ui.style import theme
@@ -19,6 +19,7 @@ NOTES = {
     SEAMS: "How much more changes between two clips than inside of them: 1 means no seam, above 2 is worth a look",
     QUALITY: "Held-out PSNR of each clip, and of each frame where it was measured; 20 to 40 dB",
     CACHE: "Frames that are decoded in memory and shown at once",
+    CAMERA: "Keys of the camera path: C at the playhead",
     MARKERS: "Markers: Ctrl+M at the playhead",
 }
 

@@ -13,9 +13,20 @@ from ui.panels.timeline.marker_box import draw_marker_box
 from ui.panels.timeline.menu import draw_clip_menu
 from ui.panels.timeline.needs import TimelineNeeds
 from ui.panels.timeline.overview import draw_overview
+from ui.panels.timeline.path_lane import draw_path_lane
 from ui.panels.timeline.pointer import handle_track
 from ui.panels.timeline.quality_lane import draw_quality_lane
-from ui.panels.timeline.rows import CACHE, MARKERS, MIN_TRACK_HEIGHT, OVERVIEW, QUALITY, RULER, SEAMS, arrange_rows
+from ui.panels.timeline.rows import (
+    CACHE,
+    CAMERA,
+    MARKERS,
+    MIN_TRACK_HEIGHT,
+    OVERVIEW,
+    QUALITY,
+    RULER,
+    SEAMS,
+    arrange_rows,
+)
 from ui.panels.timeline.ruler import draw_hover, draw_played, draw_playhead, draw_ruler
 from ui.panels.timeline.seam_lane import draw_seam_lane
 from ui.panels.timeline.small_lanes import draw_cache_lane, draw_marker_lane
@@ -39,9 +50,10 @@ def draw_timeline(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> No
 def _draw_rows(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
     origin, size = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail()
     left, right = origin.x + GUTTER_WIDTH, origin.x + max(size.x, GUTTER_WIDTH + 1.0)
+    folded = ui.timeline.folded if session.paths.paths else ui.timeline.folded | {CAMERA}
     rows = {
         row.name: Rect(left, origin.y + row.top, right, origin.y + row.top + row.height)
-        for row in arrange_rows(max(size.y, MIN_TRACK_HEIGHT), ui.timeline.folded, is_zoomed=ui.timeline.is_zoomed)
+        for row in arrange_rows(max(size.y, MIN_TRACK_HEIGHT), folded, is_zoomed=ui.timeline.is_zoomed)
     }
     overview = rows.get(OVERVIEW)
     track = Rect(left, rows[RULER].y0, right, max(row.y1 for row in rows.values()))
@@ -85,6 +97,8 @@ def _draw_track(stage: Stage, session: TimelineNeeds) -> None:
         draw_quality_lane(stage, session)
     if CACHE in stage.rows:
         draw_cache_lane(stage, session)
+    if CAMERA in stage.rows:
+        draw_path_lane(stage, session)
     if MARKERS in stage.rows:
         draw_marker_lane(stage, timeline)
     draw_played(stage, timeline)

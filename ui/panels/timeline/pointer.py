@@ -1,4 +1,6 @@
-"""What the pointer does over the track: scrub, zoom, pan, play around a seam, go to a marker or edit it."""
+"""What the pointer does over the track: scrub, zoom, pan, play around a seam, go to a marker or edit it, and move keys
+of the camera path.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +10,7 @@ from app.session.commands import SetFrame
 from ui.panels.state import Dispatch
 from ui.panels.timeline.marker_box import edit_marker
 from ui.panels.timeline.needs import TimelineNeeds
+from ui.panels.timeline.path_lane import handle_keys_of_path
 from ui.panels.timeline.seam_lane import seam_at
 from ui.panels.timeline.small_lanes import marker_at
 from ui.panels.timeline.stage import Stage
@@ -47,6 +50,8 @@ def _handle_middle_drag(stage: Stage, session: TimelineNeeds) -> None:
 
 def _handle_left(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> None:
     view, timeline = stage.ui.timeline, session.timeline
+    if handle_keys_of_path(stage, session, dispatch):
+        return
     if imgui.is_item_activated():
         seam = seam_at(stage, session)
         view.pressed_seam = None if seam is None else session.clips[seam[0]].start

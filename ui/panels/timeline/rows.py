@@ -1,7 +1,8 @@
 """How the height of the timeline is shared: which rows there are, and which give way where there is not room for all.
 
-Arithmetic only. From top to bottom: overview, ruler, clips, seams, quality, cache, markers. Ruler and clips are always
-there. In a low panel quality gives way first, then markers, cache, seams and the overview, last the transport row.
+Arithmetic only. From top to bottom: overview, ruler, clips, seams, quality, cache, camera, markers. Ruler and clips are
+always there, and the keys of the camera where there is a camera path. In a low panel quality gives way first, then
+markers, cache, camera, seams and the overview, last the transport row.
 """
 
 from __future__ import annotations
@@ -9,20 +10,22 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, MARKERS = (
+OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, MARKERS = (
     "overview",
     "ruler",
     "clips",
     "seams",
     "quality",
     "cache",
+    "camera",
     "markers",
 )
-LANES = (SEAMS, QUALITY, CACHE, MARKERS)
+LANES = (SEAMS, QUALITY, CACHE, CAMERA, MARKERS)
 """Those that can be folded away."""
-ORDER = (OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, MARKERS)
-KEPT_FIRST = (OVERVIEW, SEAMS, CACHE, MARKERS, QUALITY)
-HEIGHTS = {OVERVIEW: 16.0, RULER: 22.0, CLIPS: 32.0, SEAMS: 18.0, QUALITY: 30.0, CACHE: 12.0, MARKERS: 18.0}
+ORDER = (OVERVIEW, RULER, CLIPS, SEAMS, QUALITY, CACHE, CAMERA, MARKERS)
+KEPT_FIRST = (OVERVIEW, SEAMS, CAMERA, CACHE, MARKERS, QUALITY)
+HEIGHTS = {OVERVIEW: 16.0, RULER: 22.0, CLIPS: 32.0, SEAMS: 18.0, QUALITY: 30.0, CACHE: 12.0}
+HEIGHTS |= {CAMERA: 18.0, MARKERS: 18.0}
 """Smallest ones, units of the screen."""
 MIN_CLIPS_HEIGHT = 18.0
 LARGEST = {CLIPS: 54.0, QUALITY: 90.0}

@@ -1,0 +1,188 @@
+"""What a job comes to in a project: moments, views and names, with everything that can be said before the work."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.export.scene_frames import SceneFrames
+from app.export.staging import check_target
+from app.export.video.formats import FORMATS, check_codecs
+from app.export.video.job import MAX_PICTURES, MAX_PIXELS, MAX_SIDE_PX, VideoJob
+from app.export.video.moments import Moment, moments_of, runs_of
+from app.export.video.views import ViewOf, camera_view, path_view, turntable_view
+from app.export.video.writers.sequence import depth_unit
+from app.playback.view_modes import rig_distance
+from app.project.camera_paths import camera_path_named
+from engine.camera.camera_path import CameraPath
+from engine.capture.capture import Capture
+from engine.capture.sound import sound_source
+from engine.errors import ProjectError
+from engine.text import shown
+
+_DEPTH_REACH = 4.0
+"""What 16 bits of depth reach, in usual distances from a camera to what all of them look at."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VideoPlan:
+    """What is drawn and written.
+
+    Attributes:
+        moments: Of all pictures.
+        step: Frames of the capture from one picture to the next.
+        fps: Pictures per second.
+        view_of: From where each picture is taken.
+        picture_size: Width and height of what is written, pixels.
+        sound: File with the sound and where in it the first picture is, seconds; None for silence.
+        depth_unit: Scene units per level of a 16-bit picture of depths; None where none is written.
+        notes: What is done otherwise than asked for, in sentences.
+    """
+
+    moments: list[Moment]
+    step: float
+    fps: float
+    view_of: ViewOf
+    picture_size: tuple[int, int]
+    sound: tuple[Path, float] | None = None
+    depth_unit: float | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def is_frame_by_frame(self) -> bool:
+        """Whether every picture shows another frame of the capture, so that it can be named after it."""
+        scenes = [moment.scene for moment in self.moments]
+        return all(moment.is_whole for moment in self.moments) and len(set(scenes)) == len(scenes)
+
+    def name(self, number: int, suffix: str) -> str:
+        """File name of a picture of a sequence: by its frame of the capture, where it has one of its own."""
+        if self.is_frame_by_frame:
+            return f"frame_{round(self.moments[number].scene):06d}{suffix}"
+        return f"picture_{number:06d}{suffix}"
+
+
+def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
+    """See that a job can be done, and how. Writes nothing.
+
+    Raises:
+        MissingCodecError: This machine cannot encode the format.
+        ProjectError: The job makes no sense in this project, a clip is not trained or damaged, or there is no place
+            for the result.
+        CaptureError: The camera has no sound.
+    """
+    job.check()
+    capture = scene.opened.capture
+    fps = capture.fps if job.fps is None else job.fps
+    step = job.speed * capture.fps / fps
+    path = None if job.path is None else camera_path_named(scene.opened.project.folder, job.path)
+    runs = _runs(job, scene, path)
+    if not runs:
+        raise ProjectError("There are no frames to render.", path=scene.opened.project.folder)
+    n_pictures = sum((len(run) - 1) / step + 1 for run in runs)
+    if n_pictures > MAX_PICTURES:
+        raise ProjectError(
+            f"That makes {n_pictures:,.0f} pictures; at most {MAX_PICTURES:,} are written at once.",
+            hint="Choose fewer frames, or a higher speed.",
+        )
+    moments = moments_of(runs, step, job.hold)
+    if job.shows == "compare" and not all(moment.is_whole for moment in moments):
+        raise ProjectError(
+            "Side by side with the truth there are only frames of the capture, not moments between them.",
+            hint="Leave speed and rate out.",
+        )
+    size = capture.picture_size if job.size is None else job.size
+    _check_size(size, job.supersampling)
+    view_of = _view_of(job, capture, path, size, len(moments))
+    sound, notes = _sound(job, capture, runs)
+    check_codecs(job.format, needs_sound=sound is not None)
+    width, height = (3 * size[0], size[1]) if job.shows == "compare" else size
+    if job.format == "mp4" and (width % 2 or height % 2):
+        notes += (
+            f"H.264 needs even sizes: {width} x {height} is written as {width + width % 2} x {height + height % 2}, "
+            "with the last row or column repeated.",
+        )
+        width, height = width + width % 2, height + height % 2
+    kind = FORMATS[job.format]
+    n_bytes = round(kind.bytes_per_pixel * width * height * len(moments))
+    check_target(job.out, n_bytes=n_bytes, is_folder=kind.is_sequence)
+    scene.check([moment.scene for moment in moments])  # last, as it reads every clip
+    unit = (
+        depth_unit(_DEPTH_REACH * rig_distance(capture.rig)) if job.shows == "depth" and job.format == "png" else None
+    )
+    return VideoPlan(moments, step, fps, view_of, (width, height), sound, unit, notes)
+
+
+def _runs(job: VideoJob, scene: SceneFrames, path: CameraPath | None) -> list[range]:
+    """Frames that pictures begin at."""
+    n_frames = scene.opened.capture.n_frames
+    if job.hold is not None:
+        scene.clip_at(job.hold)  # inside of the capture
+    if job.frames is None:
+        if path is not None and len(path.keys) > 1:
+            return [_frames_of(path, None if job.hold is not None else n_frames)]
+        return runs_of(range(n_frames) if job.hold is not None else scene.trained_frames)
+    first, stop = job.frames
+    if not 0 <= first < stop <= n_frames:
+        raise ProjectError(
+            f"Frames {first}:{stop} were asked for, of which the capture does not have all.",
+            hint=f"It has frames 0 to {n_frames - 1}.",
+        )
+    return [range(first, stop)]
+
+
+def _frames_of(path: CameraPath, n_frames: int | None) -> range:
+    """Frames during which a path moves; of a capture of so many, or wherever they are where that is None."""
+    first, last = path.frame_range
+    start, stop = math.ceil(first), math.floor(last) + 1
+    if path.is_closed:  # back at its beginning, it has been there
+        stop = math.ceil(last)
+    if n_frames is not None:
+        start, stop = max(start, 0), min(stop, n_frames)
+    if start >= stop:
+        raise ProjectError(
+            f"The camera path {shown(path.name)} goes from {first:g} to {last:g}, where the capture has no frames.",
+            hint="Move its keys, or choose frames.",
+        )
+    return range(start, stop)
+
+
+def _check_size(size: tuple[int, int], supersampling: int) -> None:
+    """See that pictures of this size can be drawn."""
+    width, height = (side * supersampling for side in size)
+    if max(width, height) > MAX_SIDE_PX or width * height > MAX_PIXELS:
+        raise ProjectError(
+            f"Pictures of {size[0]} x {size[1]} with supersampling {supersampling} would be drawn with {width} x "
+            f"{height} pixels; at most {MAX_SIDE_PX} along a side and {MAX_PIXELS // 1_000_000} million in all can be.",
+            hint="Choose a smaller size, or less supersampling.",
+        )
+
+
+def _view_of(
+    job: VideoJob, capture: Capture, path: CameraPath | None, size: tuple[int, int], n_pictures: int
+) -> ViewOf:
+    if path is not None:
+        return path_view(path, size)
+    if job.camera is not None:
+        return camera_view(capture.rig, _camera(capture, job.camera), job.size)
+    assert job.turntable is not None
+    return turntable_view(capture.rig, job.turntable, n_pictures, size)
+
+
+def _camera(capture: Capture, name: str) -> int:
+    """Row of a camera. Raises CaptureError where there is none of this name."""
+    return capture.camera_indices([name])[0]
+
+
+def _sound(job: VideoJob, capture: Capture, runs: list[range]) -> tuple[tuple[Path, float] | None, tuple[str, ...]]:
+    """Where the sound is, and a note where it is left out."""
+    if job.sound is None:
+        return None, ()
+    source = sound_source(capture, _camera(capture, job.sound), runs[0].start)
+    if job.speed != 1.0:
+        return None, (f"The sound is left out, because the scene runs at {job.speed:g} times its speed.",)
+    if job.hold is not None:
+        return None, ("The sound is left out, because time stands still.",)
+    if len(runs) > 1:
+        return None, ("The sound is left out, because frames are missing in between.",)
+    return source, ()

@@ -1,0 +1,83 @@
+"""Jobs that cannot be done: each is refused with a reason before anything is written."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import pytest
+
+from app.export.video.job import Turntable, VideoJob
+from engine.errors import CaptureError, EngineError
+from tests.app.export.video.conftest import Films
+
+
+@pytest.mark.parametrize(
+    ("format_name", "entries", "message"),
+    [
+        ("gif", {}, "not a format"),
+        ("png", {"camera": None}, "give one of these three"),
+        ("png", {"turntable": Turntable(), "camera": "1"}, "give one of these three"),
+        ("png", {"camera": "nobody"}, "no camera called nobody"),
+        ("png", {"shows": "heat"}, "cannot show 'heat'"),
+        ("png", {"size": (0, 10)}, "at least one pixel"),
+        ("png", {"size": (9000, 10), "supersampling": 2}, "18000 x 20 pixels; at most 16384"),
+        ("png", {"size": (4000, 4000), "supersampling": 4}, "134 million in all"),
+        ("png", {"supersampling": 0}, "whole number from 1"),
+        ("png", {"fps": 0.0}, "The rate is 0"),
+        ("png", {"fps": float("nan")}, "The rate is nan"),
+        ("png", {"speed": -1.0}, "The speed is -1"),
+        ("png", {"hold": 6.0}, "no frame 6"),
+        ("png", {"frames": (4, 4)}, "does not have all"),
+        ("png", {"frames": (4, 99)}, "does not have all"),
+        ("png", {"background": (0, 0, 256)}, "three numbers from 0 to 255"),
+        ("png", {"sound": "0"}, "PNG files cannot hold sound"),
+        ("mp4", {"sound": "0"}, "its frames are image files"),
+        ("mp4", {"is_transparent": True}, "H.264 in mp4 has no transparency"),
+        ("exr", {"background": (1, 2, 3)}, "keep the opacity"),
+        ("exr", {"shows": "compare"}, "no numbers for OpenEXR"),
+        ("png", {"shows": "depth", "is_transparent": True}, "Only pictures in colour"),
+        ("png", {"shows": "compare", "turntable": Turntable()}, "only what a camera of the capture took"),
+        ("png", {"shows": "compare", "hold": 1.0}, "only what a camera of the capture took"),
+        ("png", {"turntable": Turntable(n_turns=0.0)}, "0 turns"),
+        ("png", {"turntable": Turntable(n_turns=float("nan"))}, "nan turns"),
+        ("png", {"turntable": Turntable(elevation_deg=120.0)}, "The elevation is 120"),
+        ("png", {"turntable": Turntable(radius=0.0)}, "The radius is 0"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(films: Films, format_name: str, entries: dict[str, Any], message: str):
+    with pytest.raises(EngineError, match=message):
+        films.render("out", format_name, **entries)
+    assert films.names == []
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(films: Films):
+    (films.folder / "file").write_text("x")
+    for name, message in (("file/a.mp4", "is a file"), (".", "folder, not a file")):
+        with pytest.raises(EngineError, match=message):
+            films.render(name, "mp4")
+    assert films.names == ["file"]
+
+
+def test_a_video_without_end_is_refused(films: Films, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("app.export.video.plan.MAX_PICTURES", 100)
+    with pytest.raises(EngineError, match="That makes 501 pictures; at most 100 are written at once"):
+        films.render("out", "png", speed=0.01)
+    assert films.names == []
+
+
+def test_a_job_goes_through_to_another_process_as_it_is(films: Films):
+    job = films.job("a.mp4", "mp4", camera=None, turntable=Turntable(radius=2.0), size=(10, 20), shows="depth")
+    again = pickle.loads(pickle.dumps(job))
+    assert again == job
+    assert isinstance(again, VideoJob)
+    with pytest.raises(AttributeError):
+        again.speed = 2.0  # type: ignore[misc]
+
+
+def test_what_a_camera_took_has_to_be_there_for_the_comparison(films: Films):
+    capture = films.opened.capture
+    (next((capture.path / "ims" / "2").glob("*5.jpg"))).unlink()
+    with pytest.raises(CaptureError, match="missing"):
+        films.render("beside", "png", shows="compare")
+    assert films.names == []

@@ -1,0 +1,27 @@
+"""Undo and redo as buttons: what each of them would do, whatever was edited."""
+
+from __future__ import annotations
+
+from imgui_bundle import imgui
+
+from app.session.commands import Redo, Undo
+from app.session.edit_status import HistoryStatus
+from ui.panels.state import Dispatch, UiState
+from ui.style.theme import Icon
+
+
+def draw_history(history: HistoryStatus, dispatch: Dispatch, ui: UiState, panel: str) -> None:
+    """Two buttons in a row. panel: In front of their names in ui.rects."""
+    imgui.begin_disabled(not history.undo)
+    if imgui.button(f"{Icon.UNDO}  Undo"):
+        dispatch(Undo())
+    ui.mark(f"{panel}.undo")
+    imgui.end_disabled()
+    imgui.set_item_tooltip(f"Takes back: {history.undo or 'nothing'} (Ctrl+Z)")
+    imgui.same_line()
+    imgui.begin_disabled(not history.redo)
+    if imgui.button(f"{Icon.LOOP}  Redo"):
+        dispatch(Redo())
+    ui.mark(f"{panel}.redo")
+    imgui.end_disabled()
+    imgui.set_item_tooltip(f"Does again: {history.redo or 'nothing'} (Ctrl+Shift+Z or Ctrl+Y)")
