@@ -34,6 +34,7 @@ class Player {
     followKeys(table);
     this.followContext();
     this.followSize();
+    notify("Loading \u2026");
     this.changed();
   }
 
