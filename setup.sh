@@ -161,8 +161,21 @@ print(" ".join(missing))
 PYTHON
 }
 
+check_browser() { # apart from the others: not every system has a package of this name
+    local name
+    for name in chromium chromium-browser google-chrome google-chrome-stable; do
+        if command -v "$name" >/dev/null; then return 0; fi
+    done
+    if apt_install chromium; then
+        say "installed Chromium with apt-get"
+    else
+        say "no Chromium, so the tests of the player are skipped; this line installs it:  sudo apt-get install -y chromium"
+    fi
+}
+
 check_system() {
     local missing
+    if [ "$WITH_TESTS" = yes ] && [ "$(uname -s)" = Linux ]; then check_browser; fi
     missing=$(missing_libraries)
     if [ "$WITH_TESTS" = yes ] && [ "$(uname -s)" = Linux ]; then
         command -v Xvfb >/dev/null || missing="$missing xvfb"

@@ -7,7 +7,7 @@ import time
 from types import ModuleType
 from typing import Any
 
-from app.cli import export_gaussians
+from app.cli import export_gaussians, export_player
 from app.cli.arguments import EXIT_OK, parse_range, path_argument
 from app.cli.terminal.progress import ProgressLine, row_progress
 from app.evaluation.headless import TrainedProject, open_trained
@@ -18,7 +18,7 @@ from engine.errors import ProjectError
 from engine.storage.json_files import json_text
 
 EXPORT_SCHEMA = 1
-KINDS: tuple[ModuleType, ...] = (export_gaussians,)
+KINDS: tuple[ModuleType, ...] = (export_gaussians, export_player)
 """Modules with `FORMATS`, names for --format with what each is; `add_arguments(command)`, options of their own; and
 `export(opened, options, frames, report)`, which writes and returns an ExportResult. frames: None where nothing was
 chosen."""
@@ -28,13 +28,16 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """Arguments of `clipgstream export`."""
     command.add_argument("project", type=path_argument, help="project folder")
     known = [f"{name}: {summary}" for kind in KINDS for name, summary in kind.FORMATS.items()]
-    command.add_argument(
+    what = command.add_mutually_exclusive_group(required=True)
+    what.add_argument(
         "--format",
-        required=True,
         choices=[name for kind in KINDS for name in kind.FORMATS],
         help=f"what to write; {'; '.join(known)}",
     )
-    command.add_argument("--out", type=path_argument, required=True, metavar="DIR", help="new or empty folder")
+    what.add_argument(
+        "--player", type=path_argument, metavar="OUT.html", help="a page that plays the scene in a browser"
+    )
+    command.add_argument("--out", type=path_argument, metavar="DIR", help="new or empty folder")
     frames = command.add_mutually_exclusive_group()
     frames.add_argument(
         "--frames", metavar="A:B", help="frames A up to B, B not included, or one frame A (default: all trained)"
@@ -52,6 +55,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream export: write files. Returns the exit code."""
     started_s = time.monotonic()
+    if options.player is None and options.out is None:
+        raise ProjectError("--out is missing.", hint="Name a new folder: --out DIR.")
     opened = open_trained(open_project(options.project, is_writable=False))
     line = ProgressLine(is_quiet=options.quiet)
     show = row_progress(line, "Exporting")
@@ -59,7 +64,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     def report(progress: ExportProgress) -> None:
         show(progress.n_done, progress.n_all, None)
 
-    kind = next(kind for kind in KINDS if options.format in kind.FORMATS)
+    kind = next((kind for kind in KINDS if options.format in kind.FORMATS), export_player)
     result: ExportResult = kind.export(opened, options, _frames(options, opened), report)
     seconds = time.monotonic() - started_s
     line.finish()
@@ -92,7 +97,7 @@ def _frames(options: argparse.Namespace, opened: TrainedProject) -> range | None
 def _document(options: argparse.Namespace, result: ExportResult, seconds: float) -> dict[str, Any]:
     return {
         "schema": EXPORT_SCHEMA,
-        "format": options.format,
+        "format": options.format or export_player.NAME,
         "path": str(result.path),
         "n_files": result.n_files,
         "n_bytes": result.n_bytes,

@@ -81,7 +81,7 @@ void main() {
         return;
     }
 
-    vec2 corner = 2.0 * vec2(gl_VertexID & 1, gl_VertexID >> 1) - 1.0;
+    vec2 corner = 2.0 * vec2(gl_VertexID & 1, gl_VertexID >> 1 & 1) - 1.0; // of the first quad or any other
     vec2 sigma_px = sqrt(vec2(major, minor));
     offset_sigma = corner * (reach_sigma + SNAP_PX / sigma_px);
     vec2 offset_px = offset_sigma * sigma_px;

@@ -1,0 +1,159 @@
+"""The job that writes a player: trained frames as one HTML page, or as a page with a folder of data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report
+from app.export.player_scene import scene_header
+from app.export.scene_frames import SceneFrames
+from app.export.staging import check_target, staged_file, staged_folder
+from engine.capture.clip import Clip
+from engine.errors import ProjectError
+from engine.export.player.blocks import Block, Packer, moving_bytes
+from engine.export.player.page import page_bytes, page_writer
+from engine.export.splats import Splats
+
+if TYPE_CHECKING:
+    from app.evaluation.headless import TrainedProject
+
+LARGEST_PAGE_BYTES = 150_000_000
+"""Above this, browsers are slow to open a single file: the data goes into a folder unless one file is asked for."""
+PAGE_SUFFIXES = (".html", ".htm")
+_DESCRIBED_BYTES = 400
+"""What a page says of a clip, about."""
+_SAMPLED_CLIPS = 3
+"""Clips of which two frames are packed to tell the size beforehand."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlayerJob:
+    """What to write.
+
+    Attributes:
+        out: The page.
+        frames: Of the capture, every n-th where the range has a step; None for all that are trained.
+        has_folder: Whether clips go into a folder beside the page; None for what fits the size.
+    """
+
+    out: Path
+    frames: range | None = None
+    has_folder: bool | None = None
+
+    @property
+    def folder(self) -> Path:
+        """Where clips go if not into the page."""
+        return self.out.with_name(f"{self.out.stem}_data")
+
+
+def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
+    """What will be written. Packs two frames of a few clips, which takes some seconds.
+
+    Raises:
+        ProjectError: The target cannot be written, or a frame is not trained.
+    """
+    if job.out.suffix.lower() not in PAGE_SUFFIXES:
+        raise ProjectError("A player is an HTML page.", hint="Give a name that ends in .html.", path=job.out)
+    check_target(job.out)
+    scene = SceneFrames(opened)
+    clips = _clips(scene, job)
+    n_frames = sum(len(wanted) for _, wanted in clips)
+    n_bytes = _expected_bytes(scene, clips)
+    has_folder = n_bytes > LARGEST_PAGE_BYTES if job.has_folder is None else job.has_folder
+    lines = [f"About {n_bytes / 1e6:.1f} MB for {n_frames} frames."]
+    if has_folder:
+        lines.append(f"The clips go into the folder {job.folder.name}, which has to stay beside the page.")
+        check_target(job.folder, n_bytes=n_bytes, is_folder=True)
+    check_target(job.out, n_bytes=n_bytes)
+    return ExportEstimate(len(clips) + 2 if has_folder else 1, n_bytes, tuple(lines))
+
+
+def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
+    """Write the player, clip by clip.
+
+    Raises:
+        ProjectError: What `estimate` raises.
+        DiskError: The disk refused; nothing is left behind.
+        ExportCancelled: From `report`; nothing is left behind.
+    """
+    report(ExportProgress(0, 0, message="Looking at the clips"))
+    expected = estimate(opened, job)
+    has_folder = expected.n_files > 1
+    scene = SceneFrames(opened)
+    clips = _clips(scene, job)
+    n_frames = sum(len(wanted) for _, wanted in clips)
+    header: dict[str, Any] = scene_header(scene, clips[0][1][0], step=job.frames.step if job.frames else 1)
+    header["folder"] = _relative_url(job.folder.name) if has_folder else None
+    packer, n_done, n_bytes = Packer(), 0, 0
+    with ExitStack() as stack:
+        page = stack.enter_context(staged_file(job.out, what="The player"))
+        folder = stack.enter_context(staged_folder(job.folder, what="The player's data")) if has_folder else None
+        stream = stack.enter_context(page.open("w", encoding="utf-8", newline="\n"))
+        with page_writer(stream, header, folder=folder) as writer:
+            for clip, wanted in clips:
+                block = _packed(
+                    packer, scene, wanted, lambda done, n=n_done: report(ExportProgress(n + done, n_frames))
+                )
+                name = f"clip{clip.clip_index:05d}"
+                place = {"clip_index": clip.clip_index, "name": name, "first": n_done, "frame_index": wanted[0]}
+                header["clips"].append(place)
+                place.update(block.description)
+                writer.block(name, block)
+                n_done += len(wanted)
+            assert packer.shared is not None
+            header["shared"] = packer.shared.description
+            writer.block("shared", packer.shared)
+        stream.flush()
+        n_bytes = writer.n_bytes_of_blocks * has_folder + page.stat().st_size
+        report(ExportProgress(n_frames, n_frames))
+    return ExportResult(job.out, len(header["clips"]) + 2 if has_folder else 1, n_bytes)
+
+
+def _expected_bytes(scene: SceneFrames, clips: Sequence[tuple[Clip, list[int]]]) -> int:
+    """Of page and blocks together, from two frames of a few clips."""
+    n_frames = sum(len(wanted) for _, wanted in clips)
+    n_packed, packer = 0.0, Packer()
+    sampled = [clips[round(at * (len(clips) - 1) / max(_SAMPLED_CLIPS - 1, 1))] for at in range(_SAMPLED_CLIPS)]
+    for _, wanted in sampled:
+        ends = wanted if len(wanted) < 2 else [wanted[0], wanted[-1]]
+        block = _packed(packer, scene, ends)
+        n_moving = moving_bytes([Splats.of(scene.gaussians(frame, "moving")) for frame in ends])
+        n_packed += (len(block.data) - n_moving) * len(clips) / len(sampled)  # what stands still: once per clip
+        n_packed += n_moving / len(ends) * n_frames / len(sampled)
+    assert packer.shared is not None
+    n_bytes = round((len(packer.shared.data) + n_packed) * 4 / 3)  # as base64
+    return n_bytes + page_bytes(scene_header(scene, clips[0][1][0], step=1)) + _DESCRIBED_BYTES * len(clips)
+
+
+def _relative_url(name: str) -> str:
+    """A name in the page's own folder, as plain letters."""
+    return PurePosixPath("/", name).as_uri().removeprefix("file:///")
+
+
+def _clips(scene: SceneFrames, job: PlayerJob) -> list[tuple[Clip, list[int]]]:
+    """Clips with the frames of each that are wanted. Raises ProjectError where one is not trained."""
+    frames = scene.trained_frames if job.frames is None else job.frames
+    scene.check(frames)
+    clips: list[tuple[Clip, list[int]]] = []
+    for frame in frames:
+        clip = scene.clip_at(frame)
+        if not clips or clips[-1][0] != clip:
+            clips.append((clip, []))
+        clips[-1][1].append(frame)
+    return clips
+
+
+def _packed(
+    packer: Packer, scene: SceneFrames, wanted: list[int], told: Callable[[int], None] = lambda n_done: None
+) -> Block:
+    """A clip's block. told: Of each frame, before it is made, how many there are."""
+
+    def moving(frame: int) -> Splats:
+        told(frame)
+        return Splats.of(scene.gaussians(wanted[frame], "moving"))
+
+    return packer.clip(len(wanted), lambda frame: Splats.of(scene.gaussians(wanted[frame], "static")), moving)

@@ -1,0 +1,249 @@
+// Ties it together: what is wanted, what is shown, and the words that say so. The label belongs to the picture that is
+// shown, never to the playhead.
+
+const SLOW_MS = 60; // where a picture takes longer, as in software, half as many lines are drawn while something moves
+const REST_MS = 250; // after so long without a move a picture is drawn in full
+const GOOD_PIXELS = 3 << 20; // more of them are not drawn on screens with very small ones
+
+class Player {
+  constructor(header, shaders, workerSource) {
+    this.header = header;
+    this.canvas = document.getElementById("picture");
+    const nFrames = header.clips.reduce((total, clip) => total + clip.moving.n.length, 0);
+    const most = (numbers) => Math.max(0, ...numbers);
+    const nStill = header.shared.n + most(header.clips.map((clip) => (clip.own ? clip.own.n : 0)));
+    const nMoving = most(header.clips.flatMap((clip) => clip.moving.n));
+    this.view = new View(header);
+    this.clock = new Clock(nFrames, header.fps / header.step);
+    this.renderer = new Renderer(this.canvas, shaders, header.background, lines(nStill) + lines(nMoving));
+    this.timeline = new Timeline(header, nFrames, (frame) => this.go(frame));
+    this.shown = null; // frame that the renderer holds
+    this.onScreen = null; // frame of the picture on the screen
+    this.isLost = this.isDrawn = false;
+    this.share = 1; // of the screen's pixels, along a side
+    this.movedMs = -REST_MS;
+    this.scheduled = 0;
+    this.pictures = new Pictures(header, new Blocks(header.folder), workerSource, {
+      onPicture: (answer) => this.take(answer),
+      onNotice: (text) => notify(text),
+    });
+    this.fillControls();
+    followPointer(this.canvas, this.view, () => this.moved());
+    const table = keyTable(this);
+    fillKeySheet(table);
+    followKeys(table);
+    this.followContext();
+    this.followSize();
+    notify("Loading \u2026");
+    this.changed();
+  }
+
+  // ---- what is shown
+
+  /** Have as many pixels as the screen shows. */
+  fit() {
+    const { canvas } = this, width = canvas.clientWidth, height = canvas.clientHeight;
+    const sharp = Math.max(1, Math.sqrt(GOOD_PIXELS / Math.max(width * height, 1)));
+    const ratio = this.share * Math.min(devicePixelRatio, sharp);
+    const size = [width, height].map((length) => Math.max(1, Math.round(length * ratio)));
+    if (canvas.width === size[0] && canvas.height === size[1]) return;
+    [canvas.width, canvas.height] = size; // which clears it
+    this.isDrawn = false;
+  }
+
+  /** The size changes with the window, with zooming, and from screen to screen. */
+  followSize() {
+    const observer = new ResizeObserver(() => this.changed());
+    try {
+      observer.observe(this.canvas, { box: "device-pixel-content-box" });
+    } catch {
+      observer.observe(this.canvas); // Safari does not know that box
+      addEventListener("resize", () => this.changed());
+    }
+  }
+
+  /** Something that is seen has changed: draw once, soon. */
+  changed() {
+    this.isDrawn = false;
+    this.schedule();
+  }
+
+  schedule() {
+    if (!this.scheduled) this.scheduled = requestAnimationFrame((nowMs) => this.tick(nowMs));
+  }
+
+  /** The same, by somebody who goes on moving. */
+  moved() {
+    this.movedMs = performance.now();
+    this.changed();
+  }
+
+  tick(nowMs) {
+    this.scheduled = 0;
+    this.clock.tell(nowMs, this.pictures.isWaitingFor(this.clock.frame));
+    const isReady = this.renderer.isDone();
+    if (isReady) {
+      const isMoving = this.clock.isPlaying || performance.now() - this.movedMs < REST_MS;
+      this.share = isMoving && this.renderer.fullMs > SLOW_MS ? 0.5 : 1;
+      this.fit();
+    }
+    const lens = this.view.lens(this.canvas.width, this.canvas.height);
+    this.pictures.want(this.clock.frame, lens.worldToCamera.slice(8, 12));
+    const isWanted = !this.isDrawn && !this.isLost && this.shown !== null;
+    if (isWanted && isReady) {
+      this.renderer.draw(lens, this.header.near_plane, this.share === 1);
+      this.isDrawn = true;
+      this.onScreen = this.shown;
+    }
+    this.tell();
+    clearTimeout(this.rest);
+    if (this.clock.isPlaying || (isWanted && !isReady) || !this.renderer.isDone()) this.schedule();
+    else if (this.share < 1) this.rest = setTimeout(() => this.changed(), REST_MS);
+  }
+
+  take(answer) {
+    if (this.isLost) return;
+    this.renderer.take(answer);
+    this.shown = answer.frame;
+    this.changed();
+  }
+
+  /** Words and marks about what is on the screen. */
+  tell() {
+    const { onScreen: shown, header, clock } = this;
+    const number = (frame) => {
+      const clip = header.clips[this.pictures.clipOf(frame)];
+      return clip.frame_index + (frame - clip.first) * header.step;
+    };
+    const text = shown === null ? "" : `Frame ${number(shown)} of ${number(clock.nFrames - 1)}`;
+    const seconds = shown === null ? "" : `${(number(shown) / header.fps).toFixed(2)} s`;
+    document.getElementById("time").textContent = shown === null ? "" : `${text} \u00b7 ${seconds}`;
+    this.timeline.show(shown, clock.frame, `${text}, ${seconds}`);
+    document.getElementById("play").setAttribute("aria-label", clock.isPlaying ? "Pause" : "Play");
+    document.getElementById("loop").setAttribute("aria-pressed", clock.isLooping);
+    document.getElementById("speed").value = clock.speed;
+    document.getElementById("camera").value = this.view.camera === null ? "" : this.view.camera;
+  }
+
+  // ---- what the user does
+
+  go(frame) {
+    this.clock.go(frame);
+    this.moved();
+  }
+
+  goToClip(steps) {
+    const starts = this.header.clips.map((clip) => clip.first), now = this.clock.frame;
+    const target = steps > 0 ? starts.find((start) => start > now) : starts.filter((start) => start < now).pop();
+    if (target !== undefined) this.go(target);
+  }
+
+  play(isPlaying) {
+    this.clock.play(isPlaying);
+    this.changed();
+  }
+
+  loop(isLooping) {
+    this.clock.isLooping = isLooping;
+    this.changed();
+  }
+
+  changeSpeed(steps) {
+    this.clock.faster(steps);
+    this.changed();
+  }
+
+  look(camera, isHome = false) {
+    if (isHome) this.view.home();
+    else if (camera === null) this.view.leave();
+    else if (camera < this.header.cameras.length) this.view.look(camera);
+    this.changed();
+  }
+
+  nextCamera(steps) {
+    const n = this.header.cameras.length, before = this.view.camera;
+    if (n) this.look(before === null ? (steps > 0 ? 0 : n - 1) : (before + steps + n) % n);
+  }
+
+  fillScreen() {
+    if (document.fullscreenElement) document.exitFullscreen();
+    else if (document.documentElement.requestFullscreen) document.documentElement.requestFullscreen().catch(() => {});
+  }
+
+  help() {
+    document.getElementById("keys").showModal();
+  }
+
+  fillControls() {
+    const title = document.getElementById("title"), by = (id) => document.getElementById(id);
+    title.textContent = this.header.title;
+    document.title = this.header.title;
+    const option = (value, text) => {
+      const made = document.createElement("option");
+      made.value = value;
+      made.textContent = text;
+      return made;
+    };
+    by("speed").append(...SPEEDS.map((speed) => option(speed, `${speed}\u00d7`)));
+    by("camera").append(option("", "Free"), ...this.header.cameras.map((camera, i) => option(i, camera.name)));
+    by("play").onclick = () => this.play(!this.clock.isPlaying);
+    by("loop").onclick = () => this.loop(!this.clock.isLooping);
+    by("home").onclick = () => this.look(null, true);
+    by("full").onclick = () => this.fillScreen();
+    by("help").onclick = () => this.help();
+    by("speed").onchange = (event) => {
+      this.clock.speed = Number(event.target.value);
+      this.changed();
+    };
+    for (const id of ["speed", "camera"]) leaveWhenChosen(by(id), this.canvas);
+    by("camera").onchange = ({ target }) => this.look(target.value === "" ? null : Number(target.value));
+  }
+
+  /** A driver may take the context away, as when a laptop wakes up; everything is sent again then. */
+  followContext() {
+    this.canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault();
+      this.isLost = true;
+      this.shown = this.onScreen = null;
+    });
+    this.canvas.addEventListener("webglcontextrestored", () => {
+      this.isLost = false;
+      this.renderer.begin();
+      this.pictures.forget();
+      this.changed();
+    });
+  }
+}
+
+/** A list that was used with the pointer gives the keys back; one that was reached by keys keeps them. */
+function leaveWhenChosen(list, canvas) {
+  let isPointed = false;
+  list.addEventListener("pointerdown", () => (isPointed = true));
+  list.addEventListener("keydown", () => (isPointed = false));
+  list.addEventListener("change", () => isPointed && canvas.focus());
+}
+
+function notify(text) {
+  const notice = document.getElementById("notice");
+  if (notice.textContent !== text) notice.textContent = text;
+  notice.hidden = !text;
+}
+
+function missing() {
+  if (typeof DecompressionStream === "undefined") return "unpack the scene (DecompressionStream)";
+  if (typeof Worker === "undefined" || typeof ResizeObserver === "undefined") return "run its parts side by side";
+  return "";
+}
+
+function begin() {
+  const part = (id) => document.getElementById(id).textContent;
+  const lacks = missing();
+  try {
+    if (lacks) throw new Error(`This browser cannot ${lacks}. A version of 2023 or later can.`);
+    window.clipgstreamPlayer = new Player(JSON.parse(part("header")), JSON.parse(part("shaders")), part("worker"));
+  } catch (error) {
+    notify(error.message);
+  }
+}
+
+begin();

@@ -1,0 +1,148 @@
+"""The job that writes a player: what it says before, what it leaves behind, and where the page looks from."""
+
+from __future__ import annotations
+
+import json
+import re
+import runpy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.evaluation.headless import TrainedProject
+from app.export import player_job
+from app.export.export_progress import ExportCancelled, ExportProgress
+from app.export.player_job import PlayerJob, estimate, run
+from app.export.player_scene import scene_header
+from app.export.scene_frames import SceneFrames
+from app.playback.orbit_view import OrbitView
+from engine.conventions import ALPHA_MIN
+from engine.errors import EngineError, ProjectError
+
+READER = runpy.run_path(str(Path(__file__).parents[3] / "docs" / "examples" / "read_player.py"))
+
+
+def ignore(progress: ExportProgress) -> None:
+    """Nobody looks."""
+
+
+def header_of(page: Path) -> dict[str, Any]:
+    found = re.search(r'id="header">([^<]*)<', page.read_text(encoding="utf-8"))
+    assert found is not None
+    return json.loads(found[1])
+
+
+def test_frames_are_those_of_the_scene(opened: TrainedProject, tmp_path: Path):
+    out = tmp_path / "out" / "scene.html"
+    told: list[ExportProgress] = []
+    result = run(opened, PlayerJob(out, range(1, 6)), told.append)
+    assert (result.path, result.n_files, result.n_bytes) == (out, 1, out.stat().st_size)
+    assert [entry.name for entry in out.parent.iterdir()] == ["scene.html"]
+    assert (told[-1].n_done, told[-1].n_all) == (5, 5)
+    page, scene = READER["Page"](out), SceneFrames(opened)
+    assert page.n_frames == 5
+    for number, frame in enumerate(range(1, 6)):
+        found, wanted = page.frame(number), scene.gaussians(frame)
+        is_seen = (wanted.opacities > ALPHA_MIN).numpy()
+        assert len(found["means"]) == is_seen.sum()
+        step = 0.02 * np.median(wanted.scales.numpy().max(1)) * 3
+        assert np.abs(found["means"] - wanted.means.numpy()[is_seen]).max() < step
+        assert np.abs(found["colors"] - wanted.colors.numpy()[is_seen]).max() < 2 / 255
+
+
+def test_clips_say_where_they_lie_in_the_capture(opened: TrainedProject, tmp_path: Path):
+    out = tmp_path / "scene.html"
+    run(opened, PlayerJob(out, range(1, 6, 2)), ignore)
+    header = header_of(out)
+    assert header["step"] == 2
+    assert [(clip["clip_index"], clip["first"], clip["frame_index"]) for clip in header["clips"]] == [
+        (0, 0, 1),
+        (1, 1, 3),
+    ]
+    assert header["fps"] == opened.capture.fps
+    assert [camera["name"] for camera in header["cameras"]] == list(opened.capture.rig.names)
+
+
+def test_all_trained_frames_are_taken_where_none_are_named(opened: TrainedProject, tmp_path: Path):
+    opened.project.clip_path(1).unlink()
+    run(opened, PlayerJob(tmp_path / "scene.html"), ignore)
+    assert [clip["moving"]["n"].__len__() for clip in header_of(tmp_path / "scene.html")["clips"]] == [3]
+
+
+def test_the_size_is_told_beforehand(opened: TrainedProject, tmp_path: Path):
+    for has_folder in (False, True):
+        job = PlayerJob(tmp_path / f"scene{has_folder}.html", has_folder=has_folder)
+        expected = estimate(opened, job)
+        assert list(tmp_path.glob("*.html")) == ([] if not has_folder else [tmp_path / "sceneFalse.html"])
+        result = run(opened, job, ignore)
+        assert result.n_bytes == pytest.approx(expected.n_bytes, rel=0.1)
+        assert result.n_files == expected.n_files
+        assert f"{expected.n_bytes / 1e6:.1f} MB" in expected.lines[0]
+
+
+def test_a_large_scene_gets_a_folder_unless_one_file_is_asked_for(
+    opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(player_job, "LARGEST_PAGE_BYTES", 1000)
+    out = tmp_path / "scene.html"
+    result = run(opened, PlayerJob(out), ignore)
+    assert result.n_files == 4
+    assert sorted(file.name for file in (tmp_path / "scene_data").iterdir()) == [
+        "clip00000.js",
+        "clip00001.js",
+        "shared.js",
+    ]
+    assert READER["Page"](out).frame(4)["means"].shape[1] == 3
+    with pytest.raises(ProjectError, match="already"):  # the clips of one page are never mixed with another's
+        run(opened, PlayerJob(out), ignore)
+    assert run(opened, PlayerJob(out, has_folder=False), ignore).n_files == 1
+
+
+@pytest.mark.parametrize("has_folder", [False, True])
+def test_a_cancelled_job_leaves_nothing(opened: TrainedProject, tmp_path: Path, has_folder: bool):
+    def cancel(progress: ExportProgress) -> None:
+        if progress.n_done >= 3:
+            raise ExportCancelled
+
+    folder = tmp_path / "out"
+    folder.mkdir()
+    with pytest.raises(ExportCancelled):
+        run(opened, PlayerJob(folder / "scene.html", has_folder=has_folder), cancel)
+    assert list(folder.iterdir()) == []
+
+
+def test_a_full_disk_leaves_nothing(opened: TrainedProject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def refuse(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    folder = tmp_path / "out"
+    folder.mkdir()
+    monkeypatch.setattr("engine.export.player.page.PageWriter.block", refuse)
+    with pytest.raises(EngineError):
+        run(opened, PlayerJob(folder / "scene.html", has_folder=True), ignore)
+    assert list(folder.iterdir()) == []
+
+
+def test_bad_targets_and_frames_are_named_before_any_work(opened: TrainedProject, tmp_path: Path):
+    (tmp_path / "folder.html").mkdir()
+    (tmp_path / "file").touch()
+    for out, said in (
+        (tmp_path / "scene.mp4", "HTML page"),
+        (tmp_path / "folder.html", "folder"),
+        (tmp_path / "file" / "scene.html", "is a file"),
+    ):
+        with pytest.raises(ProjectError, match=said):
+            run(opened, PlayerJob(out), ignore)
+    opened.project.clip_path(1).unlink()
+    with pytest.raises(ProjectError, match="clip 1, which is not trained"):
+        run(opened, PlayerJob(tmp_path / "scene.html", range(6)), ignore)
+    assert sorted(entry.name for entry in tmp_path.glob("*scene*")) == []
+
+
+def test_the_page_looks_from_where_the_window_does(opened: TrainedProject):
+    header, view = scene_header(SceneFrames(opened), 0, step=1), OrbitView(opened.capture.rig)
+    assert np.allclose(np.reshape(header["home"]["world_to_camera"], (4, 4)), view.world_to_camera())
+    assert header["home"]["distance"] == view.distance
+    assert np.allclose(header["up"], view.up)
