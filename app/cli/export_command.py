@@ -70,7 +70,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     line.finish()
     for said in result.lines:
         line.say(said)
-    line.say(f"{result.n_files} files, {result.n_bytes / 1e6:.1f} MB, in {seconds:.1f} s: {result.path}")
+    files = f"{result.n_files} file{'' if result.n_files == 1 else 's'}"
+    line.say(f"{files}, {result.n_bytes / 1e6:.1f} MB, in {seconds:.1f} s: {result.path}")
     if options.json:
         print(json_text(_document(options, result, seconds), indent=1))
     return EXIT_OK

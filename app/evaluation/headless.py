@@ -14,6 +14,8 @@ from app.status import TrainingStatus
 from app.training.messages import ClipTrained, Event, TrainingFailed, TrainingStopped, WorkerDied
 from app.training.service import TrainingService
 from engine.backends.table import backend_called
+from engine.camera.corrections import corrected
+from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import ClipHeader
@@ -164,6 +166,13 @@ class TrainedProject:
     capture: Capture
     clips: list[Clip]
     reference: ClipState | None
+
+    @property
+    def rig(self) -> CameraRig:
+        """The cameras of the capture as the reference clip refined them; see engine.camera.corrections."""
+        if self.reference is None:
+            return self.capture.rig
+        return corrected(self.capture.rig, self.reference.header.camera_names, self.reference.corrections)
 
     @property
     def trained(self) -> list[int]:

@@ -23,7 +23,7 @@ def scene_header(scene: SceneFrames, frame: int, *, step: int) -> dict[str, Any]
         step: Frames of the capture from one frame of the player to the next.
     """
     capture = scene.opened.capture
-    rig = capture.rig
+    rig = scene.opened.rig
     view = OrbitView(rig)
     home = home_camera(rig, rig.focus_point(), view.up)
     width, height = (int(v) for v in rig.image_sizes[home])

@@ -34,7 +34,7 @@ class ReadBack:
 
     def __init__(self, scene: SceneFrames, read: Callable[[BinaryIO], Splats], world: World) -> None:
         self._scene, self._read, self._world = scene, read, world
-        rig = scene.opened.capture.rig
+        rig = scene.opened.rig
         self._rig = _reduced(rig.subset(np.unique(np.linspace(0, len(rig) - 1, N_CAMERAS).round().astype(int))))
 
     def psnr_db(self, path: Path, frame: int, live: Gaussians) -> dict[str, float]:

@@ -100,7 +100,7 @@ def test_frames_that_are_not_trained_are_told_with_those_that_are(run, capture_f
     code, _, err = run("render", tmp_path / "p", "--camera", "1", "--frames", "0:6", "--out", out)
     assert code == 2
     assert "Frame 4 lies in clip 2, which is not trained; of the 3 clips asked for 1 is not." in err
-    assert "or render what is trained: --frames 0:4." in err
+    assert "or take what is trained: --frames 0:4." in err
     assert not out.exists()
 
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.evaluation.headless import TrainedProject
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target
 from app.export.video.formats import FORMATS, check_codecs
@@ -93,7 +94,7 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
         )
     size = capture.picture_size if job.size is None else job.size
     _check_size(size, job.supersampling)
-    view_of = _view_of(job, capture, path, size, len(moments))
+    view_of = _view_of(job, scene.opened, path, size, len(moments))
     sound, notes = _sound(job, capture, runs)
     check_codecs(job.format, needs_sound=sound is not None)
     width, height = (3 * size[0], size[1]) if job.shows == "compare" else size
@@ -159,14 +160,14 @@ def _check_size(size: tuple[int, int], supersampling: int) -> None:
 
 
 def _view_of(
-    job: VideoJob, capture: Capture, path: CameraPath | None, size: tuple[int, int], n_pictures: int
+    job: VideoJob, opened: TrainedProject, path: CameraPath | None, size: tuple[int, int], n_pictures: int
 ) -> ViewOf:
     if path is not None:
         return path_view(path, size)
     if job.camera is not None:
-        return camera_view(capture.rig, _camera(capture, job.camera), job.size)
+        return camera_view(opened.rig, _camera(opened.capture, job.camera), job.size)
     assert job.turntable is not None
-    return turntable_view(capture.rig, job.turntable, n_pictures, size)
+    return turntable_view(opened.rig, job.turntable, n_pictures, size)
 
 
 def _camera(capture: Capture, name: str) -> int:

@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+from app.evaluation.headless import TrainedProject
+from app.export.scene_frames import SceneFrames
 from app.export.video.job import Turntable, VideoJob
+from app.export.video.plan import plan_video
+from engine.camera.corrections import N_VALUES
+from engine.clip_files.array_names import CORRECTIONS
+from engine.clip_files.clip_state import ClipState
 from engine.errors import CaptureError, EngineError
 from tests.app.export.video.conftest import Films
 
@@ -81,3 +90,18 @@ def test_what_a_camera_took_has_to_be_there_for_the_comparison(films: Films):
     with pytest.raises(CaptureError, match="missing"):
         films.render("beside", "png", shows="compare")
     assert films.names == []
+
+
+def test_a_camera_that_was_refined_is_looked_through_as_it_was_refined(opened: TrainedProject, tmp_path: Path):
+    rig, reference = opened.capture.rig, opened.reference
+    assert reference is not None
+    names = reference.header.camera_names
+    values = np.zeros((len(names), N_VALUES), np.float32)
+    values[0, :3] = 0.01
+    refined = replace(opened, reference=ClipState(reference.arrays | {CORRECTIONS: values}, reference.header))
+    index = rig.names.index(names[0])
+    assert not np.allclose(refined.rig.world_to_camera[index], rig.world_to_camera[index])
+    job = VideoJob(out=tmp_path / "a", format="png", camera=names[0])
+    for project in (opened, refined):
+        view = plan_video(job, SceneFrames(project)).view_of(0, 0.0)
+        assert np.array_equal(view.world_to_camera, project.rig.world_to_camera[index])
