@@ -22,7 +22,7 @@ def test_the_size_is_said_before_the_page_is_written(run, project: Path, tmp_pat
     document = json.loads(out)
     assert (document["format"], document["path"], document["n_files"]) == ("player", str(page), 1)
     assert document["n_bytes"] == page.stat().st_size
-    assert err.index("MB for 4 frames.") < err.index("1 files")
+    assert err.index("MB for 4 frames.") < err.index("1 file,")
 
 
 def test_clips_go_into_a_folder_on_request(run, project: Path, tmp_path: Path):
