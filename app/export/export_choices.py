@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from app.export.picked_frames import PickedFrames, picked_frames
+
 FramesChoice = Literal["all", "range", "clip", "frame"]
 FRAMES_CHOICES: tuple[FramesChoice, ...] = ("all", "range", "clip", "frame")
 Word = Annotated[str, Meta(max_length=400)]
@@ -73,8 +75,8 @@ class ExportContext(msgspec.Struct, frozen=True):
     paths: tuple[str, ...] = ()
     has_videos: bool = False
 
-    def frames(self, choice: FramesChoice, step: int) -> range:
-        """The frames of a choice; none where there are none."""
+    def frames(self, choice: FramesChoice, step: int) -> range | PickedFrames:
+        """The frames of a choice; none where there are none. Those of "all" are trained and may have gaps."""
         if choice == "range":
             return range(self.in_frame, self.out_frame + 1, step)
         if choice == "frame":
@@ -82,10 +84,10 @@ class ExportContext(msgspec.Struct, frozen=True):
         if choice == "clip":
             found = [span for span in self.clips if span[0] <= self.frame_index < span[1]]
         else:
-            found = [self.clips[index] for index in self.trained]
-        return range(found[0][0], found[-1][1], step) if found else range(0)
+            found = [self.clips[index] for index in sorted(self.trained)]
+        return picked_frames(found, step)
 
-    def untrained(self, frames: range) -> list[tuple[int, int]]:
+    def untrained(self, frames: range | PickedFrames) -> list[tuple[int, int]]:
         """First and last frames of the runs of clips that are not trained and that some of the frames lie in."""
         runs: list[tuple[int, int]] = []
         for index, (start, stop) in enumerate(self.clips):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,10 +13,17 @@ from app.export.export_jobs import KINDS
 from app.export.forms.form import Answers
 from app.export.forms.table import answers_to
 from app.export.staging import check_target
-from engine.errors import EngineError
+from engine.errors import EngineError, ProjectError
 
 if TYPE_CHECKING:
     from app.evaluation.headless import TrainedProject
+
+TAKEN = "Another export that runs or waits writes to this place."
+_SAME = {".htm": ".html"}
+_OWN_SUFFIXES = (".mp4", ".webm", ".html")
+"""They say what a file is."""
+_FILE_SUFFIXES = (*_OWN_SUFFIXES, ".csv", ".json")
+"""Of everything that is one file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,19 +46,23 @@ class ExportPlan:
     lines: tuple[str, ...] = ()
 
 
-def plan_export(opened: TrainedProject, context: ExportContext, choices: ExportChoices) -> ExportPlan:
-    """Look at what an export would do. Reads headers and asks the disk; writes nothing."""
+def plan_export(
+    opened: TrainedProject, context: ExportContext, choices: ExportChoices, taken: Sequence[Path] = ()
+) -> ExportPlan:
+    """Look at what an export would do. Reads headers and asks the disk; writes nothing.
+
+    Args:
+        taken: What other exports will write, although it may not be there yet.
+    """
     answers = answers_to(context, choices)
     form = answers.form
     problems: list[str] = []
     lines: tuple[str, ...] = ()
     n_files = n_bytes = 0
     if form.has_frames and not answers.frames:
-        problems.append("There are no such frames.")
-    elif form.has_frames and form.needs_trained and (runs := context.untrained(answers.frames)):
-        listed = ", ".join(f"{first} to {last}" if first < last else f"{first}" for first, last in runs[:3])
-        more = f" and {len(runs) - 3} more" if len(runs) > 3 else ""
-        problems.append(f"Clips of these frames are not trained: {listed}{more}.")
+        problems.append("No frames are chosen.")
+    elif form.has_frames and form.needs_trained and choices.frames != "all":
+        problems += _untrained(context.untrained(answers.frames))
     if not choices.out.strip():
         problems.append("Say where it is to be written.")
     if not problems:
@@ -59,6 +71,9 @@ def plan_export(opened: TrainedProject, context: ExportContext, choices: ExportC
             found = KINDS[choices.kind].load().estimate(opened, job)
             n_files, n_bytes, lines = found.n_files, found.n_bytes, found.lines
             _check_place(answers, opened, n_bytes)
+            _check_name(answers)
+            if any(overlap(answers.out.resolve(), other.resolve()) for other in taken):
+                raise ProjectError(TAKEN)
             if answers.suffix and answers.out.exists():
                 lines = (*lines, "The file that is there is replaced.")
         except EngineError as error:
@@ -66,6 +81,31 @@ def plan_export(opened: TrainedProject, context: ExportContext, choices: ExportC
         except (OSError, RuntimeError, ValueError) as error:  # a path that cannot be one
             problems.append(f"This place cannot be written to ({error}).")
     return ExportPlan(choices, n_files, n_bytes, _free_bytes(choices.out), tuple(problems), lines)
+
+
+def overlap(one: Path, other: Path) -> bool:
+    """Whether two exports would write to the same place, or one into what the other writes. Whole paths."""
+    return one.is_relative_to(other) or other.is_relative_to(one)
+
+
+def _untrained(runs: list[tuple[int, int]]) -> list[str]:
+    """A sentence about runs of frames, where there are any."""
+    if not runs:
+        return []
+    listed = ", ".join(f"{first} to {last}" if first < last else f"{first}" for first, last in runs[:3])
+    more = f" and {len(runs) - 3} more runs" if len(runs) > 3 else ""
+    if len(runs) == 1 and runs[0][0] == runs[0][1]:
+        return [f"Frame {listed} is not trained yet."]
+    return [f"Frames {listed}{more} are not trained yet."]
+
+
+def _check_name(answers: Answers) -> None:
+    """See that a name does not say that something else is written. Raises ProjectError."""
+    suffix, given = answers.suffix, answers.out.suffix.lower()
+    if suffix and _SAME.get(given, given) != suffix:
+        raise ProjectError(f"The name of this file has to end in {suffix}.")
+    if not suffix and _SAME.get(given, given) in _FILE_SUFFIXES:
+        raise ProjectError(f"A folder is written here, but its name ends in {given}.")
 
 
 def _check_place(answers: Answers, opened: TrainedProject, n_bytes: int) -> None:
@@ -86,12 +126,12 @@ def _free_bytes(out: str) -> int | None:
         return None
 
 
-_OWN_SUFFIXES = (".mp4", ".webm", ".html")
-"""They say what a file is."""
+def suggested_out(folder: str, context: ExportContext, choices: ExportChoices, taken: Sequence[Path] = ()) -> str:
+    """A place for an export: a name of its own in a folder that was used last. Asks the disk.
 
-
-def suggested_out(folder: str, context: ExportContext, choices: ExportChoices) -> str:
-    """A place for an export: a name of its own in a folder that was used last."""
+    Args:
+        taken: What other exports will write, although it may not be there yet.
+    """
     answers = answers_to(context, choices)
     suffix = answers.suffix
     words = [context.name or "scene", *([] if suffix in _OWN_SUFFIXES else [choices.kind])]
@@ -101,7 +141,7 @@ def suggested_out(folder: str, context: ExportContext, choices: ExportChoices) -
     base = Path(folder) if folder else Path.home()
     for number in range(1, 1000):
         path = base / f"{name}{'' if number == 1 else f'-{number}'}{suffix}"
-        if not _exists(path):
+        if not (_exists(path) or any(overlap(path.absolute(), other) for other in taken)):
             return str(path)
     return str(base / f"{name}{suffix}")
 

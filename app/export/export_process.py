@@ -37,7 +37,7 @@ logger = logging.getLogger(__name__)
 LISTEN_S = 0.1
 GRACE_S = 6.0
 """A process that was cancelled tidies up for so long before it is killed: what it loads just now is loaded first."""
-HINT = "Nothing was left of the export. Try again; the log may say more."
+HINT = "Nothing was left behind. Try again; the log may say more."
 
 
 class Exporter(Protocol):

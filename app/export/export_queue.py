@@ -5,12 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 from app.export.export_jobs import KINDS, ExportTask
 from app.export.export_messages import Event, ExportDone, ExportFailed, ExportGoesOn
+from app.export.export_plan import TAKEN, overlap
 from app.export.export_process import Exporter, ExportProcess
 from app.export.export_status import ExportStatus
 from app.training.rate import Rate
+from engine.errors import ProjectError
 
 MAX_ENDED = 50
 """Exports that have ended and are still listed."""
@@ -54,8 +57,18 @@ class ExportQueue:
         """Whether something runs or waits."""
         return any(not status.is_over for status in self._statuses)
 
+    @property
+    def targets(self) -> tuple[Path, ...]:
+        """What exports that run or wait will write, whole paths."""
+        return tuple(status.path.absolute() for status in self._statuses if not status.is_over)
+
     def add(self, task: ExportTask, title: str) -> int:
-        """Put a task at the end; returns its number."""
+        """Put a task at the end; returns its number.
+
+        Raises:
+            ProjectError: Another one that runs or waits writes to the same place.
+        """
+        self._check_free(task.job.out)
         self._n_added += 1
         self._tasks[self._n_added] = task
         self._statuses.append(ExportStatus(self._n_added, title or KINDS[task.kind].title, task.job.out))
@@ -96,9 +109,10 @@ class ExportQueue:
         self.revision += 1
 
     def retry(self, export_id: int) -> None:
-        """Begin one that failed or was cancelled anew, after those that wait."""
+        """Begin one that failed or was cancelled anew, after those that wait. Raises what `add` raises."""
         status = self._find(export_id)
         if status is not None and status.state in ("failed", "cancelled"):
+            self._check_free(status.path)
             self._statuses.remove(status)
             self._statuses.append(ExportStatus(export_id, status.title, status.path))
             self.revision += 1
@@ -157,6 +171,10 @@ class ExportQueue:
                 self._set(export_id, state="failed", message=message, hint=hint, seconds=seconds, eta_s=None)
             case _:
                 self._set(export_id, state="cancelled", seconds=seconds, eta_s=None)
+
+    def _check_free(self, path: Path) -> None:
+        if any(overlap(path.absolute(), other) for other in self.targets):
+            raise ProjectError(TAKEN, hint="Wait for it, or choose another name.", path=path)
 
     def _find(self, export_id: int) -> ExportStatus | None:
         return next((status for status in self._statuses if status.export_id == export_id), None)

@@ -14,6 +14,7 @@ from app.evaluation.headless import TrainedProject
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
 from app.export.gaussian_files import SIDECAR, WrittenPart
 from app.export.gaussian_sequence import GaussianSequence
+from app.export.picked_frames import PickedFrames
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_folder
 from engine.clip_files.clip_header import ClipHeader
@@ -45,7 +46,7 @@ class GaussiansJob:
 
     out: Path
     format: str = "ply"
-    frames: range | None = None
+    frames: range | PickedFrames | None = None
     part: WrittenPart = "all"
     up: str | None = None
     scale: float = 1.0

@@ -18,6 +18,7 @@ from app.csv_text import csv_text
 from app.evaluation.evaluation import Scope, kept_figures
 from app.evaluation.headless import TrainedProject
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
+from app.export.picked_frames import PickedFrames
 from app.export.staging import check_target, staged_file
 from engine.errors import ProjectError
 from engine.metrics.columns import COLUMNS
@@ -61,7 +62,7 @@ class MetricsJob:
 
     out: Path
     format: MetricsFormat = "csv"
-    frames: range | None = None
+    frames: range | PickedFrames | None = None
 
 
 def estimate(opened: TrainedProject, job: MetricsJob) -> ExportEstimate:

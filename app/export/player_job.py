@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report
+from app.export.picked_frames import PickedFrames
 from app.export.player_scene import scene_header
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_file, staged_folder
@@ -41,7 +42,7 @@ class PlayerJob:
     """
 
     out: Path
-    frames: range | None = None
+    frames: range | PickedFrames | None = None
     has_folder: bool | None = None
 
     @property

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from app.background.jobs import JobContext, Jobs
-from app.background.latest import LatestWorker
+from app.background.latest import LatestWorker, nothing
 from app.export.export_choices import ExportChoices, ExportContext
 from app.export.export_jobs import ExportTask
 from app.export.export_plan import ExportPlan, plan_export, suggested_out
@@ -35,7 +35,7 @@ class ExportPage:
 
     Attributes:
         context: Of the open project, when the dialog was opened.
-        choices: What it begins with.
+        choices: What it begins with; the place is asked for with `Exporting.suggest`.
     """
 
     context: ExportContext
@@ -43,11 +43,20 @@ class ExportPage:
 
 
 class _Wish(NamedTuple):
-    """Of the worker; equal ones are looked at once."""
+    """Of the workers; equal ones are looked at once.
 
+    Attributes:
+        n_asked: Number of the page; whatever may have changed since the one before is looked at again.
+        taken: What exports that run or wait will write.
+        folder: Of the export before; empty for none.
+    """
+
+    n_asked: int
     generation: int
     context: ExportContext
     choices: ExportChoices
+    taken: tuple[Path, ...]
+    folder: str = ""
 
 
 class Exporting:
@@ -76,8 +85,12 @@ class Exporting:
         self._queue = ExportQueue(launch=launch)
         self._jobs = Jobs()
         self._planner: LatestWorker[_Wish, ExportPlan] = LatestWorker("export plan", self._plan)
+        self._namer: LatestWorker[_Wish, str] = LatestWorker("export name", _name)
         self._opened: OpenedProject | None = None
+        self._n_asked = 0
+        self._settle: Callable[[], None] = nothing
         self._read: tuple[object, TrainedProject] | None = None  # belongs to the planner's thread
+        self._settled = 0  # likewise: number of the page
         self._revision = 0
 
     @property
@@ -93,7 +106,7 @@ class Exporting:
     @property
     def finished(self) -> tuple[object, ...]:
         """Differs whenever there is something else to show."""
-        return self._revision, self._queue.revision, self._planner.newest
+        return self._revision, self._queue.revision, self._planner.newest, self._namer.newest
 
     # ---- the dialog
 
@@ -103,12 +116,16 @@ class Exporting:
         timeline: Timeline,
         trained: tuple[int, ...],
         paths: tuple[str, ...] = (),
+        *,
+        settle: Callable[[], None] = nothing,
     ) -> None:
         """Open the dialog.
 
         Args:
             trained: Indices of the clips that are finished.
-            paths: Names of the camera paths, as they are on the disk.
+            paths: Names of the camera paths.
+            settle: Waits until the camera paths are on the disk, where exports read them; called on a thread before
+                what would be written is looked at, and so before an export can begin.
         Raises:
             ProjectError: Nothing is trained yet.
         """
@@ -120,20 +137,30 @@ class Exporting:
         last = self._settings.last_export
         if last.kind not in FORMS:
             last = last.changed(kind=next(iter(FORMS)))
-        self._opened = opened
-        self.page = ExportPage(context, last.changed(out=self.suggest(context, last)))
+        self._opened, self._settle = opened, settle
+        self._n_asked += 1
+        self.page = ExportPage(context, last.changed(out=""))
         self._revision += 1
 
-    def suggest(self, context: ExportContext, choices: ExportChoices) -> str:
-        """A place for an export, beside the one before."""
-        last = self._settings.last_export.out
-        return suggested_out(str(Path(last).parent) if last else "", context, choices)
+    def suggest(self, choices: ExportChoices) -> str | None:
+        """A place for an export, beside the one before; None until one was looked for."""
+        last, wish = self._settings.last_export.out, self._wish(choices.changed(out=""))
+        if wish is None:
+            return None
+        wish = wish._replace(folder=str(Path(last).parent) if last else "")
+        newest = self._namer.newest
+        if newest is not None and newest[0] == wish:
+            return newest[1]
+        if self._namer.has_failed(wish):
+            return ""  # the user has to say where
+        self._namer.request(wish)
+        return None
 
     def plan(self, choices: ExportChoices) -> ExportPlan | None:
         """What would be written; None until that was looked at."""
-        if self.page is None or self._opened is None:
+        wish = self._wish(choices)
+        if wish is None:
             return None
-        wish = _Wish(self._opened.generation, self.page.context, choices)
         newest = self._planner.newest
         if newest is not None and newest[0] == wish:
             return newest[1]
@@ -143,6 +170,11 @@ class Exporting:
             return ExportPlan(choices, problems=(f"This could not be looked at{reason}.",))
         self._planner.request(wish)
         return None
+
+    def _wish(self, choices: ExportChoices) -> _Wish | None:
+        if self.page is None or self._opened is None:
+            return None
+        return _Wish(self._n_asked, self._opened.generation, self.page.context, choices, self._queue.targets)
 
     def close_page(self) -> None:
         """Ask no more."""
@@ -156,7 +188,7 @@ class Exporting:
         """Put an export into the queue, and remember what was chosen.
 
         Raises:
-            ProjectError: It cannot be written.
+            ProjectError: Another export that runs or waits writes to the same place.
         """
         page, opened = self.page, self._opened
         if page is None or opened is None:
@@ -225,6 +257,7 @@ class Exporting:
         self._queue.close()
         self._jobs.close()
         self._planner.close(timeout_s=0.5)
+        self._namer.close(timeout_s=0.5)
 
     # ---- on the planner's thread
 
@@ -233,12 +266,19 @@ class Exporting:
 
         opened, key = self._opened, (wish.generation, wish.context.trained)
         assert opened is not None
+        if self._settled != wish.n_asked:
+            self._settle()
+            self._settled = wish.n_asked
         if self._read is None or self._read[0] != key:
             try:
                 self._read = key, open_trained(opened.project, opened.capture)
             except EngineError as error:
                 return ExportPlan(wish.choices, problems=(str(error),))
-        return plan_export(self._read[1], wish.context, wish.choices)
+        return plan_export(self._read[1], wish.context, wish.choices, wish.taken)
+
+
+def _name(wish: _Wish) -> str:
+    return suggested_out(wish.folder, wish.context, wish.choices, wish.taken)
 
 
 def _context(

@@ -361,9 +361,8 @@ class Session:
             case commands.AskExport():
                 catalog = () if service is None else service.catalog
                 trained = tuple(i for i in range(len(catalog)) if catalog[i].state == "trained")
-                self.camera_paths.document.settle()  # exports read the paths from the disk
                 names = tuple(path.name for path in self.paths.paths)
-                exporting.ask(self.opened, self.timeline, trained, names)
+                exporting.ask(self.opened, self.timeline, trained, names, settle=self.camera_paths.document.settle)
             case commands.StartExport(choices=choices):
                 exporting.start(choices)
             case commands.CancelExport(export_id=export_id):

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from app.background.log_reader import LogLine
-from app.export.export_choices import ExportChoices, ExportContext
+from app.export.export_choices import ExportChoices
 from app.export.export_plan import ExportPlan
 from app.export.export_status import ExportStatus
 from app.playback.arrays import AnchorArrays, Picture, PointArrays
@@ -162,7 +162,7 @@ class FakeExporting:
         self.asked.append(choices)
         return self.found
 
-    def suggest(self, context: ExportContext, choices: ExportChoices) -> str:
+    def suggest(self, choices: ExportChoices) -> str | None:
         """A name that tells what it was made of."""
         return f"/out/{choices.kind}"
 

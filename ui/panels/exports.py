@@ -70,7 +70,7 @@ def files_text(n_files: int, n_bytes: float) -> str:
 def progress_text(status: ExportStatus) -> str:
     """How far an export is, how fast, and how long the rest takes."""
     if status.state == "waiting":
-        return "Waits"
+        return "Waiting"
     if status.state == "stopping":
         return "Stopping"
     progress = status.progress
@@ -89,7 +89,7 @@ def progress_text(status: ExportStatus) -> str:
 def ending_text(status: ExportStatus) -> str:
     """What came of an export that has ended."""
     if status.state == "cancelled":
-        return "Cancelled; nothing was left of it."
+        return "Cancelled; nothing was left behind."
     if status.state == "failed" or status.result is None:
         return " ".join(filter(None, (status.message, status.hint)))
     result = status.result

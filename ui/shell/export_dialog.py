@@ -5,48 +5,43 @@ Enter exports where nothing is wrong, Escape closes. What is asked comes from a 
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
-from imgui_bundle import ImVec2, ImVec4, imgui
-from imgui_bundle import portable_file_dialogs as native
+from imgui_bundle import ImVec2, imgui
 
 from app.export.export_choices import FRAMES_CHOICES, ExportChoices, ExportContext, FramesChoice
 from app.export.export_jobs import KINDS
 from app.export.export_plan import ExportPlan
 from app.export.forms.form import Option
 from app.export.forms.table import FORMS
+from app.export.picked_frames import PickedFrames
 from app.session.commands import CloseQuestion, Command, StartExport
 from engine.text import one_line
-from ui.panels.exports import ExportingFacts, bytes_text, files_text
+from ui.panels.exports import ExportingFacts
 from ui.panels.state import EXPORTS, Dispatch, UiState
-from ui.panels.widgets import elided, primary_button, segment, text_wrapped, text_wrapped_dim
-from ui.shell.dialogs import has_native_dialog
+from ui.panels.widgets import elided, primary_button, segment, text_wrapped_dim
+from ui.shell.export_place import LABEL_WIDTH, REFRESH_S, ExportPlace, Suggests, draw_plan, label
 from ui.shell.modal import Modal
 from ui.style import theme
-from ui.style.theme import Icon
 
 TITLE = "Export###export"
 SIZE = (900.0, 700.0)
 BUTTON = ImVec2(170, 34)
-LABEL_WIDTH = 130.0
 BOX_WIDTH = 320.0
 PLAN_HEIGHT = 112.0
 PLACE_HEIGHT = 66.0
 FRAMES_WIDTH = 300.0
 MAX_RADIOS = 6
-"""More answers than this go into a box."""
-REFRESH_S = 0.1
+"""More answers than this go into a box, and names whatever their number."""
 
 
-class ExportingNeeds(ExportingFacts, Protocol):
+class ExportingNeeds(ExportingFacts, Suggests, Protocol):
     """What the dialog reads of Exporting."""
 
     @property
     def page(self) -> ExportPageFacts | None: ...
 
     def plan(self, choices: ExportChoices) -> ExportPlan | None: ...
-
-    def suggest(self, context: ExportContext, choices: ExportChoices) -> str: ...
 
 
 class ExportPageFacts(Protocol):
@@ -73,9 +68,7 @@ class ExportDialog:
         self._modal = Modal()
         self._page: ExportPageFacts | None = None
         self._choices = ExportChoices()
-        self._suggested = ""
-        self._native: Any = None
-        self._has_native = False
+        self._place = ExportPlace()
         self._is_box_open = False
 
     def draw(self, session: HasExporting, dispatch: Dispatch, ui: UiState) -> None:
@@ -89,8 +82,8 @@ class ExportDialog:
             dispatch(CloseQuestion())
             return
         if page is not self._page:
-            self._page, self._choices, self._suggested = page, page.choices, page.choices.out
-            self._has_native = has_native_dialog()
+            self._page, self._choices = page, page.choices
+            self._place.begin(page.choices)
         has_keys, self._is_box_open = not self._is_box_open, False  # an open box of answers takes Enter and Escape
         is_agreed, is_left = keys.is_agreed and has_keys, keys.is_left and has_keys
         before = self._choices
@@ -100,14 +93,14 @@ class ExportDialog:
         imgui.end_child()
         if is_agreed:  # Enter also presses what the arrow keys are on
             self._choices = before
-        self._suggest_anew(exporting, page.context, before)
+        self._choices = self._place.suggested(exporting, before, self._choices)
         imgui.separator()
-        self._draw_place(ui)
-        plan = exporting.plan(self._choices)
+        self._choices = self._place.draw(self._choices, ui)
+        plan = None if self._place.is_looking else exporting.plan(self._choices)
         if plan is None:
             ui.redraw_within(REFRESH_S)
         if imgui.begin_child("plan", ImVec2(0, PLAN_HEIGHT), imgui.ChildFlags_.nav_flattened):
-            _draw_plan(plan, ui)
+            draw_plan(plan, ui)
         imgui.end_child()
         imgui.separator()
         answer = self._draw_buttons(plan, ui, is_agreed=is_agreed)
@@ -121,19 +114,11 @@ class ExportDialog:
                 ui.wanted_panel = EXPORTS
             dispatch(answer)
 
-    def _suggest_anew(self, exporting: ExportingNeeds, context: ExportContext, before: ExportChoices) -> None:
-        """Another kind or format gets another name, unless the user has typed one."""
-        now = self._choices
-        has_changed = (now.kind, now.answers) != (before.kind, before.answers)
-        if has_changed and now.out == self._suggested:
-            self._suggested = exporting.suggest(context, now)
-            self._choices = now.changed(out=self._suggested)
-
     # ---- what is asked
 
     def _draw_choices(self, context: ExportContext, ui: UiState) -> None:
         choices = self._choices
-        _label("What")
+        label("What")
         for place, kind in enumerate(FORMS):
             if place:
                 imgui.same_line(0, 6)
@@ -143,7 +128,7 @@ class ExportDialog:
             imgui.pop_id()
             ui.mark(f"export.kind.{kind}")
         form = FORMS[choices.kind]
-        _label("")
+        label("")
         text_wrapped_dim(form.about)
         imgui.spacing()
         for option in form.options(context, choices):
@@ -154,9 +139,9 @@ class ExportDialog:
 
     def _draw_option(self, option: Option, ui: UiState) -> None:
         chosen = option.chosen(self._choices)
-        _label(option.label)
+        label(option.label)
         imgui.push_id(option.name)
-        if len(option.values) > MAX_RADIOS:
+        if option.has_names or len(option.values) > MAX_RADIOS:  # a label would end at a "##" in a name
             if _begin_box(one_line(dict(option.values)[chosen])):
                 self._is_box_open = True
                 for place, (value, words) in enumerate(option.values):
@@ -196,7 +181,7 @@ class ExportDialog:
             if place % 2:
                 imgui.same_line(LABEL_WIDTH + FRAMES_WIDTH)
             else:
-                _label("Frames" if place == 0 else "")
+                label("Frames" if place == 0 else "")
             if imgui.radio_button(f"{words[choice]}##frames", self._choices.frames == choice):
                 self._choices = self._choices.changed(frames=choice)
             ui.mark(f"export.frames.{choice}")
@@ -204,7 +189,7 @@ class ExportDialog:
             imgui.text_disabled(_frames_text(context.frames(choice, 1)))
         if not FORMS[self._choices.kind].has_step:
             return
-        _label("")
+        label("")
         imgui.begin_disabled(self._choices.frames == "frame")
         imgui.text("One of every")
         imgui.same_line()
@@ -214,35 +199,6 @@ class ExportDialog:
         imgui.end_disabled()
         if has_changed:
             self._choices = self._choices.changed(step=min(max(step, 1), 100_000))
-
-    def _draw_place(self, ui: UiState) -> None:
-        _label("Written to", imgui.get_style().window_padding.x)
-        self._take_native(ui)
-        imgui.set_next_item_width(-48 if self._has_native else -1)
-        has_changed, out = imgui.input_text("##out", self._choices.out)
-        ui.mark("export.out")
-        if has_changed:
-            self._choices = self._choices.changed(out=out)
-        if self._has_native:
-            imgui.same_line()
-            if imgui.button(f"{Icon.FOLDER}##choose", ImVec2(-1, 0)) and self._native is None:
-                folder, _, _ = self._choices.out.rpartition("/")
-                self._native = native.select_folder("Folder to export into", folder)
-            ui.mark("export.choose")
-            imgui.set_item_tooltip("Choose a folder")
-
-    def _take_native(self, ui: UiState) -> None:
-        """The answer of the desktop's dialog: a folder, in which the name stays."""
-        if self._native is None:
-            return
-        if not self._native.ready(0):
-            ui.redraw_within(REFRESH_S)
-            return
-        folder, self._native = self._native.result(), None
-        if folder:
-            name = self._choices.out.replace("\\", "/").rpartition("/")[2]
-            self._suggested = f"{folder.rstrip('/')}/{name}"
-            self._choices = self._choices.changed(out=self._suggested)
 
     def _draw_buttons(self, plan: ExportPlan | None, ui: UiState, *, is_agreed: bool) -> Command | None:
         imgui.set_cursor_pos_x(imgui.get_window_width() - 2 * BUTTON.x - 22)
@@ -270,29 +226,10 @@ def _begin_box(words: str) -> bool:
     return is_open
 
 
-def _draw_plan(plan: ExportPlan | None, ui: UiState) -> None:
-    if plan is None:
-        text_wrapped_dim("Looking at what would be written ...")
-        return
-    for problem in plan.problems:
-        imgui.text_colored(ImVec4(*theme.ORANGE), Icon.WARNING)
-        imgui.same_line()
-        text_wrapped(problem)
-        ui.mark("export.problem")
-    if not plan.problems:
-        free = "" if plan.free_bytes is None else f"; {bytes_text(plan.free_bytes)} are free"
-        text_wrapped(f"{files_text(plan.n_files, plan.n_bytes).replace(', ', ', about ', 1)}{free}")
-        ui.mark("export.plan")
-    imgui.push_style_color(imgui.Col_.text, ImVec4(*theme.TEXT_DIM))
-    for line in plan.lines:
-        text_wrapped(line)
-    imgui.pop_style_color()
-
-
-def _frames_text(frames: range) -> str:
-    if not frames:
-        return "none"
-    return f"{frames[0]}" if len(frames) == 1 else f"{frames[0]} to {frames[-1]}"
+def _frames_text(frames: range | PickedFrames) -> str:
+    runs = frames.runs if isinstance(frames, PickedFrames) else (frames,)
+    listed = ", ".join(f"{run[0]} to {run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs[:2] if run)
+    return f"{listed} and more" if len(runs) > 2 else listed or "none"
 
 
 def _same_line_if_fits(words: str) -> None:
@@ -303,9 +240,3 @@ def _same_line_if_fits(words: str) -> None:
         imgui.same_line()
     else:
         imgui.set_cursor_pos_x(LABEL_WIDTH)
-
-
-def _label(text: str, indent: float = 0.0) -> None:
-    imgui.align_text_to_frame_padding()
-    imgui.text(text)
-    imgui.same_line(LABEL_WIDTH + indent)

@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from app.export.export_choices import ExportChoices, ExportContext
 from app.export.export_jobs import KINDS, Job
+from app.export.picked_frames import PickedFrames
 
 Value = TypeVar("Value", bound=str)
 
@@ -88,9 +89,18 @@ class Answers:
         return next((value for value in values if value == self[name]), values[0])
 
     @property
-    def frames(self) -> range:
+    def frames(self) -> range | PickedFrames:
         """The chosen frames."""
-        return self.context.frames(self.choices.frames, self.choices.step if self.form.has_step else 1)
+        return self.context.frames(self.choices.frames, self._step)
+
+    @property
+    def job_frames(self) -> range | PickedFrames | None:
+        """The same as jobs take them: None for all that are trained."""
+        return None if self.choices.frames == "all" and self._step == 1 else self.frames
+
+    @property
+    def _step(self) -> int:
+        return self.choices.step if self.form.has_step else 1
 
     @property
     def out(self) -> Path:

@@ -58,7 +58,7 @@ def _job(answers: Answers) -> Job:
     return GaussiansJob(
         out=answers.out,
         format=answers["format"],
-        frames=answers.frames,
+        frames=answers.job_frames,
         part=answers.one_of(WRITTEN_PARTS, "part"),
         up=answers["up"] or None,
         scale=float(answers["scale"]),

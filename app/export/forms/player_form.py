@@ -6,7 +6,7 @@ from app.export.export_choices import ExportChoices, ExportContext
 from app.export.export_jobs import Job
 from app.export.forms.form import Answers, Form, Option
 
-_DATA = (("", "As the size needs"), ("file", "In the page"), ("folder", "In a folder beside it"))
+_DATA = (("", "Depending on size"), ("file", "In the page"), ("folder", "In a folder beside it"))
 _DATA_TIPS = {
     "": "In the page up to 150 MB, in a folder above that",
     "folder": "Loaded clip by clip as it plays; the folder has to stay beside the page",
@@ -21,7 +21,7 @@ def _job(answers: Answers) -> Job:
     from app.export.player_job import PlayerJob
 
     has_folder = {"file": False, "folder": True}.get(answers["data"])
-    return PlayerJob(answers.out, answers.frames, has_folder)
+    return PlayerJob(answers.out, answers.job_frames, has_folder)
 
 
 PLAYER = Form(

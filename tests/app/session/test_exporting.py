@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import msgspec
 import pytest
 
-from app.export.export_choices import ExportChoices
+from app.evaluation.headless import open_trained
+from app.export.export_choices import ExportChoices, ExportContext
 from app.export.export_messages import ExportDone, ExportFailed
-from app.export.export_plan import ExportPlan
+from app.export.export_plan import TAKEN, ExportPlan, plan_export
 from app.export.export_progress import ExportResult
 from app.export.forms.table import FORMS, answers_to
 from app.playback.timeline import Timeline
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.project import open_project
 from app.session import commands
-from app.session.exporting import Exporting
+from app.session.exporting import Exporting, ExportPage
 from app.session.notices import Notices
 from app.session.session import Session
 from app.session.settings import Settings
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError
+from tests.app.export.test_export_choices import CONTEXT
 from tests.app.export.test_export_queue import FakeExporter
 from tests.app.residuals.conftest import make_project
 
@@ -66,6 +70,18 @@ class Bench:
         self.until(look)
         return found[-1]
 
+    def suggest(self, choices: ExportChoices) -> str:
+        """Wait for it likewise."""
+        found: list[str | None] = []
+
+        def look() -> bool:
+            found.append(self.exporting.suggest(choices))
+            return found[-1] is not None
+
+        self.until(look)
+        assert found[-1] is not None
+        return found[-1]
+
     def until(self, is_so: Callable[[], bool]) -> None:
         until_s = time.monotonic() + DEADLINE_S
         while not is_so():
@@ -76,6 +92,12 @@ class Bench:
     def start(self, out: str = "m.csv") -> None:
         self.ask()
         self.exporting.start(METRICS.changed(out=str(self.folder / "out" / out)))
+
+
+def context_of(bench: Bench) -> ExportContext:
+    """Of the dialog that is open."""
+    assert bench.exporting.page is not None
+    return bench.exporting.page.context
 
 
 @pytest.fixture
@@ -94,7 +116,7 @@ def test_the_dialog_begins_with_what_was_chosen_last(bench: Bench):
     assert (page.context.clips, page.context.trained) == (((0, 3), (3, 6)), (0, 1))
     assert (page.context.frame_index, page.context.in_frame, page.context.out_frame) == (4, 1, 2)
     assert page.choices.kind == "gaussians"
-    assert Path(page.choices.out).parent == Path.home()
+    assert Path(bench.suggest(page.choices)).parent == Path.home()
     bench.start("first.csv")
     assert bench.exporting.page is None
     assert Settings(bench.settings.path).last_export.kind == "metrics"
@@ -102,7 +124,8 @@ def test_the_dialog_begins_with_what_was_chosen_last(bench: Bench):
     again = bench.exporting.page
     assert again is not None
     assert again.choices.kind == "metrics"
-    assert again.choices.out == str(bench.folder / "out" / "p-metrics.csv")
+    assert again.choices.out == ""
+    assert bench.suggest(again.choices) == str(bench.folder / "out" / "p-metrics.csv")
 
 
 def test_nothing_trained_is_said_and_a_damaged_memory_is_none(bench: Bench):
@@ -158,11 +181,100 @@ def test_a_disk_without_room_is_told_before(bench: Bench, monkeypatch: pytest.Mo
 def test_untrained_clips_in_the_range_are_told_before(bench: Bench):
     bench.ask((0,))
     cameras = ExportChoices(kind="gaussians", frames="range", out=str(bench.folder / "g"))
-    assert bench.plan(cameras).problems == ("Clips of these frames are not trained: 3 to 5.",)
+    assert bench.plan(cameras).problems == ("Frames 3 to 5 are not trained yet.",)
     assert bench.plan(cameras.changed(frames="all")).problems == ()
     bench.timeline.seek(5)
     bench.ask((0,))
-    assert bench.plan(cameras.changed(frames="clip")).problems == ("Clips of these frames are not trained: 3 to 5.",)
+    assert bench.plan(cameras.changed(frames="clip")).problems == ("Frames 3 to 5 are not trained yet.",)
+
+
+def test_frames_that_are_not_there_and_single_ones_are_told_in_plain_words(bench: Bench):
+    bench.timeline.set_range(5, 5)
+    bench.ask((0,))
+    choices = ExportChoices(kind="gaussians", frames="range", out=str(bench.folder / "g"))
+    assert bench.plan(choices).problems == ("Frame 5 is not trained yet.",)
+    empty = msgspec.structs.replace(context_of(bench), in_frame=4, out_frame=3)
+    bench.exporting.page = ExportPage(empty, choices)
+    assert bench.plan(choices).problems == ("No frames are chosen.",)
+
+
+@pytest.mark.parametrize("kind", ["gaussians", "video", "player", "metrics"])
+@pytest.mark.parametrize("step", [1, 2])
+def test_all_that_are_trained_may_have_gaps(tmp_path: Path, kind: str, step: int):
+    folder = make_project(tmp_path, n_frames=9, trained=(0, 2))
+    opened = open_trained(open_project(folder, is_writable=False))
+    context = msgspec.structs.replace(CONTEXT, clips=((0, 3), (3, 6), (6, 9)), trained=(0, 2))
+    choices = ExportChoices(kind=kind, step=step, out=str(tmp_path / "x"))
+    choices = choices.changed(out=f"{choices.out}{answers_to(context, choices).suffix}")
+    plan = plan_export(opened, context, choices)
+    assert plan.problems == ()
+    if kind == "gaussians":
+        assert plan.n_files == len([0, 1, 2, 6, 7, 8] if step == 1 else [0, 2, 6, 8]) + 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "answer", "name", "said"),
+    [
+        ("video", "webm", "film.mp4", "has to end in .webm"),
+        ("video", "mp4", "film.webm", "has to end in .mp4"),
+        ("video", "mp4", "film", "has to end in .mp4"),
+        ("video", "mp4", "film.MP4", ""),
+        ("video", "png", "film.mp4", "folder is written"),
+        ("video", "png", "film", ""),
+        ("metrics", "json", "m.csv", "has to end in .json"),
+        ("player", "", "m.mp4", "ends in .html"),
+        ("player", "", "m.htm", ""),
+        ("gaussians", "ply", "m.v2", ""),
+    ],
+)
+def test_a_name_that_says_something_else_is_told_before(bench: Bench, kind: str, answer: str, name: str, said: str):
+    bench.ask()
+    choices = ExportChoices(kind=kind, out=str(bench.folder / "new" / name)).with_answer("format", answer)
+    problems = bench.plan(choices).problems
+    assert len(problems) == bool(said)
+    assert said in "".join(problems)
+
+
+def test_what_another_export_will_write_is_taken(bench: Bench):
+    bench.start("p-metrics.csv")
+    bench.exporting.poll(is_training=False)
+    bench.ask()
+    out = bench.folder / "out"
+    assert bench.suggest(METRICS) == str(out / "p-metrics-2.csv")
+    for name in ("p-metrics.csv", "../out/p-metrics.csv", "p-metrics.csv/more.csv"):
+        assert bench.plan(METRICS.changed(out=str(out / name))).problems == (TAKEN,)
+    assert bench.plan(METRICS.changed(out=str(out / "other.csv"))).problems == ()
+    with pytest.raises(ProjectError, match="Another export"):
+        bench.exporting.start(METRICS.changed(out=str(out / "p-metrics.csv")))
+    assert len(bench.exporting.statuses) == 1
+    bench.started[0].events.append(ExportFailed("The disk is full.", ""))
+    bench.exporting.poll(is_training=False)
+    assert bench.suggest(METRICS) == str(out / "p-metrics.csv")
+    assert bench.plan(METRICS.changed(out=str(out / "p-metrics.csv"))).problems == ()
+    bench.exporting.start(METRICS.changed(out=str(out / "p-metrics.csv")))
+    with pytest.raises(ProjectError, match="Another export"):
+        bench.exporting.retry(1)
+
+
+def test_names_and_camera_paths_are_waited_for_on_threads(bench: Bench, monkeypatch: pytest.MonkeyPatch):
+    settled: list[str] = []
+    looked: list[str] = []
+
+    def exists(path: Path) -> bool:
+        looked.append(threading.current_thread().name)
+        return False
+
+    monkeypatch.setattr("app.export.export_plan._exists", exists)
+    for _ in range(2):  # what was on the disk at the first time says nothing about the second
+        bench.exporting.ask(
+            bench.opened, bench.timeline, (0, 1), settle=lambda: settled.append(threading.current_thread().name)
+        )
+        bench.suggest(METRICS)
+        bench.plan(METRICS.changed(out=str(bench.folder / "m.csv")))
+        bench.plan(METRICS.changed(out=str(bench.folder / "n.csv")))
+        bench.exporting.close_page()
+    assert settled == ["export plan"] * 2
+    assert set(looked) == {"export name"}
 
 
 def test_every_answer_of_every_form_makes_a_job_or_says_why_not(bench: Bench):

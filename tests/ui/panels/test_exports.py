@@ -194,7 +194,7 @@ def test_the_panel_is_reached_and_used_by_keyboard(pilot: Pilot) -> None:
 
 
 def test_progress_in_words() -> None:
-    assert progress_text(STATUS) == "Waits"
+    assert progress_text(STATUS) == "Waiting"
     running = replace(STATUS, state="running")
     assert progress_text(running) == "Starting"
     assert progress_text(replace(running, progress=ExportProgress(0, 0, message="Opening"))) == "Opening"
