@@ -150,12 +150,14 @@ class FakeSynchronising:
 
 @dataclass
 class FakeExporting:
-    """What the window reads of Exporting; `asked` are the choices that a plan was wanted for."""
+    """What the window reads of Exporting; `asked` are the choices that a plan was wanted for, and with `is_looking` no name
+    was found yet."""
 
     page: ExportPage | None = None
     statuses: tuple[ExportStatus, ...] = ()
     found: ExportPlan | None = None
     asked: list[ExportChoices] = field(default_factory=list)
+    is_looking: bool = False
 
     def plan(self, choices: ExportChoices) -> ExportPlan | None:
         """What was made up."""
@@ -163,8 +165,8 @@ class FakeExporting:
         return self.found
 
     def suggest(self, choices: ExportChoices) -> str | None:
-        """A name that tells what it was made of."""
-        return f"/out/{choices.kind}"
+        """A name that tells what it was made of; none while `is_looking`."""
+        return None if self.is_looking else f"/out/{choices.kind}"
 
 
 class FakeSession:

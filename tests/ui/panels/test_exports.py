@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import pytest
 from pyglet.window import key
 
@@ -12,6 +13,9 @@ from app.export.export_choices import ExportChoices, ExportContext
 from app.export.export_plan import ExportPlan
 from app.export.export_progress import ExportProgress, ExportResult
 from app.export.export_status import ExportStatus
+from app.export.forms.table import answers_to
+from app.export.forms.video_form import VIDEO
+from app.export.video.job import Turntable
 from app.session import commands
 from app.session.exporting import ExportPage
 from tests.ui.pilot import CTRL, Pilot
@@ -40,10 +44,15 @@ def errors(pilot: Pilot) -> list[str]:
     return [notice.title for notice in pilot.session.notices if notice.kind == "error"]
 
 
-def ask(pilot: Pilot, choices: ExportChoices, **plan: object) -> None:
+def replace_context(**changes: object) -> ExportContext:
+    """The context with other facts."""
+    return msgspec.structs.replace(CONTEXT, **changes)
+
+
+def ask(pilot: Pilot, choices: ExportChoices, context: ExportContext = CONTEXT, **plan: object) -> None:
     """Open the dialog."""
     exporting = pilot.session.exporting
-    exporting.page = ExportPage(CONTEXT, choices)
+    exporting.page = ExportPage(context, choices)
     exporting.found = ExportPlan(choices, 3, 5_000_000, 10**10, **plan)  # type: ignore[arg-type]
     pilot.draw(6)
     assert "export.start" in pilot.rects
@@ -122,6 +131,44 @@ def test_names_of_cameras_and_paths_are_shown_as_they_are(pilot: Pilot) -> None:
     assert asked(pilot).answer("shows") == "compare"
     assert "export.size." not in pilot.rects  # pictures have the camera's size
     assert not errors(pilot)
+
+
+@pytest.mark.gl
+def test_names_are_shown_as_they_are_where_they_are_few(pilot: Pilot) -> None:
+    ask(pilot, ExportChoices(kind="video", out="/out/v"), context=replace_context(cameras=("a##b", "a"), paths=()))
+    assert "export.from.camera:a##b" not in pilot.rects  # not among radio buttons, whose labels end at "##"
+    pilot.click("export.from")
+    pilot.draw(3)
+    pilot.click("export.from.camera:a##b")
+    pilot.draw(3)
+    assert asked(pilot).answer("from") == "camera:a##b"
+    assert not errors(pilot)
+
+
+@pytest.mark.gl
+def test_a_turntable_has_turns_and_a_height(pilot: Pilot) -> None:
+    ask(pilot, ExportChoices(kind="video", out="/out/v").with_answer("from", "turntable"))
+    pilot.click("export.turns.2")
+    pilot.click("export.height.45")
+    pilot.draw(2)
+    assert (asked(pilot).answer("turns"), asked(pilot).answer("height")) == ("2", "45")
+    job = VIDEO.make_job(answers_to(CONTEXT, asked(pilot)))
+    assert job.turntable == Turntable(2.0, 45.0)  # type: ignore[attr-defined]
+
+
+@pytest.mark.gl
+def test_nothing_is_exported_before_there_is_a_name(pilot: Pilot) -> None:
+    exporting = pilot.session.exporting
+    exporting.is_looking = True
+    ask(pilot, ExportChoices())
+    pilot.key(key.ENTER)
+    assert exporting.asked == []
+    assert not [one for one in pilot.session.commands if isinstance(one, commands.StartExport)]
+    exporting.is_looking = False
+    pilot.draw(2)
+    assert asked(pilot).out == "/out/gaussians"
+    pilot.key(key.ENTER)
+    assert pilot.session.commands[-1] == commands.StartExport(ExportChoices(out="/out/gaussians"))
 
 
 @pytest.mark.gl
