@@ -150,8 +150,10 @@ class FakeSynchronising:
 
 @dataclass
 class FakeExporting:
-    """What the window reads of Exporting; `asked` are the choices that a plan was wanted for, and with `is_looking` no name
-    was found yet."""
+    """What the window reads of Exporting; `asked` are the choices that a plan was wanted for.
+
+    While `is_looking` no name was found yet.
+    """
 
     page: ExportPage | None = None
     statuses: tuple[ExportStatus, ...] = ()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import msgspec
 import pytest
 
@@ -47,6 +49,7 @@ def test_answers_belong_to_a_kind_and_survive_a_file():
 def test_frames_of_a_choice(choice, step, frames):
     found = CONTEXT.frames(choice, step)
     assert list(found) == frames
+    assert pickle.loads(pickle.dumps(found)) == found
     assert (len(found), found.step, [frame for frame in range(12) if frame in found]) == (len(frames), step, frames)
 
 

@@ -337,14 +337,18 @@ def test_a_file_manager_that_is_missing_is_told(bench: Bench):
     assert "no file manager" in bench.notices[0].detail
 
 
-def test_a_session_asks_and_closes(tmp_path: Path):
+def test_a_session_asks_and_closes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     session = Session(settings=Settings(tmp_path / "settings.json"), is_preloading=False)
+    waits: list[str] = []
     try:
+        monkeypatch.setattr(session.camera_paths.document, "settle", lambda: waits.append("settle"))
         session.dispatch(commands.AskExport())  # nothing is open
         assert session.exporting.page is None
         session.dispatch(commands.CancelExport(5))
         session.dispatch(commands.ShowExport(5))
         session.dispatch(commands.CloseQuestion())
         assert not list(session.notices)
+        assert waits == []  # the window's thread waits for no disk
+        monkeypatch.undo()
     finally:
         session.close()
