@@ -25,7 +25,7 @@ from ui.shell.modal import Modal
 from ui.style import theme
 
 TITLE = "Export###export"
-SIZE = (900.0, 700.0)
+SIZE = (900.0, 740.0)
 BUTTON = ImVec2(170, 34)
 BOX_WIDTH = 320.0
 PLAN_HEIGHT = 112.0

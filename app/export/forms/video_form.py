@@ -24,7 +24,6 @@ _SIZES = (("1280x720", "1280 x 720"), ("1920x1080", "1920 x 1080"), ("3840x2160"
 _RATES = (("24", "24"), ("25", "25"), ("30", "30"), ("50", "50"), ("60", "60"))
 _SPEEDS = (("1", "As it happened"), ("0.5", "Half"), ("0.25", "A quarter"), ("0.125", "An eighth"), ("2", "Double"))
 _TURNS = (("1", "One"), ("2", "Two"), ("3", "Three"), ("0.5", "Half a turn"), ("-1", "One, the other way round"))
-_HEIGHTS = tuple((degrees, f"{degrees} degrees") for degrees in ("20", "0", "10", "45", "70"))
 _SUPERSAMPLING = (("1", "None"), ("2", "2 x 2"), ("3", "3 x 3"), ("4", "4 x 4"))
 _BACKGROUNDS = {"black": (0, 0, 0), "grey": (128, 128, 128), "white": (255, 255, 255)}
 CAMERA, PATH, TURNTABLE = "camera:", "path:", "turntable"
@@ -44,7 +43,7 @@ def _options(context: ExportContext, choices: ExportChoices) -> tuple[Option, ..
         sizes = [size for size in _SIZES if size[0] != f"{width}x{height}"]
         options.append(Option("size", "Size", (("", f"{width} x {height}"), *sizes)))
     if view.chosen(choices) == TURNTABLE:
-        options += [Option("turns", "Turns", _TURNS), Option("height", "Height", _HEIGHTS)]
+        options.append(Option("turns", "Turns", _TURNS))
     options.append(Option("supersampling", "Smoothing", _SUPERSAMPLING))
     if not is_camera:
         still = f"Stands still at frame {context.frame_index}"
@@ -82,7 +81,7 @@ def _job(answers: Answers) -> Job:
         format=answers["format"],
         camera=view.removeprefix(CAMERA) if view.startswith(CAMERA) else None,
         path=view.removeprefix(PATH) if view.startswith(PATH) else None,
-        turntable=Turntable(float(answers["turns"]), float(answers["height"])) if view == TURNTABLE else None,
+        turntable=Turntable(float(answers["turns"])) if view == TURNTABLE else None,
         frames=None if has_own_frames or not frames else (frames[0], frames[-1] + 1),
         shows=answers.one_of(tuple(PASSES), "shows"),
         size=(int(width), int(height)) if size else None,
