@@ -87,7 +87,7 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
     scene = SceneFrames(opened)
     frames = _frames(scene, job)
     sequence = GaussianSequence(scene, frames, job.part, _kind(job), _world(opened, job))
-    check_target(job.out, is_folder=True)
+    check_target(job.out, opened=opened, is_folder=True)
     report(ExportProgress(0, len(frames), message="Checking the clips"))
     scene.check(frames)
     check_target(job.out, n_bytes=estimate(opened, job).n_bytes, is_folder=True)
