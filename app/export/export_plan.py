@@ -112,10 +112,7 @@ def _check_place(answers: Answers, opened: TrainedProject, n_bytes: int) -> None
     out = answers.out
     if not out.is_absolute():
         raise ValueError("give the whole path, from the root or from ~")
-    for what, folder in (("the project", opened.project.folder), ("the capture", Path(opened.capture.path))):
-        if out.resolve().is_relative_to(folder.resolve()):
-            raise ValueError(f"it lies inside of {what}")
-    check_target(out, n_bytes=n_bytes, is_folder=not answers.suffix)
+    check_target(out, n_bytes=n_bytes, is_folder=not answers.suffix, opened=opened)
 
 
 def _free_bytes(out: str) -> int | None:
