@@ -14,4 +14,4 @@ def test_known_levels() -> None:
 def test_there_and_back() -> None:
     levels = np.linspace(0.0, 1.5, 301)
     np.testing.assert_allclose(encoded_of(linear_of(levels)), levels, atol=1e-4)
-    assert linear_of(np.float32([0.5])).dtype == np.float32
+    assert linear_of(np.array([0.5], np.float32)).dtype == np.float32
