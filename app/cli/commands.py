@@ -59,7 +59,7 @@ COMMANDS = {
         "Nothing was written.",
     ),
     "export": Command(
-        "write trained frames as files of Gaussians for other programs",
+        "write Gaussians, a player, figures or cameras for other programs",
         "app.cli.export_command",
         "Nothing was written.",
     ),

@@ -19,7 +19,8 @@ from engine.storage.json_files import json_text
 
 EXPORT_SCHEMA = 1
 KINDS: tuple[ModuleType, ...] = (export_gaussians, export_data, export_player)
-"""Modules with `FORMATS`, names for --format with what each is; `add_arguments(command)`, options of their own; and
+"""Modules with `FORMATS`, names for --format with what each is; `add_arguments(command)`, options of their own, which
+`OPTIONS` names; `takes_frames(format)`; and
 `export(opened, options, frames, report)`, which writes and returns an ExportResult. frames: None where nothing was
 chosen."""
 
@@ -57,14 +58,16 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     started_s = time.monotonic()
     if options.player is None and options.out is None:
         raise ProjectError("--out is missing.", hint="Name a new folder: --out DIR.")
+    kind = next((kind for kind in KINDS if options.format in kind.FORMATS), export_player)
+    _check_options(options, kind)
     opened = open_trained(open_project(options.project, is_writable=False))
     line = ProgressLine(is_quiet=options.quiet)
     show = row_progress(line, "Exporting")
 
     def report(progress: ExportProgress) -> None:
-        show(progress.n_done, progress.n_all, None)
+        if progress.n_all:
+            show(progress.n_done, progress.n_all, None)
 
-    kind = next((kind for kind in KINDS if options.format in kind.FORMATS), export_player)
     result: ExportResult = kind.export(opened, options, _frames(options, opened), report)
     seconds = time.monotonic() - started_s
     line.finish()
@@ -75,6 +78,24 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     if options.json:
         print(json_text(_document(options, result, seconds), indent=1))
     return EXIT_OK
+
+
+def _check_options(options: argparse.Namespace, kind: ModuleType) -> None:
+    """What was asked for and would be passed over is an error."""
+    parser = argparse.ArgumentParser()
+    for other in KINDS:
+        if other is not kind:
+            other.add_arguments(parser)
+    unused = [name for other in KINDS if other is not kind for name in other.OPTIONS]
+    if not kind.takes_frames(options.format):
+        parser.set_defaults(frames=None, clip=None, step=1)
+        unused += ["frames", "clip", "step"]
+    if options.player is not None:
+        unused.append("out")
+    for name in unused:
+        if getattr(options, name) != parser.get_default(name):
+            what = options.format or export_player.NAME
+            raise ProjectError(f"--{name.replace('_', '-')} does not apply to {what}.", hint="Leave it out.")
 
 
 def _frames(options: argparse.Namespace, opened: TrainedProject) -> range | None:
@@ -91,7 +112,13 @@ def _frames(options: argparse.Namespace, opened: TrainedProject) -> range | None
     elif options.step == 1:
         return None
     else:
-        chosen = range(opened.capture.n_frames)
+        trained = [frame for i in sorted(opened.trained) for frame in opened.clips[i].frame_indices()]
+        chosen = range(trained[0], trained[-1] + 1) if trained else range(0)
+        if len(chosen) > len(trained):
+            raise ProjectError(
+                "--step is given without --frames, and clips between those that are trained are not.",
+                hint="Say which frames: --frames A:B.",
+            )
     return range(chosen.start, chosen.stop, options.step)
 
 

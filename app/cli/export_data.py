@@ -15,6 +15,14 @@ FORMATS = {
 }
 
 
+OPTIONS = ()
+
+
+def takes_frames(format_name: str) -> bool:
+    """Whether frames can be chosen: cameras stand still."""
+    return not format_name.startswith("cameras")
+
+
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """There are no options beside those of all formats."""
 

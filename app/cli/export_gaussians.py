@@ -20,6 +20,14 @@ FORMATS = {
 """Names of `engine.export.formats.table.FORMATS` in a few words; that table is loaded once it is needed."""
 
 
+OPTIONS = ("part", "up", "down", "scale", "axes")
+
+
+def takes_frames(format_name: str) -> bool:
+    """Whether frames can be chosen."""
+    return True
+
+
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Options of Gaussians."""
     own = command.add_argument_group("Gaussians")

@@ -14,6 +14,14 @@ FORMATS: dict[str, str] = {}
 """None: the page has an option of its own, since it is a file and no folder."""
 
 
+OPTIONS = ("data_folder",)
+
+
+def takes_frames(format_name: str) -> bool:
+    """Whether frames can be chosen."""
+    return True
+
+
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Options of the player."""
     own = command.add_argument_group("player")

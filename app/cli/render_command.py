@@ -30,7 +30,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--format", choices=tuple(FORMATS), help="what to write (default: by the name; PNG files into a folder)"
     )
-    command.add_argument("--frames", default=":", metavar="A:B", help="frames A up to B, B not included (default: all)")
+    command.add_argument(
+        "--frames",
+        default=":",
+        metavar="A:B",
+        help="frames A up to B, B not included (default: all that are trained, or those of the path)",
+    )
     command.add_argument(
         "--show", choices=tuple(PASSES), default="color", help="what pictures show (default: color); " + _passes(PASSES)
     )

@@ -49,7 +49,7 @@ def run(opened: TrainedProject, job: CamerasJob, report: Report) -> ExportResult
         ProjectError: The folder cannot be written.
     """
     n_cameras = len(opened.capture.layout.cameras)
-    check_target(job.out, n_bytes=estimate(opened, job).n_bytes, is_folder=True)
+    check_target(job.out, opened=opened, n_bytes=estimate(opened, job).n_bytes, is_folder=True)
     report(ExportProgress(0, n_cameras, "cameras"))
     layout, lines = _as_trained(opened)
     done = convert(layout, job.out, _TARGETS[job.format])

@@ -188,7 +188,7 @@ class GaussianSequence:
         lowest = {written.file.name: min(written.psnr_db.values()) for written in self.files if written.psnr_db}
         good = {name: value for name, value in lowest.items() if value >= self._kind.min_psnr_db}
         bad = {name: value for name, value in lowest.items() if name not in good}
-        said = "to the live picture, of the worst of the cameras it was looked at from"
+        said = "against the live picture, in the worst of the cameras it was drawn from"
         if len(good) > _MOST_LINES:
             name = min(good, key=good.__getitem__)
             lines = [f"{len(good)} files were read back; the worst is {name}: {good[name]:.1f} dB {said}."]

@@ -86,7 +86,7 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
     frames = _frames(scene, job)
     n_threads = use_threads(None)  # of this process: a job beside a training has but one
     sequence = GaussianSequence(scene, frames, job.part, _kind(job), _world(opened, job), n_threads=n_threads)
-    check_target(job.out, is_folder=True)
+    check_target(job.out, opened=opened, is_folder=True)
     report(ExportProgress(0, len(frames), message="Checking the clips"))
     scene.check(frames)
     check_target(job.out, n_bytes=estimate(opened, job).n_bytes, is_folder=True)

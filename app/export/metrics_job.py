@@ -78,7 +78,7 @@ def run(opened: TrainedProject, job: MetricsJob, report: Report) -> ExportResult
         ProjectError: Nothing is trained among the frames, a clip is damaged, or the file cannot be written.
     """
     chosen = _Chosen(opened, job)
-    check_target(job.out, n_bytes=estimate(opened, job).n_bytes)
+    check_target(job.out, opened=opened, n_bytes=estimate(opened, job).n_bytes)
     with staged_file(job.out, what="The table") as partial, partial.open("w", encoding="utf-8", newline="\n") as file:
         (_write_csv if job.format == "csv" else _write_json)(chosen, file, report)
     lines = chosen.lines()

@@ -61,7 +61,7 @@ def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
     """
     if job.out.suffix.lower() not in PAGE_SUFFIXES:
         raise ProjectError("A player is an HTML page.", hint="Give a name that ends in .html.", path=job.out)
-    check_target(job.out)
+    check_target(job.out, opened=opened)
     scene = SceneFrames(opened)
     clips = _clips(scene, job)
     n_frames = sum(len(wanted) for _, wanted in clips)

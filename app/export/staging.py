@@ -7,24 +7,34 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from engine.errors import ProjectError
 from engine.storage.files import atomic_folder, atomic_path, disk_error
+
+if TYPE_CHECKING:
+    from app.evaluation.headless import TrainedProject
 
 SPARE_BYTES = 16 << 20
 """Of the disk, which stay free whatever is written."""
 
 
-def check_target(path: Path, *, n_bytes: int = 0, is_folder: bool = False) -> None:
+def check_target(
+    path: Path, *, opened: TrainedProject | None = None, n_bytes: int = 0, is_folder: bool = False
+) -> None:
     """See that an export can be written, before the work that leads to it. Makes nothing.
 
     Args:
+        opened: What is exported; nothing is written into its project or its capture, where a file could take the place
+            of one of theirs, or be taken for one.
         path: What is to be written: a file, which may be there already and is replaced, or a new or empty folder.
         n_bytes: How large it becomes, as far as that is known.
         is_folder: Which of the two it is.
     Raises:
         ProjectError: Something else has this name, the place may not be written to, or the disk has too little room.
     """
+    if opened is not None:
+        _check_apart(path, opened)
     if is_folder and (path.is_symlink() or path.exists()) and not _is_empty_folder(path):
         raise ProjectError("There is something under this name already.", hint="Give a new folder.", path=path)
     if not is_folder and path.is_dir():
@@ -40,6 +50,14 @@ def check_target(path: Path, *, n_bytes: int = 0, is_folder: bool = False) -> No
             hint="Free some space, choose another place, or export fewer frames.",
             path=path,
         )
+
+
+def _check_apart(path: Path, opened: TrainedProject) -> None:
+    for what, folder in (("project", opened.project.folder), ("capture", Path(opened.capture.path))):
+        if path.resolve().is_relative_to(folder.resolve()):
+            raise ProjectError(
+                f"This place lies inside of the {what} that is exported.", hint="Choose another place.", path=path
+            )
 
 
 def _is_empty_folder(path: Path) -> bool:

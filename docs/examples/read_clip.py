@@ -166,7 +166,10 @@ def read_frame(project, frame):
     header, arrays = read_clip(project / "clips" / f"{clip_index:04d}.safetensors")
     reference = {}  # a clip that inherits nothing needs none
     if header["role"] == "source":
-        reference = read_clip(project / "clips" / f"{settings.get('reference_clip', 0):04d}.safetensors")[1]
+        path = project / "clips" / f"{settings.get('reference_clip', 0):04d}.safetensors"
+        base, reference = read_clip(path)
+        if base["fingerprint"] != header["reference_fingerprint"]:
+            sys.exit(f"Clip {clip_index} was trained on another reference clip; train it again.")
     return decode(header, arrays, reference, frame_in_clip)
 
 

@@ -107,7 +107,7 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
         width, height = width + width % 2, height + height % 2
     kind = FORMATS[job.format]
     n_bytes = round(kind.bytes_per_pixel * width * height * len(moments))
-    check_target(job.out, n_bytes=n_bytes, is_folder=kind.is_sequence)
+    check_target(job.out, opened=scene.opened, n_bytes=n_bytes, is_folder=kind.is_sequence)
     scene.check([moment.scene for moment in moments])  # last, as it reads every clip
     unit = (
         depth_unit(_DEPTH_REACH * rig_distance(capture.rig)) if job.shows == "depth" and job.format == "png" else None

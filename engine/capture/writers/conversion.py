@@ -91,9 +91,9 @@ def _unsaid(layout: Layout, target: Target, frames: Frames) -> list[str]:
         if any(entry.masks is not None for entry in layout.cameras):
             lines.append("Masks are left out.")
         if target == "colmap" and layout.default_holdout:
-            lines.append("Which cameras are held out is left out.")
+            lines.append("The list of held-out cameras is not written.")
     if frames == "none" and target == "colmap":
-        lines.append("The model names no files that are there: frames stay where they are.")
+        lines.append("The image names in the model are placeholders: frames stay where they are.")
     elif frames in ("none", "link"):
         lines.append("Frames stay where they are: open the folder with --follow-links.")
     return lines

@@ -31,7 +31,7 @@ def test_frames_are_exported_and_measured(run, project: Path, tmp_path: Path):
     assert (code, out) == (0, "")
     assert names(tmp_path / "o") == ["p_0001.ply", "p_0003.ply", "p_0005.ply", "p_export.json"]
     assert "Coordinates: axes as in the capture, scale as in the capture." in err
-    assert "p_0003.ply: 100.0 dB to the live picture" in err
+    assert "p_0003.ply: 100.0 dB against the live picture" in err
     assert "4 files, 0.0 MB, in" in err
 
 
@@ -65,7 +65,7 @@ def test_it_names_what_is_wrong_with_its_arguments(run, project: Path, tmp_path:
         (("--scale", 0), "The scale is 0"),
         (("--out", tmp_path / "file"), "something under this name already"),
         (("--out", tmp_path / "file" / "x"), "is a file"),
-        (("--out", project), "something under this name already"),
+        (("--out", project), "inside of the project"),
     ):
         code, out, err = run(*export, *extra)
         assert (code, out, expected in err) == (2, "", True), err
@@ -100,3 +100,36 @@ def test_every_option_has_help():
     parser = argparse.ArgumentParser()
     export_command.add_arguments(parser)
     assert all(action.help for action in parser._actions)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        (("--format", "cameras-colmap", "--up", "z"), "--up"),
+        (("--format", "cameras-transforms", "--frames", "0:2"), "--frames"),
+        (("--format", "metrics-csv", "--scale", "2"), "--scale"),
+        (("--format", "ply", "--data-folder"), "--data-folder"),
+        (("--player", "x.html", "--part", "static"), "--part"),
+        (("--player", "x.html"), "--out"),
+    ],
+)
+def test_an_option_that_would_be_passed_over_is_an_error(run, project: Path, tmp_path: Path, arguments, name: str):
+    code, _, err = run("export", project, *arguments, "--out", tmp_path / "o")
+    assert code == 2
+    assert f"{name} does not apply to" in err
+    assert not (tmp_path / "o").exists()
+
+
+def test_the_project_itself_is_no_place_for_an_export(run, project: Path):
+    before = (project / "project.json").read_bytes()
+    code, _, err = run("export", project, "--format", "metrics-json", "--out", project / "project.json")
+    assert code == 2
+    assert "inside of the project" in err
+    assert (project / "project.json").read_bytes() == before
+
+
+def test_every_second_frame_is_of_those_that_are_trained(run, project: Path, tmp_path: Path):
+    (project / "clips" / "0001.safetensors").unlink()
+    code, _, _ = run("export", project, "--format", "ply", "--step", 2, "--out", tmp_path / "o")
+    assert code == 0
+    assert sorted(path.stem for path in (tmp_path / "o").glob("*.ply")) == ["p_0000", "p_0002"]

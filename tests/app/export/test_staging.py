@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from app.evaluation.headless import TrainedProject
 from app.export import staging
 from app.export.staging import check_target, staged_file, staged_folder
 from engine.errors import DiskError, ProjectError
@@ -86,3 +87,13 @@ def test_too_little_room_is_said_before_work_starts(tmp_path: Path, monkeypatch:
     check_target(tmp_path / "a.ply", n_bytes=30_000_000)
     with pytest.raises(ProjectError, match="About 40 MB are to be written, but only 52 MB are free"):
         check_target(tmp_path / "a.ply", n_bytes=40_000_000)
+
+
+def test_nothing_is_written_into_what_is_exported(opened: TrainedProject):
+    project, capture = opened.project.folder, Path(opened.capture.path)
+    for path in (project / "project.json", project / "exports" / "a.ply", capture / "cam00.mp4"):
+        with pytest.raises(ProjectError, match="inside of the"):
+            check_target(path, opened=opened)
+    with pytest.raises(ProjectError, match="inside of the project"):
+        check_target(project / "exports", opened=opened, is_folder=True)
+    check_target(project.parent / "a.ply", opened=opened)
