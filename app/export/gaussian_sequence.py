@@ -18,7 +18,6 @@ from app.export.scene_frames import SceneFrames
 from engine.export.formats.table import Format
 from engine.export.splats import Splats
 from engine.export.world import World
-from engine.parallel import n_cores
 from engine.raster.gaussians import Gaussians
 
 SCHEMA = 1
@@ -48,15 +47,24 @@ class GaussianSequence:
         part: What is written of each.
         kind: The format.
         placement: Where the scene lies in the files.
+        n_threads: To write with; no more than a few are of use.
     """
 
     def __init__(
-        self, scene: SceneFrames, frames: Sequence[int], part: WrittenPart, kind: Format, placement: World
+        self,
+        scene: SceneFrames,
+        frames: Sequence[int],
+        part: WrittenPart,
+        kind: Format,
+        placement: World,
+        *,
+        n_threads: int,
     ) -> None:
         self.name = base_name(scene.opened.project.folder.resolve().name)
         self.files: list[WrittenFile] = []
         self._scene, self._frames, self._kind, self._placement = scene, frames, kind, placement
         self._part: WrittenPart = part
+        self._n_writers = min(_MOST_WRITERS, n_threads)
         self._n_frames = scene.opened.capture.n_frames
 
     # ---------------------------------------------------------------- writing
@@ -71,10 +79,9 @@ class GaussianSequence:
         """
         check = ReadBack(self._scene, self._kind.read, self._placement)
         middle_too = {self._frames[0], self._frames[len(self._frames) // 2], self._frames[-1]}
-        n_writers = min(_MOST_WRITERS, n_cores())
         figures: dict[GaussianFile, dict[str, float]] = {}
         pending: deque[Future[WrittenFile]] = deque()
-        pool = ThreadPoolExecutor(n_writers, thread_name_prefix="export")
+        pool = ThreadPoolExecutor(self._n_writers, thread_name_prefix="export")
         try:
             for file, live in self._contents(report):
                 future = pool.submit(self._write_file, folder, file, self._placement.placed(Splats.of(live)))
@@ -82,7 +89,7 @@ class GaussianSequence:
                 if file.part == "static" or file.frame in middle_too:
                     future.result()
                     figures[file] = check.psnr_db(folder / file.name, file.frame, live)
-                while len(pending) > n_writers:  # so many scenes are in memory at most
+                while len(pending) > self._n_writers:  # so many scenes are in memory at most
                     self.files.append(pending.popleft().result())
             self.files += [future.result() for future in pending]
         finally:

@@ -10,14 +10,15 @@ from typing import Literal
 
 import numpy as np
 
+from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
+from app.export.expected_rows import expected_rows
 from app.export.export_progress import ExportEstimate, ExportProgress, ExportResult, Report, written
 from app.export.gaussian_files import SIDECAR, WrittenPart
 from app.export.gaussian_sequence import GaussianSequence
 from app.export.picked_frames import PickedFrames
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target, staged_folder
-from engine.clip_files.clip_header import ClipHeader
 from engine.errors import ProjectError
 from engine.export.formats.table import FORMATS, Format
 from engine.export.world import AXES, World, world
@@ -25,8 +26,6 @@ from engine.storage.json_files import json_text
 
 FileAxes = Literal["ply", "rub"]
 _SCALES = (1e-6, 1e6)
-_SHOWN_MOVING = 0.3
-"""Of the Gaussians of moving anchors, those that show at a moment; for the estimate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,13 +61,13 @@ def estimate(opened: TrainedProject, job: GaussiansJob) -> ExportEstimate:
     for frame in frames:
         clip_index = scene.clip_at(frame).clip_index
         by_clip[clip_index] = by_clip.get(clip_index, 0) + 1
-    n_gaussians = 0.0
+    n_gaussians = 0
     for clip_index, n_frames in by_clip.items():
-        n_static, n_moving = _counts(opened, opened.header(clip_index))
+        n_static, n_moving = expected_rows(opened.header(clip_index))
         if job.part in ("static", "split"):
             n_gaussians += n_static
         if job.part != "static":
-            n_gaussians += n_frames * (n_moving + (n_static if job.part == "all" else 0.0))
+            n_gaussians += n_frames * (n_moving + (n_static if job.part == "all" else 0))
     n_files = (0 if job.part == "static" else len(frames)) + (len(by_clip) if job.part in ("static", "split") else 0)
     text = f"Coordinates: {_world(opened, job).text}."
     return ExportEstimate(n_files + 1, round(n_gaussians * _kind(job).bytes_each), (text,))
@@ -86,7 +85,8 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
     started_s = time.monotonic()
     scene = SceneFrames(opened)
     frames = _frames(scene, job)
-    sequence = GaussianSequence(scene, frames, job.part, _kind(job), _world(opened, job))
+    n_threads = use_threads(None)  # of this process: a job beside a training has but one
+    sequence = GaussianSequence(scene, frames, job.part, _kind(job), _world(opened, job), n_threads=n_threads)
     check_target(job.out, opened=opened, is_folder=True)
     report(ExportProgress(0, len(frames), message="Checking the clips"))
     scene.check(frames)
@@ -124,14 +124,3 @@ def _world(opened: TrainedProject, job: GaussiansJob) -> World:
         raise ProjectError(f"The scale is {job.scale:g}.", hint=f"Give a number from {_SCALES[0]} to {_SCALES[1]:.0f}.")
     scene_up = opened.capture.rig.up_direction() if job.scene_up is None else np.array(job.scene_up)
     return world(scene_up, up=job.up, scale=job.scale, is_rub=job.axes == "rub")
-
-
-def _counts(opened: TrainedProject, header: ClipHeader) -> tuple[float, float]:
-    """About how many Gaussians stand still and move at a moment of a clip."""
-    n_anchors = [header.n_anchors]
-    if header.role == "source" and opened.reference is not None:
-        n_anchors.append(opened.reference.header.n_anchors)
-    n_each = header.decoder.gaussians_per_anchor
-    n_static = sum(counts.get("static", 0) for counts in n_anchors)
-    n_all = sum(sum(counts.values()) for counts in n_anchors)
-    return float(n_each * n_static), n_each * (n_all - n_static) * _SHOWN_MOVING

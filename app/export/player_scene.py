@@ -22,7 +22,8 @@ def scene_header(scene: SceneFrames, frame: int, *, step: int) -> dict[str, Any]
         frame: One that is trained.
         step: Frames of the capture from one frame of the player to the next.
     """
-    capture = scene.opened.capture
+    capture, reference = scene.opened.capture, scene.opened.reference
+    base = scene.opened.header(scene.clip_at(frame).clip_index) if reference is None else reference.header
     rig = scene.opened.rig
     view = OrbitView(rig)
     home = home_camera(rig, rig.focus_point(), view.up)
@@ -31,7 +32,7 @@ def scene_header(scene: SceneFrames, frame: int, *, step: int) -> dict[str, Any]
         "title": capture.path.name or "ClipGStream",
         "fps": float(capture.fps),
         "step": step,
-        "near_plane": float(scene.trained(frame).base.header.near_plane),
+        "near_plane": float(base.near_plane),
         "background": [round(float(v), 6) for v in BACKGROUND],
         "up": _numbers(view.up),
         "radius": float(view.radius),

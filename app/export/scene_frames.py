@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -11,6 +11,7 @@ from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
 from app.playback.contents import part_of
 from engine.capture.clip import Clip
+from engine.capture.frame_runs import runs_of
 from engine.errors import ProjectError
 
 if TYPE_CHECKING:
@@ -87,7 +88,7 @@ class SceneFrames:
         missing = [clip_index for clip_index in needed if clip_index not in trained]
         if missing:
             first = next(frame for frame in frames if self.clip_at(frame).clip_index in missing)
-            ranges = [f"{start}:{stop}" for start, stop in _runs(self.trained_frames)]
+            ranges = [f"{run.start}:{run.stop}" for run in runs_of(self.trained_frames)]
             raise ProjectError(
                 f"Frame {first:g} lies in clip {self.clip_at(first).clip_index}, which is not trained; of the "
                 f"{len(needed)} clips asked for {len(missing)} {'is' if len(missing) == 1 else 'are'} not.",
@@ -187,14 +188,3 @@ class SceneFrames:
         rows = {role: model.alive(role, knot / trained.clip.clip_length) for role in model.roles()}
         with torch.no_grad():
             return model.decode(clip_time, rows).detach()
-
-
-def _runs(frames: Sequence[int]) -> list[tuple[int, int]]:
-    """Rising frames as runs without gaps: first, and one after the last."""
-    runs: list[tuple[int, int]] = []
-    for frame in frames:
-        if runs and runs[-1][1] == frame:
-            runs[-1] = (runs[-1][0], frame + 1)
-        else:
-            runs.append((frame, frame + 1))
-    return runs

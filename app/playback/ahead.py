@@ -10,6 +10,7 @@ from app.playback.course import Course
 from app.playback.frame_decoder import FrameDecoder, FrameKey, FrameRequest
 from app.playback.render import Look, PictureKey, Renderer, RenderRequest
 from app.playback.view_modes import PLAIN, ShownAs, decoded_as
+from engine.capture.frame_runs import runs_of
 
 PLAYING_S = 1.5
 """This much of what comes is made ready while it plays."""
@@ -153,7 +154,7 @@ class Ahead:
         identity = (states, self._decoder.revision, self._renderer.revision, tuple(self._looks.items()))
         if identity != self._runs_of:
             frames = sorted({key[-1] for key in keys if is_current(key) and self._is_ready(key)})
-            self._runs_of, self._runs = identity, _runs(frames)
+            self._runs_of, self._runs = identity, [(run.start, run.stop) for run in runs_of(frames)]
         return self._runs
 
 
@@ -166,14 +167,3 @@ def _picture_distance(key: PictureKey, course: Course, look_keys: set[Hashable])
     """Of other looks than those that are shown nothing is wanted soon."""
     gaussians_key, look = key
     return course.distance(gaussians_key[-1]) if look.key in look_keys else float("inf")
-
-
-def _runs(frames: list[int]) -> list[tuple[int, int]]:
-    """Ascending frames as runs: first and stop of each."""
-    runs: list[tuple[int, int]] = []
-    for frame in frames:
-        if runs and runs[-1][1] == frame:
-            runs[-1] = (runs[-1][0], frame + 1)
-        else:
-            runs.append((frame, frame + 1))
-    return runs

@@ -12,6 +12,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+from engine.images.srgb import encoded_of, linear_of
+
 N_COLORS = 256
 SIGNED = "signed"
 """The map for values around zero: blue below, white at zero, orange above."""
@@ -32,14 +34,12 @@ _TO_LAB = np.array(
 
 def _to_oklab(colors: np.ndarray) -> np.ndarray:
     """Display-encoded RGB in 0..1 to Oklab. [n, 3]"""
-    linear = np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
-    return np.cbrt(linear @ _TO_LMS.T) @ _TO_LAB.T
+    return np.cbrt(linear_of(colors) @ _TO_LMS.T) @ _TO_LAB.T
 
 
 def _from_oklab(lab: np.ndarray) -> np.ndarray:
     """The inverse, cut to 0..1. [n, 3]"""
-    linear = np.clip((lab @ np.linalg.inv(_TO_LAB).T) ** 3 @ np.linalg.inv(_TO_LMS).T, 0.0, 1.0)
-    return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return encoded_of(np.clip((lab @ np.linalg.inv(_TO_LAB).T) ** 3 @ np.linalg.inv(_TO_LMS).T, 0.0, 1.0))
 
 
 def _table(name: str) -> np.ndarray:

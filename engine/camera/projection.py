@@ -44,6 +44,18 @@ def vertical_fov(focal_px: float, height_px: float) -> float:
     return 2.0 * math.atan(height_px / (2.0 * focal_px))
 
 
+def pinhole_K(fov_y_rad: float, image_size: tuple[int, int]) -> np.ndarray:
+    """Intrinsics of a lens with its axis in the middle of the picture. [3, 3]
+
+    Args:
+        fov_y_rad: Vertical field of view.
+        image_size: Width and height, pixels.
+    """
+    width, height = image_size
+    focal = height / (2.0 * math.tan(fov_y_rad / 2.0))
+    return np.array([[focal, 0.0, width / 2.0], [0.0, focal, height / 2.0], [0.0, 0.0, 1.0]])
+
+
 def relative_homography(rig: CameraRig, camera: int, other: int) -> tuple[np.ndarray, np.ndarray]:
     """(matrix [3, 3], shift [3]) so that pixel p of `camera` at inverse depth q lies at matrix @ p + q shift."""
     rotation = rig.world_to_camera[other, :3, :3] @ rig.world_to_camera[camera, :3, :3].T

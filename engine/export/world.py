@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from engine.camera.rotations import quat_product, quats_of
 from engine.export.splats import Splats
 
 AXES: dict[str, tuple[float, float, float]] = {
@@ -50,7 +51,7 @@ class World:
         return replace(
             splats,
             means=(scale * (splats.means.astype(np.float64) @ rotation.T)).astype(np.float32),
-            quats=turned(quat_of_rotation(rotation), splats.quats).astype(np.float32),
+            quats=quat_product(quats_of(rotation), splats.quats.astype(np.float64)).astype(np.float32),
             scales=(scale * splats.scales.astype(np.float64)).astype(np.float32),
         )
 
@@ -97,26 +98,3 @@ def rotation_between(source: np.ndarray, target: np.ndarray) -> np.ndarray:
     cross = np.cross(a, b)
     K = np.array([[0.0, -cross[2], cross[1]], [cross[2], 0.0, -cross[0]], [-cross[1], cross[0], 0.0]])
     return np.eye(3) + K + K @ K / (1.0 + a @ b)
-
-
-def quat_of_rotation(rotation: np.ndarray) -> np.ndarray:
-    """A rotation matrix as a unit quaternion wxyz. [4]"""
-    r = rotation
-    # of the four ways to it, the one that divides by the largest component
-    squares = np.array([1.0 + r.trace(), *(1.0 + 2.0 * r[i, i] - r.trace() for i in range(3))])
-    w, x, y, z = squares
-    rows = (
-        (w, r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]),
-        (r[2, 1] - r[1, 2], x, r[1, 0] + r[0, 1], r[0, 2] + r[2, 0]),
-        (r[0, 2] - r[2, 0], r[1, 0] + r[0, 1], y, r[2, 1] + r[1, 2]),
-        (r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[2, 1] + r[1, 2], z),
-    )
-    quat = np.array(rows[int(squares.argmax())])
-    return quat / np.linalg.norm(quat)
-
-
-def turned(quat: np.ndarray, quats: np.ndarray) -> np.ndarray:
-    """Rotations after each of which another one follows: quat * quats. [N, 4] float64"""
-    w, x, y, z = quat
-    left = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
-    return quats.astype(np.float64) @ left.T

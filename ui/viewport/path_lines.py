@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 
 import numpy as np
 
 from engine.camera.camera_path import CameraKey, CameraPath
-from engine.camera.projection import to_camera, to_pixels
+from engine.camera.projection import pinhole_K, to_camera, to_pixels
 from engine.camera.rig import CameraRig
 from ui.gl.lines import frusta_lines
 from ui.style.colors import PATH, Color
@@ -38,15 +37,10 @@ def path_line(path: CameraPath) -> np.ndarray:
 
 def key_rig(keys: tuple[CameraKey, ...]) -> CameraRig:
     """Keys as cameras, to be drawn as such."""
-    width, height = PICTURE_SIZE
-    Ks = np.zeros((len(keys), 3, 3))
-    for row, key in enumerate(keys):
-        focal = height / (2.0 * math.tan(key.fov_y_rad / 2.0))
-        Ks[row] = [[focal, 0.0, width / 2], [0.0, focal, height / 2], [0.0, 0.0, 1.0]]
     return CameraRig(
         names=("",) * len(keys),
         world_to_camera=np.stack([key.world_to_camera for key in keys]) if keys else np.zeros((0, 4, 4)),
-        Ks=Ks,
+        Ks=np.array([pinhole_K(key.fov_y_rad, PICTURE_SIZE) for key in keys]).reshape(-1, 3, 3),
         image_sizes=np.tile(np.array(PICTURE_SIZE), (len(keys), 1)),
     )
 

@@ -39,16 +39,5 @@ def moments_of(runs: Sequence[range], step: float, hold: float | None = None) ->
     return [Moment(view if hold is None else hold, view) for view in views]
 
 
-def runs_of(frames: Sequence[int]) -> list[range]:
-    """Rising frames as runs without gaps."""
-    runs: list[range] = []
-    for frame in frames:
-        if runs and runs[-1].stop == frame:
-            runs[-1] = range(runs[-1].start, frame + 1)
-        else:
-            runs.append(range(frame, frame + 1))
-    return runs
-
-
 def _snapped(moment: float) -> float:
     return float(round(moment)) if abs(moment - round(moment)) < SNAP else moment

@@ -11,13 +11,14 @@ from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target
 from app.export.video.formats import FORMATS, check_codecs
 from app.export.video.job import MAX_PICTURES, MAX_PIXELS, MAX_SIDE_PX, VideoJob
-from app.export.video.moments import Moment, moments_of, runs_of
+from app.export.video.moments import Moment, moments_of
 from app.export.video.views import ViewOf, camera_view, path_view, turntable_view
 from app.export.video.writers.sequence import depth_unit
 from app.playback.view_modes import rig_distance
 from app.project.camera_paths import camera_path_named
 from engine.camera.camera_path import CameraPath
 from engine.capture.capture import Capture
+from engine.capture.frame_runs import runs_of
 from engine.capture.sound import sound_source
 from engine.errors import ProjectError
 from engine.text import shown

@@ -13,6 +13,7 @@ from app.playback.rig_views import camera_fov, fitted_K, home_camera
 from app.playback.scene_axes import rig_radius
 from engine.camera import path_presets
 from engine.camera.camera_path import CameraPath
+from engine.camera.projection import pinhole_K
 from engine.camera.rig import CameraRig
 
 
@@ -77,15 +78,3 @@ def turntable_view(rig: CameraRig, turntable: Turntable, n_pictures: int, size: 
     )
     along = path_view(path, size)
     return lambda picture, moment: along(picture, picture)
-
-
-def pinhole_K(fov_y_rad: float, size: tuple[int, int]) -> np.ndarray:
-    """Intrinsics of a lens with its axis in the middle of the picture. [3, 3]
-
-    Args:
-        fov_y_rad: Vertical field of view.
-        size: Width and height, pixels.
-    """
-    width, height = size
-    focal = height / (2.0 * math.tan(fov_y_rad / 2.0))
-    return np.array([[focal, 0.0, width / 2.0], [0.0, focal, height / 2.0], [0.0, 0.0, 1.0]])

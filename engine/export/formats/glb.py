@@ -11,11 +11,13 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from engine.camera.rotations import quats_of
 from engine.errors import ProjectError
 from engine.export.formats.damaged import damaged
 from engine.export.packing import as_levels
 from engine.export.splats import Splats, colors_of
-from engine.export.world import quat_of_rotation, rotation_between
+from engine.export.world import rotation_between
+from engine.images.srgb import linear_of
 
 EXTENSION = "KHR_gaussian_splatting"
 _MAGIC, _VERSION, _JSON, _BIN = 0x46546C67, 2, 0x4E4F534A, 0x004E4942
@@ -79,8 +81,7 @@ def read(file: BinaryIO) -> Splats:
 
 def _columns(splats: Splats) -> dict[str, np.ndarray]:
     """Attributes, each of rows of a multiple of four bytes. [N, ...]"""
-    linear = np.where(splats.colors <= 0.04045, splats.colors / 12.92, ((splats.colors + 0.055) / 1.055) ** 2.4)
-    rgba = np.concatenate([np.nan_to_num(linear), splats.opacities[:, None]], axis=1)
+    rgba = np.concatenate([np.nan_to_num(linear_of(splats.colors)), splats.opacities[:, None]], axis=1)
     return {
         "POSITION": splats.means.astype("<f4"),
         f"{EXTENSION}:ROTATION": splats.quats[:, [1, 2, 3, 0]].astype("<f4"),
@@ -92,7 +93,7 @@ def _columns(splats: Splats) -> dict[str, np.ndarray]:
 
 
 def _document(splats: Splats, columns: dict[str, np.ndarray]) -> dict[str, Any]:
-    rotation = quat_of_rotation(rotation_between(np.array(splats.up), np.array(_Y_UP)))
+    rotation = quats_of(rotation_between(np.array(splats.up), np.array(_Y_UP)))
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": "ClipGStream Studio"},
         "scene": 0,

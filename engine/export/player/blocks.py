@@ -106,12 +106,6 @@ def _moving(frames: Sequence[Splats], pieces: list[bytes]) -> dict[str, Any]:
     return {"n": [len(frame) for frame in frames], "rounding": rounding.described()}
 
 
-def moving_bytes(frames: Sequence[Splats]) -> int:
-    """How much of a block the moving rows of these frames are."""
-    pieces: list[bytes] = []
-    return len(deflated(pieces, _moving([seen(frame) for frame in frames], pieces)).data)
-
-
 def seen(splats: Splats) -> Splats:
     """Rows that are not too faint to be drawn anywhere."""
     return splats[np.flatnonzero(splats.opacities > ALPHA_MIN)]

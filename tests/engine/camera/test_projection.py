@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from engine.camera.projection import is_in_picture, pixel_rays, project, projection_matrices, unproject
+from engine.camera.projection import (
+    is_in_picture,
+    pinhole_K,
+    pixel_rays,
+    project,
+    projection_matrices,
+    unproject,
+    vertical_fov,
+)
 from engine.synthetic.rigs import make_rig
 
 RIG = make_rig(3, (8, 6))
@@ -36,3 +44,11 @@ def test_a_point_behind_the_camera_has_finite_pixels_and_is_not_in_the_picture()
 def test_the_picture_begins_at_zero_and_ends_before_its_size():
     pixels = np.array([[0.0, 0.0], [7.999, 5.999], [8.0, 3.0], [3.0, 6.0], [-0.001, 3.0]])
     assert is_in_picture(pixels, np.ones(5), 8, 6).tolist() == [True, True, False, False, False]
+
+
+def test_a_lens_of_a_field_of_view_has_that_field_of_view():
+    K = pinhole_K(0.9, (160, 90))
+    assert vertical_fov(K[1, 1], 90.0) == pytest.approx(0.9)
+    assert K[0, 0] == K[1, 1]
+    top, bottom = project(np.array([[0.0, -np.tan(0.45), 1.0], [0.0, np.tan(0.45), 1.0]]), K @ np.eye(3, 4))[0]
+    np.testing.assert_allclose([top, bottom], [[80.0, 0.0], [80.0, 90.0]], atol=1e-12)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from engine.export.world import AXES, World, quat_of_rotation, rotation_between, turned, world
+from engine.export.splats import Splats
+from engine.export.world import AXES, World, rotation_between, world
 from tests.engine.export.scenes import angles_deg, chance_splats
 
 
@@ -55,19 +56,18 @@ def test_rub_reverses_y_and_z():
     assert "y and z reversed" in placement.text
 
 
-def test_rotations_as_quaternions():
+def test_gaussians_turn_with_the_world():
     random = np.random.default_rng(1)
-    for rotation in [
-        *Rotation.from_quat(random.standard_normal((50, 4))).as_matrix(),
-        *map(np.diag, [(1, -1, -1), (-1, 1, -1), (-1, -1, 1)]),
-    ]:
-        quat = quat_of_rotation(rotation)
-        x, y, z, w = Rotation.from_matrix(rotation).as_quat()
-        assert angles_deg(quat[None], np.array([[w, x, y, z]])).max() < 1e-4
     a, b = (Rotation.from_quat(random.standard_normal(4)) for _ in range(2))
     (x, y, z, w), expected = b.as_quat(), (a * b).as_quat()[[3, 0, 1, 2]]
-    assert angles_deg(turned(quat_of_rotation(a.as_matrix()), np.array([[w, x, y, z]])), expected[None]).max() < 1e-4
-    direction = random.standard_normal(3)
+    splats = Splats.from_arrays(np.zeros(3), np.array([[w, x, y, z]]), np.ones((1, 3)), np.ones(1), np.zeros((1, 3)))
+    turned = World(rotation=a.as_matrix()).placed(splats).quats
+    assert turned.dtype == np.float32
+    np.testing.assert_allclose(turned[0] * np.sign(turned[0] @ expected), expected, atol=1e-6)
+
+
+def test_directions_that_are_the_same_need_no_turn():
+    direction = np.random.default_rng(1).standard_normal(3)
     np.testing.assert_allclose(rotation_between(direction, direction), np.eye(3), atol=1e-12)
 
 

@@ -12,6 +12,7 @@ from PIL.PngImagePlugin import PngInfo
 from app.export.video.job import PassName
 from app.export.video.passes import PassPicture
 from engine.export.exr import write_exr
+from engine.images.srgb import linear_of
 
 MAX_LEVEL = 65_535
 NOTHING_DEPTH = 1e10
@@ -58,11 +59,6 @@ def write_exr_picture(path: Path, picture: PassPicture, shows: PassName) -> None
         write_exr(path, {"Z" if shows == "depth" else "Y": values})
         return
     alpha = picture.alpha
-    linear = _linear(picture.color / np.maximum(alpha, 1e-6)[..., None]) * alpha[..., None]
+    linear = linear_of(picture.color / np.maximum(alpha, 1e-6)[..., None]) * alpha[..., None]
     channels = {name: linear[..., row].astype(np.float16) for row, name in enumerate("RGB")}
     write_exr(path, {**channels, "A": alpha.astype(np.float16), "Z": values})
-
-
-def _linear(encoded: np.ndarray) -> np.ndarray:
-    """Display-encoded colours as light: the curve of sRGB."""
-    return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)

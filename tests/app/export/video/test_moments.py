@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from app.export.video.moments import Moment, moments_of, runs_of
+from app.export.video.moments import Moment, moments_of
+from engine.capture.frame_runs import runs_of
 
 
 @pytest.mark.parametrize(

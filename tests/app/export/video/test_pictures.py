@@ -9,10 +9,10 @@ import pytest
 from app.export.scene_frames import SceneFrames
 from app.export.video.drawing import draw
 from app.export.video.job import Turntable
-from app.export.video.views import camera_view, pinhole_K
+from app.export.video.views import camera_view
 from app.project.camera_paths import write_camera_paths
 from engine.camera.camera_path import CameraKey, CameraPath
-from engine.camera.projection import vertical_fov
+from engine.camera.projection import pinhole_K, vertical_fov
 from engine.camera.rig import CameraRig
 from engine.errors import ProjectError
 from engine.metrics.pictures.colors import to_levels
