@@ -14,6 +14,7 @@ from pyglet.window import key
 
 import app.playback.ahead
 import app.playback.frame_decoder
+from app.playback.render import Picture, RenderRequest
 from app.session import commands as c
 from engine.clip_files.clip_state import ClipState
 from tests.app.fakes import N_ANCHORS, write_capture
@@ -215,8 +216,19 @@ def test_the_cloud_key_does_something_on_a_trained_clip_and_says_what(window: Pi
     assert hud(window).note == ""
 
 
-def test_a_view_that_moved_is_being_redrawn_and_the_resolution_is_told(window: Pilot) -> None:
+def test_a_view_that_moved_is_being_redrawn_and_the_resolution_is_told(
+    window: Pilot, monkeypatch: pytest.MonkeyPatch
+) -> None:
     show_frame(window, 0)
+    may_draw = threading.Event()  # small pictures may be finished before the window is drawn once
+    worker = window.session.playback.renderer.worker
+    draw_picture = worker._compute
+
+    def wait_and_draw(request: RenderRequest) -> Picture:
+        assert may_draw.wait(WAIT_S)
+        return draw_picture(request)
+
+    monkeypatch.setattr(worker, "_compute", wait_and_draw)
     scene = window.studio.frame.viewport.scene
     full = scene.shown.size
     assert f"{full[0]} x {full[1]}" in hud(window).label
@@ -224,5 +236,6 @@ def test_a_view_that_moved_is_being_redrawn_and_the_resolution_is_told(window: P
     window.studio.frame.request_redraw()
     window.draw(1)
     assert hud(window).pending == "being redrawn from here"
+    may_draw.set()
     draw_until(window, lambda: hud(window).pending == "", "the new picture")
     assert scene.shown.source.look == window.session.view.look_key
