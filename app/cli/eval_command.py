@@ -8,9 +8,10 @@ from typing import Any
 
 from app.cli.arguments import EXIT_OK, add_figure_choices, parse_range, path_argument
 from app.cli.terminal.progress import ProgressLine, row_progress
-from app.cli.terminal.results import check_writable, write_text
+from app.cli.terminal.results import write_text
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
+from app.export.staging import check_target
 from app.project.project import open_project
 from app.training.service import Launch
 from engine.storage.json_files import json_text
@@ -28,7 +29,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream eval: measure trained clips, into a JSON document. Returns the exit code."""
     if options.json != "-":
-        check_writable(Path(options.json))
+        check_target(Path(options.json))
     opened = open_trained(open_project(options.project, is_writable=False))
     chosen = list(parse_range(options.clips, len(opened.clips), option="--clips", what="clips"))
     if options.clips.strip() == ":":

@@ -20,6 +20,7 @@ from app.export.show_in_folder import show_in_folder
 from app.playback.timeline import Timeline
 from app.project.opened_project import OpenedProject
 from app.project.recents import project_name
+from app.session import commands
 from app.session.notices import Notices
 from app.session.settings import Settings
 from engine.capture.frames import VideoFrames
@@ -183,6 +184,24 @@ class Exporting:
             self._revision += 1
 
     # ---- the queue
+
+    def apply(self, command: commands.ExportCommand) -> None:
+        """Carry out a command on the queue; asking is `ask`."""
+        match command:
+            case commands.StartExport(choices=choices):
+                self.start(choices)
+            case commands.CancelExport(export_id=export_id):
+                self.cancel(export_id)
+            case commands.RetryExport(export_id=export_id):
+                self.retry(export_id)
+            case commands.MoveExport(export_id=export_id, place=place):
+                self.move(export_id, place)
+            case commands.RemoveExport(export_id=export_id):
+                self.remove(export_id)
+            case commands.ClearExports():
+                self.clear()
+            case commands.ShowExport(export_id=export_id):
+                self.show(export_id)
 
     def start(self, choices: ExportChoices) -> None:
         """Put an export into the queue, and remember what was chosen.

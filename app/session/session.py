@@ -264,8 +264,10 @@ class Session:
                 self.calibrating.close_page()
                 self.synchronising.close_page()
                 self.exporting.close_page()
+            case commands.AskExport():
+                self._ask_export()
             case _ if isinstance(command, commands.ExportCommand):
-                self._export(command)
+                self.exporting.apply(command)
             case commands.SynchroniseCameras():
                 self.synchronising.measure(self.opened)
             case commands.ApplyOffsets(target=target):
@@ -355,28 +357,12 @@ class Session:
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
-    def _export(self, command: commands.ExportCommand) -> None:
-        exporting, service = self.exporting, self.live_training.service
-        match command:
-            case commands.AskExport():
-                catalog = () if service is None else service.catalog
-                trained = tuple(i for i in range(len(catalog)) if catalog[i].state == "trained")
-                names = tuple(path.name for path in self.paths.paths)
-                exporting.ask(self.opened, self.timeline, trained, names, settle=self.camera_paths.document.settle)
-            case commands.StartExport(choices=choices):
-                exporting.start(choices)
-            case commands.CancelExport(export_id=export_id):
-                exporting.cancel(export_id)
-            case commands.RetryExport(export_id=export_id):
-                exporting.retry(export_id)
-            case commands.MoveExport(export_id=export_id, place=place):
-                exporting.move(export_id, place)
-            case commands.RemoveExport(export_id=export_id):
-                exporting.remove(export_id)
-            case commands.ClearExports():
-                exporting.clear()
-            case commands.ShowExport(export_id=export_id):
-                exporting.show(export_id)
+    def _ask_export(self) -> None:
+        service = self.live_training.service
+        catalog = () if service is None else service.catalog
+        trained = tuple(i for i in range(len(catalog)) if catalog[i].state == "trained")
+        names = tuple(path.name for path in self.paths.paths)
+        self.exporting.ask(self.opened, self.timeline, trained, names, settle=self.camera_paths.document.settle)
 
     def _change_settings(self, command: commands.SettingCommand) -> None:
         """Replace settings that every clip shares; only while nothing was learned with the old ones."""

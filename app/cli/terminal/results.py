@@ -1,28 +1,13 @@
-"""Result files of the command line: that they can be written is seen before the work that leads to them."""
+"""Result files of the command line, complete or not there at all; app.export.staging sees before that they can be."""
 
 from __future__ import annotations
 
 import contextlib
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 from engine.errors import ProjectError
 from engine.storage.files import atomic_path
-
-
-def check_writable(path: Path) -> None:
-    """See that a result can be written, before the work that leads to it. Makes nothing.
-
-    Raises:
-        ProjectError: The path is a folder, or lies where nothing may be written.
-    """
-    if path.is_dir():
-        raise ProjectError("This is a folder, not a file.", hint="Give the name of a file.", path=path)
-    folder = next((parent for parent in path.absolute().parents if parent.exists()), Path(path.anchor))
-    if not folder.is_dir() or not os.access(folder, os.W_OK):
-        reason = "may not be written to" if folder.is_dir() else "is a file"
-        raise ProjectError(f"{folder} {reason}.", hint="Choose another place.", path=path)
 
 
 def write_text(path: Path, text: str) -> None:

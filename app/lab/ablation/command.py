@@ -13,9 +13,9 @@ from app.cli.arguments import (
     path_argument,
 )
 from app.cli.terminal.progress import ProgressLine, row_progress
-from app.cli.terminal.results import check_writable
 from app.cli.terminal.training_lines import show_outcome, show_status
 from app.cli.training_settings import add_training_settings, overrides_of
+from app.export.staging import check_target
 from app.project.project import check_settings, default_settings
 from app.training.service import Launch
 from engine.capture.capture import open_capture
@@ -97,7 +97,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             f"--reference-clip is {settings.reference_clip}, which is none of the {n_clips} clips of the ablation.",
             hint=f"Choose one from 0 to {n_clips - 1}, or raise --n-clips.",
         )
-    check_writable(options.project / RESULT_FILE)
+    check_target(options.project / RESULT_FILE)
     line = ProgressLine(is_quiet=options.quiet)
 
     def show_variant(name: str, seed: int, n_done: int, n: int) -> None:

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from app.cli.arguments import EXIT_OK, path_argument
 from app.cli.terminal.progress import ProgressLine
-from app.cli.terminal.results import check_writable, named_failure, write_text
+from app.cli.terminal.results import named_failure, write_text
+from app.export.staging import check_target
 from app.training.service import Launch
 from engine.errors import ProjectError
 from engine.storage.files import atomic_path
@@ -39,7 +40,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     table_file = None if options.json in (None, "-") else Path(options.json)
     for path in (chart, table_file):  # said before a minute is spent
         if path is not None:
-            check_writable(path)
+            check_target(path)
     if options.threads is not None and options.threads < 1:
         raise ProjectError(f"--threads is {options.threads}; at least one is needed.")
     from app.lab.bench.suite import FULL, QUICK, document, run_plan

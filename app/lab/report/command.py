@@ -8,7 +8,7 @@ from typing import Any
 
 from app.cli.arguments import EXIT_OK, add_figure_choices, path_argument
 from app.cli.terminal.progress import ProgressLine, row_progress
-from app.cli.terminal.results import check_writable
+from app.export.staging import check_target
 from app.project.project import read_settings
 from app.training.service import Launch
 
@@ -37,7 +37,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     from app.lab.report.write import PAGE_FILE, REPORTS, write_report
 
     read_settings(options.project)  # refuses a folder that is not a project before anything else
-    check_writable((options.project / REPORTS if options.out is None else options.out) / PAGE_FILE)
+    check_target((options.project / REPORTS if options.out is None else options.out) / PAGE_FILE)
     line = ProgressLine(is_quiet=options.quiet)
     shown: dict[str, Callable[[int, int, Any], None]] = {}
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from app.cli.commands import COMMANDS
-from app.cli.terminal.results import check_writable
+from app.export.staging import check_target
 from app.project.project import read_settings
 from engine.errors import ProjectError
 from tests.app.fakes import write_capture
@@ -71,10 +71,10 @@ def test_results_that_cannot_be_written_are_refused_before_the_work(run, capture
     (tmp_path / "file").write_text("")
     for out, expected in ((tmp_path / "file" / "o.json", "is a file"), (tmp_path, "is a folder")):
         with pytest.raises(ProjectError, match=expected):
-            check_writable(out)
+            check_target(out)
         code, _, err = run("eval", tmp_path / "p", "--json", out)
         assert (code, expected in err) == (2, True), err
-    check_writable(tmp_path / "new" / "deep" / "o.json")
+    check_target(tmp_path / "new" / "deep" / "o.json")
     assert [path.name for path in tmp_path.iterdir() if path.name in ("file", "new")] == ["file"]
 
 

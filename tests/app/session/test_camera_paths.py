@@ -297,7 +297,7 @@ def test_a_damaged_file_costs_the_paths_alone_and_is_not_written_over(make_sessi
     session = make_session()
     poll_until(session, lambda: len(session.notices) > 0, what="a notice")
     assert session.notices[0].title == "The camera paths could not be read or kept"
-    assert session.regions.can_mark
+    poll_until(session, lambda: session.regions.can_mark, what="the regions, which another thread reads")
     assert len(session.regions.regions) == 1
     assert not session.paths.can_edit
     assert "cannot be read" in session.paths.why_not
