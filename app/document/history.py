@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 
 from app.document.project_document import ProjectDocument
@@ -37,7 +37,25 @@ class Redone:
     """The step that was taken back last was done again."""
 
 
-Event = Changed | Undone | Redone
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """The capture lies somewhere else, or its files may lie outside of it: in every document, and no step of its own.
+
+    Attributes:
+        capture: Its folder.
+        follow_links: See ProjectSettings.
+    """
+
+    capture: str
+    follow_links: bool
+
+    def in_document(self, document: ProjectDocument) -> ProjectDocument:
+        """The document with that."""
+        settings = replace(document.settings, capture=self.capture, follow_links=self.follow_links)
+        return document if settings == document.settings else replace(document, settings=settings)
+
+
+Event = Changed | Undone | Redone | Placed
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +110,15 @@ class DocumentHistory:
                 return self._undone() if self.past else self
             case Redone():
                 return self._redone() if self.future else self
+            case Placed():
+                return self.each(event.in_document)
+
+    def each(self, change: Callable[[ProjectDocument], ProjectDocument]) -> DocumentHistory:
+        """The history with every document changed alike."""
+        past, future = (
+            tuple(replace(step, document=change(step.document)) for step in steps) for steps in (self.past, self.future)
+        )
+        return DocumentHistory(change(self.present), past, future)
 
     def _undone(self) -> DocumentHistory:
         step = self.past[-1]
@@ -108,3 +135,16 @@ def _closed(steps: tuple[Step, ...]) -> tuple[Step, ...]:
     if not steps or steps[-1].merge is None:
         return steps
     return (*steps[:-1], replace(steps[-1], merge=None))
+
+
+def coalesced(events: Sequence[Event]) -> list[Event]:
+    """The same with fewer events: of changes in a row that count as one step, only the last one."""
+    found: list[Event] = []
+    for event in events:
+        last = found[-1] if found else None
+        if isinstance(event, Changed) and isinstance(last, Changed) and event.merge is not None:
+            if event.merge == last.merge:
+                found[-1] = replace(event, name=last.name)
+                continue
+        found.append(event)
+    return found
