@@ -17,7 +17,7 @@ from app.document.project_document import ProjectDocument
 from app.document.stored_document import ENTRIES, document_of, plain_document
 from engine.errors import ProjectError
 from engine.storage.files import PARTIAL_PREFIX, disk_error
-from engine.storage.json_files import HAND_EDITED, MAX_JSON_BYTES, checksum_of
+from engine.storage.json_files import HAND_EDITED, MAX_JSON_BYTES
 from engine.storage.typed_json import EntryError, to_type
 
 SCHEMA = 2
@@ -103,11 +103,6 @@ def _damaged(error: ProjectError) -> DamagedDocument:
     return DamagedDocument(error.message, hint=error.hint, path=error.path)
 
 
-def stored_content(document: ProjectDocument, step: int = 0) -> dict[str, Any]:
-    """What `write_document` writes of a document. Raises ProjectError where it cannot be kept."""
-    return {"schema": SCHEMA, "step": step, **plain_document(document)}
-
-
 def write_document(folder: Path, document: ProjectDocument, step: int = 0) -> str:
     """Write project.json, keep the one before as its backup, and remove what lay beside that of schema 1.
 
@@ -117,20 +112,15 @@ def write_document(folder: Path, document: ProjectDocument, step: int = 0) -> st
         ProjectError: The document cannot be kept.
         DiskError: The disk refused; what was there stands.
     """
-    content = stored_content(document, step)
-    return write_content(folder, content)
-
-
-def write_content(folder: Path, content: dict[str, Any]) -> str:
-    """Likewise, of a document that is plain data already."""
     path = folder / PROJECT_FILE
-    is_migrating = (folder / GATE_FILE).exists() or (folder / CAMERA_PATHS_FILE).exists()
-    if not is_migrating:  # what lay beside the file was a part of the document
+    old = [folder / name for name in (GATE_FILE, CAMERA_PATHS_FILE) if (folder / name).exists()]
+    content = {"schema": SCHEMA, "step": step, **plain_document(document)}
+    if not old:  # else a copy of the file alone would lack a part of the document
         _keep_backup(path)
-    write_kept(path, content, max_bytes=MAX_DOCUMENT_BYTES)
-    for name in (GATE_FILE, CAMERA_PATHS_FILE):
-        (folder / name).unlink(missing_ok=True)
-    return checksum_of(content)
+    checksum = write_kept(path, content, max_bytes=MAX_DOCUMENT_BYTES)
+    for name in old:
+        name.unlink(missing_ok=True)
+    return checksum
 
 
 def _keep_backup(path: Path) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 
 from app.document.project_document import ProjectDocument
+from app.document.project_settings import ProjectSettings
 
 MAX_STEPS = 500
 """Steps that can be taken back; the oldest go."""
@@ -39,20 +40,13 @@ class Redone:
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """The capture lies somewhere else, or its files may lie outside of it: in every document, and no step of its own.
+    """The capture is found in another place, or may follow links now. Not a step: undo does not take it back.
 
     Attributes:
-        capture: Its folder.
-        follow_links: See ProjectSettings.
+        settings: Of the document, with the new place.
     """
 
-    capture: str
-    follow_links: bool
-
-    def in_document(self, document: ProjectDocument) -> ProjectDocument:
-        """The document with that."""
-        settings = replace(document.settings, capture=self.capture, follow_links=self.follow_links)
-        return document if settings == document.settings else replace(document, settings=settings)
+    settings: ProjectSettings
 
 
 Event = Changed | Undone | Redone | Placed
@@ -110,8 +104,8 @@ class DocumentHistory:
                 return self._undone() if self.past else self
             case Redone():
                 return self._redone() if self.future else self
-            case Placed():
-                return self.each(event.in_document)
+            case Placed(settings=settings):
+                return replace(self, present=replace(self.present, settings=settings))
 
     def each(self, change: Callable[[ProjectDocument], ProjectDocument]) -> DocumentHistory:
         """The history with every document changed alike."""
@@ -123,11 +117,20 @@ class DocumentHistory:
     def _undone(self) -> DocumentHistory:
         step = self.past[-1]
         back = Step(step.name, self.present)
-        return DocumentHistory(step.document, _closed(self.past[:-1]), (*self.future, back))
+        return DocumentHistory(self._in_place(step.document), _closed(self.past[:-1]), (*self.future, back))
 
     def _redone(self) -> DocumentHistory:
         step = self.future[-1]
-        return DocumentHistory(step.document, (*_closed(self.past), Step(step.name, self.present)), self.future[:-1])
+        past = (*_closed(self.past), Step(step.name, self.present))
+        return DocumentHistory(self._in_place(step.document), past, self.future[:-1])
+
+    def _in_place(self, document: ProjectDocument) -> ProjectDocument:
+        """A document of another time, with the capture where it is now."""
+        now, then = self.present.settings, document.settings
+        if (now.capture, now.follow_links) == (then.capture, then.follow_links):
+            return document
+        settings = replace(then, capture=now.capture, follow_links=now.follow_links)
+        return replace(document, settings=settings)
 
 
 def _closed(steps: tuple[Step, ...]) -> tuple[Step, ...]:
@@ -142,9 +145,9 @@ def coalesced(events: Sequence[Event]) -> list[Event]:
     found: list[Event] = []
     for event in events:
         last = found[-1] if found else None
-        if isinstance(event, Changed) and isinstance(last, Changed) and event.merge is not None:
-            if event.merge == last.merge:
-                found[-1] = replace(event, name=last.name)
-                continue
-        found.append(event)
+        is_same_step = isinstance(event, Changed) and isinstance(last, Changed) and event.merge is not None
+        if is_same_step and event.merge == last.merge:
+            found[-1] = replace(event, name=last.name)
+        else:
+            found.append(event)
     return found

@@ -181,9 +181,19 @@ def write_checked_json(
         OSError: The disk refused.
         ValueError: The document holds NaN.
     """
-    text = json.dumps(document | {CHECKSUM: checksum_of(document)}, indent=2, allow_nan=False) + "\n"
+    text, _ = checked_text(document)
     with atomic_path(path, makes_parents=makes_parents, is_durable=is_durable) as partial:
         partial.write_text(text, encoding="utf-8")
+
+
+def checked_text(document: dict[str, Any]) -> tuple[str, str]:
+    """What `write_checked_json` writes, and the checksum in it.
+
+    Raises:
+        ValueError: The document holds NaN.
+    """
+    checksum = checksum_of(document)
+    return json.dumps(document | {CHECKSUM: checksum}, indent=2, allow_nan=False) + "\n", checksum
 
 
 def read_checked_json(path: Path | str, *, max_bytes: int = MAX_JSON_BYTES) -> dict[str, Any]:
