@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from app.document.camera_paths import StoredPath
-from app.document.kept_json import kept_object, read_kept, write_kept
+from app.document.kept_json import KeptText, kept_object, kept_text, read_kept, write_kept
 from app.document.project_document import ProjectDocument
 from app.document.stored_document import ENTRIES, document_of, plain_document
 from engine.errors import ProjectError
@@ -51,7 +51,12 @@ class StoredDocument:
     schema: int
 
 
-def read_document(folder: Path, name: str = PROJECT_FILE) -> StoredDocument:
+def read_document(folder: Path) -> ProjectDocument:
+    """The document of project.json alone. Raises what `read_stored` raises."""
+    return read_stored(folder).document
+
+
+def read_stored(folder: Path, name: str = PROJECT_FILE) -> StoredDocument:
     """Read project.json, or its backup, and of schema 1 what lay beside it.
 
     Raises:
@@ -103,24 +108,30 @@ def _damaged(error: ProjectError) -> DamagedDocument:
     return DamagedDocument(error.message, hint=error.hint, path=error.path)
 
 
-def write_document(folder: Path, document: ProjectDocument, step: int = 0) -> str:
+def document_text(document: ProjectDocument, step: int = 0) -> KeptText:
+    """project.json of a document at some step. Raises ProjectError where it cannot be kept."""
+    content = {"schema": SCHEMA, "step": step, **plain_document(document)}
+    return kept_text(content, max_bytes=MAX_DOCUMENT_BYTES)
+
+
+def write_document(folder: Path, document: ProjectDocument) -> None:
+    """Write project.json of a document that nothing has happened to. Raises what the two functions around it raise."""
+    write_document_text(folder, document_text(document))
+
+
+def write_document_text(folder: Path, text: KeptText) -> None:
     """Write project.json, keep the one before as its backup, and remove what lay beside that of schema 1.
 
-    Returns:
-        The checksum of what was written.
     Raises:
-        ProjectError: The document cannot be kept.
         DiskError: The disk refused; what was there stands.
     """
     path = folder / PROJECT_FILE
     old = [folder / name for name in (GATE_FILE, CAMERA_PATHS_FILE) if (folder / name).exists()]
-    content = {"schema": SCHEMA, "step": step, **plain_document(document)}
     if not old:  # else a copy of the file alone would lack a part of the document
         _keep_backup(path)
-    checksum = write_kept(path, content, max_bytes=MAX_DOCUMENT_BYTES)
+    write_kept(path, text)
     for name in old:
         name.unlink(missing_ok=True)
-    return checksum
 
 
 def _keep_backup(path: Path) -> None:

@@ -16,7 +16,7 @@ from msgspec import Meta, Struct
 
 from app.document.document_patch import document_difference, document_with
 from app.document.history import MAX_NAME_CHARACTERS, MAX_STEPS, DocumentHistory, Step
-from app.document.kept_json import read_kept, write_kept
+from app.document.kept_json import kept_text, read_kept, write_kept
 from app.document.plain_patch import PatchError
 from app.document.project_document import ProjectDocument
 from engine.errors import ProjectError
@@ -59,7 +59,7 @@ def write_history(folder: Path, history: DocumentHistory, *, step: int, document
     """
     past, future = _chain(history.present, history.past), _chain(history.present, history.future)
     content = {"history": FORMAT, "step": step, "document": document, "past": past, "future": future}
-    write_kept(folder / HISTORY_FILE, content, max_bytes=MAX_BYTES)
+    write_kept(folder / HISTORY_FILE, kept_text(content, max_bytes=MAX_BYTES))
 
 
 def _chain(present: ProjectDocument, steps: Sequence[Step]) -> list[dict[str, Any]]:

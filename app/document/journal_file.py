@@ -84,9 +84,7 @@ def read_journal(path: Path) -> tuple[JournalFile, JournalDamage | None]:
         data = read_bytes(path, max_bytes=MAX_JOURNAL_BYTES)
     except OSError as error:
         raise _damage(path, f"It cannot be read ({error.strerror or error})") from error
-    lines = data.split(b"\n")
-    if lines[-1] == b"":
-        lines.pop()
+    *lines, rest = data.split(b"\n")
     try:
         first = _row(lines[0] if lines else b"", None)
         start, document, after = _header(first)
@@ -107,10 +105,10 @@ def read_journal(path: Path) -> tuple[JournalFile, JournalDamage | None]:
             elif row.get("step") != start + len(rows) + 1:
                 problem = f"step {row.get('step')!r:.20} follows step {start + len(rows)}"
         except (JsonError, KeyError) as error:
-            if number == len(lines):  # broken off while it was written
+            if number == len(lines) and not rest:  # broken off while it was written
                 break
             row, problem = {}, str(error)
-        if not problem and is_whole and number < len(lines):
+        if not problem and is_whole and (rest or number < len(lines)):
             problem, number = "something follows the last line", number + 1
         if problem:
             known = JournalFile(path, start, document, after, tuple(rows), tuple(links), tuple(ends), False, False)

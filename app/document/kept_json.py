@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -48,29 +49,41 @@ def kept_object(path: Path, what: str, *, hint: str, max_bytes: int) -> tuple[di
         ) from error
 
 
-def write_kept(path: Path, content: dict[str, Any], *, max_bytes: int = MAX_BYTES) -> str:
-    """Write a file of a project, atomically and for good. max_bytes: What is read again.
+@dataclass(frozen=True, slots=True)
+class KeptText:
+    """What is to be written, and the checksum in it."""
 
-    Returns:
-        Its checksum.
+    data: bytes
+    checksum: str
+
+
+def kept_text(content: dict[str, Any], *, max_bytes: int = MAX_BYTES) -> KeptText:
+    """A file of a project as it is written. max_bytes: What is read again.
+
     Raises:
         ProjectError: It would be too large, or holds what JSON cannot.
-        DiskError: The disk refused.
     """
     try:
         text, checksum = checked_text(content)
         data = text.encode("utf-8")
     except ValueError as error:  # NaN, or half a Unicode character
-        raise ProjectError(f"That cannot be kept ({error}).", path=path) from error
+        raise ProjectError(f"That cannot be kept ({error}).") from error
     if len(data) > max_bytes:
         raise ProjectError(
             f"The project would take {len(data) / 1e6:.0f} MB, at most {max_bytes / 1e6:.0f} are kept.",
             hint="Delete some of what is not needed.",
-            path=path,
         )
+    return KeptText(data, checksum)
+
+
+def write_kept(path: Path, text: KeptText) -> None:
+    """Write a file of a project, atomically and for good.
+
+    Raises:
+        DiskError: The disk refused.
+    """
     try:
         with atomic_path(path, makes_parents=False, is_durable=True) as partial:
-            partial.write_bytes(data)
+            partial.write_bytes(text.data)
     except OSError as error:
         raise disk_error(error, what="The project", path=path) from error
-    return checksum

@@ -57,7 +57,10 @@ def _of_lists(before: list[Any], after: list[Any]) -> Patch | None:
     items: list[Any] = [[0, head]] if head else []
     for i, item in enumerate(new):
         patch = difference(old[i], item) if len(old) == len(new) else {"is": item}
-        items.append([head + i, head + i + 1] if patch is None else patch if "is" in patch else {"of": head + i, **patch})
+        if patch is None:
+            items.append([head + i, head + i + 1])
+        else:
+            items.append(patch if "is" in patch else {"of": head + i, **patch})
     if tail:
         items.append([len(before) - tail, len(before)])
     return {"items": items}

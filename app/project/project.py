@@ -1,6 +1,9 @@
 """Project: the folder that keeps what was learned about one capture. Paths, settings and the lock; no training.
 
 project.json                 the document: settings, regions, camera paths, edits and so on, see ProjectDocument
+journal/00000000.jsonl       what has happened to the document since that step
+history.json                 the way back from the document of project.json
+project.backup.json          project.json before it was written last
 clips/0000.safetensors       finished clips
 versions/0000/               what was trained before it was trained again
 checkpoints/0000.safetensors unfinished clips: everything needed to go on
@@ -21,11 +24,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.document.document_file import PROJECT_FILE, write_document
+from app.document.document_file import BACKUP_FILE, PROJECT_FILE
 from app.document.document_store import DocumentStore
 from app.document.history import Changed, DocumentHistory, Event, Placed
+from app.document.history_file import HISTORY_FILE
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
+from app.document.replay import JOURNAL_FOLDER
 from app.project.header_cache import HeaderCache
 from app.project.lock import ProcessLock, is_process_alive
 from engine.capture.capture import Capture
@@ -51,9 +56,11 @@ class Project:
         headers: Of its clips and checkpoints, read once for everybody who asks.
     """
 
-    def __init__(self, folder: Path, history: DocumentHistory, lock: ProcessLock | None) -> None:
+    def __init__(
+        self, folder: Path, history: DocumentHistory, lock: ProcessLock | None, *, store: DocumentStore | None = None
+    ) -> None:
         self.folder = folder
-        self.history, self.store = history, DocumentStore(folder)
+        self.history, self.store = history, store or DocumentStore(folder)
         self.headers = HeaderCache()
         self._lock = lock
 
@@ -207,15 +214,18 @@ class Project:
             os.replace(path, self.metrics_path(clip_index))
 
     def close(self) -> None:
-        """Release the lock. The object can still be read from."""
+        """Write what the journal holds into project.json, and release the lock. The object can still be read from."""
+        if self.is_writable:
+            self.store.compact()
         if self._lock is not None:
             self._lock.release()
 
     def remove_files(self) -> None:
         """Take back a project that has learned nothing: its own files and folders go, other things stay."""
-        for name in ("clips", "versions", "checkpoints", "live", "prep", "metrics", "logs"):
+        for name in ("clips", "versions", "checkpoints", "live", "prep", "metrics", "logs", JOURNAL_FOLDER):
             shutil.rmtree(self.folder / name, ignore_errors=True)
-        (self.folder / PROJECT_FILE).unlink(missing_ok=True)
+        for name in (PROJECT_FILE, BACKUP_FILE, HISTORY_FILE):
+            (self.folder / name).unlink(missing_ok=True)
 
 
 # ---------------------------------------------------------------- opening
@@ -320,12 +330,12 @@ def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
     try:
         if (folder / PROJECT_FILE).exists():  # made while this one looked
             raise ProjectError("There is a project already.", hint="Open it instead.", path=folder)
-        document = ProjectDocument(settings)
-        write_document(folder, document)
+        document, store = ProjectDocument(settings), DocumentStore(folder)
+        store.create(document)
     except ProjectError:
         lock.release()
         raise
-    return Project(folder, DocumentHistory(document), lock)
+    return Project(folder, DocumentHistory(document), lock, store=store)
 
 
 def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
@@ -335,17 +345,18 @@ def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
         ProjectError: The folder is not a project, is damaged, of a newer schema, or open for writing elsewhere.
     """
     folder = Path(folder)
-    history = DocumentStore(folder).read()
+    store = DocumentStore(folder)
+    history = store.read()
     lock = None
     if is_writable:
         lock = ProcessLock(folder / LOCK_FILE)
         lock.acquire()
         try:
-            history = DocumentStore(folder).read()  # another program may have changed it until now
+            history = store.read()  # another program may have changed it until now
         except ProjectError:
             lock.release()
             raise
-    project = Project(folder, history, lock)
+    project = Project(folder, history, lock, store=store)
     if is_writable:
         sweep(project)
     return project
