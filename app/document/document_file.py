@@ -119,15 +119,17 @@ def write_document(folder: Path, document: ProjectDocument) -> None:
     write_document_text(folder, document_text(document))
 
 
-def write_document_text(folder: Path, text: KeptText) -> None:
+def write_document_text(folder: Path, text: KeptText, *, is_backup_kept: bool = True) -> None:
     """Write project.json, keep the one before as its backup, and remove what lay beside that of schema 1.
 
+    Args:
+        is_backup_kept: Whether the one before is sound, so that it may become the backup.
     Raises:
         DiskError: The disk refused; what was there stands.
     """
     path = folder / PROJECT_FILE
     old = [folder / name for name in (GATE_FILE, CAMERA_PATHS_FILE) if (folder / name).exists()]
-    if not old:  # else a copy of the file alone would lack a part of the document
+    if is_backup_kept and not old:  # else a copy of the file alone would lack a part of the document
         _keep_backup(path)
     write_kept(path, text)
     for name in old:

@@ -31,14 +31,19 @@ MAX_EVENTS, MAX_JOURNAL_BYTES = 200, 8 << 20
 
 
 class DocumentStore:
-    """For any thread; one store of one process at a time may write. folder: Of the project.
+    """For any thread; one store of one process at a time may write.
+
+    Args:
+        folder: Of the project.
+        place: Where that folder will lie; None where it lies there already.
 
     Attributes:
         n_replayed, notes: See Replayed; as of the last time that the files were read.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, place: Path | None = None) -> None:
         self.folder = folder
+        self._place = place or folder
         self.n_replayed = 0
         self.notes: tuple[str, ...] = ()
         self._known: Replayed | None = None
@@ -76,10 +81,10 @@ class DocumentStore:
         return f'"clipgstream repair {self.folder}" says what can be kept.'
 
     def _found(self, document: ProjectDocument) -> ProjectDocument:
-        return with_capture(document, lambda capture: found_place(capture, self.folder))
+        return with_capture(document, lambda capture: found_place(capture, self._place))
 
     def _stored(self, document: ProjectDocument) -> ProjectDocument:
-        return with_capture(document, lambda capture: stored_place(capture, self.folder))
+        return with_capture(document, lambda capture: stored_place(capture, self._place))
 
     # ---------------------------------------------------------------- writing
 
@@ -87,9 +92,14 @@ class DocumentStore:
         """Make the files of a new project. Raises what `write` raises."""
         self.begin(DocumentHistory(document), step=0)
 
-    def begin(self, history: DocumentHistory, *, step: int) -> None:
-        """Write everything anew, at a step that no file of the journal reaches. Raises what `write` raises."""
-        self._begin(Replayed(history.each(self._stored), step))
+    def begin(self, history: DocumentHistory, *, step: int, is_backup_kept: bool = True) -> None:
+        """Write everything anew, at a step that no file of the journal reaches. Raises what `write` raises.
+
+        Args:
+            is_backup_kept: Whether project.json is sound, so that it may become the backup.
+        """
+        with self._lock:
+            self._begin(Replayed(history.each(self._stored), step), is_backup_kept=is_backup_kept)
 
     def write(self, events: Sequence[Event], history: DocumentHistory) -> None:
         """Keep what has happened, for good.
@@ -156,12 +166,12 @@ class DocumentStore:
                 text = None if merge is None else f"{self._session}: {merge!r}"  # other sessions have the same keys
                 return replace(event, document=self._stored(document), merge=text)
             case Placed(settings=settings):
-                place = stored_place(settings.capture, self.folder)
+                place = stored_place(settings.capture, self._place)
                 return Placed(replace(settings, capture=place))
             case _:
                 return event
 
-    def _begin(self, known: Replayed) -> None:
+    def _begin(self, known: Replayed, *, is_backup_kept: bool = True) -> None:
         """Write the document and its history, then begin a file of the journal; what was before stays beside it."""
         folder, step = self.folder, known.step
         before = known.journal
@@ -170,7 +180,7 @@ class DocumentStore:
             text = document_text(known.history.present, step)
             if step > 0:  # a new project has none
                 write_history(folder, known.history, step=step, document=text.checksum)
-            write_document_text(folder, text)
+            write_document_text(folder, text, is_backup_kept=is_backup_kept)
             after = "" if before is None else before.links[-1]
             journal = create_journal(journal_path(folder, step), step, document=text.checksum, after=after)
         except OSError as error:

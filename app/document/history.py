@@ -144,10 +144,9 @@ def coalesced(events: Sequence[Event]) -> list[Event]:
     """The same with fewer events: of changes in a row that count as one step, only the last one."""
     found: list[Event] = []
     for event in events:
-        last = found[-1] if found else None
-        is_same_step = isinstance(event, Changed) and isinstance(last, Changed) and event.merge is not None
-        if is_same_step and event.merge == last.merge:
-            found[-1] = replace(event, name=last.name)
-        else:
-            found.append(event)
+        match found[-1:], event:
+            case [Changed(name=name, merge=merge)], Changed() if merge is not None and event.merge == merge:
+                found[-1] = replace(event, name=name)
+            case _:
+                found.append(event)
     return found

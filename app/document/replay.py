@@ -6,6 +6,7 @@ needed are replayed one after the other. Nothing is written here, so that any pr
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -135,6 +136,9 @@ class _Replay:
     def run(self) -> None:
         """Replay all that follows. Raises ProjectError at the first damage."""
         steps = journal_steps(self.folder)
+        journal = self.folder / JOURNAL_FOLDER
+        if os.path.lexists(journal) and not journal.is_dir():
+            raise JournalDamage("The journal of the project is not a folder.", path=journal)
         if self.stored.schema == 1:
             if steps:
                 raise self._damage("It is of a version that has no journal, but there is one")

@@ -30,6 +30,7 @@ from app.document.history import Changed, DocumentHistory, Event, Placed
 from app.document.history_file import HISTORY_FILE
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
+from app.document.recovery import plain_history, recover
 from app.document.replay import JOURNAL_FOLDER
 from app.project.header_cache import HeaderCache
 from app.project.lock import ProcessLock, is_process_alive
@@ -43,6 +44,7 @@ logger = logging.getLogger(__name__)
 
 LOCK_FILE = "lock"
 LOCK_FILES = (LOCK_FILE, f".{LOCK_FILE}")
+OPEN_ELSEWHERE = "Another program has it open for writing. Close it there first, then open it again."
 MIN_TRAINING_CAMERAS = 2
 DEFAULT_CLIP_LENGTH = 10
 
@@ -54,15 +56,25 @@ class Project:
         history: The document and the way back. The window sets it, and keeps it by itself a moment later.
         store: Where the document is kept.
         headers: Of its clips and checkpoints, read once for everybody who asks.
+
+    Args:
+        why_read_only: Without a lock, why, and what helps.
     """
 
     def __init__(
-        self, folder: Path, history: DocumentHistory, lock: ProcessLock | None, *, store: DocumentStore | None = None
+        self,
+        folder: Path,
+        history: DocumentHistory,
+        lock: ProcessLock | None,
+        *,
+        store: DocumentStore | None = None,
+        why_read_only: str = OPEN_ELSEWHERE,
     ) -> None:
         self.folder = folder
         self.history, self.store = history, store or DocumentStore(folder)
         self.headers = HeaderCache()
         self._lock = lock
+        self._why_read_only = why_read_only
 
     @property
     def document(self) -> ProjectDocument:
@@ -167,11 +179,7 @@ class Project:
             ProjectError: It may not.
         """
         if not self.is_writable:
-            raise ProjectError(
-                "The project is open for reading only, because another program trains into it.",
-                hint="Close it there first, then open it again.",
-                path=self.folder,
-            )
+            raise ProjectError("The project is open for reading only.", hint=self._why_read_only, path=self.folder)
 
     def change(self, document: ProjectDocument, name: str) -> None:
         """Replace the document, on disk first, as a step of its history. name: See Changed.
@@ -338,13 +346,20 @@ def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
     return Project(folder, DocumentHistory(document), lock, store=store)
 
 
-def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
+def open_project(
+    folder: Path | str, *, is_writable: bool = True, is_journal_used: bool = True, why_read_only: str = OPEN_ELSEWHERE
+) -> Project:
     """Open an existing project folder; for writing it is locked, and left-over snapshots are swept.
 
+    Args:
+        is_journal_used: False for the document of project.json as it is, where the journal is damaged; read-only.
+        why_read_only: See Project.
     Raises:
         ProjectError: The folder is not a project, is damaged, of a newer schema, or open for writing elsewhere.
     """
     folder = Path(folder)
+    if not is_journal_used:
+        return Project(folder, plain_history(folder), None, why_read_only=why_read_only)
     store = DocumentStore(folder)
     history = store.read()
     lock = None
@@ -356,10 +371,26 @@ def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
         except ProjectError:
             lock.release()
             raise
-    project = Project(folder, history, lock, store=store)
+    project = Project(folder, history, lock, store=store, why_read_only=why_read_only)
     if is_writable:
         sweep(project)
     return project
+
+
+def repair_project(folder: Path | str) -> Path:
+    """Go on with the steps before the damage; see app.document.recovery.
+
+    Returns:
+        The folder with what was damaged.
+    Raises:
+        ProjectError: Nothing can be kept, or the project is open for writing elsewhere.
+    """
+    lock = ProcessLock(Path(folder) / LOCK_FILE)
+    lock.acquire()
+    try:
+        return recover(Path(folder))
+    finally:
+        lock.release()
 
 
 def sweep(project: Project) -> None:

@@ -11,6 +11,8 @@ from pathlib import Path
 from app.calibration.job import CalibrationRequest
 from app.export.export_choices import ExportChoices
 from app.project.opening_answers import OpeningAnswers
+from app.project.project_choices import AS_USUAL, ProjectChoices
+from app.session.files.file_commands import FileCommand
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
@@ -31,6 +33,8 @@ class OpenCapture:
     """Report what it is, and ask what a project of it begins with, where there is none; or why it does not open."""
     answers: OpeningAnswers | None = None
     """What a new project begins with; None takes what suits."""
+    choices: ProjectChoices = AS_USUAL
+    """How its project is opened."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +42,7 @@ class OpenProject:
     """Open a project folder and the capture it names."""
 
     path: Path
+    choices: ProjectChoices = AS_USUAL
 
 
 @dataclass(frozen=True, slots=True)
@@ -455,6 +460,7 @@ ExportCommand = (
 Command = (
     OpenCapture
     | OpenProject
+    | FileCommand
     | TrainNextClip
     | QueueCommand
     | PauseTraining

@@ -34,7 +34,9 @@ def picked_edit(edit_id: int, n_picks: int, rng: random.Random) -> Edit:
     return Edit(edit_id, f"pick {edit_id}", Picked((PickedRows(0, "abc", "static", pack_rows(rows)),)), Delete())
 
 
-def random_events(rng: random.Random, n: int, document: ProjectDocument = EMPTY) -> Iterator[tuple[Event, DocumentHistory]]:
+def random_events(
+    rng: random.Random, n: int, document: ProjectDocument = EMPTY
+) -> Iterator[tuple[Event, DocumentHistory]]:
     """So many events, and the history after each."""
     history = DocumentHistory(document)
     for number in range(n):
@@ -81,7 +83,8 @@ def _random_change(document: ProjectDocument, rng: random.Random, number: int) -
     labels, markers = (Label("camera", f"cam{number % 5}", f"text {x}"),), (Marker(number, "clap"),)
     overrides = {"passes": rng.choice((6, 6.0, 7.5)), "seed_factor": 1} if x > 0 else {"passes": 6.0}
     settings = replace(document.settings, overrides={k: v for k, v in overrides.items() if k == "passes"})
-    return "name", replace(document, labels=labels, markers=(*document.markers, *markers)[-4:], settings=settings), "type"
+    markers = (*document.markers, *markers)[-4:]
+    return "name", replace(document, labels=labels, markers=markers, settings=settings), "type"
 
 
 def _edited(edit: Edit, rng: random.Random) -> Edit:

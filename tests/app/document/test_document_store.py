@@ -231,7 +231,9 @@ def test_a_project_json_edited_by_hand_is_taken_where_nothing_waits(tmp_path: Pa
     store.compact()
     path = tmp_path / "project.json"
     edited = path.read_text().replace('"text": "x"', '"text": "y"')
-    path.write_text("".join(line for line in edited.splitlines(True) if "checksum" not in line).replace("},\n}", "}\n}"))
+    path.write_text(
+        "".join(line for line in edited.splitlines(True) if "checksum" not in line).replace("},\n}", "}\n}")
+    )
     store = DocumentStore(tmp_path)
     history = store.read()
     assert history.present.markers == (Marker(1, "y"),)

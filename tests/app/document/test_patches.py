@@ -81,7 +81,11 @@ def test_edits_that_change_places_are_not_written_again() -> None:
 
 def test_what_could_not_be_read_again_is_not_written() -> None:
     edit = picked_edit(1, 3, random.Random(1))
-    for edits in ((edit, edit), (Edit(-1, "", edit.target, edit.action),), (Edit(1, "x" * 300, edit.target, edit.action),)):
+    for edits in (
+        (edit, edit),
+        (Edit(-1, "", edit.target, edit.action),),
+        (Edit(1, "x" * 300, edit.target, edit.action),),
+    ):
         with pytest.raises(ProjectError):
             document_difference(EMPTY, replace(EMPTY, edits=edits))
 
@@ -89,7 +93,13 @@ def test_what_could_not_be_read_again_is_not_written() -> None:
 @pytest.mark.parametrize(
     "patch",
     [
-        *([], {"edit": {"items": []}}, {"edits": {"is": []}}, {"edits": {"items": [{"is": {}}]}}, {"world": {"items": []}}),
+        *(
+            [],
+            {"edit": {"items": []}},
+            {"edits": {"is": []}},
+            {"edits": {"items": [{"is": {}}]}},
+            {"world": {"items": []}},
+        ),
         *({"world": {"in": {"up": {"is": [1.0, 2.0]}}}}, {"markers": {"items": [[0, 1]]}}, {"settings": {"is": 3}}),
     ],
 )
