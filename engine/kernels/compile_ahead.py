@@ -32,7 +32,7 @@ GROUPS = (
     ("loss and optimiser", "engine.backends.cpu.step.warm", 5.0),
     ("figures", "engine.metrics.pictures.warm", 1.5),
     ("view modes", "engine.backends.inspection.warm", 1.5),
-    ("selection", "engine.editing.selecting.warm", 4.0),
+    ("selection", "engine.editing.selection.warm", 4.0),
 )
 """Name, module, and about how long compiling takes, of each group. Every module has a `warm_up()` that runs each of its
 kernels once. Groups share no cached kernel but the entry of `routines.run`, or two processes would compile it at the

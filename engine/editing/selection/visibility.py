@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from engine.conventions import ALPHA_MAX, ALPHA_MIN, EPS2D_PX2
-from engine.editing.selecting.projected import ProjectedGaussians
+from engine.editing.selection.projected import ProjectedGaussians
 
 PICTURE_PX = 60_000
 """Pixels of the picture in which it is looked, at most."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from engine.camera.rotations import matrices_of
 from engine.editing.edit import Box, Sphere
-from engine.editing.selecting.in_picture import EXTENT_SIGMAS
+from engine.editing.selection.in_picture import EXTENT_SIGMAS
 
 
 def in_volume(

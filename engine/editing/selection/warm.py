@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from engine.editing.selecting.in_picture import under_mask
-from engine.editing.selecting.neighbours import flooded, grown
-from engine.editing.selecting.projected import project_gaussians
-from engine.editing.selecting.seen_from import SeenFrom
-from engine.editing.selecting.shapes import brush_mask, lasso_mask
-from engine.editing.selecting.visibility import seen_rows
+from engine.editing.selection.in_picture import under_mask
+from engine.editing.selection.neighbours import flooded, grown
+from engine.editing.selection.projected import project_gaussians
+from engine.editing.selection.seen_from import SeenFrom
+from engine.editing.selection.shapes import brush_mask, lasso_mask
+from engine.editing.selection.visibility import seen_rows
 
 
 def warm_up() -> None:

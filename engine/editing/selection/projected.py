@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from engine.conventions import FRUSTUM_MARGIN
-from engine.editing.selecting.seen_from import SeenFrom
+from engine.editing.selection.seen_from import SeenFrom
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from engine.conventions import EPS2D_PX2
-from engine.editing.selecting.projected import ProjectedGaussians
+from engine.editing.selection.projected import ProjectedGaussians
 
 EXTENT_SIGMAS = 2.0
 """By extent, a Gaussian reaches as far as this, standard deviations."""
