@@ -13,6 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
+
 from app.background.jobs import Jobs
 from app.background.log_reader import LogLine, LogView
 from app.background.usage import UsageMeter
@@ -82,6 +84,8 @@ from app.training.service import Launch, ShownState
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.editing.selection.ranges import Spread
+from engine.editing.selection.seen_from import SeenFrom
 from engine.errors import EngineError, ProjectError
 
 
@@ -656,6 +660,18 @@ class Session:
         trained."""
         shown = self.playback.frame(self.timeline, self._shown_as)
         return None if shown is None else shown.gaussians
+
+    def selected(self, gaussians: GaussianArrays) -> np.ndarray:
+        """Which Gaussians of a frame are selected. [N] bool"""
+        return self.selecting.mask(gaussians)
+
+    def selected_share(self, gaussians: GaussianArrays, view: SeenFrom) -> np.ndarray | None:
+        """Where selected Gaussians are seen; see Selecting.share."""
+        return self.selecting.share(gaussians, view, self.views.current_index)
+
+    def attribute_spread(self, attribute: str) -> Spread | None:
+        """How an attribute is spread over the shown frame; see Selecting.spread."""
+        return self.selecting.spread(attribute)
 
     def shown_anchors(self) -> AnchorArrays | None:
         """Anchors that exist at the shown frame; those of the newest frame there is until it was decoded."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -30,11 +30,15 @@ from app.session.editing.selection_commands import (
     SelectionCommand,
     ShrinkSelection,
 )
+from engine.editing.gaussian_rows import GaussianRows
+from engine.editing.selection.projected import project_gaussians
 from engine.editing.selection.ranges import Spread, spread_of
+from engine.editing.selection.seen_from import SeenFrom
 from engine.editing.selection.set_algebra import combined
+from engine.editing.selection.share import selected_share
 from engine.errors import ProjectError
 
-FIND, SPREAD = "find", "spread"
+FIND, SPREAD, SHARE = "find", "spread", "share"
 """Lanes of the thread."""
 
 
@@ -102,6 +106,22 @@ class _SpreadWork:
         return spread_of(values, is_log=ATTRIBUTES[self.attribute].is_log)
 
 
+@dataclass(frozen=True, slots=True)
+class _ShareWork:
+    """Work for the thread: where selected Gaussians are seen."""
+
+    key: tuple[object, ...]
+    view: SeenFrom = field(compare=False)
+    gaussians: GaussianArrays = field(compare=False)
+    selected: np.ndarray = field(compare=False)
+
+    def answer(self) -> np.ndarray:
+        gaussians = self.gaussians
+        view = replace(self.view, near=max(self.view.near, gaussians.near_plane))
+        projected = project_gaussians(gaussians.means, gaussians.quats, gaussians.scales, view)
+        return selected_share(projected, gaussians.opacities, self.selected)
+
+
 class Selecting:
     """The selection of the open project.
 
@@ -122,11 +142,13 @@ class Selecting:
         self._running: _Find | None = None
         self._numbers = itertools.count(1)
         self._revision = 0
-        self._mask: tuple[object, int, np.ndarray] | None = None
+        self._mask: tuple[GaussianRows, int, np.ndarray] | None = None
+        self._share_lanes: dict[object, None] = {}
         self._words: tuple[int, int, str] | None = None
         self._worker: LatestWorker[Any, Any] = LatestWorker(
             "selecting", lambda work: work.answer(), prepare=_prepare, on_done=lambda: self.on_found()
         )
+        self._worker.active_lane = FIND
 
     def open(self) -> None:
         """Another project is open: what was selected belongs to the one before."""
@@ -148,10 +170,9 @@ class Selecting:
         Raises:
             ProjectError: There is nothing to select, or the command makes no sense.
         """
-        if isinstance(command, ClearSelection | Reselect):
-            if not self._is_busy:
-                self._change(command)
-                return
+        if isinstance(command, ClearSelection | Reselect) and not self._is_busy:
+            self._change(command)
+            return
         gaussians = self._shown.selectable()
         if gaussians is None or gaussians.rows is None:
             raise ProjectError("There are no Gaussians to select here.", hint="Go to a frame that is trained.")
@@ -200,7 +221,9 @@ class Selecting:
         how, keeps_others = _how(work.command)
         if how.is_whole_anchors:
             found = whole_anchors(rows, found, ground.gaussians_per_anchor)
-        self._take(self.selection.with_mask(rows, combined(ground.selected, found, how.mode), keeps_others=keeps_others))
+        self._take(
+            self.selection.with_mask(rows, combined(ground.selected, found, how.mode), keeps_others=keeps_others)
+        )
 
     def _take(self, selection: Selection) -> None:
         if selection != self.selection:
@@ -230,7 +253,7 @@ class Selecting:
     @property
     def finished(self) -> object:
         """Another value means that there is something new to see."""
-        newest = [self._worker.newest_in(lane) for lane in (FIND, SPREAD)]
+        newest = [self._worker.newest_in(lane) for lane in (FIND, SPREAD, *self._share_lanes)]
         return tuple(None if found is None else found[0] for found in newest)
 
     # ---------------------------------------------------------------- what is shown of it
@@ -242,11 +265,11 @@ class Selecting:
 
     def mask(self, gaussians: GaussianArrays) -> np.ndarray:
         """Which Gaussians of a frame are selected. The newest answer is kept; do not change it. [N] bool"""
-        known = self._mask
-        if known is None or known[:2] != (gaussians.key, self._revision):
-            rows = gaussians.rows
-            mask = np.zeros(len(gaussians), np.bool_) if rows is None else self.selection.mask(rows)
-            self._mask = known = (gaussians.key, self._revision, mask)
+        rows, known = gaussians.rows, self._mask
+        if rows is None:
+            return np.zeros(len(gaussians), np.bool_)
+        if known is None or known[0] is not rows or known[1] != self._revision:
+            self._mask = known = (rows, self._revision, self.selection.mask(rows))
         return known[2]
 
     def status(self) -> SelectionStatus:
@@ -283,6 +306,26 @@ class Selecting:
         if newest is None or newest[0] != work:
             self._worker.request(work, lane=SPREAD)
         return newest[1] if newest is not None and newest[0].attribute == attribute else None
+
+    def share(self, gaussians: GaussianArrays, view: SeenFrom, view_id: object) -> np.ndarray | None:
+        """How much of each pixel of a view the selected Gaussians of a frame make up, see
+        engine.editing.selection.share; None until that is known, and where none of them is selected. [h, w] float32
+
+        Args:
+            view_id: Of the place where it is shown: each has one newest request.
+        """
+        selected = self.mask(gaussians)
+        if gaussians.rows is None or not selected.any():
+            return None
+        matrices = (np.asarray(m, np.float64).tobytes() for m in (view.world_to_camera, view.K))
+        work = _ShareWork((gaussians.key, self._revision, *matrices, *view.size), view, gaussians, selected)
+        lane = (SHARE, view_id)
+        self._share_lanes[lane] = None
+        newest = self._worker.newest_in(lane)
+        if newest is not None and newest[0] == work:
+            return newest[1]
+        self._worker.request(work, lane=lane)
+        return None
 
     def _residuals_of(self, attribute: str) -> AnchorValues | None:
         column = ATTRIBUTES[attribute].column

@@ -67,7 +67,8 @@ def flooded(means: np.ndarray, colors: np.ndarray, seed: int, distance: float, c
 
 def _points(means: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     points = np.ascontiguousarray(means, np.float64)
-    return points, np.isfinite(points).all(axis=1)
+    is_sound: np.ndarray = np.isfinite(points).all(axis=1)
+    return points, is_sound
 
 
 def _grid(points: np.ndarray, is_in: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:

@@ -53,8 +53,8 @@ def project_gaussians(means: np.ndarray, quats: np.ndarray, scales: np.ndarray, 
     K = view.K
     lens = np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2]], np.float64)
     size = np.array([view.width, view.height], np.float64)
-    arrays = (np.ascontiguousarray(a, np.float32) for a in (means, quats, scales))
-    _project(*arrays, pose, lens, size, max(view.near, 1e-9), centers, depths, spreads, is_before)
+    means, quats, scales = (np.ascontiguousarray(array, np.float32) for array in (means, quats, scales))
+    _project(means, quats, scales, pose, lens, size, max(view.near, 1e-9), centers, depths, spreads, is_before)
     return ProjectedGaussians(view, centers, depths, spreads, is_before)
 
 

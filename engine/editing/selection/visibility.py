@@ -12,6 +12,7 @@ from numba import njit
 
 from engine.conventions import ALPHA_MAX, ALPHA_MIN, EPS2D_PX2
 from engine.editing.selection.projected import ProjectedGaussians
+from engine.editing.selection.seen_from import SeenFrom
 
 PICTURE_PX = 60_000
 """Pixels of the picture in which it is looked, at most."""
@@ -32,8 +33,7 @@ def seen_rows(projected: ProjectedGaussians, opacities: np.ndarray) -> np.ndarra
         opacities: In 0..1. [N]
     """
     view = projected.view
-    scale = min(np.sqrt(PICTURE_PX / (view.width * view.height)), 1.0)
-    width, height = max(int(np.ceil(view.width * scale)), 1), max(int(np.ceil(view.height * scale)), 1)
+    scale, width, height = small_picture(view)
     opacities = np.ascontiguousarray(opacities, np.float64)
     found = np.zeros(len(projected), np.bool_)
     rows = np.flatnonzero(projected.is_before & (opacities >= ALPHA_MIN))
@@ -46,8 +46,14 @@ def seen_rows(projected: ProjectedGaussians, opacities: np.ndarray) -> np.ndarra
     return found
 
 
+def small_picture(view: SeenFrom) -> tuple[float, int, int]:
+    """The picture in which it is looked: pixels of it per pixel of the view, its width and its height."""
+    scale = min(float(np.sqrt(PICTURE_PX / (view.width * view.height))), 1.0)
+    return scale, max(int(np.ceil(view.width * scale)), 1), max(int(np.ceil(view.height * scale)), 1)
+
+
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _footprint(centers, spreads, reach, i, scale, height, width):
+def footprint(centers, spreads, reach, i, scale, height, width):
     """Place, inverse spread, slope of depth, thickness, and first and last pixel of a Gaussian in the small picture.
 
     reach: How far it is looked at, standard deviations.
@@ -75,7 +81,7 @@ def _stop_light(centers, depths, spreads, opacities, order, scale, stops, left):
     for k in range(len(order)):
         i = order[k]
         limit = np.log(opacities[i] / ALPHA_MIN)
-        u, v, ixx, ixy, iyy, slope_x, slope_y, thickness, first_x, last_x, first_y, last_y = _footprint(
+        u, v, ixx, ixy, iyy, slope_x, slope_y, thickness, first_x, last_x, first_y, last_y = footprint(
             centers, spreads, np.sqrt(2.0 * limit), i, scale, height, width
         )
         for row in range(first_y, last_y + 1):
@@ -99,7 +105,7 @@ def _find_seen(centers, depths, spreads, order, scale, set_back, stops, found):
     core = -2.0 * np.log(CORE_SHARE)
     for k in range(len(order)):
         i = order[k]
-        u, v, ixx, ixy, iyy, slope_x, slope_y, thickness, first_x, last_x, first_y, last_y = _footprint(
+        u, v, ixx, ixy, iyy, slope_x, slope_y, thickness, first_x, last_x, first_y, last_y = footprint(
             centers, spreads, np.sqrt(core), i, scale, height, width
         )
         same = DEPTH_SHARE * max(depths[i] - set_back, 0.0)

@@ -38,7 +38,8 @@ def in_volume(
         beside = np.abs(offsets @ axes.T)
         if quats is not None and scales is not None:
             beside = beside - EXTENT_SIGMAS * _sigmas(quats, scales, axes[None])
-        return (beside <= np.asarray(volume.half_sizes)).all(axis=1)
+        is_in: np.ndarray = (beside <= np.asarray(volume.half_sizes)).all(axis=1)
+    return is_in
 
 
 def _sigmas(quats: np.ndarray, scales: np.ndarray, directions: np.ndarray) -> np.ndarray:
