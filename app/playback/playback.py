@@ -29,6 +29,8 @@ from app.status import WantedFrame
 from app.training.service import ShownState
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
+from engine.editing.edit import Edit
+from engine.editing.effects import EditStack
 
 StateOf = Callable[[int], ShownState | None]
 """The state of a clip to look at; None where it has none."""
@@ -65,6 +67,7 @@ class Playback:
         self.ahead = Ahead(self.decoder, self.renderer)
         self._modes, self._coverage, self._trails = ModeArrays(), CoverageFinder(), TrailMaker()
         self._opened: OpenedProject | None = None
+        self._edits = EditStack()
         self._state_of = state_of
         self._n_ahead_seen = 0
         self._inherited: dict[int, Path | None] = {}
@@ -83,6 +86,11 @@ class Playback:
             for store in (*self._stores, self.ahead, self._modes):
                 store.clear()
         self._opened, self._inherited = opened, {}
+
+    def apply(self, edits: tuple[Edit, ...]) -> None:
+        """Show frames with these edits from now on. Frames that they leave alone are kept."""
+        if edits != self._edits.edits:
+            self._edits = EditStack(edits)
 
     def build_first_cloud(self, jobs: Jobs) -> None:
         """Make something to look at until the reference clip has a state, unless there is one."""
@@ -237,13 +245,14 @@ class Playback:
 
     def cached_frames(self) -> list[tuple[int, int]]:
         """Frames that can be shown at once, as they are looked at now: first and stop of each run, in order."""
-        return self.ahead.runs(self._state_of, self._is_current)
+        return self.ahead.runs(lambda clip_index: (self._state_of(clip_index), self._edits), self._is_current)
 
     def _is_current(self, key: FrameKey) -> bool:
-        generation, path, clip_index, revision, _, _ = key
+        generation, path, clip_index, revision, digest, _, frame_index = key
         state = self._state_of(clip_index)
         is_open = self._opened is not None and self._opened.generation == generation
-        return is_open and state is not None and (str(state.file), state.revision) == (path, revision)
+        is_edited_so = digest == self._edits.at(frame_index).digest
+        return is_open and is_edited_so and state is not None and (str(state.file), state.revision) == (path, revision)
 
     def _request(self, timeline: Timeline, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
         """What is to be decoded for the playhead; None where nothing is trained."""
@@ -277,6 +286,7 @@ class Playback:
             clip=clip,
             is_live=state.is_live,
             shown_as=decoded_as(shown_as),
+            effects=self._edits.at(frame_index),
         )
 
     def _inherited_path(self, opened: OpenedProject, clip_index: int) -> Path | None:

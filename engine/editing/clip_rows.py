@@ -84,6 +84,10 @@ class ClipRows:
         """Where Gaussians of these indices come from."""
         return GaussianRows(self.sets, self.set_of[indices], self.number_of[indices])
 
+    def rows_of_anchors(self, role: str, anchors: np.ndarray) -> np.ndarray:
+        """Rows of a set by the numbers of their anchors, none of which is hidden. [n] int64"""
+        return np.searchsorted(self._anchors[role], anchors)
+
     def anchors_among(self, rows: GaussianRows, role: str) -> np.ndarray:
         """Which rows of a set have a Gaussian among these. [A of the set] bool"""
         place = next(place for place, row_set in enumerate(self.sets) if row_set.role == role)
