@@ -82,6 +82,12 @@ class ClipParts:
             self._parts[content] = EditedClip(part_of(self._model, content), self._clip, self.named)
         return self._parts[content]
 
+    def apart(self, content: str) -> EditedClip:
+        """A part with caches of its own, to be decoded on another thread; not of the whole clip."""
+        from engine.editing.edited_clip import EditedClip
+
+        return EditedClip(part_of(self._model, content), self._clip, self.named)
+
     def has_left(self, edited: EditedGaussians, content: str) -> tuple[np.ndarray, np.ndarray]:
         """Which of all anchors of ClipModel.anchors have a Gaussian that edits have left, inherited and own ones.
 

@@ -22,7 +22,7 @@ from app.playback.mode_arrays import ModeArrays
 from app.playback.orbit_view import OrbitView
 from app.playback.render import Look, Renderer
 from app.playback.timeline import Timeline
-from app.playback.trails import TrailMaker, TrailRequest, Trails
+from app.playback.trails import TrailMaker, TrailRequest, Trails, trail_frames
 from app.playback.view_modes import PLAIN, ShownAs, decoded_as
 from app.project.opened_project import OpenedProject
 from app.status import WantedFrame
@@ -120,10 +120,11 @@ class Playback:
     def trails(self, timeline: Timeline) -> Trails | None:
         """Trails that end at the playhead, or the newest ones of its clip until those are made."""
         request = self._request(timeline)
-        model = None if request is None else self.decoder.model(request)
-        if request is None or model is None:
+        loaded = None if request is None else self.decoder.loaded(request)
+        if request is None or loaded is None:
             return None
-        return self._trails.trails(TrailRequest(request.model_key, request.frame_index, model, request.clip))
+        effects = tuple(map(self._edits.at, trail_frames(request.clip, request.frame_index)))
+        return self._trails.trails(TrailRequest(request.model_key, request.frame_index, effects, loaded.parts))
 
     def is_loaded(self, timeline: Timeline) -> bool:
         """Whether the file of the clip under the playhead is not needed any more. Asks for what is missing."""

@@ -84,6 +84,10 @@ class ClipRows:
         """Where Gaussians of these indices come from."""
         return GaussianRows(self.sets, self.set_of[indices], self.number_of[indices])
 
+    def indices_of(self, rows: GaussianRows) -> np.ndarray:
+        """Inverse of `named`. [n] int64"""
+        return self._first_of_set[rows.set_index] + rows.number
+
     def rows_of_anchors(self, role: str, anchors: np.ndarray) -> np.ndarray:
         """Rows of a set by the numbers of their anchors, none of which is hidden. [n] int64"""
         return np.searchsorted(self._anchors[role], anchors)
