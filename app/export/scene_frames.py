@@ -52,7 +52,7 @@ class SceneFrames:
         opened: A project opened for reading.
         n_threads: Threads to decode with; None for all.
         features: Which features of the anchors are used, see engine.metrics.clips.features_apart.
-        edits: What is applied; empty for the scene as it was trained.
+        edits: What is applied; None for the edits of the project, empty for the scene as it was trained.
     """
 
     def __init__(
@@ -61,10 +61,10 @@ class SceneFrames:
         *,
         n_threads: int | None = None,
         features: Features = "both",
-        edits: tuple[Edit, ...] = (),
+        edits: tuple[Edit, ...] | None = None,
     ) -> None:
         self.opened = opened
-        self._edits = EditStack(edits)
+        self._edits = EditStack(opened.project.document.edits if edits is None else edits)
         self._n_threads = n_threads
         self._features: Features = features
         self._clip_of = [clip for clip in opened.clips for _ in clip.frame_indices()]

@@ -29,7 +29,6 @@ from app.status import WantedFrame
 from app.training.service import ShownState
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
-from engine.editing.edit import Edit
 from engine.editing.effects import EditStack
 
 StateOf = Callable[[int], ShownState | None]
@@ -67,7 +66,7 @@ class Playback:
         self.ahead = Ahead(self.decoder, self.renderer)
         self._modes, self._coverage, self._trails = ModeArrays(), CoverageFinder(), TrailMaker()
         self._opened: OpenedProject | None = None
-        self._edits = EditStack()
+        self._stack = EditStack()
         self._state_of = state_of
         self._n_ahead_seen = 0
         self._inherited: dict[int, Path | None] = {}
@@ -86,11 +85,6 @@ class Playback:
             for store in (*self._stores, self.ahead, self._modes):
                 store.clear()
         self._opened, self._inherited = opened, {}
-
-    def apply(self, edits: tuple[Edit, ...]) -> None:
-        """Show frames with these edits from now on. Frames that they leave alone are kept."""
-        if edits != self._edits.edits:
-            self._edits = EditStack(edits)
 
     def build_first_cloud(self, jobs: Jobs) -> None:
         """Make something to look at until the reference clip has a state, unless there is one."""
@@ -123,7 +117,7 @@ class Playback:
         loaded = None if request is None else self.decoder.loaded(request)
         if request is None or loaded is None:
             return None
-        effects = tuple(map(self._edits.at, trail_frames(request.clip, request.frame_index)))
+        effects = tuple(map(self._edits().at, trail_frames(request.clip, request.frame_index)))
         return self._trails.trails(TrailRequest(request.model_key, request.frame_index, effects, loaded.parts))
 
     def is_loaded(self, timeline: Timeline) -> bool:
@@ -246,13 +240,13 @@ class Playback:
 
     def cached_frames(self) -> list[tuple[int, int]]:
         """Frames that can be shown at once, as they are looked at now: first and stop of each run, in order."""
-        return self.ahead.runs(lambda clip_index: (self._state_of(clip_index), self._edits), self._is_current)
+        return self.ahead.runs(lambda clip_index: (self._state_of(clip_index), self._edits()), self._is_current)
 
     def _is_current(self, key: FrameKey) -> bool:
         generation, path, clip_index, revision, digest, _, frame_index = key
         state = self._state_of(clip_index)
         is_open = self._opened is not None and self._opened.generation == generation
-        is_edited_so = digest == self._edits.at(frame_index).digest
+        is_edited_so = digest == self._edits().at(frame_index).digest
         return is_open and is_edited_so and state is not None and (str(state.file), state.revision) == (path, revision)
 
     def _request(self, timeline: Timeline, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
@@ -287,8 +281,15 @@ class Playback:
             clip=clip,
             is_live=state.is_live,
             shown_as=decoded_as(shown_as),
-            effects=self._edits.at(frame_index),
+            effects=self._edits().at(frame_index),
         )
+
+    def _edits(self) -> EditStack:
+        """Those of the document as it is now; frames that a change of them leaves alone stay as they are."""
+        edits = () if self._opened is None else self._opened.project.document.edits
+        if edits is not self._stack.edits:
+            self._stack = EditStack(edits)
+        return self._stack
 
     def _inherited_path(self, opened: OpenedProject, clip_index: int) -> Path | None:
         """Kept: it is asked for many times in every turn of the loop, and follows from all settings."""

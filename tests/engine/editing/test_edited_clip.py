@@ -206,12 +206,12 @@ def test_numbers_that_are_not_finite_do_not_spread(action: str) -> None:
         model.anchor_set("moving").positions[2] = torch.nan
         model.anchor_set("static").positions[5] = torch.inf
     found = edited(model).decode(1 / 6, effects_of(Effect(TARGETS["box"], ACTIONS[action], is_inverted=True)))
-    bad = ~np.isfinite(found.gaussians.means.numpy()).all(1)
+    bad = np.asarray(~np.isfinite(found.gaussians.means.numpy()).all(1))
     roles = [
         (found.rows.sets[place].role, number // K)
         for place, number in zip(found.rows.set_index, found.rows.number, strict=True)
     ]
-    assert {name for name, is_bad in zip(roles, bad.tolist(), strict=True) if is_bad} <= {("moving", 2), ("static", 7)}
+    assert {name for name, is_bad in zip(roles, bad, strict=True) if is_bad} <= {("moving", 2), ("static", 7)}
     for tensor in found.gaussians.tensors():
         assert np.isfinite(tensor.numpy()[~bad]).all()
 
