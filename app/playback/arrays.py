@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from app.playback.picture_source import UNKNOWN, PictureSource
+from engine.editing.gaussian_rows import GaussianRows
 
 BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
 """Behind everything; the viewport takes its dark grey from here."""
@@ -32,6 +33,7 @@ class GaussianArrays:
         births: Where each comes from, see app.playback.contents; None where unknown. [N] uint8
         changes: How far each is from the reference clip, NaN where that has none; None where nobody asked.
             [N] float32
+        rows: Which anchor set each comes from, and its number there; None where unknown.
     """
 
     means: np.ndarray
@@ -46,6 +48,7 @@ class GaussianArrays:
     still_key: Hashable = None
     births: np.ndarray | None = None
     changes: np.ndarray | None = None
+    rows: GaussianRows | None = None
 
     def __len__(self) -> int:
         return len(self.means)

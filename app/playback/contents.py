@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.playback.view_modes import ALL
+from engine.editing.gaussian_rows import GaussianRows, RowSet
 
 if TYPE_CHECKING:
     from engine.clip_files.clip_state import ClipState
@@ -92,6 +93,23 @@ class ClipParts:
             n_gaussians = len(part.alive(role, clip_time)) * part.decoder.gaussians_per_anchor
             births.append(np.full(n_gaussians, self._birth(role), np.uint8))
         return np.concatenate(births)
+
+    def rows(self, content: str, clip_time: float) -> GaussianRows:
+        """Which anchor set each Gaussian of `decode` comes from, and its number there."""
+        from engine.model.host_array import host_array
+
+        part, k, sets = self.part(content), self._model.decoder.gaussians_per_anchor, []
+        places, numbers = [np.zeros(0, np.uint8)], [np.zeros(0, np.int32)]
+        for role in part.roles():
+            is_own = self._reference is None or self._model.anchor_set(role).is_trainable
+            header = self._state.header if self._reference is None or is_own else self._reference.header
+            anchors, is_hidden = host_array(part.alive(role, clip_time)), part.hidden.get(role)
+            if is_hidden is not None:
+                anchors = np.flatnonzero(~host_array(is_hidden))[anchors]
+            places.append(np.full(k * len(anchors), len(sets), np.uint8))
+            numbers.append((anchors[:, None] * k + np.arange(k)).reshape(-1).astype(np.int32))
+            sets.append(RowSet(header.fingerprint, header.clip_index, role))
+        return GaussianRows(tuple(sets), np.concatenate(places), np.concatenate(numbers))
 
     def _birth(self, role: str) -> int:
         if self._reference is None or not self._model.anchor_set(role).is_trainable:

@@ -280,6 +280,7 @@ class FrameDecoder:
             n_still=loaded.parts.part(content).n_constant_rows(),
             still_key=(request.model_key, content),
             births=loaded.parts.births(content, clip_time),
+            rows=loaded.parts.rows(content, clip_time),
             changes=loaded.parts.changes(content, clip_time, gaussians) if has_changes else None,
         )
         shown = ShownFrame(arrays, anchors)

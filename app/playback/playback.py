@@ -103,6 +103,12 @@ class Playback:
         request = self._request(timeline)
         return None if request is None or not request.is_live else self.decoder.anchors(request)
 
+    def gaussians_per_anchor(self, timeline: Timeline) -> int | None:
+        """K of the clip under the playhead, as of all clips of its project; None until it is loaded."""
+        request = self._request(timeline)
+        model = None if request is None else self.decoder.model(request)
+        return None if model is None else model.decoder.gaussians_per_anchor
+
     def coverage(self, timeline: Timeline) -> Coverage | None:
         """What inherited anchors cover in the clip under the playhead; None until it is loaded and measured."""
         request = self._request(timeline)

@@ -12,6 +12,7 @@ from app.calibration.job import CalibrationRequest
 from app.export.export_choices import ExportChoices
 from app.project.opening_answers import OpeningAnswers
 from app.session.editing.edit_commands import EditCommand, GoToStep
+from app.session.editing.selection_commands import SelectionCommand
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
@@ -472,6 +473,7 @@ Command = (
     | MarkCommand
     | PathCommand
     | EditCommand
+    | SelectionCommand
     | Undo
     | Redo
     | GoToStep

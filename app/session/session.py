@@ -46,6 +46,8 @@ from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
+from app.session.editing.selecting import Selecting, SelectionStatus
+from app.session.editing.shown_to_select import ShownToSelect
 from app.session.exporting import Exporting
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
@@ -156,7 +158,11 @@ class Session:
         self.residuals = Residuals(self.playback)
         self.document = KeptDocument(guard=self._check_change, on_change=self._follow_change)
         self.marking, self.camera_paths = Marking(self.document), CameraPaths(self.document)
-        self.editing = Edits(self.document)
+        self.selecting = Selecting(
+            ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self.overlays.content)
+        )
+        self.selection = SelectionStatus()
+        self.editing = Edits(self.document, self.selecting)
         self.edits: EditsStatus = self.editing.status()
         self.regions: RegionsStatus = self.marking.status([])
         self.paths: PathsStatus = self.camera_paths.status()
@@ -354,6 +360,8 @@ class Session:
                     self.doctor.correct(corrections)
             case _ if isinstance(command, commands.MarkCommand):
                 self.marking.apply(command)
+            case _ if isinstance(command, commands.SelectionCommand):
+                self.selecting.apply(command)
             case _ if isinstance(command, commands.PathCommand):
                 self.camera_paths.apply(command, self.views, self.timeline)
             case _ if isinstance(command, commands.EditCommand):
@@ -451,6 +459,7 @@ class Session:
         opened = opened_project(found.capture, found.project, generation)
         self.document.open(found.project)  # first: it keeps what was edited in the project that is left
         self.camera_paths.leave()
+        self.selecting.open()
         self._show(opened)
         self.live_training.open(opened, found.catalog)
         self.versions.open(opened)
@@ -500,7 +509,7 @@ class Session:
         if any(isinstance(event, ENDINGS) for event in events):
             self._keep_recent()
         self._release_snapshot()
-        has_changed |= bool(events) | self.document.poll()
+        has_changed |= bool(events) | self.document.poll() | self.selecting.poll()
         has_changed |= self.lead_view()
         is_training = self.live_training.is_busy and self.training.state != "paused"
         has_changed |= self.exporting.poll(is_training=is_training)
@@ -533,6 +542,7 @@ class Session:
             *self.calibrating.finished,
             *self.synchronising.finished,
             *self.exporting.finished,
+            self.selecting.finished,
             looked,
             jobs,
             self.notices.revision,
@@ -557,6 +567,9 @@ class Session:
             if failure.is_of_clip:
                 self.live_training.note_damage(failure.error)
             told.append((failure.title, failure.error))
+        unselected = self.selecting.take_error()
+        if unselected is not None:
+            told.append(("That cannot be selected", unselected))
         unkept = self.document.take_error()
         if unkept is not None:
             told.append(("What was edited could not be read or kept", unkept))
@@ -575,6 +588,7 @@ class Session:
         self.lead_view()
         self.paths, self.history = self.camera_paths.status(), self.document.status()
         self.edits = self.editing.status()
+        self.selection = self.selecting.status()
         self.plan, self.queue = live.plan(), live.queue()
         self.usage = self._usage.sample(None if live.service is None else live.service.worker_pid)
         if opened is not None:
@@ -586,7 +600,7 @@ class Session:
 
     def wake_by(self, wake: Callable[[], None]) -> None:
         """Call this, on some thread, when a frame or picture that was asked for is there; it must not block."""
-        self.playback.renderer.on_picture = self.playback.decoder.on_frame = wake
+        self.playback.renderer.on_picture = self.playback.decoder.on_frame = self.selecting.on_found = wake
 
     def close(self) -> None:
         """End workers and threads, keeping what was learned. Blocks for a few seconds at most. May be called twice."""
@@ -594,6 +608,7 @@ class Session:
             return
         self._is_closed = True
         self.document.close()
+        self.selecting.close()
         self.live_training.close()
         self._keep_recent()
         if self.project is not None:
@@ -748,6 +763,7 @@ _TITLES: dict[type, str] = {
     commands.SetTrainSetting: "The setting cannot be changed",
     commands.SetPreset: "The preset cannot be taken",
     commands.SynchroniseCameras: "The cameras cannot be synchronised",
+    **dict.fromkeys(get_args(commands.SelectionCommand), "That cannot be selected"),
     commands.MarkRegion: "The region cannot be marked",
     commands.RemoveRegion: "The region cannot be removed",
     commands.Undo: "The last change cannot be taken back",

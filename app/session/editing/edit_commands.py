@@ -17,7 +17,8 @@ class AddEdit:
     """Put a new edit on top of the stack."""
 
     action: Action
-    target: Target
+    target: Target | None = None
+    """None for what is selected, which is not selected any more where it disappears."""
     scope: Scope = EVERYWHERE
     is_inverted: bool = False
     """Whether it acts on everything but the target."""

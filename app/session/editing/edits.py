@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 from app.document import edit_changes, note_changes, world_changes
 from app.document.edit_words import edit_title, what_text
@@ -11,6 +12,9 @@ from app.document.project_document import ProjectDocument
 from app.session.edit_status import EditsStatus
 from app.session.editing import edit_commands as c
 from app.session.editing.kept_document import KeptDocument
+from app.session.editing.selection import NOTHING_SELECTED, Selection
+from engine.editing.edit import Delete, Hide
+from engine.errors import ProjectError
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +26,27 @@ class Change:
     merge: Hashable = None
 
 
-class Edits:
-    """For one thread. document: Holds and keeps them."""
+class Selects(Protocol):
+    """Knows what is selected."""
 
-    def __init__(self, document: KeptDocument) -> None:
-        self._document = document
+    @property
+    def selection(self) -> Selection: ...
+
+    def select(self, selection: Selection) -> None:
+        """Select this and nothing else."""
+        ...
+
+
+class Edits:
+    """For one thread.
+
+    Args:
+        document: Holds and keeps them.
+        selecting: What is selected becomes the target of edits.
+    """
+
+    def __init__(self, document: KeptDocument, selecting: Selects) -> None:
+        self._document, self._selecting = document, selecting
 
     def status(self) -> EditsStatus:
         """Everything as one value."""
@@ -40,9 +60,21 @@ class Edits:
             ProjectError: It cannot be done now, or makes no sense.
         """
         document = self._document.checked().document
+        if isinstance(command, c.AddEdit) and command.target is None:
+            self._add_to_selected(document, command)
+            return
         change = changed(document, command)
         if not _is_same(document, change.document):
             self._document.change(change.document, change.name, change.merge)
+
+    def _add_to_selected(self, document: ProjectDocument, command: c.AddEdit) -> None:
+        selection = self._selecting.selection
+        if not len(selection):
+            raise ProjectError("Nothing is selected.", hint="Select Gaussians first, or place a box or a sphere.")
+        change = changed(document, replace(command, target=selection.target()))
+        self._document.change(change.document, change.name, change.merge)
+        if isinstance(command.action, Hide | Delete) and not command.is_inverted:
+            self._selecting.select(NOTHING_SELECTED)
 
     def go(self, n_steps: int) -> None:
         """Take back so many steps, or do so many again where the number is positive; as many as there are.

@@ -24,7 +24,9 @@ from app.session.editing.edit_commands import (
     SetUp,
     ToggleEdit,
 )
-from engine.editing.edit import Box, Delete, Expose, Hide, Scope, Sphere
+from app.session.editing.selection import Selection
+from engine.editing.edit import Box, Delete, Expose, Hide, Recolor, Scope, Sphere
+from engine.editing.gaussian_rows import RowSet
 from engine.storage.json_files import json_text
 
 BOX = Box((0.0, 0.0, 0.0), (0.5, 0.5, 0.5))
@@ -160,3 +162,22 @@ def test_everything_is_there_when_the_project_is_opened_again(session, make_sess
     assert again.edits.label("camera", "cam01") == "door"
     assert again.timeline.markers.frames == [2]
     np.testing.assert_allclose(again.view.up, [1.0, 0.0, 0.0])
+
+
+def test_what_is_selected_is_edited_and_gone_from_the_selection(session):
+    session.dispatch(AddEdit(Delete()))
+    assert [notice.detail for notice in session.notices] == ["Nothing is selected."]
+    rows = RowSet("origin", 2, "residual")
+    session.selecting.select(Selection(((rows, np.array([3, 5, 9])),)))
+    session.dispatch(AddEdit(Recolor(saturation=0.0)))
+    assert len(session.selecting.selection) == 3
+    session.dispatch(AddEdit(Hide(), is_inverted=True))
+    assert len(session.selecting.selection) == 3
+    session.dispatch(AddEdit(Delete(), scope=Scope(2, 3)))
+    assert len(session.selecting.selection) == 0
+    assert session.history.past == (
+        "recolour 3 Gaussians of clip 2",
+        "isolate 3 Gaussians of clip 2",
+        "delete 3 Gaussians of clip 2",
+    )
+    assert Selection.of_target(session.edits.edits[-1].target).clip_indices == (2,)
