@@ -114,6 +114,24 @@ class SetUp:
 
 
 @dataclass(frozen=True, slots=True)
+class SetUpByGround:
+    """Let what stands upright on the ground be up. points: Three of the ground, scene units."""
+
+    points: tuple[Vector, Vector, Vector]
+    toward: Vector
+    """A point above the ground, such as where the cameras stand."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetScaleByLength:
+    """Two points are known to be so far apart. a, b: Scene units."""
+
+    a: Vector
+    b: Vector
+    length_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class SetScale:
     """Say how long a scene unit is, m; None where nobody knows."""
 
@@ -140,6 +158,8 @@ EditCommand = (
     | MoveMarker
     | SetLabel
     | SetUp
+    | SetUpByGround
     | SetScale
+    | SetScaleByLength
 )
 """What changes edits, markers, labels and the world, and can be taken back."""

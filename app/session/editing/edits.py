@@ -97,7 +97,8 @@ def changed(document: ProjectDocument, command: c.EditCommand) -> Change:
     match command:
         case c.AddEdit(action=action, target=target, scope=scope, is_inverted=is_inverted, name=name):
             added = edit_changes.add_edit(document, action, target, scope=scope, is_inverted=is_inverted, name=name)
-            return Change(added, name or what_text(action, target, is_inverted=is_inverted))
+            title = what_text(action, added.edits[-1].target, is_inverted=is_inverted)
+            return Change(added, name or title)
         case c.ChangeEdit(edit=edit, gesture=gesture, verb=verb):
             merge = ("edit", verb, edit.edit_id, gesture) if gesture else None
             before = edit_changes.edit_with(document, edit.edit_id)
@@ -132,6 +133,12 @@ def changed(document: ProjectDocument, command: c.EditCommand) -> Change:
             return Change(note_changes.set_label(document, kind, name, text), f"label a {kind}")
         case c.SetUp(direction=direction):
             return Change(world_changes.set_up(document, direction), "set what is up")
+        case c.SetUpByGround(points=points, toward=toward):
+            up = world_changes.up_of_ground(points, toward)
+            return Change(world_changes.set_up(document, up), "set what is up by the ground")
+        case c.SetScaleByLength(a=a, b=b, length_m=length_m):
+            meters_per_unit = world_changes.scale_of_length(a, b, length_m)
+            return Change(world_changes.set_scale(document, meters_per_unit), "set the scale by a length")
         case c.SetScale(meters_per_unit=meters_per_unit):
             return Change(world_changes.set_scale(document, meters_per_unit), "set the scale")
 
