@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -76,20 +77,20 @@ def document_of(content: Any) -> ProjectDocument:
         stored.exclusions,
         stored.world,
     )
-    check_edits(document)
+    check_edits(document.edits)
     return document
 
 
-def check_edits(document: ProjectDocument) -> None:
+def check_edits(edits: Sequence[Edit]) -> None:
     """See that edits can be told apart, and that what they picked can be read.
 
     Raises:
         ProjectError: They cannot.
     """
-    ids = [edit.edit_id for edit in document.edits]
+    ids = [edit.edit_id for edit in edits]
     if len(set(ids)) != len(ids):
         raise ProjectError("Two edits have the same number.")
-    for edit in document.edits:
+    for edit in edits:
         if isinstance(edit.target, Picked):
             try:
                 for rows in edit.target.sets:

@@ -33,12 +33,8 @@ class GaussianArrays:
         births: Where each comes from, see app.playback.contents; None where unknown. [N] uint8
         changes: How far each is from the reference clip, NaN where that has none; None where nobody asked.
             [N] float32
-<<<<<<< HEAD
-        rows: Which anchor set each comes from, and its number there; None where unknown.
-=======
         rows: Which Gaussian of which anchor set each is, the same in all frames and clips; None where they stand for
             none.
->>>>>>> wip-edits
     """
 
     means: np.ndarray

@@ -2,8 +2,8 @@
 finished work in. Belongs to one thread; nothing here blocks. Draws nothing.
 
 It composes: `playback` prepares what is shown, `live_training` trains, `residuals` compares with what the cameras took,
-`document` holds what is edited and the way back, `marking` and `camera_paths` change parts of it, `recent` what was
-opened before. What is open is one immutable value that each of them is handed.
+`document` holds what is edited and the way back, `editing`, `marking` and `camera_paths` change parts of it, `recent`
+what was opened before. What is open is one immutable value that each of them is handed.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from app.document.project_document import ProjectDocument
 from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
 from app.playback.bookmarks import Bookmarks
 from app.playback.coverage import Coverage
+from app.playback.markers import Markers
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
@@ -44,7 +45,8 @@ from app.session.capture_doctor import CaptureDoctor
 from app.session.capture_opening import CaptureOpening
 from app.session.clip_versions import Versions
 from app.session.doctor_status import DoctorStatus
-from app.session.edit_status import HistoryStatus, PathsStatus
+from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
+from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.selecting import Selecting, SelectionStatus
 from app.session.editing.shown_to_select import ShownToSelect
@@ -95,9 +97,9 @@ class Session:
     Attributes:
         opened: What is open; None before.
         timeline, views, bookmarks: What the user looks at; the window may change them directly.
-        training, queue, clip_states, plan, regions, paths, history, usage, project_status: Status values, remade by
-            `poll` and `dispatch`. The plan is that of the next clip; None while something trains or nothing is left to
-            train.
+        training, queue, clip_states, plan, regions, paths, edits, history, usage, project_status: Status values,
+            remade by `poll` and `dispatch`. The plan is that of the next clip; None while something trains or nothing
+            is left to train.
         versions: What clips were before they were trained again.
         log: What program and training have said.
         question: What the user has to answer; None while there is nothing to ask.
@@ -164,6 +166,8 @@ class Session:
             ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self.overlays.content)
         )
         self.selection = SelectionStatus()
+        self.editing = Edits(self.document, self.selecting)
+        self.edits: EditsStatus = self.editing.status()
         self.regions: RegionsStatus = self.marking.status([])
         self.paths: PathsStatus = self.camera_paths.status()
         self.history = HistoryStatus()
@@ -364,9 +368,11 @@ class Session:
                 self.selecting.apply(command)
             case _ if isinstance(command, commands.PathCommand):
                 self.camera_paths.apply(command, self.views, self.timeline)
-            case commands.Undo() | commands.Redo():
+            case _ if isinstance(command, commands.EditCommand):
+                self.editing.apply(command)
+            case commands.Undo() | commands.Redo() | commands.GoToStep():
                 with self.camera_paths.showing_change():
-                    (self.document.undo if isinstance(command, commands.Undo) else self.document.redo)()
+                    self.editing.go(_n_steps(command))
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
@@ -410,6 +416,12 @@ class Session:
         """The document has changed: show what follows from it."""
         if before.settings != after.settings:
             self._follow_settings()
+        self._show_notes(after)
+
+    def _show_notes(self, document: ProjectDocument) -> None:
+        """Let the timeline show the document's markers, and views stand upright as it says."""
+        self.timeline.markers = Markers(document.markers)
+        self.views.set_scene_up(document.world.up)
 
     def _follow_settings(self) -> None:
         opened = self.opened
@@ -458,6 +470,7 @@ class Session:
         self._open_residuals(opened)
         self.doctor.open(opened)
         self.views.look_at(opened.rig)
+        self._show_notes(opened.project.document)
         self.bookmarks = Bookmarks()
         self._keep_recent()
         for sentence in opened.capture.warnings:
@@ -578,6 +591,7 @@ class Session:
         self.regions = self.marking.status(self.clip_states)
         self.lead_view()
         self.paths, self.history = self.camera_paths.status(), self.document.status()
+        self.edits = self.editing.status()
         self.selection = self.selecting.status()
         self.plan, self.queue = live.plan(), live.queue()
         self.usage = self._usage.sample(None if live.service is None else live.service.worker_pid)
@@ -740,6 +754,12 @@ class Session:
         return None if camera_index is None else self.residuals.heat(self.timeline, camera_index, kind)
 
 
+def _n_steps(command: commands.Undo | commands.Redo | commands.GoToStep) -> int:
+    if isinstance(command, commands.GoToStep):
+        return command.n_steps
+    return -1 if isinstance(command, commands.Undo) else 1
+
+
 _SETTING_NAMES: dict[type, str] = {
     commands.SetHoldout: "choose held-out cameras",
     commands.SetClipLength: "change the clip length",
@@ -764,6 +784,8 @@ _TITLES: dict[type, str] = {
     commands.RemoveRegion: "The region cannot be removed",
     commands.Undo: "The last change cannot be taken back",
     commands.Redo: "The change cannot be made again",
+    commands.GoToStep: "That step of the history cannot be reached",
+    **dict.fromkeys(get_args(commands.EditCommand), "That cannot be edited"),
     **dict.fromkeys(get_args(commands.PathCommand), "That cannot be done with the camera path"),
     commands.CorrectCapture: "The capture cannot be corrected",
 }
