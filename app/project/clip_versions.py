@@ -56,7 +56,7 @@ def version_path(project: Project, clip_index: int, number: int) -> Path:
 
 def versions_dir(project: Project, clip_index: int) -> Path:
     """Where the versions of a clip lie."""
-    return project.folder / "versions" / f"{clip_index:04d}"
+    return project.folder / "versions" / project.clip_name(clip_index)
 
 
 def list_versions(project: Project, clip_index: int) -> list[ClipVersion]:
@@ -183,15 +183,19 @@ def restore_version(project: Project, clip_index: int, number: int) -> None:
 
 def why_not(project: Project, clip_index: int, header: ClipHeader) -> str:
     """Why a clip file cannot be clip `clip_index` of this project now; empty where it can."""
-    if header.clip_index != clip_index:
-        return f"The version is of clip {header.clip_index}, not of clip {clip_index}."
+    start, stop = project.frames_of(clip_index)
+    if header.start != start or (stop is not None and header.start + header.n_frames > stop):
+        last = header.start + header.n_frames - 1
+        return f"The version is of frames {header.start} to {last}, not of clip {clip_index}."
+    base = project.inherited_index(clip_index)
+    if header.role != ("reference" if base is None else "source"):
+        return "The version was trained before another clip was made the reference."
     found = project.headers.read(project.clip_path(clip_index))
     current = None if found is None else found.header
     if current is not None:
-        of_project = (current.start, current.n_frames, current.clip_length, current.camera_names, current.role)
-        if (header.start, header.n_frames, header.clip_length, header.camera_names, header.role) != of_project:
+        of_project = (current.start, current.n_frames, current.clip_length, current.camera_names)
+        if (header.start, header.n_frames, header.clip_length, header.camera_names) != of_project:
             return "The version belongs to another project: its frames or cameras are others."
-    base = project.inherited_index(clip_index)
     known = None if base is None else project.headers.read(project.clip_path(base))
     if header.role == "source" and base is not None:
         fingerprint = None if known is None or known.header is None else known.header.fingerprint

@@ -14,8 +14,9 @@ from typing import Annotated, Any
 
 from msgspec import Meta
 
+from app.project.clip_names import bounds_problem
 from app.project.kept_json import read_kept, write_kept
-from engine.capture.clip import Clip, split_clips
+from engine.capture.clip import Clip, cut_clips, split_clips
 from engine.clip_files.clip_header import SettingValue
 from engine.errors import ProjectError
 from engine.gate.regions import GateRegion, parse_region
@@ -48,6 +49,8 @@ class ProjectSettings:
         reference_clip: Index of the clip that the others inherit from.
         follow_links: Whether the user allowed the capture's files to lie outside of its folder.
         frames: First frame of the capture that is worked on, and the one after the last; None for all.
+        clip_bounds: Where clips were split or merged: the first frame of every clip, and at the end the number of
+            frames. None where every clip has clip_length frames, the last one what is left.
     """
 
     capture: Annotated[str, Meta(pattern=r"\A[^\0]*\Z")]
@@ -60,11 +63,25 @@ class ProjectSettings:
     reference_clip: Annotated[int, Meta(ge=0, lt=2**31)] = 0
     follow_links: bool = False
     frames: tuple[Annotated[int, Meta(ge=0, lt=2**31)], Annotated[int, Meta(ge=1, lt=2**31)]] | None = None
+    clip_bounds: tuple[Annotated[int, Meta(ge=0, lt=2**31)], ...] | None = None
     schema: int = SCHEMA
 
     def clips(self, n_frames: int) -> list[Clip]:
-        """The clips of a capture of that many frames."""
-        return split_clips(n_frames, n_frames if self.config().field == "joint" else self.clip_length)
+        """The clips of a capture of that many frames.
+
+        Raises:
+            ProjectError: The project's clips were cut from a capture of another length.
+        """
+        if self.config().field == "joint":
+            return split_clips(n_frames, n_frames)
+        if self.clip_bounds is None:
+            return split_clips(n_frames, self.clip_length)
+        if self.clip_bounds[-1] != n_frames:
+            raise ProjectError(
+                f"The project's clips end at frame {self.clip_bounds[-1]}, but there are {n_frames} frames.",
+                hint="Put the original capture back, or make a new project.",
+            )
+        return cut_clips(self.clip_bounds, self.clip_length)
 
     def config(self) -> TrainConfig:
         """The training settings. Raises ProjectError for an unknown one or a value that it may not have."""
@@ -102,6 +119,8 @@ def read_settings(folder: Path) -> ProjectSettings:
         settings = to_type(content, ProjectSettings)
         settings = replace(settings, overrides=without_retired(settings.overrides))
         settings.config()
+        if settings.clip_bounds is not None and bounds_problem(settings.clip_bounds):
+            raise EntryError(bounds_problem(settings.clip_bounds))
     except ProjectError as error:
         raise ProjectError(error.message, hint="Correct it or restore the file from a copy.", path=path) from error
     except EntryError as error:
