@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -60,8 +61,9 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     project = open_project(options.project, is_writable=is_change)
     try:
         if is_change:
-            kept = () if options.forget else project.gate_regions()
-            project.set_gate_regions(after_marking(kept, marks))
+            kept = () if options.forget else project.document.regions
+            marked = replace(project.document, regions=after_marking(kept, marks))
+            project.change(marked, "forget regions" if not marks else "mark regions")
         found = describe_gate(project)
     finally:
         project.close()
@@ -90,7 +92,7 @@ def describe_gate(project: Project) -> dict[str, Any]:
         "schema": SCHEMA,
         "path": str(project.folder),
         "gate": project.settings.config().gate,
-        "regions": [region.as_dict() for region in project.gate_regions()],
+        "regions": [region.as_dict() for region in project.document.regions],
         "clips": clips,
         "damaged": damaged,
     }

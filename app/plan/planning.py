@@ -77,7 +77,7 @@ def _looks_still(project: Project, capture: Capture, clip: Clip, config: TrainCo
         looks_still,  # with numba, which the first picture of a window can wait for
     )
 
-    if project.gate_regions():  # a region may make something move that no mask shows
+    if project.document.regions:  # a region may make something move that no mask shows
         return False
     held_out = capture.camera_indices(project.settings.holdout)
     return looks_still(capture, clip, capture.training_cameras(held_out), config, project.prep_dir)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.project.header_cache import FoundHeader
+from app.project.metrics_file import read_metrics
 from app.project.project import Project
-from app.project.project_files import read_metrics
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.roles import REFERENCE_ROLES
 

@@ -8,7 +8,6 @@ merged, and are there again when that is taken back.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -50,10 +49,3 @@ def finished_files(
     rank = {name: index for index, name in enumerate(_names(clip_bounds, clip_length))}
     return sorted((rank[path.stem], path) for path in found if path.stem in rank)
 
-
-def bounds_problem(clip_bounds: Sequence[int]) -> str:
-    """Why these cannot be the bounds of clips; empty where they can."""
-    rises = all(start < stop for start, stop in zip(clip_bounds, clip_bounds[1:], strict=False))
-    if len(clip_bounds) < 2 or clip_bounds[0] != 0 or not rises:
-        return "clip_bounds have to rise from 0 to the number of frames"
-    return ""

@@ -2,19 +2,21 @@
 finished work in. Belongs to one thread; nothing here blocks. Draws nothing.
 
 It composes: `playback` prepares what is shown, `live_training` trains, `residuals` compares with what the cameras took,
-`marking` and `camera_paths` hold what is edited, `edits` the way back, `recent` what was opened before. What is open is
-one immutable value that each of them is handed.
+`document` holds what is edited and the way back, `marking` and `camera_paths` change parts of it, `recent` what was
+opened before. What is open is one immutable value that each of them is handed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
 from app.background.jobs import Jobs
 from app.background.log_reader import LogLine, LogView
 from app.background.usage import UsageMeter
+from app.document.project_document import ProjectDocument
 from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
 from app.playback.bookmarks import Bookmarks
 from app.playback.coverage import Coverage
@@ -41,9 +43,9 @@ from app.session.capture_opening import CaptureOpening
 from app.session.clip_versions import Versions
 from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import HistoryStatus, PathsStatus
+from app.session.editing.kept_document import KeptDocument
 from app.session.exporting import Exporting
 from app.session.following import follow_training
-from app.session.history import History
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
 from app.session.notices import Notices
@@ -78,7 +80,7 @@ from app.training.service import Launch, ShownState
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.errors import EngineError
+from engine.errors import EngineError, ProjectError
 
 
 class Session:
@@ -150,9 +152,8 @@ class Session:
         self._usage, self.log = UsageMeter(), LogView()
         self.playback = Playback(self.live_training.state_of)
         self.residuals = Residuals(self.playback)
-        self.edits = History()
-        self.marking, self.camera_paths = Marking(self.edits), CameraPaths(self.edits)
-        self._documents = (self.marking.document, self.camera_paths.document)
+        self.document = KeptDocument(guard=self._check_change, on_change=self._follow_change)
+        self.marking, self.camera_paths = Marking(self.document), CameraPaths(self.document)
         self.regions: RegionsStatus = self.marking.status([])
         self.paths: PathsStatus = self.camera_paths.status()
         self.history = HistoryStatus()
@@ -353,7 +354,7 @@ class Session:
                 self.camera_paths.apply(command, self.views, self.timeline)
             case commands.Undo() | commands.Redo():
                 with self.camera_paths.showing_change():
-                    (self.edits.undo if isinstance(command, commands.Undo) else self.edits.redo)()
+                    (self.document.undo if isinstance(command, commands.Undo) else self.document.redo)()
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
@@ -362,7 +363,7 @@ class Session:
         catalog = () if service is None else service.catalog
         trained = tuple(i for i in range(len(catalog)) if catalog[i].state == "trained")
         names = tuple(path.name for path in self.paths.paths)
-        self.exporting.ask(self.opened, self.timeline, trained, names, settle=self.camera_paths.document.settle)
+        self.exporting.ask(self.opened, self.timeline, trained, names, settle=self.document.settle)
 
     def _change_settings(self, command: commands.SettingCommand) -> None:
         """Replace settings that every clip shares; only while nothing was learned with the old ones."""
@@ -379,7 +380,28 @@ class Session:
             )
             return
         check_settings(changed, opened.capture)
-        opened.project.update(changed)
+        name = _SETTING_NAMES.get(type(command), "change settings")
+        self.document.change(replace(opened.project.document, settings=changed), name)
+
+    def _check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
+        """See that nothing was learned with settings that change. Raises ProjectError."""
+        opened = self.opened
+        if opened is None or before.settings == after.settings:
+            return
+        if opened.project.has_progress or self.live_training.is_busy:
+            raise ProjectError(
+                "What all clips share is fixed once training has begun.",
+                hint="What was learned with them would be worthless. Use another project folder for other values.",
+            )
+
+    def _follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
+        """The document has changed: show what follows from it."""
+        if before.settings != after.settings:
+            self._follow_settings()
+
+    def _follow_settings(self) -> None:
+        opened = self.opened
+        assert opened is not None
         before = self.timeline
         changed_project = opened_project(opened.capture, opened.project, opened.generation)
         self._show(changed_project)
@@ -415,8 +437,7 @@ class Session:
         self._keep_recent()  # the one that is left
         generation = 1 if self.opened is None else self.opened.generation + 1
         opened = opened_project(found.capture, found.project, generation)
-        for document in self._documents:  # first: they keep what was edited in the project that is left
-            document.open(found.project)
+        self.document.open(found.project)  # first: it keeps what was edited in the project that is left
         self.camera_paths.leave()
         self._show(opened)
         self.live_training.open(opened, found.catalog)
@@ -452,7 +473,7 @@ class Session:
         self.notices.add_failure(f"{job_name} has failed", error)
 
     def _launch_worker(self, job: TrainJob, project: Project) -> Worker:
-        self.marking.document.settle()  # a region marked a moment ago is meant to count
+        self.document.settle()  # a region marked a moment ago is meant to count
         return self._launch(job, project)
 
     # ---------------------------------------------------------------- letting finished work in
@@ -466,7 +487,7 @@ class Session:
         if any(isinstance(event, ENDINGS) for event in events):
             self._keep_recent()
         self._release_snapshot()
-        has_changed |= bool(events) | any([document.poll() for document in self._documents])
+        has_changed |= bool(events) | self.document.poll()
         has_changed |= self.lead_view()
         is_training = self.live_training.is_busy and self.training.state != "paused"
         has_changed |= self.exporting.poll(is_training=is_training)
@@ -523,8 +544,9 @@ class Session:
             if failure.is_of_clip:
                 self.live_training.note_damage(failure.error)
             told.append((failure.title, failure.error))
-        unkept = [(document.what, document.take_error()) for document in self._documents]
-        told += [(f"The {what} could not be read or kept", error) for what, error in unkept if error is not None]
+        unkept = self.document.take_error()
+        if unkept is not None:
+            told.append(("What was edited could not be read or kept", unkept))
         for title, error in told:
             if not self.notices.has_told(error):
                 self.notices.add_failure(title, error)
@@ -538,7 +560,7 @@ class Session:
         self.clip_states = live.clip_states()
         self.regions = self.marking.status(self.clip_states)
         self.lead_view()
-        self.paths, self.history = self.camera_paths.status(), self.edits.status()
+        self.paths, self.history = self.camera_paths.status(), self.document.status()
         self.plan, self.queue = live.plan(), live.queue()
         self.usage = self._usage.sample(None if live.service is None else live.service.worker_pid)
         if opened is not None:
@@ -557,8 +579,7 @@ class Session:
         if self._is_closed:
             return
         self._is_closed = True
-        for document in self._documents:
-            document.close()
+        self.document.close()
         self.live_training.close()
         self._keep_recent()
         if self.project is not None:
@@ -688,6 +709,12 @@ class Session:
         return None if camera_index is None else self.residuals.heat(self.timeline, camera_index, kind)
 
 
+_SETTING_NAMES: dict[type, str] = {
+    commands.SetHoldout: "choose held-out cameras",
+    commands.SetClipLength: "change the clip length",
+    commands.SetTrainSetting: "change a setting",
+    commands.SetPreset: "take a preset",
+}
 _TITLES: dict[type, str] = {
     commands.TrainClip: "The clip cannot be trained",
     commands.TrainNextClip: "The clip cannot be trained",

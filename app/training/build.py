@@ -57,7 +57,7 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
         prep_dir=project.prep_dir,
         report=report,
         previous=previous,
-        regions=project.gate_regions(),
+        regions=project.document.regions,
     )
 
 

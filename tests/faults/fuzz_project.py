@@ -46,9 +46,9 @@ OLD = "old-"
 
 def make_project(folder: Path) -> None:
     """Two trained clips, checkpoint, live snapshot, curves, regions, paths, caches; beside them files of the user."""
+    from app.document.project_settings import ProjectSettings
     from app.evaluation.kept_figures import KeptFigures
     from app.project.project import create_project
-    from app.project.project_files import ProjectSettings
     from app.project.recents import RecentProject
     from app.session.settings import Settings
     from engine.camera.path_presets import turntable
@@ -184,7 +184,7 @@ def _read_regions(project: Path, path: Path) -> Any:
 
 
 def _read_camera_paths(project: Path, path: Path) -> Any:
-    from app.project.camera_paths import read_camera_paths
+    from app.document.camera_paths import read_camera_paths
 
     return [
         (path.name, path.is_closed, [(key.frame, key.fov_y_rad, key.world_to_camera.tolist()) for key in path.keys])

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from app.project.camera_paths import (
+from app.document.camera_paths import (
     CAMERA_PATHS_FILE,
     MAX_NAME_CHARACTERS,
     camera_path_named,

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from app.project.metrics_file import read_metrics
 from app.project.project import (
     ProjectSettings,
     create_project,
@@ -17,7 +18,6 @@ from app.project.project import (
     open_project,
     read_settings,
 )
-from app.project.project_files import read_metrics
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError
 

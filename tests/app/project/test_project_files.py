@@ -5,8 +5,6 @@ import os
 from pathlib import Path
 
 import pytest
-
-from app.project.project import create_project, open_project
 from app.project.project_files import (
     ProjectSettings,
     read_metrics,
@@ -15,6 +13,8 @@ from app.project.project_files import (
     write_regions,
     write_settings,
 )
+
+from app.project.project import create_project, open_project
 from app.project.recents import RecentProject
 from app.session.settings import Settings
 from engine.errors import ProjectError

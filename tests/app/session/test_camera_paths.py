@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from app.project.camera_paths import CAMERA_PATHS_FILE, read_camera_paths
+from app.document.camera_paths import CAMERA_PATHS_FILE, read_camera_paths
 from app.project.project import Project
 from app.session import commands as c
 from app.session import path_commands as p

@@ -4,10 +4,10 @@ import threading
 from functools import partial
 
 import pytest
+from app.project.project_files import read_regions
 
 from app.cli.cli import main
 from app.project.project import Project, open_project
-from app.project.project_files import read_regions
 from app.session import commands as c
 from app.session.marking import effect_text, region_text
 from app.training.build import build_training

@@ -6,11 +6,11 @@ import av
 import numpy as np
 import pytest
 
+from app.document.camera_paths import write_camera_paths
 from app.export.scene_frames import SceneFrames
 from app.export.video.drawing import draw
 from app.export.video.job import Turntable
 from app.export.video.views import camera_view
-from app.project.camera_paths import write_camera_paths
 from engine.camera.camera_path import CameraKey, CameraPath
 from engine.camera.projection import pinhole_K, vertical_fov
 from engine.camera.rig import CameraRig
