@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -75,6 +76,6 @@ def check_bounds(clip_bounds: tuple[int, ...] | None) -> None:
     """
     if clip_bounds is None:
         return
-    rises = all(start < stop for start, stop in zip(clip_bounds, clip_bounds[1:], strict=False))
+    rises = all(start < stop for start, stop in itertools.pairwise(clip_bounds))
     if len(clip_bounds) < 2 or clip_bounds[0] != 0 or not rises:
         raise ProjectError("The bounds of the clips have to rise from 0 to the number of frames.")

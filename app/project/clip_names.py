@@ -7,6 +7,7 @@ merged, and are there again when that is taken back.
 
 from __future__ import annotations
 
+import itertools
 import re
 from functools import lru_cache
 from pathlib import Path
@@ -33,19 +34,16 @@ def clip_name(clip_index: int, clip_bounds: tuple[int, ...] | None, clip_length:
 def _names(clip_bounds: tuple[int, ...], clip_length: int) -> tuple[str, ...]:
     n_frames = clip_bounds[-1]
     names = []
-    for start, stop in zip(clip_bounds, clip_bounds[1:], strict=False):
+    for start, stop in itertools.pairwise(clip_bounds):
         is_regular = start % clip_length == 0 and stop == min(start + clip_length, n_frames)
         names.append(f"{start // clip_length:04d}" if is_regular else f"{start:06d}-{stop:06d}")
     return tuple(names)
 
 
-def finished_files(
-    folder: Path, clip_bounds: tuple[int, ...] | None, clip_length: int
-) -> list[tuple[int, Path]]:
+def finished_files(folder: Path, clip_bounds: tuple[int, ...] | None, clip_length: int) -> list[tuple[int, Path]]:
     """Index and file of every finished clip in a project folder, in order; without those of other cuts."""
     found = [path for path in (folder / "clips").glob("*.safetensors") if PROGRAM_NAME.fullmatch(path.stem)]
     if clip_bounds is None:
         return sorted((int(path.stem), path) for path in found if path.stem.isdecimal())
     rank = {name: index for index, name in enumerate(_names(clip_bounds, clip_length))}
     return sorted((rank[path.stem], path) for path in found if path.stem in rank)
-

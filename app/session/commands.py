@@ -11,6 +11,7 @@ from pathlib import Path
 from app.calibration.job import CalibrationRequest
 from app.export.export_choices import ExportChoices
 from app.project.opening_answers import OpeningAnswers
+from app.session.clips.clip_commands import ClipCommand
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
@@ -457,6 +458,7 @@ Command = (
     | OpenProject
     | TrainNextClip
     | QueueCommand
+    | ClipCommand
     | PauseTraining
     | ResumeTraining
     | StopTraining

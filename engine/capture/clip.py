@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -59,7 +60,7 @@ def cut_clips(bounds: Sequence[int], clip_length: int) -> list[Clip]:
         bounds: Rise from 0.
         clip_length: M of every clip that is not longer.
     """
-    pairs = enumerate(zip(bounds, bounds[1:], strict=False))
+    pairs = enumerate(itertools.pairwise(bounds))
     return [Clip(i, start, stop - start, max(clip_length, stop - start)) for i, (start, stop) in pairs]
 
 

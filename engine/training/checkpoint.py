@@ -61,7 +61,9 @@ def write_checkpoint(path: Path | str, checkpoint: Checkpoint) -> None:
     write_clip_state(path, ClipState(arrays, header), is_durable=True)
 
 
-def read_checkpoint(path: Path | str, *, frames: tuple[int, int, int], camera_names: Sequence[str], seed: int) -> Checkpoint:
+def read_checkpoint(
+    path: Path | str, *, frames: tuple[int, int, int], camera_names: Sequence[str], seed: int
+) -> Checkpoint:
     """Inverse of `write_checkpoint`.
 
     Args:

@@ -13,7 +13,7 @@ from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.playback.views import Views
 from app.session.edit_status import HistoryStatus, PathsStatus
-from app.status import Overlays, QueueStatus, TrainingStatus, WantedFrame
+from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
@@ -55,6 +55,8 @@ class ActionNeeds(RegionsNeeds, Protocol):
 
     @property
     def queue(self) -> QueueStatus: ...
+
+    def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]: ...
 
     def wanted_frame(self) -> WantedFrame | None: ...
 
