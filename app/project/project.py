@@ -25,7 +25,7 @@ from typing import Any
 
 from app.document.document_file import PROJECT_FILE, write_document
 from app.document.document_store import DocumentStore
-from app.document.history import Changed, DocumentHistory, Event
+from app.document.history import Changed, DocumentHistory, Event, Placed
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.project.clip_names import clip_name, finished_files
@@ -201,8 +201,12 @@ class Project:
         self.history = history
 
     def update(self, settings: ProjectSettings) -> None:
-        """Replace the settings; see `change`."""
-        self.change(replace(self.document, settings=settings), "change settings")
+        """Replace the settings; see `change`. Another place of the capture alone is not a step of the history."""
+        before = self.settings
+        if replace(settings, capture=before.capture, follow_links=before.follow_links) == before:
+            self.happen(Placed(settings))
+        else:
+            self.change(replace(self.document, settings=settings), "change settings")
 
     def discard_progress(self, clip_index: int) -> None:
         """Forget the unfinished training of a clip; a finished clip and its curves stay."""
