@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.project.clip_versions import list_versions, version_path
-from app.project.disk.use import files_of
+from app.project.disk.use import unused_files
 from app.project.project import Project
 from engine.errors import ProjectError
 from engine.storage.files import disk_error
+from engine.training.preparation.stages import stage_files
 
 WHAT = {
     "oldest": "the oldest version of every clip",
@@ -54,7 +55,7 @@ def room_of(project: Project, n_clips: int, what: str, clip_index: int | None = 
         raise ProjectError(f"There is no clip {clip_index}; clips are 0 to {n_clips - 1}.")
     chosen = range(n_clips) if clip_index is None else (clip_index,)
     if what == "unused":
-        paths = [] if clip_index is not None else _unused(project, n_clips)
+        paths = [] if clip_index is not None else unused_files(project, n_clips)
     elif what == "checkpoints":
         paths = [path for index in chosen for path in _unfinished(project, index)]
     else:
@@ -98,17 +99,5 @@ def make_room(project: Project, room: Room) -> int:
 
 
 def _unfinished(project: Project, clip_index: int) -> list[Path]:
-    stages = project.prep_dir.glob(f"clip-{project.clip_name(clip_index)}-*.safetensors")
-    return [project.checkpoint_path(clip_index), project.unfinished_metrics_path(clip_index), *sorted(stages)]
-
-
-def _unused(project: Project, n_clips: int) -> list[Path]:
-    names = {project.clip_name(index) for index in range(n_clips)}
-    found = []
-    for folder in ("clips", "checkpoints", "metrics"):
-        files = files_of(project.folder / folder, set())
-        found += [path for path, _ in files if path.name.partition(".")[0] not in names]
-    for path, _ in files_of(project.folder / "versions", set()):
-        if path.parent.name not in names:
-            found.append(path)
-    return sorted(found)
+    stages = stage_files(project.prep_dir, clip_index)
+    return [project.checkpoint_path(clip_index), project.unfinished_metrics_path(clip_index), *stages]

@@ -8,6 +8,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.project.clip_names import PROGRAM_NAME
+from app.project.clip_versions import DAMAGED
 from app.project.project import Project
 
 
@@ -77,32 +79,57 @@ def disk_use(project: Project, n_clips: int) -> DiskUse:
         n_clips: How many clips the capture has.
     """
     names = {project.clip_name(index): index for index in range(n_clips)}
-    clips, versions, n_versions, checkpoints = ([0] * n_clips for _ in range(4))
-    sums = {"unused": 0, "n_unused": 0, "preparation": 0, "other": 0}
-    seen: set[tuple[int, int]] = set()
-    for path, n_bytes in sorted(files_of(project.folder, seen), key=lambda found: found[0]):
+    unused = set(unused_files(project, n_clips))
+    parts: dict[str, list[int]] = {"clips": [0] * n_clips, "versions": [0] * n_clips, "checkpoints": [0] * n_clips}
+    n_versions = [0] * n_clips
+    n_unused_bytes = n_unused = preparation = other = 0
+    for path, n_bytes in files_of(project.folder, set()):
         place = path.relative_to(project.folder).parts
-        top, name = place[0], path.name.partition(".")[0]
-        if top == "clips" or (top == "metrics" and not path.name.endswith(".unfinished.jsonl")):
-            kind, index = clips, names.get(name)
-        elif top == "versions" and len(place) > 2:
-            kind, index = versions, names.get(place[1])
-            if index is not None:
-                n_versions[index] += path.suffix == ".safetensors"
-        elif top in ("checkpoints", "metrics"):
-            kind, index = checkpoints, names.get(name)
-        elif top == "prep" and name.startswith("clip-"):
-            kind, index = checkpoints, names.get(name.removeprefix("clip-").rpartition("-")[0])
+        part, index = _owner(place, names)
+        is_clip = path.suffix == ".safetensors"
+        if path in unused:
+            n_unused_bytes += n_bytes
+            n_unused += is_clip
+        elif index is not None and index < n_clips:
+            parts[part][index] += n_bytes
+            n_versions[index] += part == "versions" and is_clip
+        elif place[0] == "prep":
+            preparation += n_bytes
         else:
-            sums["preparation" if top == "prep" else "other"] += n_bytes
-            continue
-        if index is None:
-            sums["unused"] += n_bytes
-            sums["n_unused"] += path.suffix == ".safetensors" and top in ("clips", "versions")
-        else:
-            kind[index] += n_bytes
-    uses = zip(clips, versions, n_versions, checkpoints, strict=True)
-    return DiskUse(tuple(ClipUse(*use) for use in uses), **sums)
+            other += n_bytes
+    rows = zip(parts["clips"], parts["versions"], n_versions, parts["checkpoints"], strict=True)
+    return DiskUse(tuple(ClipUse(*row) for row in rows), n_unused_bytes, n_unused, preparation, other)
+
+
+def _owner(place: tuple[str, ...], names: dict[str, int]) -> tuple[str, int | None]:
+    """Which part of which clip a file is, if of any. place: Names of folders and of the file inside the project."""
+    top, name = place[0], place[-1].partition(".")[0]
+    if top == "prep" and name.startswith("clip-"):  # pieces of a preparation are kept by the index of the clip
+        number = name.removeprefix("clip-").partition("-")[0]
+        return "checkpoints", int(number) if number.isdecimal() else None
+    if top == "versions" and len(place) > 2:
+        return "versions", names.get(place[1])
+    if top == "checkpoints" or (top == "metrics" and place[-1].endswith(".unfinished.jsonl")):
+        return "checkpoints", names.get(name)
+    return "clips", names.get(name) if top in ("clips", "metrics") else None
+
+
+def unused_files(project: Project, n_clips: int) -> list[Path]:
+    """Files of clips that are not in use: of other cuts of the capture, and damaged ones that were put aside. Only what
+    has a name that this program gives: what somebody else put there is nobody's business.
+
+    Args:
+        project: May be read-only.
+        n_clips: How many clips the capture has.
+    """
+    names = {project.clip_name(index) for index in range(n_clips)}
+    found = [path for path, _ in files_of(project.folder / DAMAGED, set()) if path.suffix == ".safetensors"]
+    for folder in ("clips", "checkpoints", "metrics", "versions"):
+        for path, _ in files_of(project.folder / folder, set()):
+            name = path.parent.name if folder == "versions" else path.name.partition(".")[0]
+            if name not in names and PROGRAM_NAME.fullmatch(name):
+                found.append(path)
+    return sorted(found)
 
 
 def files_of(folder: Path, seen: set[tuple[int, int]]) -> Iterator[tuple[Path, int]]:

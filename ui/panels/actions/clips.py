@@ -96,7 +96,7 @@ ACTIONS = (
         keys=("Alt+T",),
         lacks=_nothing_stale,
     ),
-    Action("clips.split", "Split this clip at the playhead", TRAIN, _split, keys=("Alt+S",), lacks=_cannot_split),
+    Action("clips.split", "Split this clip at the playhead", TRAIN, _split, keys=("Alt+C",), lacks=_cannot_split),
     Action("clips.merge", "Merge this clip with the next one", TRAIN, _merge, keys=("Alt+M",), lacks=_cannot_merge),
     Action(
         "clips.reference",
