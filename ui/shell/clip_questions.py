@@ -105,7 +105,7 @@ def _cut_texts(question: CutQuestion) -> list[str]:
         them = "1 other clip is" if n == 1 else f"{n} other clips are"
         texts.append(f"{them} out of date then, until trained again.")
     if question.seconds is not None:
-        texts.append(f"Training everything anew takes about {duration_text(question.seconds)}.")
+        texts.append(f"Training what is not trained then takes about {duration_text(question.seconds)}.")
     return texts
 
 

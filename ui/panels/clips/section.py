@@ -157,9 +157,7 @@ def _draw_versions(session: ClipSectionNeeds, dispatch: Dispatch, ui: UiState, c
         text_wrapped_dim("No earlier versions. Training a clip again keeps what it was.")
     for version in versions:
         imgui.push_id(version.number)
-        imgui.text(f"Version {version.number}")
-        imgui.same_line()
-        imgui.text_disabled(version_text(version))
+        text_wrapped_dim(f"Version {version.number}: {version_text(version)}")
         ui.mark(f"clip.version{version.number}")
         tooltip = "\n".join([*difference_lines(version), *([version.why_not] if version.why_not else [])])
         if tooltip:
