@@ -11,6 +11,7 @@ from pathlib import Path
 from app.calibration.job import CalibrationRequest
 from app.export.export_choices import ExportChoices
 from app.project.opening_answers import OpeningAnswers
+from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, GoToStep
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.path_commands import PathCommand
@@ -459,6 +460,7 @@ Command = (
     | OpenProject
     | TrainNextClip
     | QueueCommand
+    | ClipCommand
     | PauseTraining
     | ResumeTraining
     | StopTraining

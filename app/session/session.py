@@ -29,6 +29,7 @@ from app.playback.timeline import Timeline
 from app.playback.trails import Trails
 from app.playback.view_modes import CONTENTS, MODES, ShownAs
 from app.playback.views import Views
+from app.project.disk.use import DiskUse
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.opening_answers import answers_to_keep
@@ -44,6 +45,9 @@ from app.session.camera_paths import CameraPaths
 from app.session.capture_doctor import CaptureDoctor
 from app.session.capture_opening import CaptureOpening
 from app.session.clip_versions import Versions
+from app.session.clips.clip_commands import ClipCommand, CompareVersion
+from app.session.clips.clip_work import ClipWork
+from app.session.clips.comparing import show_version
 from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edits import Edits
@@ -59,7 +63,7 @@ from app.session.project_opener import ProjectOpener
 from app.session.questions import ProjectQuestion, Question
 from app.session.queue_commands import QueueCommands
 from app.session.recent_projects import RecentProjects
-from app.session.setting_changes import changed_settings
+from app.session.setting_changes import changed_settings, is_other_cut
 from app.session.settings import Settings
 from app.session.synchronising import Synchronising
 from app.status import (
@@ -67,6 +71,7 @@ from app.status import (
     COMPARE_MODES,
     OVERLAY_NAMES,
     ClipStatus,
+    DependencyStatus,
     JobStatus,
     Overlays,
     PlanStatus,
@@ -161,6 +166,7 @@ class Session:
         self.playback = Playback(self.live_training.state_of)
         self.residuals = Residuals(self.playback)
         self.document = KeptDocument(guard=self._check_change, on_change=self._follow_change)
+        self.clip_work = ClipWork(self._jobs, self.notices, self.live_training, self.document, self._take_question)
         self.marking, self.camera_paths = Marking(self.document), CameraPaths(self.document)
         self.selecting = Selecting(
             ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self.overlays.content)
@@ -300,6 +306,11 @@ class Session:
             case _ if isinstance(command, commands.QueueCommand):
                 self.question = None
                 self.question = self._queue_commands.obey(command)
+            case CompareVersion():
+                show_version(command, self.timeline, self.overlays)
+            case _ if isinstance(command, ClipCommand):
+                self.question = None
+                self.question = self.clip_work.obey(command)
             case commands.PauseTraining():
                 live.pause()
             case commands.ResumeTraining():
@@ -401,10 +412,18 @@ class Session:
         name = _SETTING_NAMES.get(type(command), "change settings")
         self.document.change(replace(opened.project.document, settings=changed), name)
 
+    def _take_question(self, question: Question) -> None:
+        if self.question is None:  # what is asked already comes first
+            self.question = question
+
     def _check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """See that nothing was learned with settings that change. Raises ProjectError."""
         opened = self.opened
         if opened is None or before.settings == after.settings:
+            return
+        if is_other_cut(before.settings, after.settings):
+            self.live_training.check_idle()
+            check_settings(after.settings, opened.capture)
             return
         if opened.project.has_progress or self.live_training.is_busy:
             raise ProjectError(
@@ -431,6 +450,7 @@ class Session:
         self._show(changed_project)
         self.live_training.open(changed_project)
         self.versions.open(changed_project)
+        self.clip_work.open(changed_project)
         self._open_residuals(changed_project)
         self.timeline.take_over(before)
 
@@ -467,6 +487,7 @@ class Session:
         self._show(opened)
         self.live_training.open(opened, found.catalog)
         self.versions.open(opened)
+        self.clip_work.open(opened)
         self._open_residuals(opened)
         self.doctor.open(opened)
         self.views.look_at(opened.rig)
@@ -522,6 +543,7 @@ class Session:
             self.residuals.look_at(self.timeline, self.view.look_through)
         has_changed |= self.residuals.poll(is_busy=is_training or is_attended)
         self._tell_failures()
+        self.clip_work.look_for_damage()
         self.playback.work_ahead(self.timeline, is_busy=self.live_training.is_busy)
         rig = self.playback.rig(self.timeline)
         if rig is not None and rig is not self.view.rig:  # a view that looks through a camera follows it
@@ -548,6 +570,7 @@ class Session:
             *self.exporting.finished,
             self.selecting.finished,
             looked,
+            self.clip_work.finished,
             jobs,
             self.notices.revision,
             self.recent.missing,
@@ -627,6 +650,7 @@ class Session:
         self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)
         self.playback.close()
         self.versions.close()
+        self.clip_work.close()
         self.log.close()
         if self.capture is not None:
             self.capture.close()
@@ -641,6 +665,14 @@ class Session:
     def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]:
         """What a clip was before it was trained again, newest first; none until that was read."""
         return self.versions.statuses(clip_index)
+
+    def clip_dependencies(self, clip_index: int) -> DependencyStatus:
+        """What a clip depends on, and what depends on it."""
+        return self.clip_work.dependencies(clip_index)
+
+    def disk_use(self) -> DiskUse | None:
+        """What the project takes on the disk; None until that was looked up."""
+        return self.clip_work.disk_use()
 
     def version_state(self, clip_index: int, version: int) -> ShownState | None:
         """An earlier version of a clip as a file to show; None until it was read, and where it cannot be shown."""
@@ -772,6 +804,7 @@ _TITLES: dict[type, str] = {
     commands.TrainClips: "The clips cannot be trained",
     commands.TrainAll: "The clips cannot be trained",
     commands.AskTrainSettings: "The clip cannot be trained",
+    **dict.fromkeys(get_args(ClipCommand), "That cannot be done with the clips"),
     commands.RestoreVersion: "The version cannot be brought back",
     commands.RemoveVersion: "The version cannot be removed",
     commands.SetHoldout: "These cameras cannot be held out",

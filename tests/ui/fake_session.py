@@ -26,6 +26,7 @@ from app.playback.timeline import Timeline
 from app.playback.view_modes import MODES, ShownAs
 from app.playback.views import Views
 from app.project.capture_report import RefusedFolder
+from app.project.disk.use import DiskUse
 from app.project.opening_answers import OpeningAnswers
 from app.project.recents import RecentProject
 from app.residuals.anchor_heat import AnchorHeat
@@ -46,6 +47,7 @@ from app.session.synchronisation_page import SynchronisationPage
 from app.status import (
     CELL_RANGES,
     ClipStatus,
+    DependencyStatus,
     JobStatus,
     OpeningForecast,
     Overlays,
@@ -202,6 +204,7 @@ class FakeSession:
         self.exporting = FakeExporting()
         self.queue = QueueStatus()
         self.usage = UsageStatus(window_mb=412.0, window_cores=0.1, n_cores=2)
+        self.disk: DiskUse | None = None
         self.versions: dict[int, tuple[VersionStatus, ...]] = {}
         self.curves: dict[int, tuple[list[tuple[int, float]], list[tuple[int, float]]]] = {}
         self.lines: tuple[LogLine, ...] = ()
@@ -427,6 +430,17 @@ class FakeSession:
     def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]:
         """What a test put there."""
         return self.versions.get(clip_index, ())
+
+    def clip_dependencies(self, clip_index: int) -> DependencyStatus:
+        """The reference is needed by all others."""
+        n = len(self.clips)
+        if clip_index == self.reference_index:
+            return DependencyStatus(needed_by=tuple(i for i in range(n) if i != clip_index))
+        return DependencyStatus(needs=(self.reference_index,))
+
+    def disk_use(self) -> DiskUse | None:
+        """What a test put there."""
+        return self.disk
 
     def log_lines(self) -> tuple[LogLine, ...]:
         """What a test put there."""
