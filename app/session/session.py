@@ -26,6 +26,7 @@ from app.playback.timeline import Timeline
 from app.playback.trails import Trails
 from app.playback.view_modes import CONTENTS, MODES, ShownAs
 from app.playback.views import Views
+from app.project.allowed_changes import check_change
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.opening_answers import answers_to_keep
@@ -80,7 +81,7 @@ from app.training.service import Launch, ShownState
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.errors import EngineError, ProjectError
+from engine.errors import EngineError
 
 
 class Session:
@@ -386,13 +387,8 @@ class Session:
     def _check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """See that nothing was learned with settings that change. Raises ProjectError."""
         opened = self.opened
-        if opened is None or before.settings == after.settings:
-            return
-        if opened.project.has_progress or self.live_training.is_busy:
-            raise ProjectError(
-                "What all clips share is fixed once training has begun.",
-                hint="What was learned with them would be worthless. Use another project folder for other values.",
-            )
+        if opened is not None:
+            check_change(opened.project, before, after, is_training=self.live_training.is_busy)
 
     def _follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """The document has changed: show what follows from it."""
