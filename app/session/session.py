@@ -29,6 +29,7 @@ from app.playback.timeline import Timeline
 from app.playback.trails import Trails
 from app.playback.view_modes import CONTENTS, MODES, ShownAs
 from app.playback.views import Views
+from app.project.allowed_changes import check_change, is_other_cut
 from app.project.disk.use import DiskUse
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
@@ -63,7 +64,7 @@ from app.session.project_opener import ProjectOpener
 from app.session.questions import ProjectQuestion, Question
 from app.session.queue_commands import QueueCommands
 from app.session.recent_projects import RecentProjects
-from app.session.setting_changes import changed_settings, is_other_cut
+from app.session.setting_changes import changed_settings
 from app.session.settings import Settings
 from app.session.synchronising import Synchronising
 from app.status import (
@@ -93,7 +94,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.editing.selection.ranges import Spread
 from engine.editing.selection.seen_from import SeenFrom
-from engine.errors import EngineError, ProjectError
+from engine.errors import EngineError
 
 
 class Session:
@@ -419,17 +420,11 @@ class Session:
     def _check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """See that nothing was learned with settings that change. Raises ProjectError."""
         opened = self.opened
-        if opened is None or before.settings == after.settings:
+        if opened is None:
             return
         if is_other_cut(before.settings, after.settings):
             self.live_training.check_idle()
-            check_settings(after.settings, opened.capture)
-            return
-        if opened.project.has_progress or self.live_training.is_busy:
-            raise ProjectError(
-                "What all clips share is fixed once training has begun.",
-                hint="What was learned with them would be worthless. Use another project folder for other values.",
-            )
+        check_change(opened.project, opened.capture, before, after, is_training=self.live_training.is_busy)
 
     def _follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """The document has changed: show what follows from it."""
