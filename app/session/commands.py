@@ -12,6 +12,9 @@ from app.calibration.job import CalibrationRequest
 from app.export.export_choices import ExportChoices
 from app.project.opening_answers import OpeningAnswers
 from app.project.project_choices import AS_USUAL, ProjectChoices
+from app.session.clips.clip_commands import ClipCommand
+from app.session.editing.edit_commands import EditCommand, GoToStep
+from app.session.editing.selection_commands import SelectionCommand
 from app.session.files.file_commands import FileCommand
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
@@ -463,6 +466,7 @@ Command = (
     | FileCommand
     | TrainNextClip
     | QueueCommand
+    | ClipCommand
     | PauseTraining
     | ResumeTraining
     | StopTraining
@@ -476,8 +480,11 @@ Command = (
     | SettingCommand
     | MarkCommand
     | PathCommand
+    | EditCommand
+    | SelectionCommand
     | Undo
     | Redo
+    | GoToStep
     | CalibrationCommand
     | SynchronisationCommand
     | HomeView

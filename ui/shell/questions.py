@@ -11,6 +11,7 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
+from app.session.clips.clip_questions import ClipQuestion
 from app.session.commands import CloseQuestion, Command, CorrectCapture, OpenCapture, OpenProject, TrainClip
 from app.session.files.file_commands import CancelSaveAs
 from app.session.files.file_questions import RecoveryQuestion, RelocationQuestion, SaveAsQuestion, SavingQuestion
@@ -19,6 +20,7 @@ from app.status import JobStatus
 from engine.text import duration_text
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, primary_button, text_wrapped_dim
+from ui.shell.clip_questions import clip_question_title, draw_clip_question
 from ui.shell.files.recovery_dialog import RecoveryDialog
 from ui.shell.files.relocation_dialog import draw_relocation
 from ui.shell.files.save_as_dialog import SaveAsDialog, draw_saving
@@ -92,6 +94,8 @@ class QuestionDialogs:
             answer = self._saving.draw(question, ui, is_agreed)
         elif isinstance(question, SavingQuestion):
             answer = draw_saving(question, session.jobs, ui)
+        elif isinstance(question, ClipQuestion):
+            answer = draw_clip_question(question, ui, is_agreed)
         else:
             answer = self._draw_projects(question, ui, is_agreed)
         imgui.pop_text_wrap_pos()
@@ -165,6 +169,8 @@ def _closing(question: Question) -> Command:
 
 
 def _title(question: Question) -> str:
+    if isinstance(question, ClipQuestion):
+        return clip_question_title(question)
     if isinstance(question, SettingsQuestion):
         return f"Train clip {question.clip_index} with other settings###question"
     if isinstance(question, RetrainQuestion):
@@ -246,7 +252,7 @@ def retrain_texts(question: RetrainQuestion) -> list[str]:
     if question.is_damaged:
         texts = [
             f"{clip} was finished, but cannot be read. {question.reason}",
-            "Training it again replaces the file for good. If you have a copy of it, restore that instead.",
+            'Training it again puts the damaged file aside in the project\'s folder "damaged".',
         ]
     else:
         figure = "" if question.held_out_psnr is None else f" with a held-out PSNR of {question.held_out_psnr:.1f} dB"
