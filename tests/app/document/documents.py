@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 
 from app.document.history import Changed, DocumentHistory, Event, Redone, Undone
 from app.document.project_document import Exclusions, Label, Marker, PaintedMask, ProjectDocument, Stroke, World
@@ -88,7 +89,6 @@ def _random_change(document: ProjectDocument, rng: random.Random, number: int) -
 
 
 def _edited(edit: Edit, rng: random.Random) -> Edit:
-    values = {name: getattr(edit, name) for name in edit.__struct_fields__}
     first = rng.randrange(20)
     change = rng.choice(
         (
@@ -99,4 +99,4 @@ def _edited(edit: Edit, rng: random.Random) -> Edit:
             {"action": rng.choice((Hide(), Recolor(gains=(1.0, rng.random(), 1.0)), Transform((1, 0, 0))))},
         )
     )
-    return Edit(**(values | change))
+    return structs.replace(edit, **change)
