@@ -215,6 +215,9 @@ def kill_windows(work: Path, n_kills: int, rng: random.Random, tally: Tally) -> 
             desk.close()
         if folder is None:
             (folder,) = (path.parent for path in (work / "home").rglob("project.json"))
+        tally.n_steps += n_seen - n_before
+        if n_seen == n_before:
+            tally.faults.append(f"window {number}: no key was set")
         project = open_project(folder, is_writable=False)
         n_before = sum(len(path.keys) for path in project.document.camera_paths)
         tally.kills["of the window"] += 1
