@@ -29,10 +29,6 @@ def _tool(kind: ToolKind) -> Run:
     return take
 
 
-def _leave(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    ui.selecting.leave()
-
-
 def _send(make: Callable[[], Any]) -> Run:
     def send(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
         dispatch(make())
@@ -51,13 +47,6 @@ def _by_distance(make: Callable[[float], Any]) -> Run:
 
 def _moving(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(SelectByAttribute("motion", 1.0, 1.0, ui.selecting.how()))
-
-
-def _resize(steps: float) -> Run:
-    def resize(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-        ui.selecting.resize(steps)
-
-    return resize
 
 
 def _toggle(name: str) -> Run:
@@ -95,9 +84,6 @@ ACTIONS = (
         Action(f"select.{kind}", f"Select with the tool {TOOL_WORDS[kind]}", SELECT, _tool(kind), keys=(key,), **_ANY)
         for kind, key in _TOOL_KEYS.items()
     ),
-    Action("select.leave", "Leave the tool that selects", SELECT, _leave, keys=("Escape",), needs_tool="any"),
-    Action("select.smaller", "Smaller brush", SELECT, _resize(-1), keys=("[",), needs_tool="brush", repeats=True),
-    Action("select.larger", "Larger brush", SELECT, _resize(1), keys=("]",), needs_tool="brush", repeats=True),
     Action("select.all", "Select everything that is shown", SELECT, _send(SelectAll), keys=("Ctrl+A",), **_ANY),
     Action("select.none", "Select nothing", SELECT, _send(ClearSelection), keys=("Ctrl+Shift+A",), **_SOME),
     Action("select.invert", "Select what is not selected", SELECT, _send(InvertSelection), keys=("Ctrl+I",), **_ANY),
