@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -9,7 +10,7 @@ from msgspec import Struct, to_builtins
 
 from app.document.camera_paths import StoredPath, check_paths, stored_paths, to_path
 from app.document.project_document import Exclusions, Label, Marker, ProjectDocument, World
-from app.document.project_settings import ProjectSettings
+from app.document.project_settings import ProjectSettings, check_bounds
 from engine.editing.edit import Edit, Picked
 from engine.editing.picks import unpack_rows
 from engine.errors import ProjectError
@@ -64,6 +65,7 @@ def document_of(content: Any) -> ProjectDocument:
     stored = to_type(content, _Stored)
     settings = replace(stored.settings, overrides=without_retired(stored.settings.overrides))
     settings.config()
+    check_bounds(settings.clip_bounds)
     paths = tuple(to_path(path) for path in stored.camera_paths)
     check_paths(paths)
     document = ProjectDocument(
@@ -76,20 +78,20 @@ def document_of(content: Any) -> ProjectDocument:
         stored.exclusions,
         stored.world,
     )
-    check_edits(document)
+    check_edits(document.edits)
     return document
 
 
-def check_edits(document: ProjectDocument) -> None:
+def check_edits(edits: Sequence[Edit]) -> None:
     """See that edits can be told apart, and that what they picked can be read.
 
     Raises:
         ProjectError: They cannot.
     """
-    ids = [edit.edit_id for edit in document.edits]
+    ids = [edit.edit_id for edit in edits]
     if len(set(ids)) != len(ids):
         raise ProjectError("Two edits have the same number.")
-    for edit in document.edits:
+    for edit in edits:
         if isinstance(edit.target, Picked):
             try:
                 for rows in edit.target.sets:

@@ -33,7 +33,8 @@ class GaussianArrays:
         births: Where each comes from, see app.playback.contents; None where unknown. [N] uint8
         changes: How far each is from the reference clip, NaN where that has none; None where nobody asked.
             [N] float32
-        rows: Which anchor set each comes from, and its number there; None where unknown.
+        rows: Which Gaussian of which anchor set each is, the same in all frames and clips; None where they stand for
+            none.
     """
 
     means: np.ndarray
@@ -56,7 +57,9 @@ class GaussianArrays:
     @property
     def n_bytes(self) -> int:
         """Memory of the arrays."""
-        return sum(a.nbytes for a in (self.means, self.quats, self.scales, self.opacities, self.colors))
+        arrays = [self.means, self.quats, self.scales, self.opacities, self.colors]
+        arrays += [] if self.rows is None else [self.rows.set_index, self.rows.number]
+        return sum(array.nbytes for array in arrays)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

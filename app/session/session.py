@@ -2,8 +2,8 @@
 finished work in. Belongs to one thread; nothing here blocks. Draws nothing.
 
 It composes: `playback` prepares what is shown, `live_training` trains, `residuals` compares with what the cameras took,
-`document` holds what is edited and the way back, `marking` and `camera_paths` change parts of it, `recent` what was
-opened before. What is open is one immutable value that each of them is handed.
+`document` holds what is edited and the way back, `editing`, `marking` and `camera_paths` change parts of it, `recent`
+what was opened before. What is open is one immutable value that each of them is handed.
 """
 
 from __future__ import annotations
@@ -22,12 +22,15 @@ from app.document.project_document import ProjectDocument
 from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
 from app.playback.bookmarks import Bookmarks
 from app.playback.coverage import Coverage
+from app.playback.markers import Markers
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
 from app.playback.trails import Trails
 from app.playback.view_modes import CONTENTS, MODES, ShownAs
 from app.playback.views import Views
+from app.project.allowed_changes import check_change, is_other_cut
+from app.project.disk.use import DiskUse
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.opening_answers import answers_to_keep
@@ -43,8 +46,12 @@ from app.session.camera_paths import CameraPaths
 from app.session.capture_doctor import CaptureDoctor
 from app.session.capture_opening import CaptureOpening
 from app.session.clip_versions import Versions
+from app.session.clips.clip_commands import ClipCommand, CompareVersion
+from app.session.clips.clip_work import ClipWork
+from app.session.clips.comparing import show_version
 from app.session.doctor_status import DoctorStatus
-from app.session.edit_status import HistoryStatus, PathsStatus
+from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
+from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.selecting import Selecting, SelectionStatus
 from app.session.editing.shown_to_select import ShownToSelect
@@ -65,6 +72,7 @@ from app.status import (
     COMPARE_MODES,
     OVERLAY_NAMES,
     ClipStatus,
+    DependencyStatus,
     JobStatus,
     Overlays,
     PlanStatus,
@@ -86,7 +94,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.editing.selection.ranges import Spread
 from engine.editing.selection.seen_from import SeenFrom
-from engine.errors import EngineError, ProjectError
+from engine.errors import EngineError
 
 
 class Session:
@@ -95,9 +103,9 @@ class Session:
     Attributes:
         opened: What is open; None before.
         timeline, views, bookmarks: What the user looks at; the window may change them directly.
-        training, queue, clip_states, plan, regions, paths, history, usage, project_status: Status values, remade by
-            `poll` and `dispatch`. The plan is that of the next clip; None while something trains or nothing is left to
-            train.
+        training, queue, clip_states, plan, regions, paths, edits, history, usage, project_status: Status values,
+            remade by `poll` and `dispatch`. The plan is that of the next clip; None while something trains or nothing
+            is left to train.
         versions: What clips were before they were trained again.
         log: What program and training have said.
         question: What the user has to answer; None while there is nothing to ask.
@@ -159,11 +167,14 @@ class Session:
         self.playback = Playback(self.live_training.state_of)
         self.residuals = Residuals(self.playback)
         self.document = KeptDocument(guard=self._check_change, on_change=self._follow_change)
+        self.clip_work = ClipWork(self._jobs, self.notices, self.live_training, self.document, self._take_question)
         self.marking, self.camera_paths = Marking(self.document), CameraPaths(self.document)
         self.selecting = Selecting(
             ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self.overlays.content)
         )
         self.selection = SelectionStatus()
+        self.editing = Edits(self.document, self.selecting)
+        self.edits: EditsStatus = self.editing.status()
         self.regions: RegionsStatus = self.marking.status([])
         self.paths: PathsStatus = self.camera_paths.status()
         self.history = HistoryStatus()
@@ -296,6 +307,11 @@ class Session:
             case _ if isinstance(command, commands.QueueCommand):
                 self.question = None
                 self.question = self._queue_commands.obey(command)
+            case CompareVersion():
+                show_version(command, self.timeline, self.overlays)
+            case _ if isinstance(command, ClipCommand):
+                self.question = None
+                self.question = self.clip_work.obey(command)
             case commands.PauseTraining():
                 live.pause()
             case commands.ResumeTraining():
@@ -364,9 +380,11 @@ class Session:
                 self.selecting.apply(command)
             case _ if isinstance(command, commands.PathCommand):
                 self.camera_paths.apply(command, self.views, self.timeline)
-            case commands.Undo() | commands.Redo():
+            case _ if isinstance(command, commands.EditCommand):
+                self.editing.apply(command)
+            case commands.Undo() | commands.Redo() | commands.GoToStep():
                 with self.camera_paths.showing_change():
-                    (self.document.undo if isinstance(command, commands.Undo) else self.document.redo)()
+                    self.editing.go(_n_steps(command))
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
@@ -395,21 +413,29 @@ class Session:
         name = _SETTING_NAMES.get(type(command), "change settings")
         self.document.change(replace(opened.project.document, settings=changed), name)
 
+    def _take_question(self, question: Question) -> None:
+        if self.question is None:  # what is asked already comes first
+            self.question = question
+
     def _check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """See that nothing was learned with settings that change. Raises ProjectError."""
         opened = self.opened
-        if opened is None or before.settings == after.settings:
+        if opened is None:
             return
-        if opened.project.has_progress or self.live_training.is_busy:
-            raise ProjectError(
-                "What all clips share is fixed once training has begun.",
-                hint="What was learned with them would be worthless. Use another project folder for other values.",
-            )
+        if is_other_cut(before.settings, after.settings):
+            self.live_training.check_idle()
+        check_change(opened.project, opened.capture, before, after, is_training=self.live_training.is_busy)
 
     def _follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """The document has changed: show what follows from it."""
         if before.settings != after.settings:
             self._follow_settings()
+        self._show_notes(after)
+
+    def _show_notes(self, document: ProjectDocument) -> None:
+        """Let the timeline show the document's markers, and views stand upright as it says."""
+        self.timeline.markers = Markers(document.markers)
+        self.views.set_scene_up(document.world.up)
 
     def _follow_settings(self) -> None:
         opened = self.opened
@@ -419,6 +445,7 @@ class Session:
         self._show(changed_project)
         self.live_training.open(changed_project)
         self.versions.open(changed_project)
+        self.clip_work.open(changed_project)
         self._open_residuals(changed_project)
         self.timeline.take_over(before)
 
@@ -455,9 +482,11 @@ class Session:
         self._show(opened)
         self.live_training.open(opened, found.catalog)
         self.versions.open(opened)
+        self.clip_work.open(opened)
         self._open_residuals(opened)
         self.doctor.open(opened)
         self.views.look_at(opened.rig)
+        self._show_notes(opened.project.document)
         self.bookmarks = Bookmarks()
         self._keep_recent()
         for sentence in opened.capture.warnings:
@@ -509,6 +538,7 @@ class Session:
             self.residuals.look_at(self.timeline, self.view.look_through)
         has_changed |= self.residuals.poll(is_busy=is_training or is_attended)
         self._tell_failures()
+        self.clip_work.look_for_damage()
         self.playback.work_ahead(self.timeline, is_busy=self.live_training.is_busy)
         rig = self.playback.rig(self.timeline)
         if rig is not None and rig is not self.view.rig:  # a view that looks through a camera follows it
@@ -535,6 +565,7 @@ class Session:
             *self.exporting.finished,
             self.selecting.finished,
             looked,
+            self.clip_work.finished,
             jobs,
             self.notices.revision,
             self.recent.missing,
@@ -578,6 +609,7 @@ class Session:
         self.regions = self.marking.status(self.clip_states)
         self.lead_view()
         self.paths, self.history = self.camera_paths.status(), self.document.status()
+        self.edits = self.editing.status()
         self.selection = self.selecting.status()
         self.plan, self.queue = live.plan(), live.queue()
         self.usage = self._usage.sample(None if live.service is None else live.service.worker_pid)
@@ -613,6 +645,7 @@ class Session:
         self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)
         self.playback.close()
         self.versions.close()
+        self.clip_work.close()
         self.log.close()
         if self.capture is not None:
             self.capture.close()
@@ -627,6 +660,14 @@ class Session:
     def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]:
         """What a clip was before it was trained again, newest first; none until that was read."""
         return self.versions.statuses(clip_index)
+
+    def clip_dependencies(self, clip_index: int) -> DependencyStatus:
+        """What a clip depends on, and what depends on it."""
+        return self.clip_work.dependencies(clip_index)
+
+    def disk_use(self) -> DiskUse | None:
+        """What the project takes on the disk; None until that was looked up."""
+        return self.clip_work.disk_use()
 
     def version_state(self, clip_index: int, version: int) -> ShownState | None:
         """An earlier version of a clip as a file to show; None until it was read, and where it cannot be shown."""
@@ -740,6 +781,12 @@ class Session:
         return None if camera_index is None else self.residuals.heat(self.timeline, camera_index, kind)
 
 
+def _n_steps(command: commands.Undo | commands.Redo | commands.GoToStep) -> int:
+    if isinstance(command, commands.GoToStep):
+        return command.n_steps
+    return -1 if isinstance(command, commands.Undo) else 1
+
+
 _SETTING_NAMES: dict[type, str] = {
     commands.SetHoldout: "choose held-out cameras",
     commands.SetClipLength: "change the clip length",
@@ -752,6 +799,7 @@ _TITLES: dict[type, str] = {
     commands.TrainClips: "The clips cannot be trained",
     commands.TrainAll: "The clips cannot be trained",
     commands.AskTrainSettings: "The clip cannot be trained",
+    **dict.fromkeys(get_args(ClipCommand), "That cannot be done with the clips"),
     commands.RestoreVersion: "The version cannot be brought back",
     commands.RemoveVersion: "The version cannot be removed",
     commands.SetHoldout: "These cameras cannot be held out",
@@ -764,6 +812,8 @@ _TITLES: dict[type, str] = {
     commands.RemoveRegion: "The region cannot be removed",
     commands.Undo: "The last change cannot be taken back",
     commands.Redo: "The change cannot be made again",
+    commands.GoToStep: "That step of the history cannot be reached",
+    **dict.fromkeys(get_args(commands.EditCommand), "That cannot be edited"),
     **dict.fromkeys(get_args(commands.PathCommand), "That cannot be done with the camera path"),
     commands.CorrectCapture: "The capture cannot be corrected",
 }

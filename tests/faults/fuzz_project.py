@@ -34,7 +34,7 @@ from tests.faults.tally import Case, Outcome, fuzz_main, judge, start_memory, ta
 N_FRAMES = 4
 BACKGROUNDS_KEY = {"capture": "none", "cameras": ["a", "b"], "size": [13, 6], "frames": 5, "is_corrected": True}
 PLACE = {"phases": [["static", 3], ["joint", 5]], "phase_index": 1, "steps_in_phase": 2, "generator": [1, 2, 250]}
-EXPECTED = {"clip_index": 1, "camera_names": ["a", "b", "c"], "seed": 0}
+EXPECTED = {"frames": (N_FRAMES, N_FRAMES, N_FRAMES), "camera_names": ["a", "b", "c"], "seed": 0}
 CONTENT = {"schema": 3, "clip": "abc", "cameras": ["a"]}
 """What the kept figures depend on."""
 _said: list[str] = []

@@ -15,7 +15,7 @@ from app.playback.timeline import Timeline
 from app.playback.views import Views
 from app.session.edit_status import HistoryStatus, PathsStatus
 from app.session.editing.selecting import SelectionStatus
-from app.status import Overlays, QueueStatus, TrainingStatus, WantedFrame
+from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
@@ -63,6 +63,7 @@ class ActionNeeds(RegionsNeeds, Protocol):
     def selection(self) -> SelectionStatus: ...
 
     def shown_anchors(self) -> AnchorArrays | None: ...
+    def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]: ...
 
     def wanted_frame(self) -> WantedFrame | None: ...
 

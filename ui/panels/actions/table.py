@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 from ui.panels.actions import (
     bookmarks,
     camera_path,
+    clips,
     compare,
     doctor,
     exporting,
@@ -38,6 +39,7 @@ ACTIONS: tuple[Action, ...] = (
     *marking.ACTIONS,
     *camera_path.ACTIONS,
     *training.ACTIONS,
+    *clips.ACTIONS,
     *doctor.ACTIONS,
     *exporting.ACTIONS,
     *window.ACTIONS,
