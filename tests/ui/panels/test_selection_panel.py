@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
+import numpy as np
 import pytest
 from pyglet.window import key
 
+from app.playback.arrays import AnchorArrays
 from app.session.editing.selecting import SelectionStatus
 from app.session.editing.selection_commands import (
     ClearSelection,
@@ -37,9 +38,8 @@ def panel(open_pilot: Callable[..., Pilot], monkeypatch: pytest.MonkeyPatch) -> 
     session.selection = SelectionStatus(
         "1,240 Gaussians, 96 anchors, 3 clips", 1240, 900, has_before=True, can_select=True
     )
-    anchors = session.shown_anchors()
-    assert anchors is not None
-    monkeypatch.setattr(session, "shown_anchors", lambda: replace(anchors, spacing=0.2))
+    anchors = AnchorArrays(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), key="spaced", spacing=0.2)
+    monkeypatch.setattr(session, "shown_anchors", lambda: anchors)
     pilot = open_pilot(session, size=(1280, 1500))
     pilot.studio.frame.ui.wanted_panel = SELECTION
     pilot.draw(4)
