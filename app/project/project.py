@@ -28,6 +28,7 @@ from app.document.document_store import DocumentStore
 from app.document.history import Changed, DocumentHistory, Event, Placed
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
+from app.project.clip_exchange import finish_exchange
 from app.project.clip_names import clip_name, finished_files
 from app.project.header_cache import HeaderCache
 from app.project.lock import ProcessLock, is_process_alive
@@ -365,6 +366,11 @@ def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
             raise
     project = Project(folder, history, lock)
     if is_writable:
+        try:
+            finish_exchange(folder)
+        except ProjectError:
+            project.close()
+            raise
         sweep(project)
     return project
 
