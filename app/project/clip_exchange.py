@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from app.document.kept_json import read_kept, write_kept
+from app.document.kept_json import kept_text, read_kept, write_kept
 from engine.errors import ProjectError
 from engine.storage.files import disk_error, replace_file
 
@@ -52,7 +52,7 @@ def exchange(folder: Path, names: Sequence[str]) -> None:
     Raises:
         DiskError: The disk refused. Where it did so after the exchange had begun, opening the project again ends it.
     """
-    write_kept(folder / EXCHANGE / LIST_FILE, {"files": list(names)})
+    write_kept(folder / EXCHANGE / LIST_FILE, kept_text({"files": list(names)}))
     finish_exchange(folder)
 
 

@@ -32,12 +32,9 @@ from app.document.history import Changed, DocumentHistory, Event, Placed
 from app.document.history_file import HISTORY_FILE
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
-<<<<<<< HEAD
-from app.project.clip_exchange import finish_exchange
-=======
 from app.document.recovery import plain_history, recover
 from app.document.replay import JOURNAL_FOLDER
->>>>>>> wip-core
+from app.project.clip_exchange import finish_exchange
 from app.project.clip_names import clip_name, finished_files
 from app.project.header_cache import HeaderCache
 from app.project.lock import ProcessLock, is_process_alive
