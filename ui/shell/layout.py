@@ -12,7 +12,9 @@ from imgui_bundle import ImVec2, imgui
 from ui.panels.state import (
     CAPTURE,
     DOCTOR,
+    EDITS,
     EXPORTS,
+    HISTORY,
     LAYOUTS,
     LOG,
     PATHS,
@@ -30,6 +32,7 @@ SMALLEST = {
     TRAINING: SIDE,
     REGIONS: SIDE,
     SELECTION: SIDE,
+    EDITS: SIDE,
     RESIDUALS: SIDE,
     PATHS: (176.0, 0.0),
     TIMELINE: (0.0, 140.0),
@@ -64,11 +67,13 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
     _, right, middle = internal.dock_builder_split_node_py(rest, imgui.Dir.right, right_share)
     for title, node_id in (
         (VIEWPORT, middle),
+        (HISTORY, left),
         (PATHS, left),
         (CAPTURE, left),
         (TRAINING, right),
         (REGIONS, right),
         (SELECTION, right),
+        (EDITS, right),
         (RESIDUALS, right),
         (TIMELINE, bottom),
         (LOG, bottom),

@@ -82,7 +82,8 @@ class Edits:
         Raises:
             ProjectError: A step cannot be taken; those before it were.
         """
-        for _ in range(abs(n_steps)):
+        history = self._document.checked().history
+        for _ in range(min(abs(n_steps), len(history.past if n_steps < 0 else history.future))):
             (self._document.undo if n_steps < 0 else self._document.redo)()
 
 

@@ -8,22 +8,23 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from app.playback.arrays import AnchorArrays
+from app.playback.arrays import AnchorArrays, GaussianArrays
 from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.playback.views import Views
-from app.session.edit_status import HistoryStatus, PathsStatus
+from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.selecting import SelectionStatus
 from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
 from engine.camera.rig import CameraRig
+from ui.panels.editing.edit_subject import Selects
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.editing.select_tool import TOOLS
 
 TIME, PLAY, VIEW, COMPARE = "Time", "Play and timeline", "View", "Show and compare"
 MARK, PATH, TRAIN, WINDOW = "Mark regions", "Camera path", "Train", "Window"
-SELECT = "Select"
+SELECT, EDIT = "Select", "Edit"
 NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
@@ -63,8 +64,16 @@ class ActionNeeds(RegionsNeeds, Protocol):
     @property
     def selection(self) -> SelectionStatus: ...
 
+    @property
+    def selecting(self) -> Selects: ...
+
+    @property
+    def edits(self) -> EditsStatus: ...
+
     def shown_anchors(self) -> AnchorArrays | None: ...
     def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]: ...
+
+    def shown_gaussians(self) -> GaussianArrays | None: ...
 
     def wanted_frame(self) -> WantedFrame | None: ...
 
