@@ -67,7 +67,6 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
     _, right, middle = internal.dock_builder_split_node_py(rest, imgui.Dir.right, right_share)
     for title, node_id in (
         (VIEWPORT, middle),
-        (HISTORY, left),
         (PATHS, left),
         (CAPTURE, left),
         (TRAINING, right),
@@ -79,6 +78,7 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
         (LOG, bottom),
         (DOCTOR, bottom),
         (EXPORTS, bottom),
+        (HISTORY, bottom),
     ):
         internal.dock_builder_dock_window(title, node_id)
     node = internal.dock_builder_get_node(middle)  # it stays the central node: the one that gives way

@@ -22,7 +22,7 @@ from ui.style import theme
 from ui.style.theme import Icon
 
 ROW_HEIGHT, BUTTON_WIDTH = 42.0, 30.0
-LEAST_ROWS, MOST_ROWS = 2.2, 6.2
+LEAST_ROWS, MOST_ROWS = 1.2, 6.2
 PAYLOAD = "edit"
 
 

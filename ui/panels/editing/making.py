@@ -12,6 +12,7 @@ from app.playback.timeline import Timeline
 from app.session.commands import MarkBox, MarkRegion
 from app.session.editing.edit_commands import AddEdit
 from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, chosen_scope, reach_text
+from app.session.editing.selection_commands import ClearSelection
 from engine.editing.edit import (
     Action,
     Box,
@@ -134,6 +135,7 @@ def make_edit(session: MakingNeeds, dispatch: Dispatch, ui: UiState, making: Mak
         if volume is not None:  # its handles are those of the edit now
             ui.selecting.leave()
             ui.editing.is_outside = False
+            dispatch(ClearSelection())
 
 
 def mark_moving(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
