@@ -89,6 +89,9 @@ COMMANDS = {
         "list what clips were before they were trained again, bring it back, make room on the disk",
         "app.cli.versions_command",
     ),
+    "edit": Command(
+        "list and change the edits of a project, and take steps back", "app.cli.edit_command", "Nothing was changed."
+    ),
     "gate": Command("say what is static in a project and why, and overrule it", "app.cli.gate_command"),
     "doctor": Command(
         "look at this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.doctor_command"
