@@ -80,14 +80,6 @@ def _moved_by(step: int) -> Callable[[ActionNeeds, Edit], MoveEdit | None]:
     return moved
 
 
-def _leave(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    """Ask for no more points; without that, let no edit stand out. What else Escape leaves comes first."""
-    if ui.editing.asking is not None:
-        ui.editing.ask(None)
-    elif not (ui.selecting.is_active or ui.regions.is_active or ui.editing.held is not None):
-        ui.editing.choose(None)
-
-
 def _up_of_view(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(SetUp(view_up(session.view)))
 
@@ -123,7 +115,6 @@ ACTIONS = (
     Action("edit.moving", "Set moving: mark what was drawn as moving", EDIT, mark_moving, lacks=_cannot_edit),
     Action("edit.unhide", "Show again what was hidden last", EDIT, _show_again, keys=("Alt+H",), lacks=_no_edits),
     Action("edit.outside", "Edit everything outside of what was drawn", EDIT, _outside, keys=("Shift+I",)),
-    Action("edit.leave", "Let no edit stand out", EDIT, _leave, keys=("Escape",)),
     Action("edit.next_scope", "Let new edits hold elsewhere: the next choice", EDIT, _next_scope, keys=("Shift+U",)),
     *(
         Action(

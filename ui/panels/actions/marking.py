@@ -25,7 +25,13 @@ def _mark_chosen(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _leave_choosing(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    ui.regions.leave()
+    if ui.editing.held is not None:  # the drag of a handle is given back, and nothing else
+        return
+    if ui.editing.asking is None and (ui.selecting.is_active or ui.regions.is_active):
+        ui.selecting.leave()
+        ui.regions.leave()
+    else:
+        ui.editing.leave()
 
 
 def _grow_by(factor: float) -> Run:
@@ -87,7 +93,15 @@ _STEERING: dict[str, Any] = _SIZING | {"moves_keys": True}
 ACTIONS = (
     Action("mark.choose", "Mark a sphere as static or moving; again to switch", MARK, _choose_region, keys=("M",)),
     Action("mark.accept", "Mark the chosen sphere", MARK, _mark_chosen, keys=("Enter",), needs_choosing=True),
-    Action("mark.leave", "Leave without marking", MARK, _leave_choosing, keys=("Escape",), needs_choosing=True),
+    Action(
+        "mark.leave",
+        "Leave the tool, without marking or selecting; then the chosen edit",
+        MARK,
+        _leave_choosing,
+        keys=("Escape",),
+        needs_choosing=True,
+        leaves_tool=True,
+    ),
     Action("mark.smaller", "Smaller sphere", MARK, _grow_by(1 / GROWTH), keys=("-",), **_SIZING),
     Action("mark.larger", "Larger sphere", MARK, _grow_by(GROWTH), keys=("+",), **_SIZING),
     Action(

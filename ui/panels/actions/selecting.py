@@ -29,11 +29,6 @@ def _tool(kind: ToolKind) -> Run:
     return take
 
 
-def _leave(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    if ui.editing.held is None:  # else Escape gives back what is dragged
-        ui.selecting.leave()
-
-
 def _invert(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     invert_selection(dispatch, ui)
 
@@ -56,13 +51,6 @@ def _by_distance(make: Callable[[float], Any]) -> Run:
 
 def _moving(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(SelectByAttribute("motion", 1.0, 1.0, ui.selecting.how()))
-
-
-def _resize(steps: float) -> Run:
-    def resize(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-        ui.selecting.resize(steps)
-
-    return resize
 
 
 def _toggle(name: str) -> Run:
@@ -100,9 +88,6 @@ ACTIONS = (
         Action(f"select.{kind}", f"Select with the tool {TOOL_WORDS[kind]}", SELECT, _tool(kind), keys=(key,), **_ANY)
         for kind, key in _TOOL_KEYS.items()
     ),
-    Action("select.leave", "Leave the tool that selects", SELECT, _leave, keys=("Escape",), needs_tool="any"),
-    Action("select.smaller", "Smaller brush", SELECT, _resize(-1), keys=("[",), needs_tool="brush", repeats=True),
-    Action("select.larger", "Larger brush", SELECT, _resize(1), keys=("]",), needs_tool="brush", repeats=True),
     Action("select.all", "Select everything that is shown", SELECT, _send(SelectAll), keys=("Ctrl+A",), **_ANY),
     Action("select.none", "Select nothing", SELECT, _send(ClearSelection), keys=("Ctrl+Shift+A",), **_SOME),
     Action("select.invert", "Select what is not selected", SELECT, _invert, keys=("Ctrl+I",), **_ANY),

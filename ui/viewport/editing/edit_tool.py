@@ -93,6 +93,18 @@ class EditTool:
         """Ask for points of the scene; None ends it."""
         self.asking, self.points = asking, []
 
+    @property
+    def is_active(self) -> bool:
+        """Whether there is something to leave."""
+        return self.chosen is not None or self.asking is not None
+
+    def leave(self) -> None:
+        """Ask for no more points; without that, let no edit stand out."""
+        if self.asking is not None:
+            self.ask(None)
+        else:
+            self.choose(None)
+
     def shown_thing(self, edit: Edit | None) -> Thing | None:
         """What has handles of the chosen edit: the movement that it makes, else the box or sphere it acts on."""
         if edit is None:
