@@ -130,8 +130,9 @@ def changed(document: ProjectDocument, command: c.EditCommand) -> Change:
         case c.MoveMarker(frame_index=frame_index, to_frame=to_frame, gesture=gesture):
             merge = ("move marker", gesture) if gesture else None
             return Change(note_changes.move_marker(document, frame_index, to_frame), "move marker", merge)
-        case c.SetLabel(kind=kind, name=name, text=text):
-            return Change(note_changes.set_label(document, kind, name, text), f"label a {kind}")
+        case c.SetLabel(kind=kind, name=name, text=text, gesture=gesture):
+            merge = ("label", kind, name, gesture) if gesture else None
+            return Change(note_changes.set_label(document, kind, name, text), f"label a {kind}", merge)
         case c.SetUp(direction=direction):
             return Change(world_changes.set_up(document, direction), "set what is up")
         case c.SetUpByGround(points=points, toward=toward):

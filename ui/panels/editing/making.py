@@ -83,7 +83,7 @@ MAKINGS = (
         "Move",
         "Move, rotate and scale what is selected",
         lambda session, volume: Transform(pivot=pivot_of(session, volume)),
-        ("Shift+G",),
+        ("Alt+G",),
     ),
     Making(
         "recolor", "Recolour", "Recolour what is selected", lambda session, volume: Recolor(), is_for_everything=True
