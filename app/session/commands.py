@@ -11,7 +11,11 @@ from pathlib import Path
 from app.calibration.job import CalibrationRequest
 from app.export.export_choices import ExportChoices
 from app.project.opening_answers import OpeningAnswers
+<<<<<<< HEAD
 from app.session.clips.clip_commands import ClipCommand
+=======
+from app.session.editing.selection_commands import SelectionCommand
+>>>>>>> wip-core
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
@@ -472,6 +476,7 @@ Command = (
     | SettingCommand
     | MarkCommand
     | PathCommand
+    | SelectionCommand
     | Undo
     | Redo
     | CalibrationCommand

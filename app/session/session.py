@@ -13,6 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
+
 from app.background.jobs import Jobs
 from app.background.log_reader import LogLine, LogView
 from app.background.usage import UsageMeter
@@ -48,6 +50,8 @@ from app.session.clips.comparing import show_version
 from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import HistoryStatus, PathsStatus
 from app.session.editing.kept_document import KeptDocument
+from app.session.editing.selecting import Selecting, SelectionStatus
+from app.session.editing.shown_to_select import ShownToSelect
 from app.session.exporting import Exporting
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
@@ -85,6 +89,8 @@ from app.training.service import Launch, ShownState
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.editing.selection.ranges import Spread
+from engine.editing.selection.seen_from import SeenFrom
 from engine.errors import EngineError, ProjectError
 
 
@@ -160,6 +166,10 @@ class Session:
         self.document = KeptDocument(guard=self._check_change, on_change=self._follow_change)
         self.clip_work = ClipWork(self._jobs, self.notices, self.live_training, self.document, self._take_question)
         self.marking, self.camera_paths = Marking(self.document), CameraPaths(self.document)
+        self.selecting = Selecting(
+            ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self.overlays.content)
+        )
+        self.selection = SelectionStatus()
         self.regions: RegionsStatus = self.marking.status([])
         self.paths: PathsStatus = self.camera_paths.status()
         self.history = HistoryStatus()
@@ -361,6 +371,8 @@ class Session:
                     self.doctor.correct(corrections)
             case _ if isinstance(command, commands.MarkCommand):
                 self.marking.apply(command)
+            case _ if isinstance(command, commands.SelectionCommand):
+                self.selecting.apply(command)
             case _ if isinstance(command, commands.PathCommand):
                 self.camera_paths.apply(command, self.views, self.timeline)
             case commands.Undo() | commands.Redo():
@@ -459,6 +471,7 @@ class Session:
         opened = opened_project(found.capture, found.project, generation)
         self.document.open(found.project)  # first: it keeps what was edited in the project that is left
         self.camera_paths.leave()
+        self.selecting.open()
         self._show(opened)
         self.live_training.open(opened, found.catalog)
         self.versions.open(opened)
@@ -508,7 +521,7 @@ class Session:
         if any(isinstance(event, ENDINGS) for event in events):
             self._keep_recent()
         self._release_snapshot()
-        has_changed |= bool(events) | self.document.poll()
+        has_changed |= bool(events) | self.document.poll() | self.selecting.poll()
         has_changed |= self.lead_view()
         is_training = self.live_training.is_busy and self.training.state != "paused"
         has_changed |= self.exporting.poll(is_training=is_training)
@@ -542,6 +555,7 @@ class Session:
             *self.calibrating.finished,
             *self.synchronising.finished,
             *self.exporting.finished,
+            self.selecting.finished,
             looked,
             self.clip_work.finished,
             jobs,
@@ -567,6 +581,9 @@ class Session:
             if failure.is_of_clip:
                 self.live_training.note_damage(failure.error)
             told.append((failure.title, failure.error))
+        unselected = self.selecting.take_error()
+        if unselected is not None:
+            told.append(("That cannot be selected", unselected))
         unkept = self.document.take_error()
         if unkept is not None:
             told.append(("What was edited could not be read or kept", unkept))
@@ -584,6 +601,7 @@ class Session:
         self.regions = self.marking.status(self.clip_states)
         self.lead_view()
         self.paths, self.history = self.camera_paths.status(), self.document.status()
+        self.selection = self.selecting.status()
         self.plan, self.queue = live.plan(), live.queue()
         self.usage = self._usage.sample(None if live.service is None else live.service.worker_pid)
         if opened is not None:
@@ -595,7 +613,7 @@ class Session:
 
     def wake_by(self, wake: Callable[[], None]) -> None:
         """Call this, on some thread, when a frame or picture that was asked for is there; it must not block."""
-        self.playback.renderer.on_picture = self.playback.decoder.on_frame = wake
+        self.playback.renderer.on_picture = self.playback.decoder.on_frame = self.selecting.on_found = wake
 
     def close(self) -> None:
         """End workers and threads, keeping what was learned. Blocks for a few seconds at most. May be called twice."""
@@ -603,6 +621,7 @@ class Session:
             return
         self._is_closed = True
         self.document.close()
+        self.selecting.close()
         self.live_training.close()
         self._keep_recent()
         if self.project is not None:
@@ -673,6 +692,18 @@ class Session:
         trained."""
         shown = self.playback.frame(self.timeline, self._shown_as)
         return None if shown is None else shown.gaussians
+
+    def selected(self, gaussians: GaussianArrays) -> np.ndarray:
+        """Which Gaussians of a frame are selected. [N] bool"""
+        return self.selecting.mask(gaussians)
+
+    def selected_share(self, gaussians: GaussianArrays, view: SeenFrom) -> np.ndarray | None:
+        """Where selected Gaussians are seen; see Selecting.share."""
+        return self.selecting.share(gaussians, view, self.views.current_index)
+
+    def attribute_spread(self, attribute: str) -> Spread | None:
+        """How an attribute is spread over the shown frame; see Selecting.spread."""
+        return self.selecting.spread(attribute)
 
     def shown_anchors(self) -> AnchorArrays | None:
         """Anchors that exist at the shown frame; those of the newest frame there is until it was decoded."""
@@ -761,6 +792,7 @@ _TITLES: dict[type, str] = {
     commands.SetTrainSetting: "The setting cannot be changed",
     commands.SetPreset: "The preset cannot be taken",
     commands.SynchroniseCameras: "The cameras cannot be synchronised",
+    **dict.fromkeys(get_args(commands.SelectionCommand), "That cannot be selected"),
     commands.MarkRegion: "The region cannot be marked",
     commands.RemoveRegion: "The region cannot be removed",
     commands.Undo: "The last change cannot be taken back",

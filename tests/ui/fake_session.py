@@ -15,7 +15,7 @@ from app.background.log_reader import LogLine
 from app.export.export_choices import ExportChoices
 from app.export.export_plan import ExportPlan
 from app.export.export_status import ExportStatus
-from app.playback.arrays import AnchorArrays, Picture, PointArrays
+from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
 from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
@@ -32,6 +32,7 @@ from app.session import commands, path_commands
 from app.session.calibration_page import CalibrationPage
 from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import HistoryStatus, PathsStatus
+from app.session.editing.selecting import SelectionStatus
 from app.session.exporting import ExportPage
 from app.session.marking import after_marking
 from app.session.notices import Notices
@@ -60,6 +61,8 @@ from app.status import (
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.clip import Clip, split_clips
 from engine.doctor.finding import Finding
+from engine.editing.selection.ranges import Spread, spread_of
+from engine.editing.selection.seen_from import SeenFrom
 from engine.gate.regions import GateRegion, sphere_region
 
 
@@ -227,6 +230,7 @@ class FakeSession:
             inherited_reasons=np.where(inherited_roles == 2, 2, 255).astype(np.uint8),
             own_reasons=np.full(300, 255, np.uint8),
         )
+        self.selection = SelectionStatus()
         self.regions = RegionsStatus(why_not="Open a capture first.")
         self.paths, self.history = PathsStatus(why_not="Open a capture first."), HistoryStatus()
         self.capture: FakeCapture | None = None
@@ -280,6 +284,18 @@ class FakeSession:
         return AnchorHeat(
             positions, values, column, (column, frame_index), 0, frame_index, n_cameras=8, n_cameras_all=8
         )
+
+    def selected(self, gaussians: GaussianArrays) -> np.ndarray:
+        """Nothing."""
+        return np.zeros(len(gaussians), np.bool_)
+
+    def selected_share(self, gaussians: GaussianArrays, view: SeenFrom) -> np.ndarray | None:
+        """Nothing."""
+        return None
+
+    def attribute_spread(self, attribute: str) -> Spread | None:
+        """Rises evenly from 0 to 1; residuals are not known."""
+        return None if attribute in ("error", "flicker") else spread_of(np.linspace(0.0, 1.0, 1000))
 
     def cached_frames(self) -> list[tuple[int, int]]:
         """Runs of frames in memory."""

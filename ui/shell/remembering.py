@@ -18,7 +18,7 @@ from ui.panels.capture import CaptureFacts
 from ui.panels.state import UiState
 
 SAVE_AFTER_S = 5.0
-LAYOUT_VERSION = "; panels of ClipGStream Studio, version 5\n"
+LAYOUT_VERSION = "; panels of ClipGStream Studio, version 6\n"
 """Comes first in the kept layout; another version has other panels and is not taken."""
 
 
