@@ -89,6 +89,7 @@ COMMANDS = {
         "list what clips were before they were trained again, bring it back, make room on the disk",
         "app.cli.versions_command",
     ),
+    "exclude": Command("leave cameras and pictures out of training", "app.cli.exclude_command"),
     "gate": Command("say what is static in a project and why, and overrule it", "app.cli.gate_command"),
     "doctor": Command(
         "look at this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.doctor_command"

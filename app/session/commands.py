@@ -11,11 +11,9 @@ from pathlib import Path
 from app.calibration.job import CalibrationRequest
 from app.export.export_choices import ExportChoices
 from app.project.opening_answers import OpeningAnswers
-<<<<<<< HEAD
 from app.session.clips.clip_commands import ClipCommand
-=======
 from app.session.editing.selection_commands import SelectionCommand
->>>>>>> wip-core
+from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
@@ -463,6 +461,7 @@ Command = (
     | TrainNextClip
     | QueueCommand
     | ClipCommand
+    | ExclusionCommand
     | PauseTraining
     | ResumeTraining
     | StopTraining

@@ -52,6 +52,8 @@ from app.session.edit_status import HistoryStatus, PathsStatus
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.selecting import Selecting, SelectionStatus
 from app.session.editing.shown_to_select import ShownToSelect
+from app.session.exclusions.excluding import apply_exclusion
+from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.exporting import Exporting
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
@@ -89,6 +91,7 @@ from app.training.service import Launch, ShownState
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.editing.selection.ranges import Spread
 from engine.editing.selection.seen_from import SeenFrom
 from engine.errors import EngineError, ProjectError
@@ -237,6 +240,12 @@ class Session:
         return ShownAs(self.overlays.mode, self.overlays.content)
 
     @property
+    def exclusions(self) -> Exclusions:
+        """What of the open capture training never sees."""
+        content = self.document.content
+        return NOTHING_EXCLUDED if content is None else content.exclusions
+
+    @property
     def residual_status(self) -> ResidualStatus:
         """What is measured of every picture."""
         return self.residuals.status
@@ -307,6 +316,9 @@ class Session:
             case _ if isinstance(command, ClipCommand):
                 self.question = None
                 self.question = self.clip_work.obey(command)
+            case _ if isinstance(command, ExclusionCommand):
+                n_frames = 0 if self.capture is None else self.capture.n_frames
+                apply_exclusion(command, self.document, self.rig.names, n_frames)
             case commands.PauseTraining():
                 live.pause()
             case commands.ResumeTraining():
@@ -429,6 +441,10 @@ class Session:
         """The document has changed: show what follows from it."""
         if before.settings != after.settings:
             self._follow_settings()
+        elif before.exclusions != after.exclusions and self.opened is not None:
+            if self.live_training.service is not None:
+                self.live_training.service.catalog.judge_anew()
+            self._open_residuals(self.opened)
 
     def _follow_settings(self) -> None:
         opened = self.opened
@@ -784,6 +800,7 @@ _TITLES: dict[type, str] = {
     commands.TrainClips: "The clips cannot be trained",
     commands.TrainAll: "The clips cannot be trained",
     commands.AskTrainSettings: "The clip cannot be trained",
+    **dict.fromkeys(get_args(ExclusionCommand), "That cannot be excluded"),
     **dict.fromkeys(get_args(ClipCommand), "That cannot be done with the clips"),
     commands.RestoreVersion: "The version cannot be brought back",
     commands.RemoveVersion: "The version cannot be removed",
