@@ -19,26 +19,22 @@ BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
 class GaussianArrays:
     """Gaussians of one frame, for upload. float32, C-contiguous.
 
-        Attributes:
-            means: [N, 3] scene units.
-            quats: [N, 4] wxyz, not necessarily of unit length.
-            scales: [N, 3] standard deviations, scene units.
-            opacities: [N] in 0..1.
-            colors: [N, 3] in 0..1.
-            key: Changes when the content does.
-            near_plane: Nearest depth that should be drawn, scene units.
-            source: The frame, and the state of the clip it was decoded from.
-            n_still: So many rows come first and differ in nothing but their colours between arrays of one `still_key`.
-            still_key: None where no rows are known to be so.
-            births: Where each comes from, see app.playback.contents; None where unknown. [N] uint8
-            changes: How far each is from the reference clip, NaN where that has none; None where nobody asked.
-                [N] float32
-    <<<<<<< HEAD
-            rows: Which anchor set each comes from, and its number there; None where unknown.
-    =======
-            rows: Which Gaussian of which anchor set each is, the same in all frames and clips; None where they stand for
-                none.
-    >>>>>>> wip-edits
+    Attributes:
+        means: [N, 3] scene units.
+        quats: [N, 4] wxyz, not necessarily of unit length.
+        scales: [N, 3] standard deviations, scene units.
+        opacities: [N] in 0..1.
+        colors: [N, 3] in 0..1.
+        key: Changes when the content does.
+        near_plane: Nearest depth that should be drawn, scene units.
+        source: The frame, and the state of the clip it was decoded from.
+        n_still: So many rows come first and differ in nothing but their colours between arrays of one `still_key`.
+        still_key: None where no rows are known to be so.
+        births: Where each comes from, see app.playback.contents; None where unknown. [N] uint8
+        changes: How far each is from the reference clip, NaN where that has none; None where nobody asked.
+            [N] float32
+        rows: Which Gaussian of which anchor set each is, the same in all frames and clips; None where they stand for
+            none.
     """
 
     means: np.ndarray

@@ -31,7 +31,7 @@ class Timeline:
         in_frame, out_frame: Where playing begins and ends; None where the capture does. in_frame <= out_frame.
         around: Frames that are played over and over for the moment, whatever in_frame and out_frame say; None else.
         is_following: Whether the playhead goes along with the training. Ends when the user moves it.
-        markers: Frames that the user wants to find again.
+        markers: Frames that the user wants to find again; put here by who owns the document.
     """
 
     def __init__(self, clips: Sequence[Clip] = (), *, fps: float = 30.0) -> None:
@@ -56,7 +56,6 @@ class Timeline:
         """Go on where another timeline of the same frames is, as when they are cut into other clips."""
         for name in ("is_looping", "is_every_frame", "speed", "markers"):
             setattr(self, name, getattr(other, name))
-        self.markers.keep_below(self.n_frames)
         self.set_range(other.in_frame, other.out_frame)
         self.seek(other.frame_index)
 

@@ -2,8 +2,8 @@
 finished work in. Belongs to one thread; nothing here blocks. Draws nothing.
 
 It composes: `playback` prepares what is shown, `live_training` trains, `residuals` compares with what the cameras took,
-`document` holds what is edited and the way back, `marking` and `camera_paths` change parts of it, `recent` what was
-opened before. What is open is one immutable value that each of them is handed.
+`document` holds what is edited and the way back, `editing`, `marking` and `camera_paths` change parts of it, `recent`
+what was opened before. What is open is one immutable value that each of them is handed.
 """
 
 from __future__ import annotations
@@ -22,17 +22,20 @@ from app.document.project_document import ProjectDocument
 from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
 from app.playback.bookmarks import Bookmarks
 from app.playback.coverage import Coverage
+from app.playback.markers import Markers
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
 from app.playback.trails import Trails
 from app.playback.view_modes import CONTENTS, MODES, ShownAs
 from app.playback.views import Views
+from app.project.allowed_changes import check_change, is_other_cut
 from app.project.disk.use import DiskUse
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.opening_answers import answers_to_keep
 from app.project.project import Project, check_settings
+from app.project.project_choices import AS_USUAL
 from app.project.recents import project_name
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
@@ -48,13 +51,15 @@ from app.session.clips.clip_commands import ClipCommand, CompareVersion
 from app.session.clips.clip_work import ClipWork
 from app.session.clips.comparing import show_version
 from app.session.doctor_status import DoctorStatus
-from app.session.edit_status import HistoryStatus, PathsStatus
+from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
+from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.selecting import Selecting, SelectionStatus
 from app.session.editing.shown_to_select import ShownToSelect
 from app.session.exclusions.excluding import apply_exclusion
 from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.exporting import Exporting
+from app.session.files.project_files import ProjectFiles
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
@@ -63,7 +68,7 @@ from app.session.project_opener import ProjectOpener
 from app.session.questions import ProjectQuestion, Question
 from app.session.queue_commands import QueueCommands
 from app.session.recent_projects import RecentProjects
-from app.session.setting_changes import changed_settings, is_other_cut
+from app.session.setting_changes import changed_settings
 from app.session.settings import Settings
 from app.session.synchronising import Synchronising
 from app.status import (
@@ -94,7 +99,7 @@ from engine.capture.clip import Clip
 from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.editing.selection.ranges import Spread
 from engine.editing.selection.seen_from import SeenFrom
-from engine.errors import EngineError, ProjectError
+from engine.errors import EngineError
 
 
 class Session:
@@ -103,9 +108,9 @@ class Session:
     Attributes:
         opened: What is open; None before.
         timeline, views, bookmarks: What the user looks at; the window may change them directly.
-        training, queue, clip_states, plan, regions, paths, history, usage, project_status: Status values, remade by
-            `poll` and `dispatch`. The plan is that of the next clip; None while something trains or nothing is left to
-            train.
+        training, queue, clip_states, plan, regions, paths, edits, history, usage, project_status: Status values,
+            remade by `poll` and `dispatch`. The plan is that of the next clip; None while something trains or nothing
+            is left to train.
         versions: What clips were before they were trained again.
         log: What program and training have said.
         question: What the user has to answer; None while there is nothing to ask.
@@ -114,6 +119,7 @@ class Session:
         synchronising: How far the cameras of the open capture are ahead of each other.
         exporting: What leaves the project for other programs: what is asked, and the queue.
         recent: What was opened lately.
+        files: Repairing, relocating and copying projects.
         doctor: What is wrong with the open capture, and what helps.
         notices: What the user has to know.
 
@@ -173,6 +179,8 @@ class Session:
             ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self.overlays.content)
         )
         self.selection = SelectionStatus()
+        self.editing = Edits(self.document, self.selecting)
+        self.edits: EditsStatus = self.editing.status()
         self.regions: RegionsStatus = self.marking.status([])
         self.paths: PathsStatus = self.camera_paths.status()
         self.history = HistoryStatus()
@@ -184,6 +192,10 @@ class Session:
             project_dir=project_dir,
             open_path=opener,
             refuse=self.opening.refuse,
+            ask=lambda asked, error: self.files.ask_about(asked, error),
+        )
+        self.files = ProjectFiles(
+            self._jobs, self.notices, ask=self._ask, open_project=self.dispatch, settle=self.document.settle
         )
         self.doctor = CaptureDoctor(self._jobs, self.notices, self.dispatch)
         self._attention = Attention()
@@ -279,9 +291,14 @@ class Session:
         match command:
             case commands.OpenCapture() | commands.OpenProject():
                 self.question = None
-                current = None if self.project is None else self.project.folder
+                current = None if self.project is None or not self.project.is_writable else self.project.folder
+                if command.choices != AS_USUAL:  # it may be the open one, in another way
+                    self.document.settle()
                 known = self._take_answers(command) if isinstance(command, commands.OpenCapture) else None
                 self.opener.open(command, current=current, recent=self.recent.entries, known=known)
+            case _ if isinstance(command, commands.FileCommand):
+                self.question = None
+                self.files.apply(command, self.project, is_training=live.is_busy)
             case commands.ForgetRecent(folder=folder):
                 self.recent.forget(Path(folder))
             case commands.CloseQuestion():
@@ -387,11 +404,16 @@ class Session:
                 self.selecting.apply(command)
             case _ if isinstance(command, commands.PathCommand):
                 self.camera_paths.apply(command, self.views, self.timeline)
-            case commands.Undo() | commands.Redo():
+            case _ if isinstance(command, commands.EditCommand):
+                self.editing.apply(command)
+            case commands.Undo() | commands.Redo() | commands.GoToStep():
                 with self.camera_paths.showing_change():
-                    (self.document.undo if isinstance(command, commands.Undo) else self.document.redo)()
+                    self.editing.go(_n_steps(command))
             case _:
                 raise TypeError(f"not a command: {command!r}")
+
+    def _ask(self, question: Question) -> None:
+        self.question = question
 
     def _ask_export(self) -> None:
         service = self.live_training.service
@@ -425,17 +447,11 @@ class Session:
     def _check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """See that nothing was learned with settings that change. Raises ProjectError."""
         opened = self.opened
-        if opened is None or before.settings == after.settings:
+        if opened is None:
             return
         if is_other_cut(before.settings, after.settings):
             self.live_training.check_idle()
-            check_settings(after.settings, opened.capture)
-            return
-        if opened.project.has_progress or self.live_training.is_busy:
-            raise ProjectError(
-                "What all clips share is fixed once training has begun.",
-                hint="What was learned with them would be worthless. Use another project folder for other values.",
-            )
+        check_change(opened.project, opened.capture, before, after, is_training=self.live_training.is_busy)
 
     def _follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """The document has changed: show what follows from it."""
@@ -445,6 +461,12 @@ class Session:
             if self.live_training.service is not None:
                 self.live_training.service.catalog.judge_anew()
             self._open_residuals(self.opened)
+        self._show_notes(after)
+
+    def _show_notes(self, document: ProjectDocument) -> None:
+        """Let the timeline show the document's markers, and views stand upright as it says."""
+        self.timeline.markers = Markers(document.markers)
+        self.views.set_scene_up(document.world.up)
 
     def _follow_settings(self) -> None:
         opened = self.opened
@@ -495,12 +517,13 @@ class Session:
         self._open_residuals(opened)
         self.doctor.open(opened)
         self.views.look_at(opened.rig)
+        self._show_notes(opened.project.document)
         self.bookmarks = Bookmarks()
         self._keep_recent()
         for sentence in opened.capture.warnings:
             self.notices.add("warn", "The capture is odd but usable", sentence)
-        if found.note is not None:
-            self.notices.add(*found.note)
+        for note in found.notes:
+            self.notices.add(*note)
         if self._is_preloading:
             self.playback.build_first_cloud(self._jobs)
 
@@ -617,6 +640,7 @@ class Session:
         self.regions = self.marking.status(self.clip_states)
         self.lead_view()
         self.paths, self.history = self.camera_paths.status(), self.document.status()
+        self.edits = self.editing.status()
         self.selection = self.selecting.status()
         self.plan, self.queue = live.plan(), live.queue()
         self.usage = self._usage.sample(None if live.service is None else live.service.worker_pid)
@@ -788,6 +812,12 @@ class Session:
         return None if camera_index is None else self.residuals.heat(self.timeline, camera_index, kind)
 
 
+def _n_steps(command: commands.Undo | commands.Redo | commands.GoToStep) -> int:
+    if isinstance(command, commands.GoToStep):
+        return command.n_steps
+    return -1 if isinstance(command, commands.Undo) else 1
+
+
 _SETTING_NAMES: dict[type, str] = {
     commands.SetHoldout: "choose held-out cameras",
     commands.SetClipLength: "change the clip length",
@@ -814,6 +844,9 @@ _TITLES: dict[type, str] = {
     commands.RemoveRegion: "The region cannot be removed",
     commands.Undo: "The last change cannot be taken back",
     commands.Redo: "The change cannot be made again",
+    commands.GoToStep: "That step of the history cannot be reached",
+    **dict.fromkeys(get_args(commands.EditCommand), "That cannot be edited"),
     **dict.fromkeys(get_args(commands.PathCommand), "That cannot be done with the camera path"),
     commands.CorrectCapture: "The capture cannot be corrected",
+    **dict.fromkeys(get_args(commands.FileCommand), "That cannot be done with the project"),
 }

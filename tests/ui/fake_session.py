@@ -12,11 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from app.background.log_reader import LogLine
+from app.document.project_document import ProjectDocument
+from app.document.project_settings import ProjectSettings
 from app.export.export_choices import ExportChoices
 from app.export.export_plan import ExportPlan
 from app.export.export_status import ExportStatus
 from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
 from app.playback.bookmarks import Bookmarks
+from app.playback.markers import Markers
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
@@ -31,7 +34,9 @@ from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands, path_commands
 from app.session.calibration_page import CalibrationPage
 from app.session.doctor_status import DoctorStatus
-from app.session.edit_status import HistoryStatus, PathsStatus
+from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
+from app.session.editing.edit_commands import EditCommand
+from app.session.editing.edits import changed, edits_status
 from app.session.editing.selecting import SelectionStatus
 from app.session.exporting import ExportPage
 from app.session.marking import after_marking
@@ -233,6 +238,10 @@ class FakeSession:
         self.selection = SelectionStatus()
         self.regions = RegionsStatus(why_not="Open a capture first.")
         self.paths, self.history = PathsStatus(why_not="Open a capture first."), HistoryStatus()
+        self.edits, self.content = (
+            EditsStatus(why_not="Open a capture first."),
+            ProjectDocument(ProjectSettings("", "")),
+        )
         self.capture: FakeCapture | None = None
         self.rig: CameraRig = NO_CAMERAS
         self.clips: list[Clip] = []
@@ -323,6 +332,7 @@ class FakeSession:
         self.timeline = Timeline(self.clips, fps=capture.fps)
         self.views.look_at(capture.rig)
         self.paths, self.history = PathsStatus(can_edit=True), HistoryStatus()
+        self.edits = EditsStatus(can_edit=True)
         self.regions = RegionsStatus(can_mark=True, effect="Marks apply to clips whose training starts from now on.")
 
     def dispatch(self, command: commands.Command) -> None:
@@ -374,6 +384,11 @@ class FakeSession:
                 result = edited(self.paths, command, self.view, self.timeline)
                 self.paths = PathsStatus(result.paths, result.chosen, result.chosen_key, can_edit=True)
                 self.history = HistoryStatus(undo=result.name)
+            case _ if isinstance(command, EditCommand):
+                change = changed(self.content, command)
+                self.content, self.edits = change.document, edits_status(change.document)
+                self.history = HistoryStatus(undo=change.name, past=(*self.history.past, change.name))
+                self.timeline.markers = Markers(change.document.markers)
             case commands.TrainClip(clip_index=clip_index, is_confirmed=False):
                 if self.clip_states[clip_index].state == "trained":
                     self.question = RetrainQuestion(clip_index, False, "", 29.7, (), None, True, None, None)
