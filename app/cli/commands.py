@@ -89,6 +89,7 @@ COMMANDS = {
         "list what clips were before they were trained again, bring it back, make room on the disk",
         "app.cli.versions_command",
     ),
+    "exclude": Command("leave cameras and pictures out of training", "app.cli.exclude_command"),
     "edit": Command(
         "list and change the edits of a project, and take steps back", "app.cli.edit_command", "Nothing was changed."
     ),
