@@ -9,6 +9,7 @@ from typing import Any
 
 from app.cli.arguments import parse_cameras, parse_range
 from app.cli.training_settings import overrides_of
+from app.document.document_store import DocumentStore
 from app.document.history import DocumentHistory
 from app.document.project_document import ProjectDocument
 from app.project.project import (
@@ -44,7 +45,8 @@ def open_for_training(options: argparse.Namespace) -> tuple[Project, Capture]:
 def project_to_plan(options: argparse.Namespace) -> tuple[Project, Capture]:
     """Likewise, for looking only: nothing is made, changed or locked."""
     settings, stored, capture = _chosen_settings(options)
-    project = _unlocked(options.project, settings)
+    document = None if stored is None else DocumentStore(options.project).read().present
+    project = _unlocked(options.project, settings, document)
     if stored is not None:
         _check_changes(options, _unlocked(options.project, stored), settings)
     return project, capture
@@ -97,8 +99,9 @@ def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, Proj
     return settings, stored, capture
 
 
-def _unlocked(folder: Path, settings: ProjectSettings) -> Project:
-    return Project(folder, DocumentHistory(ProjectDocument(settings)), None)
+def _unlocked(folder: Path, settings: ProjectSettings, document: ProjectDocument | None = None) -> Project:
+    known = ProjectDocument(settings) if document is None else replace(document, settings=settings)
+    return Project(folder, DocumentHistory(known), None)
 
 
 def _check_changes(options: argparse.Namespace, project: Project, settings: ProjectSettings) -> None:

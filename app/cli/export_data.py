@@ -18,6 +18,7 @@ FORMATS = {
 
 
 OPTIONS = ()
+TAKES_EDITS = False
 
 
 def takes_frames(format_name: str) -> bool:

@@ -23,6 +23,7 @@ FORMATS = {
 
 
 OPTIONS = ("part", "up", "down", "scale", "axes", "scene_up")
+TAKES_EDITS = True
 
 
 def takes_frames(format_name: str) -> bool:
@@ -77,4 +78,5 @@ def export(
         scale=options.scale,
         axes=options.axes,
         scene_up=None if options.scene_up is None else tuple(options.scene_up),
+        has_edits=not options.without_edits,
     )

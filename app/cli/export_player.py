@@ -18,6 +18,7 @@ FORMATS: dict[str, str] = {}
 
 
 OPTIONS = ("data_folder", "one_file")
+TAKES_EDITS = True
 
 
 def takes_frames(format_name: str) -> bool:
@@ -43,7 +44,11 @@ def export(
 ) -> ExportResult:
     """Write the page; says before how large it becomes. Raises ProjectError."""
     kind, job = named_job(
-        NAME, options.player, frames=frames, has_folder=False if options.one_file else options.data_folder
+        NAME,
+        options.player,
+        frames=frames,
+        has_folder=False if options.one_file else options.data_folder,
+        has_edits=not options.without_edits,
     )
     work = KINDS[kind].load()
     for said in work.estimate(opened, job).lines:

@@ -81,9 +81,9 @@ def describe_gate(project: Project) -> dict[str, Any]:
         clips that cannot be read, each with path and reason.
     """
     clips, damaged = [], []
-    for path in sorted((project.folder / "clips").glob("*.safetensors")):
+    for clip_index, path in project.finished_clips():
         try:
-            clips.append(_describe_clip(read_clip_state(path)))
+            clips.append(_describe_clip(read_clip_state(path), clip_index))
         except ProjectError as error:
             damaged.append({"path": str(path), "reason": error.message})
         except (KeyError, TypeError, ValueError, IndexError) as error:  # whole, but not as this version writes them
@@ -98,10 +98,10 @@ def describe_gate(project: Project) -> dict[str, Any]:
     }
 
 
-def _describe_clip(state: ClipState) -> dict[str, Any]:
+def _describe_clip(state: ClipState, clip_index: int) -> dict[str, Any]:
     records = state.anchors
     return {
-        "clip_index": state.header.clip_index,
+        "clip_index": clip_index,
         "role": state.header.role,
         "sets": {role: len(record.own) for role, record in sorted(records.items()) if record.own is not None},
         "n_hidden": sum(int(record.is_hidden.sum()) for record in records.values() if record.is_hidden is not None),

@@ -6,6 +6,7 @@ from collections.abc import Hashable
 from dataclasses import dataclass, replace
 
 from app.document.project_document import ProjectDocument
+from app.document.project_settings import ProjectSettings
 
 MAX_STEPS = 500
 """Steps that can be taken back; the oldest go."""
@@ -37,7 +38,18 @@ class Redone:
     """The step that was taken back last was done again."""
 
 
-Event = Changed | Undone | Redone
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """The capture is found in another place, or may follow links now. Not a step: undo does not take it back.
+
+    Attributes:
+        settings: Of the document, with the new place.
+    """
+
+    settings: ProjectSettings
+
+
+Event = Changed | Undone | Redone | Placed
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,15 +104,26 @@ class DocumentHistory:
                 return self._undone() if self.past else self
             case Redone():
                 return self._redone() if self.future else self
+            case Placed(settings=settings):
+                return replace(self, present=replace(self.present, settings=settings))
 
     def _undone(self) -> DocumentHistory:
         step = self.past[-1]
         back = Step(step.name, self.present)
-        return DocumentHistory(step.document, _closed(self.past[:-1]), (*self.future, back))
+        return DocumentHistory(self._in_place(step.document), _closed(self.past[:-1]), (*self.future, back))
 
     def _redone(self) -> DocumentHistory:
         step = self.future[-1]
-        return DocumentHistory(step.document, (*_closed(self.past), Step(step.name, self.present)), self.future[:-1])
+        past = (*_closed(self.past), Step(step.name, self.present))
+        return DocumentHistory(self._in_place(step.document), past, self.future[:-1])
+
+    def _in_place(self, document: ProjectDocument) -> ProjectDocument:
+        """A document of another time, with the capture where it is now."""
+        now, then = self.present.settings, document.settings
+        if (now.capture, now.follow_links) == (then.capture, then.follow_links):
+            return document
+        settings = replace(then, capture=now.capture, follow_links=now.follow_links)
+        return replace(document, settings=settings)
 
 
 def _closed(steps: tuple[Step, ...]) -> tuple[Step, ...]:

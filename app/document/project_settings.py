@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 from typing import Annotated
 
 from msgspec import Meta
 
-from engine.capture.clip import Clip, split_clips
+from engine.capture.clip import Clip, cut_clips, split_clips
 from engine.clip_files.clip_header import SettingValue
+from engine.errors import ProjectError
 from engine.training.config import TrainConfig, config_of
 
 
@@ -27,6 +29,8 @@ class ProjectSettings:
         reference_clip: Index of the clip that the others inherit from.
         follow_links: Whether the user allowed the capture's files to lie outside of its folder.
         frames: First frame of the capture that is worked on, and the one after the last; None for all.
+        clip_bounds: Where clips were split or merged: the first frame of every clip, and at the end the number of
+            frames. None where every clip has clip_length frames, the last one what is left.
     """
 
     capture: Annotated[str, Meta(pattern=r"\A[^\0]*\Z")]
@@ -40,10 +44,38 @@ class ProjectSettings:
     follow_links: bool = False
     frames: tuple[Annotated[int, Meta(ge=0, lt=2**31)], Annotated[int, Meta(ge=1, lt=2**31)]] | None = None
 
+    clip_bounds: tuple[Annotated[int, Meta(ge=0, lt=2**31)], ...] | None = None
+
     def clips(self, n_frames: int) -> list[Clip]:
-        """The clips of a capture of that many frames."""
-        return split_clips(n_frames, n_frames if self.config().field == "joint" else self.clip_length)
+        """The clips of a capture of that many frames.
+
+        Raises:
+            ProjectError: The clips were cut from a capture of another length.
+        """
+        if self.config().field == "joint":
+            return split_clips(n_frames, n_frames)
+        if self.clip_bounds is None:
+            return split_clips(n_frames, self.clip_length)
+        if self.clip_bounds[-1] != n_frames:
+            raise ProjectError(
+                f"The clips of the project end at frame {self.clip_bounds[-1]}, the capture at frame {n_frames}.",
+                hint="Put the original capture back, or make a new project.",
+            )
+        return cut_clips(self.clip_bounds, self.clip_length)
 
     def config(self) -> TrainConfig:
         """The training settings. Raises ProjectError for an unknown one or a value that it may not have."""
         return config_of(self.overrides)
+
+
+def check_bounds(clip_bounds: tuple[int, ...] | None) -> None:
+    """See that clips can be cut so.
+
+    Raises:
+        ProjectError: They do not rise from 0.
+    """
+    if clip_bounds is None:
+        return
+    rises = all(start < stop for start, stop in itertools.pairwise(clip_bounds))
+    if len(clip_bounds) < 2 or clip_bounds[0] != 0 or not rises:
+        raise ProjectError("The bounds of the clips have to rise from 0 to the number of frames.")

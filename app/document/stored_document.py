@@ -10,7 +10,7 @@ from msgspec import Struct, to_builtins
 
 from app.document.camera_paths import StoredPath, check_paths, stored_paths, to_path
 from app.document.project_document import Exclusions, Label, Marker, ProjectDocument, World
-from app.document.project_settings import ProjectSettings
+from app.document.project_settings import ProjectSettings, check_bounds
 from engine.editing.edit import Edit, Picked
 from engine.editing.picks import unpack_rows
 from engine.errors import ProjectError
@@ -65,6 +65,7 @@ def document_of(content: Any) -> ProjectDocument:
     stored = to_type(content, _Stored)
     settings = replace(stored.settings, overrides=without_retired(stored.settings.overrides))
     settings.config()
+    check_bounds(settings.clip_bounds)
     paths = tuple(to_path(path) for path in stored.camera_paths)
     check_paths(paths)
     document = ProjectDocument(

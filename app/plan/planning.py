@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from app.background.kernels import COMPILING
@@ -94,7 +95,8 @@ def _measured(project: Project, clip_index: int) -> MeasuredClip | None:
     if found is None or found.header is None:
         return None
     compiling_s = found.header.figures.stages_s.get(COMPILING, 0.0)
-    return measured_clip(found.header, disk_mb=found.n_bytes / 1e6, uncounted_s=compiling_s)
+    known = measured_clip(found.header, disk_mb=found.n_bytes / 1e6, uncounted_s=compiling_s)
+    return replace(known, clip_index=clip_index)  # a file keeps its number when clips before it are split or merged
 
 
 # ---------------------------------------------------------------- for the window

@@ -2,7 +2,9 @@
 
 project.json                 the document: settings, regions, camera paths, edits and so on, see ProjectDocument
 clips/0000.safetensors       finished clips
+clips/000030-000035.safetensors  one of frames 30 to 34, after a split or merge; see app.project.clip_names
 versions/0000/               what was trained before it was trained again
+damaged/0000-1.safetensors   damaged files that were put aside
 checkpoints/0000.safetensors unfinished clips: everything needed to go on
 live/                        snapshots of the running training; swept when the project is opened for writing
 prep/                        what clips share, such as backgrounds
@@ -23,9 +25,10 @@ from typing import Any
 
 from app.document.document_file import PROJECT_FILE, write_document
 from app.document.document_store import DocumentStore
-from app.document.history import Changed, DocumentHistory, Event
+from app.document.history import Changed, DocumentHistory, Event, Placed
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
+from app.project.clip_names import clip_name, finished_files
 from app.project.header_cache import HeaderCache
 from app.project.lock import ProcessLock, is_process_alive
 from engine.capture.capture import Capture
@@ -87,21 +90,36 @@ class Project:
         """A rough cloud to look at before anything is trained."""
         return self.prep_dir / "first_cloud.safetensors"
 
+    def clip_name(self, clip_index: int) -> str:
+        """The name of a clip's files, see app.project.clip_names."""
+        return clip_name(clip_index, self.settings.clip_bounds, self.settings.clip_length)
+
+    def frames_of(self, clip_index: int) -> tuple[int, int | None]:
+        """First frame of a clip, and one past its last; None of the last where only the capture knows it."""
+        bounds, length = self.settings.clip_bounds, self.settings.clip_length
+        if bounds is not None and 0 <= clip_index < len(bounds) - 1:
+            return bounds[clip_index], bounds[clip_index + 1]
+        return clip_index * length, None if self.settings.config().field == "joint" else (clip_index + 1) * length
+
+    def finished_clips(self) -> list[tuple[int, Path]]:
+        """Index and file of every finished clip, damaged ones included, in order."""
+        return finished_files(self.folder, self.settings.clip_bounds, self.settings.clip_length)
+
     def clip_path(self, clip_index: int) -> Path:
         """A finished clip."""
-        return self.folder / "clips" / f"{clip_index:04d}.safetensors"
+        return self.folder / "clips" / f"{self.clip_name(clip_index)}.safetensors"
 
     def checkpoint_path(self, clip_index: int) -> Path:
         """An unfinished clip."""
-        return self.folder / "checkpoints" / f"{clip_index:04d}.safetensors"
+        return self.folder / "checkpoints" / f"{self.clip_name(clip_index)}.safetensors"
 
     def metrics_path(self, clip_index: int) -> Path:
         """Curves of a finished clip."""
-        return self.folder / "metrics" / f"{clip_index:04d}.jsonl"
+        return self.folder / "metrics" / f"{self.clip_name(clip_index)}.jsonl"
 
     def unfinished_metrics_path(self, clip_index: int) -> Path:
         """Curves of a training that is not finished. Beside the others, so that those of an earlier one stand."""
-        return self.folder / "metrics" / f"{clip_index:04d}.unfinished.jsonl"
+        return self.folder / "metrics" / f"{self.clip_name(clip_index)}.unfinished.jsonl"
 
     def curve_path(self, clip_index: int, *, is_finished: bool) -> Path:
         """Curves of the finished clip, or of its training that was stopped."""
@@ -112,7 +130,7 @@ class Project:
 
     def log_path(self, clip_index: int) -> Path:
         """Log of a clip's worker."""
-        return self.folder / "logs" / f"clip-{clip_index:04d}.log"
+        return self.folder / "logs" / f"clip-{self.clip_name(clip_index)}.log"
 
     def is_trained(self, clip_index: int) -> bool:
         """Whether the clip is finished."""
@@ -183,8 +201,12 @@ class Project:
         self.history = history
 
     def update(self, settings: ProjectSettings) -> None:
-        """Replace the settings; see `change`."""
-        self.change(replace(self.document, settings=settings), "change settings")
+        """Replace the settings; see `change`. Another place of the capture alone is not a step of the history."""
+        before = self.settings
+        if replace(settings, capture=before.capture, follow_links=before.follow_links) == before:
+            self.happen(Placed(settings))
+        else:
+            self.change(replace(self.document, settings=settings), "change settings")
 
     def discard_progress(self, clip_index: int) -> None:
         """Forget the unfinished training of a clip; a finished clip and its curves stay."""
@@ -209,7 +231,7 @@ class Project:
 
     def remove_files(self) -> None:
         """Take back a project that has learned nothing: its own files and folders go, other things stay."""
-        for name in ("clips", "versions", "checkpoints", "live", "prep", "metrics", "logs"):
+        for name in ("clips", "versions", "damaged", "checkpoints", "live", "prep", "metrics", "logs"):
             shutil.rmtree(self.folder / name, ignore_errors=True)
         (self.folder / PROJECT_FILE).unlink(missing_ok=True)
 

@@ -183,7 +183,9 @@ class ScriptedProject:
     def _happen(self, event: Event) -> None:
         self._check_open()
         self._project.check_writable()
-        check_change(self._project, self.document, self.history.after(event).present)
+        after = self.history.after(event).present
+        if after.settings != self.document.settings:
+            check_change(self._project, self.document, after, self.capture)
         self._project.happen(event)
 
     # ---------------------------------------------------------------- edits

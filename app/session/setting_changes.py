@@ -22,7 +22,7 @@ def changed_settings(settings: ProjectSettings, command: SettingCommand, rig: Ca
         case SetHoldout(camera_indices=indices):
             return replace(settings, holdout=tuple(rig.names[i] for i in sorted(set(indices)) if 0 <= i < len(rig)))
         case SetClipLength(n_frames=n_frames):
-            return replace(settings, clip_length=int(n_frames))
+            return replace(settings, clip_length=int(n_frames), clip_bounds=None)
         case SetTrainSetting(name=name, value=value):
             overrides = {**settings.overrides, name: value}
         case SetPreset(name=name):

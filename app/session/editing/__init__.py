@@ -1,1 +1,1 @@
-"""What the user edits: the document of the open project, its history, and what is selected."""
+"""Editing in the window: what is selected, and what becomes of it."""

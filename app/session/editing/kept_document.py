@@ -55,6 +55,7 @@ class KeptDocument:
         self._problem = ""
         self._lock = threading.Lock()
         self._pending: list[Event] = []
+        self._told: tuple[DocumentHistory | None, HistoryStatus] = (None, HistoryStatus())
 
     @property
     def project(self) -> Project | None:
@@ -71,7 +72,10 @@ class KeptDocument:
         if self._project is None:
             return HistoryStatus()
         history = self._project.history
-        return HistoryStatus(history.undo_name, history.redo_name)
+        if history is not self._told[0]:  # asked at every turn of the window's loop
+            past, future = (tuple(step.name for step in steps) for steps in (history.past, history.future[::-1]))
+            self._told = history, HistoryStatus(history.undo_name, history.redo_name, past, future)
+        return self._told[1]
 
     def open(self, project: Project) -> None:
         """Take another project, with what it holds."""

@@ -42,7 +42,8 @@ def test_new_edits_lie_on_top_and_have_a_number_of_their_own() -> None:
     document = _three()
     assert [edit.edit_id for edit in document.edits] == [1, 2, 3]
     assert document.edits[2].target == Everything()
-    assert document.edits[0].is_inverted and document.edits[1].scope == Scope(3, 7)
+    assert document.edits[0].is_inverted
+    assert document.edits[1].scope == Scope(3, 7)
     without = change.remove_edit(document, 2)
     assert [edit.edit_id for edit in without.edits] == [1, 3]
     assert change.add_edit(without, Hide()).edits[-1].edit_id == 4
@@ -66,7 +67,8 @@ def test_one_edit_changes_and_the_others_stay() -> None:
     assert [edit.is_on for edit in off.edits] == [True, False, True]
     assert change.toggle_edit(off, 2) == document == change.toggle_edit(document, 2, True)
     renamed = change.rename_edit(document, 2, "  50 % ## floaters ")
-    assert renamed.edits[1].name == "50 % ## floaters" and renamed.edits[::2] == document.edits[::2]
+    assert renamed.edits[1].name == "50 % ## floaters"
+    assert renamed.edits[::2] == document.edits[::2]
     assert change.set_scope(document, 2, Scope(4)).edits[1].scope == Scope(4)
     assert not change.invert_edit(document, 1).edits[0].is_inverted
     assert change.clear_edits(document).edits == ()
