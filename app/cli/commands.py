@@ -82,15 +82,15 @@ COMMANDS = {
         "app.cli.convert_command",
         "Nothing was written.",
     ),
-    "edit": Command(
-        "list and change the edits of a project, and take steps back", "app.cli.edit_command", "Nothing was changed."
-    ),
     "clips": Command(
         "list the clips of a project, split and merge them, choose the reference", "app.cli.clips_command"
     ),
     "versions": Command(
         "list what clips were before they were trained again, bring it back, make room on the disk",
         "app.cli.versions_command",
+    ),
+    "edit": Command(
+        "list and change the edits of a project, and take steps back", "app.cli.edit_command", "Nothing was changed."
     ),
     "gate": Command("say what is static in a project and why, and overrule it", "app.cli.gate_command"),
     "doctor": Command(

@@ -77,6 +77,6 @@ def export(
         up=f"+{options.up}" if options.up else f"-{options.down}" if options.down else None,
         scale=options.scale,
         axes=options.axes,
-        scene_up=None if options.scene_up is None else tuple(options.scene_up),
         has_edits=not options.without_edits,
+        scene_up=None if options.scene_up is None else tuple(options.scene_up),
     )

@@ -11,35 +11,31 @@ from engine.capture.capture import Capture
 from engine.errors import ProjectError
 
 
+def check_change(
+    project: Project, capture: Capture, before: ProjectDocument, after: ProjectDocument, *, is_training: bool = False
+) -> None:
+    """See that settings fit the capture, and that nothing was learned with those that change.
+
+    Args:
+        is_training: Whether a clip trains now.
+    Raises:
+        ProjectError: They do not, or something was.
+    """
+    if before.settings == after.settings:
+        return
+    check_settings(after.settings, capture)
+    if is_other_cut(before.settings, after.settings):
+        return
+    if project.has_progress or is_training:
+        raise ProjectError(
+            "What all clips share is fixed once training has begun.",
+            hint="What was learned with them would be worthless. Use another project folder for other values.",
+        )
+
+
 def is_other_cut(before: ProjectSettings, after: ProjectSettings) -> bool:
     """Whether nothing differs but where clips begin and which is the reference: what may change at any time, because
     clips that do not fit keep their files and are out of use or out of date."""
     return (
         before != after and replace(before, clip_bounds=after.clip_bounds, reference_clip=after.reference_clip) == after
     )
-
-
-def check_change(
-    project: Project,
-    before: ProjectDocument,
-    after: ProjectDocument,
-    capture: Capture,
-    *,
-    is_training: bool = False,
-) -> None:
-    """See that nothing was learned with settings that change, and that new ones fit.
-
-    Args:
-        capture: Of the project.
-        is_training: Whether a clip trains now.
-    Raises:
-        ProjectError: Something was, or they do not.
-    """
-    if before.settings == after.settings:
-        return
-    if not is_other_cut(before.settings, after.settings) and (project.has_progress or is_training):
-        raise ProjectError(
-            "What all clips share is fixed once training has begun.",
-            hint="What was learned with them would be worthless. Use another project folder for other values.",
-        )
-    check_settings(after.settings, capture)

@@ -184,8 +184,8 @@ class ScriptedProject:
         self._check_open()
         self._project.check_writable()
         after = self.history.after(event).present
-        if after.settings != self.document.settings:
-            check_change(self._project, self.document, after, self.capture)
+        if after.settings != self.document.settings:  # the capture may be gone, which is nothing to an edit
+            check_change(self._project, self.capture, self.document, after)
         self._project.happen(event)
 
     # ---------------------------------------------------------------- edits

@@ -11,9 +11,11 @@ from pathlib import Path
 from app.calibration.job import CalibrationRequest
 from app.export.export_choices import ExportChoices
 from app.project.opening_answers import OpeningAnswers
+from app.project.project_choices import AS_USUAL, ProjectChoices
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, GoToStep
 from app.session.editing.selection_commands import SelectionCommand
+from app.session.files.file_commands import FileCommand
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
@@ -34,6 +36,8 @@ class OpenCapture:
     """Report what it is, and ask what a project of it begins with, where there is none; or why it does not open."""
     answers: OpeningAnswers | None = None
     """What a new project begins with; None takes what suits."""
+    choices: ProjectChoices = AS_USUAL
+    """How its project is opened."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +45,7 @@ class OpenProject:
     """Open a project folder and the capture it names."""
 
     path: Path
+    choices: ProjectChoices = AS_USUAL
 
 
 @dataclass(frozen=True, slots=True)
@@ -458,6 +463,7 @@ ExportCommand = (
 Command = (
     OpenCapture
     | OpenProject
+    | FileCommand
     | TrainNextClip
     | QueueCommand
     | ClipCommand

@@ -35,6 +35,7 @@ from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.opening_answers import answers_to_keep
 from app.project.project import Project, check_settings
+from app.project.project_choices import AS_USUAL
 from app.project.recents import project_name
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
@@ -56,6 +57,7 @@ from app.session.editing.kept_document import KeptDocument
 from app.session.editing.selecting import Selecting, SelectionStatus
 from app.session.editing.shown_to_select import ShownToSelect
 from app.session.exporting import Exporting
+from app.session.files.project_files import ProjectFiles
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
@@ -114,6 +116,7 @@ class Session:
         synchronising: How far the cameras of the open capture are ahead of each other.
         exporting: What leaves the project for other programs: what is asked, and the queue.
         recent: What was opened lately.
+        files: Repairing, relocating and copying projects.
         doctor: What is wrong with the open capture, and what helps.
         notices: What the user has to know.
 
@@ -186,6 +189,10 @@ class Session:
             project_dir=project_dir,
             open_path=opener,
             refuse=self.opening.refuse,
+            ask=lambda asked, error: self.files.ask_about(asked, error),
+        )
+        self.files = ProjectFiles(
+            self._jobs, self.notices, ask=self._ask, open_project=self.dispatch, settle=self.document.settle
         )
         self.doctor = CaptureDoctor(self._jobs, self.notices, self.dispatch)
         self._attention = Attention()
@@ -275,9 +282,14 @@ class Session:
         match command:
             case commands.OpenCapture() | commands.OpenProject():
                 self.question = None
-                current = None if self.project is None else self.project.folder
+                current = None if self.project is None or not self.project.is_writable else self.project.folder
+                if command.choices != AS_USUAL:  # it may be the open one, in another way
+                    self.document.settle()
                 known = self._take_answers(command) if isinstance(command, commands.OpenCapture) else None
                 self.opener.open(command, current=current, recent=self.recent.entries, known=known)
+            case _ if isinstance(command, commands.FileCommand):
+                self.question = None
+                self.files.apply(command, self.project, is_training=live.is_busy)
             case commands.ForgetRecent(folder=folder):
                 self.recent.forget(Path(folder))
             case commands.CloseQuestion():
@@ -388,6 +400,9 @@ class Session:
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
+    def _ask(self, question: Question) -> None:
+        self.question = question
+
     def _ask_export(self) -> None:
         service = self.live_training.service
         catalog = () if service is None else service.catalog
@@ -424,7 +439,7 @@ class Session:
             return
         if is_other_cut(before.settings, after.settings):
             self.live_training.check_idle()
-        check_change(opened.project, before, after, opened.capture, is_training=self.live_training.is_busy)
+        check_change(opened.project, opened.capture, before, after, is_training=self.live_training.is_busy)
 
     def _follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """The document has changed: show what follows from it."""
@@ -491,8 +506,8 @@ class Session:
         self._keep_recent()
         for sentence in opened.capture.warnings:
             self.notices.add("warn", "The capture is odd but usable", sentence)
-        if found.note is not None:
-            self.notices.add(*found.note)
+        for note in found.notes:
+            self.notices.add(*note)
         if self._is_preloading:
             self.playback.build_first_cloud(self._jobs)
 
@@ -816,4 +831,5 @@ _TITLES: dict[type, str] = {
     **dict.fromkeys(get_args(commands.EditCommand), "That cannot be edited"),
     **dict.fromkeys(get_args(commands.PathCommand), "That cannot be done with the camera path"),
     commands.CorrectCapture: "The capture cannot be corrected",
+    **dict.fromkeys(get_args(commands.FileCommand), "That cannot be done with the project"),
 }
