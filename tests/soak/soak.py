@@ -265,6 +265,8 @@ def main() -> int:
             while time.monotonic() - started_s < 60 * options.minutes:
                 held = soak.round()
                 if (len(soak.samples) - 1) % options.every == 0:
+                    minutes = (time.monotonic() - started_s) / 60
+                    print(f"{minutes:6.1f} min, round {len(soak.samples)}: {held}", flush=True)
         finally:
             soak.close()
         minutes = (time.monotonic() - started_s) / 60

@@ -95,10 +95,10 @@ def test_edits_are_steps_that_can_be_taken_back(trained):
         project.move_edit(3, 0)
         project.remove_edit(2)
         assert [(edit.edit_id, edit.is_on) for edit in project.edits] == [(3, True), (1, False)]
-        assert project.undo() == "remove expose everything by +0.5 EV"
-        assert project.undo() == "move crop to sphere of radius 1"
+        assert project.undo() == "remove edit: expose everything by +0.5 EV"
+        assert project.undo() == "reorder edit: crop to sphere of radius 1"
         assert [edit.edit_id for edit in project.edits] == [1, 2, 3]
-        assert project.redo() == "move crop to sphere of radius 1"
+        assert project.redo() == "reorder edit: crop to sphere of radius 1"
         project.replace_edit(replace_scope(first))
         kept = project.document
     assert open_project(trained, is_writable=False).document == kept
