@@ -412,7 +412,7 @@ class Session:
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
-    def _ask(self, question: Question) -> None:
+    def _ask(self, question: Question | None) -> None:
         self.question = question
 
     def _ask_export(self) -> None:
