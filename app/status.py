@@ -250,6 +250,7 @@ class QueueStatus:
         is_ending_after: Whether they are held once the clip that trains has ended.
         queued: The clip that trains and those that wait; None without any.
         everything: All clips that are not finished, whether they wait or not; None where every clip is.
+        stale: Clips that are out of date and do not wait: what training them again takes; None where there are none.
         progress: Share of the steps of the present sequence that is done, 0..1.
         n_done: Clips of that sequence that have ended.
         free_mb: Room on the disk of the project, 10^6 bytes; None where not known.
@@ -262,6 +263,7 @@ class QueueStatus:
     is_ending_after: bool = False
     queued: SequenceForecast | None = None
     everything: SequenceForecast | None = None
+    stale: SequenceForecast | None = None
     progress: float = 0.0
     n_done: int = 0
     free_mb: float | None = None
@@ -306,6 +308,23 @@ class VersionStatus:
     n_bytes: int = 0
     differences: tuple[tuple[str, str, str], ...] = ()
     why_not: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class DependencyStatus:
+    """What a clip depends on, and what depends on it.
+
+    Attributes:
+        needs: Clips that it starts from.
+        needed_by: Clips that start from it, whether they are trained or not.
+        trained_on_it: Finished clips that were trained on it as it is now.
+        outdated_seconds: What training these again is expected to take; None where nobody can know.
+    """
+
+    needs: tuple[int, ...] = ()
+    needed_by: tuple[int, ...] = ()
+    trained_on_it: tuple[int, ...] = ()
+    outdated_seconds: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

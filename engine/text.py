@@ -38,3 +38,10 @@ def duration_text(seconds: float | None) -> str:
 
 def _escaped(sign: str) -> str:
     return sign.encode("unicode_escape").decode("ascii")
+
+
+def size_text(megabytes: float) -> str:
+    """An amount of memory or disk, in two or three digits."""
+    if megabytes >= 999.5:
+        return f"{megabytes / 1e3:.1f} GB"
+    return f"{megabytes:.0f} MB" if megabytes >= 9.95 else f"{megabytes:.1f} MB"

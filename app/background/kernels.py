@@ -68,3 +68,13 @@ def prepare_decoding() -> None:
         import engine.model.clip_model  # noqa: F401
 
         use_threads(1)
+
+
+def prepare_selecting() -> None:
+    """Once on a thread that selects: its kernels, compiled before or now."""
+    warm_cache()
+    with uncollected():
+        if is_cache_warm():
+            from engine.editing.selection.warm import warm_up
+
+            warm_up()

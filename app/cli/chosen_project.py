@@ -9,6 +9,9 @@ from typing import Any
 
 from app.cli.arguments import parse_cameras, parse_range
 from app.cli.training_settings import overrides_of
+from app.document.document_store import DocumentStore
+from app.document.history import DocumentHistory
+from app.document.project_document import ProjectDocument
 from app.project.project import (
     PROJECT_FILE,
     Project,
@@ -42,9 +45,10 @@ def open_for_training(options: argparse.Namespace) -> tuple[Project, Capture]:
 def project_to_plan(options: argparse.Namespace) -> tuple[Project, Capture]:
     """Likewise, for looking only: nothing is made, changed or locked."""
     settings, stored, capture = _chosen_settings(options)
-    project = Project(options.project, settings, None)
+    document = None if stored is None else DocumentStore(options.project).read().present
+    project = _unlocked(options.project, settings, document)
     if stored is not None:
-        _check_changes(options, Project(options.project, stored, None), settings)
+        _check_changes(options, _unlocked(options.project, stored), settings)
     return project, capture
 
 
@@ -93,6 +97,11 @@ def _chosen_settings(options: argparse.Namespace) -> tuple[ProjectSettings, Proj
     settings = replace(stored, **changes)
     check_settings(settings, capture)
     return settings, stored, capture
+
+
+def _unlocked(folder: Path, settings: ProjectSettings, document: ProjectDocument | None = None) -> Project:
+    known = ProjectDocument(settings) if document is None else replace(document, settings=settings)
+    return Project(folder, DocumentHistory(known), None)
 
 
 def _check_changes(options: argparse.Namespace, project: Project, settings: ProjectSettings) -> None:

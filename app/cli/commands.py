@@ -82,6 +82,13 @@ COMMANDS = {
         "app.cli.convert_command",
         "Nothing was written.",
     ),
+    "clips": Command(
+        "list the clips of a project, split and merge them, choose the reference", "app.cli.clips_command"
+    ),
+    "versions": Command(
+        "list what clips were before they were trained again, bring it back, make room on the disk",
+        "app.cli.versions_command",
+    ),
     "gate": Command("say what is static in a project and why, and overrule it", "app.cli.gate_command"),
     "doctor": Command(
         "look at this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.doctor_command"

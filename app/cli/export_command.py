@@ -20,7 +20,7 @@ from engine.storage.json_files import json_text
 EXPORT_SCHEMA = 1
 KINDS: tuple[ModuleType, ...] = (export_gaussians, export_data, export_player)
 """Modules with `FORMATS`, names for --format with what each is; `add_arguments(command)`, options of their own, which
-`OPTIONS` names; `takes_frames(format)`; and
+`OPTIONS` names; `TAKES_EDITS`, whether edits change what is written; `takes_frames(format)`; and
 `export(opened, options, frames, report)`, which writes and returns an ExportResult. frames: None where nothing was
 chosen."""
 
@@ -47,6 +47,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--step", type=int, default=1, metavar="N", help="only every N-th of these frames (default: 1)"
     )
+    command.add_argument("--without-edits", action="store_true", help="the scene as it was trained")
     command.add_argument("--json", action="store_true", help="print what was written as JSON on standard output")
     command.add_argument("--quiet", action="store_true", help="no progress")
     for kind in KINDS:
@@ -92,6 +93,9 @@ def _check_options(options: argparse.Namespace, kind: ModuleType) -> None:
         unused += ["frames", "clip", "step"]
     if options.player is not None:
         unused.append("out")
+    if not kind.TAKES_EDITS:
+        parser.set_defaults(without_edits=False)
+        unused.append("without_edits")
     for name in unused:
         if getattr(options, name) != parser.get_default(name):
             what = options.format or export_player.NAME

@@ -16,6 +16,7 @@ FORMATS = {
 
 
 OPTIONS = ()
+TAKES_EDITS = False
 
 
 def takes_frames(format_name: str) -> bool:

@@ -21,6 +21,7 @@ FORMATS = {
 
 
 OPTIONS = ("part", "up", "down", "scale", "axes")
+TAKES_EDITS = True
 
 
 def takes_frames(format_name: str) -> bool:
@@ -65,5 +66,6 @@ def export(opened: TrainedProject, options: argparse.Namespace, frames: range | 
         up=f"+{options.up}" if options.up else f"-{options.down}" if options.down else None,
         scale=options.scale,
         axes=options.axes,
+        has_edits=not options.without_edits,
     )
     return run(opened, job, report)

@@ -15,6 +15,7 @@ FORMATS: dict[str, str] = {}
 
 
 OPTIONS = ("data_folder",)
+TAKES_EDITS = True
 
 
 def takes_frames(format_name: str) -> bool:
@@ -37,7 +38,9 @@ def export(opened: TrainedProject, options: argparse.Namespace, frames: range | 
     """Write the page; says before how large it becomes. Raises ProjectError."""
     from app.export.player_job import PlayerJob, estimate, run
 
-    job = PlayerJob(out=options.player, frames=frames, has_folder=options.data_folder)
+    job = PlayerJob(
+        out=options.player, frames=frames, has_folder=options.data_folder, has_edits=not options.without_edits
+    )
     for said in estimate(opened, job).lines:
         ProgressLine(sys.stderr, is_quiet=options.quiet).say(said)
     return run(opened, job, report)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -60,8 +61,9 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     project = open_project(options.project, is_writable=is_change)
     try:
         if is_change:
-            kept = () if options.forget else project.gate_regions()
-            project.set_gate_regions(after_marking(kept, marks))
+            kept = () if options.forget else project.document.regions
+            marked = replace(project.document, regions=after_marking(kept, marks))
+            project.change(marked, "forget regions" if not marks else "mark regions")
         found = describe_gate(project)
     finally:
         project.close()
@@ -79,9 +81,9 @@ def describe_gate(project: Project) -> dict[str, Any]:
         clips that cannot be read, each with path and reason.
     """
     clips, damaged = [], []
-    for path in sorted((project.folder / "clips").glob("*.safetensors")):
+    for clip_index, path in project.finished_clips():
         try:
-            clips.append(_describe_clip(read_clip_state(path)))
+            clips.append(_describe_clip(read_clip_state(path), clip_index))
         except ProjectError as error:
             damaged.append({"path": str(path), "reason": error.message})
         except (KeyError, TypeError, ValueError, IndexError) as error:  # whole, but not as this version writes them
@@ -90,16 +92,16 @@ def describe_gate(project: Project) -> dict[str, Any]:
         "schema": SCHEMA,
         "path": str(project.folder),
         "gate": project.settings.config().gate,
-        "regions": [region.as_dict() for region in project.gate_regions()],
+        "regions": [region.as_dict() for region in project.document.regions],
         "clips": clips,
         "damaged": damaged,
     }
 
 
-def _describe_clip(state: ClipState) -> dict[str, Any]:
+def _describe_clip(state: ClipState, clip_index: int) -> dict[str, Any]:
     records = state.anchors
     return {
-        "clip_index": state.header.clip_index,
+        "clip_index": clip_index,
         "role": state.header.role,
         "sets": {role: len(record.own) for role, record in sorted(records.items()) if record.own is not None},
         "n_hidden": sum(int(record.is_hidden.sum()) for record in records.values() if record.is_hidden is not None),

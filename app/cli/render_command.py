@@ -61,6 +61,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         default="both",
         help="show what the static or the dynamic features of the anchors carry (default: both)",
     )
+    command.add_argument("--without-edits", action="store_true", help="the scene as it was trained")
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
@@ -124,6 +125,7 @@ def _job(options: argparse.Namespace, opened: TrainedProject) -> Any:
         is_transparent=options.transparent,
         sound=None if options.sound is None else _camera(options.sound, "--sound", opened),
         features=options.features,
+        has_edits=not options.without_edits,
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.project.clip_versions import read_finished, recovery_hint
 from app.project.opening import open_capture_of
 from app.project.project import Project
 from app.status import TrainingStatus
@@ -19,7 +20,7 @@ from engine.camera.rig import CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.clip_files.clip_header import ClipHeader
-from engine.clip_files.clip_state import ClipState, DamagedClip, look_at_clip, read_clip_state
+from engine.clip_files.clip_state import ClipState, DamagedClip, look_at_clip
 from engine.errors import ProjectError
 
 if TYPE_CHECKING:
@@ -194,7 +195,8 @@ class TrainedProject:
         if header is None:
             raise ProjectError(f"Clip {clip_index} is not trained.", hint="Train it first.", path=self.project.folder)
         if isinstance(header, DamagedClip):
-            raise header.error()
+            error = header.error()
+            raise ProjectError(error.message, hint=recovery_hint(self.project, clip_index), path=error.path)
         return header
 
     def load(self, clip_index: int) -> TrainedClip:
@@ -212,11 +214,11 @@ class TrainedProject:
                 hint="Train it first.",
                 path=self.project.folder,
             )
-        state = read_clip_state(self.project.clip_path(clip_index))
+        state = read_finished(self.project, clip_index)
         base = state if state.is_reference or self.reference is None else self.reference
         model = load_clip_model(state, self.reference, backend=backend_called())
         if self.project.settings.config().field == "continue":  # one field for all clips: as the last one left it
-            last = read_clip_state(self.project.clip_path(self.last_trained))
+            last = read_finished(self.project, self.last_trained)
             if last.header.field and model.field is not None:
                 model.attach_field(read_field(last).requires_grad_(requires_grad=False))
         return TrainedClip(self.clips[clip_index], model, base, state.drift)
@@ -240,7 +242,7 @@ def open_trained(project: Project, capture: Capture | None = None) -> TrainedPro
         raise ProjectError(
             "Nothing is trained in this project yet.", hint="Run `clipgstream train` first.", path=project.folder
         )
-    reference = read_clip_state(project.reference_path) if has_reference else None
+    reference = read_finished(project, settings.reference_clip) if has_reference else None
     return TrainedProject(project, capture, clips, reference)
 
 

@@ -57,6 +57,7 @@ class ExportContext(msgspec.Struct, frozen=True):
         in_frame, out_frame: Of the timeline, both included.
         cameras: Names.
         paths: Names of the project's camera paths.
+        has_edits: Whether the project has edits that are on.
         has_videos: Whether some camera has a video, which may have sound.
         picture_size: Width and height of a capture camera's picture.
         fps: Frames per second.
@@ -74,6 +75,7 @@ class ExportContext(msgspec.Struct, frozen=True):
     fps: float
     paths: tuple[str, ...] = ()
     has_videos: bool = False
+    has_edits: bool = False
 
     def frames(self, choice: FramesChoice, step: int) -> range | PickedFrames:
         """The frames of a choice; none where there are none. Those of "all" are trained and may have gaps."""

@@ -20,7 +20,8 @@ _MAX_NAME_BYTES = 120
 
 @dataclass(frozen=True, slots=True)
 class GaussianFile:
-    """One file to write: a part of the scene at a frame. What stands still is that of the frame's clip."""
+    """One file to write: a part of the scene at a frame. What stands still is that of the frame's clip, with the edits
+    that hold then."""
 
     name: str
     frame: int

@@ -103,12 +103,12 @@ class GaussianSequence:
         suffix, n_frames = self._kind.suffix, self._n_frames
         moments = {file.frame: file for file in moment_files(self.name, suffix, self._frames, self._part, n_frames)}
         still: Gaussians | None = None
-        clip_index = -1
+        stretch: object = None
         for n_done, frame in enumerate(self._frames):
             report(ExportProgress(n_done, len(self._frames)))
-            clip = self._scene.clip_at(frame)
-            if self._part in ("static", "split") and clip.clip_index != clip_index:
-                clip_index = clip.clip_index
+            clip_and_effects = (self._scene.clip_at(frame).clip_index, self._scene.effects(frame))
+            if self._part in ("static", "split") and clip_and_effects != stretch:
+                stretch = clip_and_effects
                 found = self._scene.gaussians(frame, "static")
                 if still is None or not _are_same(still, found):
                     still = found

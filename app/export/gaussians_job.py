@@ -4,6 +4,7 @@ document beside them that says what they are."""
 from __future__ import annotations
 
 import time
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -40,6 +41,7 @@ class GaussiansJob:
         up: Axis of the files that the scene's up is turned to, one of `engine.export.world.AXES`; None leaves it.
         scale: Units of the files per scene unit.
         axes: "ply" as they are; "rub" turned by 180 degrees about x, for programs of Niantic.
+        has_edits: Whether the edits of the project are applied.
         scene_up: Which way is up in the capture; None for what its cameras agree on. [3]
     """
 
@@ -51,24 +53,22 @@ class GaussiansJob:
     scale: float = 1.0
     axes: FileAxes = "ply"
     scene_up: tuple[float, float, float] | None = None
+    has_edits: bool = True
 
 
 def estimate(opened: TrainedProject, job: GaussiansJob) -> ExportEstimate:
     """How many files and bytes, of the headers of the clips. Raises ProjectError where a frame is not trained."""
-    scene = SceneFrames(opened)
+    scene = _scene(opened, job)
     frames = _frames(scene, job)
-    by_clip: dict[int, int] = {}
-    for frame in frames:
-        clip_index = scene.clip_at(frame).clip_index
-        by_clip[clip_index] = by_clip.get(clip_index, 0) + 1
+    stretches = Counter((scene.clip_at(frame).clip_index, scene.effects(frame)) for frame in frames)
     n_gaussians = 0
-    for clip_index, n_frames in by_clip.items():
+    for (clip_index, _), n_frames in stretches.items():  # as many as there are without edits
         n_static, n_moving = expected_rows(opened.header(clip_index))
         if job.part in ("static", "split"):
             n_gaussians += n_static
         if job.part != "static":
             n_gaussians += n_frames * (n_moving + (n_static if job.part == "all" else 0))
-    n_files = (0 if job.part == "static" else len(frames)) + (len(by_clip) if job.part in ("static", "split") else 0)
+    n_files = (0 if job.part == "static" else len(frames)) + (len(stretches) if job.part in ("static", "split") else 0)
     text = f"Coordinates: {_world(opened, job).text}."
     return ExportEstimate(n_files + 1, round(n_gaussians * _kind(job).bytes_each), (text,))
 
@@ -83,7 +83,7 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
         DiskError: The disk refused.
     """
     started_s = time.monotonic()
-    scene = SceneFrames(opened)
+    scene = _scene(opened, job)
     frames = _frames(scene, job)
     n_threads = use_threads(None)  # of this process: a job beside a training has but one
     sequence = GaussianSequence(scene, frames, job.part, _kind(job), _world(opened, job), n_threads=n_threads)
@@ -99,6 +99,10 @@ def run(opened: TrainedProject, job: GaussiansJob, report: Report) -> ExportResu
         }
         (folder / f"{sequence.name}{SIDECAR}").write_text(json_text(document, indent=1) + "\n", encoding="utf-8")
     return written(job.out, psnr_db=sequence.psnr_db, lines=sequence.lines())
+
+
+def _scene(opened: TrainedProject, job: GaussiansJob) -> SceneFrames:
+    return SceneFrames(opened, edits=None if job.has_edits else ())
 
 
 def _frames(scene: SceneFrames, job: GaussiansJob) -> list[int]:

@@ -42,11 +42,13 @@ class PlayerJob:
         out: The page.
         frames: Of the capture, every n-th where the range has a step; None for all that are trained.
         has_folder: Whether clips go into a folder beside the page; None for what fits the size.
+        has_edits: Whether the edits of the project are applied.
     """
 
     out: Path
     frames: range | PickedFrames | None = None
     has_folder: bool | None = None
+    has_edits: bool = True
 
     @property
     def folder(self) -> Path:
@@ -63,7 +65,7 @@ def estimate(opened: TrainedProject, job: PlayerJob) -> ExportEstimate:
     if job.out.suffix.lower() not in PAGE_SUFFIXES:
         raise ProjectError("A player is an HTML page.", hint="Give a name that ends in .html.", path=job.out)
     check_target(job.out, opened=opened)
-    scene = SceneFrames(opened)
+    scene = _scene(opened, job)
     clips = _clips(scene, job)
     n_frames = sum(len(wanted) for _, wanted in clips)
     n_bytes = _expected_bytes(scene, clips)
@@ -87,7 +89,7 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
     report(ExportProgress(0, 0, message="Looking at the clips"))
     expected = estimate(opened, job)
     has_folder = expected.n_files > 1
-    scene = SceneFrames(opened)
+    scene = _scene(opened, job)
     clips = _clips(scene, job)
     scene.check(wanted[0] for _, wanted in clips)
     n_frames = sum(len(wanted) for _, wanted in clips)
@@ -102,7 +104,8 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
                 block = _packed(
                     packer, scene, wanted, lambda done, n=n_done: report(ExportProgress(n + done, n_frames))
                 )
-                name = f"clip{clip.clip_index:05d}"
+                n_before = sum(place["clip_index"] == clip.clip_index for place in header["clips"])
+                name = f"clip{clip.clip_index:05d}" + (f"-{n_before + 1}" if n_before else "")
                 place = {"clip_index": clip.clip_index, "name": name, "first": n_done, "frame_index": wanted[0]}
                 header["clips"].append(place)
                 place.update(block.description)
@@ -120,10 +123,10 @@ def run(opened: TrainedProject, job: PlayerJob, report: Report) -> ExportResult:
 def _expected_bytes(scene: SceneFrames, clips: Sequence[tuple[Clip, list[int]]]) -> int:
     """Of page and blocks together, from the headers of the clips."""
     n_packed = 0.0
-    for clip, wanted in clips:
+    for number, (clip, wanted) in enumerate(clips):
         n_still, n_moving = expected_rows(scene.opened.header(clip.clip_index))
         n_packed += _LIGHT_ROW_BYTES * n_still + _MOVING_ROW_BYTES * n_moving * len(wanted)
-        if clip == clips[0][0]:
+        if number == 0:
             n_packed += _SHARED_ROW_BYTES * n_still
     n_bytes = round(n_packed * 4 / 3)  # as base64
     return n_bytes + page_bytes(scene_header(scene, clips[0][1][0], step=1)) + _DESCRIBED_BYTES * len(clips)
@@ -166,14 +169,19 @@ def _relative_url(name: str) -> str:
     return PurePosixPath("/", name).as_uri().removeprefix("file:///")
 
 
+def _scene(opened: TrainedProject, job: PlayerJob) -> SceneFrames:
+    return SceneFrames(opened, edits=None if job.has_edits else ())
+
+
 def _clips(scene: SceneFrames, job: PlayerJob) -> list[tuple[Clip, list[int]]]:
-    """Clips with the frames of each that are wanted. Raises ProjectError where one is not trained."""
+    """Clips with the frames of each that are wanted; one comes several times where different edits hold in it, so that
+    what stands still does so in each stretch. Raises ProjectError where one is not trained."""
     frames = scene.trained_frames if job.frames is None else job.frames
     scene.check_trained(frames)
     clips: list[tuple[Clip, list[int]]] = []
     for frame in frames:
         clip = scene.clip_at(frame)
-        if not clips or clips[-1][0] != clip:
+        if not clips or clips[-1][0] != clip or scene.effects(clips[-1][1][-1]) != scene.effects(frame):
             clips.append((clip, []))
         clips[-1][1].append(frame)
     return clips

@@ -1,4 +1,4 @@
-"""SceneFrames: the one place where a moment of the trained scene is made for an export."""
+"""SceneFrames: the one place where a moment of the trained scene is made for an export, edits included."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ from app.evaluation.headless import TrainedProject
 from app.playback.contents import part_of
 from engine.capture.clip import Clip
 from engine.capture.frame_runs import runs_of
+from engine.editing.edit import Edit
+from engine.editing.effects import EditStack, Effects
 from engine.errors import ProjectError
 
 if TYPE_CHECKING:
+    from engine.editing.clip_rows import NamedSet
+    from engine.editing.edited_clip import EditedClip
     from engine.metrics.clips.features_apart import Features
     from engine.metrics.clips.trained_clip import TrainedClip
-    from engine.model.clip_model import ClipModel
     from engine.raster.gaussians import Gaussians
 
 Part = Literal["all", "static", "moving"]
@@ -49,15 +52,25 @@ class SceneFrames:
         opened: A project opened for reading.
         n_threads: Threads to decode with; None for all.
         features: Which features of the anchors are used, see engine.metrics.clips.features_apart.
+        edits: What is applied; None for the edits of the project, empty for the scene as it was trained.
     """
 
-    def __init__(self, opened: TrainedProject, *, n_threads: int | None = None, features: Features = "both") -> None:
+    def __init__(
+        self,
+        opened: TrainedProject,
+        *,
+        n_threads: int | None = None,
+        features: Features = "both",
+        edits: tuple[Edit, ...] | None = None,
+    ) -> None:
         self.opened = opened
+        self._edits = EditStack(opened.project.document.edits if edits is None else edits)
         self._n_threads = n_threads
         self._features: Features = features
         self._clip_of = [clip for clip in opened.clips for _ in clip.frame_indices()]
         self._loaded: TrainedClip | None = None
-        self._parts: dict[Part, ClipModel] = {}
+        self._named: dict[str, NamedSet] = {}
+        self._parts: dict[Part, EditedClip] = {}
 
     @property
     def trained_frames(self) -> list[int]:
@@ -123,19 +136,28 @@ class SceneFrames:
         """
         clip = self.clip_at(frame)
         if self._loaded is None or self._loaded.clip != clip:
+            from engine.editing.clip_rows import named_sets
             from engine.metrics.clips.features_apart import with_features
 
             use_threads(self._n_threads)
             loaded = self.opened.load(clip.clip_index)
+            header = self.opened.header(clip.clip_index)
+            self._named = named_sets(loaded.model, header, self.opened.project.settings.reference_clip)
             self._loaded, self._parts = replace(loaded, model=with_features(loaded.model, self._features)), {}
         return self._loaded
 
-    def model(self, frame: float, part: Part = "all") -> ClipModel:
+    def _part(self, frame: float, part: Part) -> EditedClip:
         """The part of the clip that shows a moment. Raises what `trained` raises."""
+        from engine.editing.edited_clip import EditedClip
+
         trained = self.trained(frame)
         if part not in self._parts:
-            self._parts[part] = part_of(trained.model, _CONTENTS[part])
+            self._parts[part] = EditedClip(part_of(trained.model, _CONTENTS[part]), trained.clip, self._named)
         return self._parts[part]
+
+    def effects(self, frame: float) -> Effects:
+        """Of the edits that hold at a moment: between two frames those of the frame before."""
+        return self._edits.at(frame)
 
     def gaussians(self, frame: float, part: Part = "all") -> Gaussians:
         """The scene at a moment, between frames too.
@@ -144,12 +166,9 @@ class SceneFrames:
             frame: In frames of the capture; its field is evaluated there.
             part: "static": what stands still in the whole clip, "moving": the rest, "all": both.
         Raises:
-            ProjectError: What `trained` raises.
+            ProjectError: What `trained` raises; an edit is damaged.
         """
-        import torch
-
-        with torch.no_grad():
-            return self.model(frame, part).decode(self.clip_time(frame)).detach()
+        return self._part(frame, part).decode(self.clip_time(frame), self.effects(frame)).gaussians
 
     def shares(self, frame: float) -> Iterator[Share]:
         """What is shown of a moment, to be drawn one by one and mixed by weight.
@@ -162,7 +181,7 @@ class SceneFrames:
         Raises:
             ProjectError: What `trained` raises.
         """
-        before = math.floor(frame)
+        before, effects = math.floor(frame), self.effects(frame)
         fraction = frame - before
         if fraction > 0 and self.clip_at(before) != self.clip_at(before + 1):
             weights = {before: 1.0 - fraction, before + 1: fraction}
@@ -170,21 +189,13 @@ class SceneFrames:
             known = {at: weight for at, weight in weights.items() if self.clip_at(at).clip_index in finished}
             is_loaded = {at: self._loaded is not None and self._loaded.clip == self.clip_at(at) for at in known}
             for at in sorted(known, key=lambda at: not is_loaded[at]):  # each clip is loaded once
-                yield Share(known[at] / sum(known.values()), self.trained(at), self.clip_time(at), self.gaussians(at))
+                trained, clip_time = self.trained(at), self.clip_time(at)
+                edited = self._part(at, "all").decode(clip_time, effects)
+                yield Share(known[at] / sum(known.values()), trained, clip_time, edited.gaussians)
             return
         trained, clip_time = self.trained(frame), self.clip_time(frame)
         knots = trained.model.knots(clip_time)
-        if len(knots) == 1:
-            yield Share(1.0, trained, clip_time, self.gaussians(frame))
-            return
         for knot, weight in knots:
-            yield Share(weight, trained, clip_time, self._existing_at(trained, clip_time, knot))
-
-    def _existing_at(self, trained: TrainedClip, clip_time: float, knot: int) -> Gaussians:
-        """What exists at one of the clip's frames, at another time of the clip."""
-        import torch
-
-        model = trained.model
-        rows = {role: model.alive(role, knot / trained.clip.clip_length) for role in model.roles()}
-        with torch.no_grad():
-            return model.decode(clip_time, rows).detach()
+            alive_at = None if len(knots) == 1 else knot / trained.clip.clip_length
+            edited = self._part(frame, "all").decode(clip_time, effects, alive_at=alive_at)
+            yield Share(weight, trained, clip_time, edited.gaussians)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from app.background.kernels import COMPILING
@@ -76,7 +77,7 @@ def _looks_still(project: Project, capture: Capture, clip: Clip, config: TrainCo
         looks_still,  # with numba, which the first picture of a window can wait for
     )
 
-    if project.gate_regions():  # a region may make something move that no mask shows
+    if project.document.regions:  # a region may make something move that no mask shows
         return False
     held_out = capture.camera_indices(project.settings.holdout)
     return looks_still(capture, clip, capture.training_cameras(held_out), config, project.prep_dir)
@@ -94,7 +95,8 @@ def _measured(project: Project, clip_index: int) -> MeasuredClip | None:
     if found is None or found.header is None:
         return None
     compiling_s = found.header.figures.stages_s.get(COMPILING, 0.0)
-    return measured_clip(found.header, disk_mb=found.n_bytes / 1e6, uncounted_s=compiling_s)
+    known = measured_clip(found.header, disk_mb=found.n_bytes / 1e6, uncounted_s=compiling_s)
+    return replace(known, clip_index=clip_index)  # a file keeps its number when clips before it are split or merged
 
 
 # ---------------------------------------------------------------- for the window

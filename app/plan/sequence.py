@@ -121,6 +121,7 @@ class Waiting:
     clips: tuple[QueuedClip, ...] = ()
     queued: SequenceForecast = NOTHING
     everything: SequenceForecast = NOTHING
+    stale: SequenceForecast = NOTHING
 
 
 class SequencePlan:
@@ -163,6 +164,7 @@ class SequencePlan:
             is_ending_after=service.is_ending_after,
             queued=queued,
             everything=everything,
+            stale=waiting.stale if waiting.stale.n_clips else None,
             progress=n_done / max(n_done + (0 if queued is None else queued.n_steps), 1),
             n_done=service.queue.n_done,
             free_mb=kinds.free_mb,
@@ -185,6 +187,7 @@ class SequencePlan:
             tuple(QueuedClip(index, parts[index].n_steps, parts[index].seconds, index in own) for index in clips),
             together([parts[index] for index in clips]),
             together([parts[index] for index in sorted(due)]),
+            together([parts[index] for index in service.stale if index not in queue and index != running]),
         )
         return self._kept
 

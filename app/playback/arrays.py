@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from app.playback.picture_source import UNKNOWN, PictureSource
+from engine.editing.gaussian_rows import GaussianRows
 
 BACKGROUND = (18 / 255, 20 / 255, 24 / 255)
 """Behind everything; the viewport takes its dark grey from here."""
@@ -32,6 +33,8 @@ class GaussianArrays:
         births: Where each comes from, see app.playback.contents; None where unknown. [N] uint8
         changes: How far each is from the reference clip, NaN where that has none; None where nobody asked.
             [N] float32
+        rows: Which Gaussian of which anchor set each is, the same in all frames and clips; None where they stand for
+            none.
     """
 
     means: np.ndarray
@@ -46,6 +49,7 @@ class GaussianArrays:
     still_key: Hashable = None
     births: np.ndarray | None = None
     changes: np.ndarray | None = None
+    rows: GaussianRows | None = None
 
     def __len__(self) -> int:
         return len(self.means)
@@ -53,7 +57,9 @@ class GaussianArrays:
     @property
     def n_bytes(self) -> int:
         """Memory of the arrays."""
-        return sum(a.nbytes for a in (self.means, self.quats, self.scales, self.opacities, self.colors))
+        arrays = [self.means, self.quats, self.scales, self.opacities, self.colors]
+        arrays += [] if self.rows is None else [self.rows.set_index, self.rows.number]
+        return sum(array.nbytes for array in arrays)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.playback.view_modes import ALL
+from engine.capture.clip import Clip
+from engine.editing.gaussian_rows import GaussianRows
 
 if TYPE_CHECKING:
     from engine.clip_files.clip_state import ClipState
+    from engine.editing.edited_clip import EditedClip, EditedGaussians
     from engine.model.clip_model import ClipModel
     from engine.raster.gaussians import Gaussians
 
@@ -52,72 +55,86 @@ def part_of(model: ClipModel, content: str) -> ClipModel:
 
 
 class ClipParts:
-    """Parts of one loaded clip, and what is known of their Gaussians.
+    """Parts of one loaded clip with the edits that hold, and what is known of their Gaussians.
 
     Args:
         model: The clip.
+        clip: Its frames.
         state: What it was loaded from.
         reference: What it inherits from; None for a clip that inherits nothing.
     """
 
-    def __init__(self, model: ClipModel, state: ClipState, reference: ClipState | None) -> None:
-        self._model, self._state, self._reference = model, state, reference
-        self._parts: dict[str, ClipModel] = {ALL: model}
+    def __init__(self, model: ClipModel, clip: Clip, state: ClipState, reference: ClipState | None) -> None:
+        from engine.editing.clip_rows import named_sets
+
+        self._model, self._clip, self._state, self._reference = model, clip, state, reference
+        reference_index = 0 if reference is None else reference.header.clip_index
+        self.named = named_sets(model, state.header, reference_index)
+        self._parts: dict[str, EditedClip] = {}
         self._base: Gaussians | None = None
         self._base_rows: dict[str, np.ndarray] = {}
 
-    def part(self, content: str) -> ClipModel:
+    def part(self, content: str) -> EditedClip:
         """The clip of which only this part is decoded."""
+        from engine.editing.edited_clip import EditedClip
+
         if content not in self._parts:
-            self._parts[content] = part_of(self._model, content)
+            self._parts[content] = EditedClip(part_of(self._model, content), self._clip, self.named)
         return self._parts[content]
 
-    def decode(self, content: str, clip_time: float) -> Gaussians:
-        """Gaussians of a part at a time of the clip; none where it has no anchors."""
-        import torch
+    def apart(self, content: str) -> EditedClip:
+        """A part with caches of its own, to be decoded on another thread; not of the whole clip."""
+        from engine.editing.edited_clip import EditedClip
 
-        from engine.raster.gaussians import Gaussians
+        return EditedClip(part_of(self._model, content), self._clip, self.named)
 
-        part = self.part(content)
-        if not part.roles():
-            empty = (torch.zeros(0, *width) for width in ((3,), (4,), (3,), (), (3,)))
-            return Gaussians(*empty)
-        with torch.no_grad():
-            return part.decode(clip_time)
+    def has_left(self, edited: EditedGaussians, content: str) -> tuple[np.ndarray, np.ndarray]:
+        """Which of all anchors of ClipModel.anchors have a Gaussian that edits have left, inherited and own ones.
 
-    def births(self, content: str, clip_time: float) -> np.ndarray:
-        """Where each Gaussian of `decode` comes from, one of the codes above. [N] uint8"""
-        part, births = self.part(content), [np.zeros(0, np.uint8)]
-        for role in part.roles():
-            n_gaussians = len(part.alive(role, clip_time)) * part.decoder.gaussians_per_anchor
-            births.append(np.full(n_gaussians, self._birth(role), np.uint8))
-        return np.concatenate(births)
+        Args:
+            edited: Of a part of the clip; nothing is left of its other anchors.
+        Returns:
+            [A0], [A] bool
+        """
+        rows, part = self.part(ALL).rows, self.part(content).model
+        inherited, own = [np.zeros(0, bool)], [np.zeros(0, bool)]
+        for role in self._model.roles():
+            is_left = np.zeros(len(self._model.anchor_set(role)), bool)
+            if role in part.roles():
+                is_left = rows.anchors_among(edited.rows, role)
+            (own if self._model.anchor_set(role).is_trainable else inherited).append(is_left)
+        return np.concatenate(inherited), np.concatenate(own)
+
+    def births(self, rows: GaussianRows) -> np.ndarray:
+        """Where each Gaussian comes from, one of the codes above. [N] uint8"""
+        return np.array([self._birth(row_set.role) for row_set in rows.sets], np.uint8)[rows.set_index]
 
     def _birth(self, role: str) -> int:
         if self._reference is None or not self._model.anchor_set(role).is_trainable:
             return OF_REFERENCE
         return LEARNED_ON if role in ("adapted", "replacing") else BORN_HERE
 
-    def changes(self, content: str, clip_time: float, gaussians: Gaussians) -> np.ndarray:
-        """How far each Gaussian is from what its anchor holds without time in the reference clip.
+    def changes(self, gaussians: Gaussians, rows: GaussianRows) -> np.ndarray:
+        """How far each Gaussian is from what its anchor holds without time in the reference clip, edits included.
 
         The largest of three: of the differences of its colour's channels, that of its opacity, and the way between its
         centres in spacings of static anchors.
 
         Args:
-            gaussians: Of `decode`.
+            gaussians: Of a part.
+            rows: Which they are.
         Returns:
             NaN where the reference clip has no such anchor. [N] float32
         """
         from engine.model.host_array import host_array
 
-        base, part = self._base_gaussians(), self.part(content)
-        k, rows = part.decoder.gaussians_per_anchor, [np.zeros(0, np.int64)]
-        for role in part.roles():
-            anchors = self._base_rows[role][host_array(part.alive(role, clip_time))]
-            found = np.where(anchors[:, None] < 0, -1, anchors[:, None] * k + np.arange(k))
-            rows.append(found.reshape(-1))
-        row = np.concatenate(rows)
+        base, whole = self._base_gaussians(), self.part(ALL).rows
+        k, row = self._model.decoder.gaussians_per_anchor, np.full(len(rows), -1, np.int64)
+        for place, row_set in enumerate(rows.sets):
+            is_of_set = rows.set_index == place
+            anchors, among_k = np.divmod(rows.number[is_of_set].astype(np.int64), k)
+            found = self._base_rows[row_set.role][whole.rows_of_anchors(row_set.role, anchors)]
+            row[is_of_set] = np.where(found < 0, -1, found * k + among_k)
         is_known = row >= 0
         changes = np.full(len(row), np.nan, np.float32)
         if not is_known.any():

@@ -1,9 +1,9 @@
 """FrameDecoder: a frame of a trained clip as arrays to draw. Loads states and decodes on one thread; keeps results by
 key.
 
-A key is (generation, path, clip_index, revision, shown_as, frame_index). The generation goes up when another project
-is opened: what the thread finishes for the one before is dropped. A new revision of a live clip makes its older frames
-worthless.
+A key is (generation, path, clip_index, revision, effects, shown_as, frame_index). The generation goes up when another
+project is opened: what the thread finishes for the one before is dropped. A new revision of a live clip makes its older
+frames worthless. Effects are those of the edits that hold at the frame: another edit makes only its own frames anew.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from engine.backends.table import backend_called
 from engine.byte_cache import ByteCache
 from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState, read_clip_state
+from engine.editing.effects import NO_EFFECTS, Effects
 
 if TYPE_CHECKING:
     from engine.metrics.clips.trained_clip import TrainedClip
@@ -40,8 +41,8 @@ MAX_MODELS = 6
 
 ModelKey = tuple[int, str, int, str]
 """generation, path, clip_index, revision"""
-FrameKey = tuple[int, str, int, str, ShownAs, int]
-"""the same, what is decoded of the frame, and frame_index"""
+FrameKey = tuple[int, str, int, str, str, ShownAs, int]
+"""the same, digest of the effects of edits, what is decoded of the frame, and frame_index"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +57,7 @@ class FrameRequest:
             one follows soon.
         generation: Of the open project.
         shown_as: What is decoded; see app.playback.view_modes.decoded_as.
+        effects: Of the edits that hold at the frame.
     """
 
     clip_index: int
@@ -67,6 +69,7 @@ class FrameRequest:
     clip: Clip = field(compare=False)
     is_live: bool = field(default=False, compare=False)
     shown_as: ShownAs = PLAIN
+    effects: Effects = NO_EFFECTS
 
     @property
     def model_key(self) -> ModelKey:
@@ -76,7 +79,7 @@ class FrameRequest:
     @property
     def key(self) -> FrameKey:
         """Identity of the result."""
-        return *self.model_key, self.shown_as, self.frame_index
+        return *self.model_key, self.effects.digest, self.shown_as, self.frame_index
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +131,7 @@ class ClipFiles:
         spacing = min(header.spacing, header.moving_spacing or header.spacing)
         anchors = _anchor_arrays(model.anchors(), request.model_key, spacing)
         trained = TrainedClip.of_state(request.clip, model, state, reference)
-        colors, parts = None if trained is None else trained.colors, ClipParts(model, state, reference)
+        colors, parts = None if trained is None else trained.colors, ClipParts(model, request.clip, state, reference)
         return LoadedClip(model, parts, anchors, header.near_plane, header.step, colors, trained)
 
     def _read_reference(self, path: Path | None) -> ClipState | None:
@@ -260,7 +263,7 @@ class FrameDecoder:
         loaded = self._load(request)
         clip_time = request.clip.clip_time(request.frame_index)
         content = request.shown_as.content
-        gaussians = loaded.parts.decode(content, clip_time)
+        edited = loaded.parts.part(content).decode(clip_time, request.effects)
         source = PictureSource(
             request.clip_index,
             request.frame_index,
@@ -269,18 +272,23 @@ class FrameDecoder:
             loaded.model.field is None,
             shown_as=ShownAs(content=content),
         )
-        anchors = _anchor_arrays(loaded.model.anchors(clip_time), request.key, loaded.anchors.spacing, source)
-        values = [np.ascontiguousarray(host_array(tensor)) for tensor in gaussians.tensors()]
+        if request.effects:
+            view = loaded.model.anchors().chosen(*loaded.parts.has_left(edited, content))
+        else:
+            view = loaded.model.anchors(clip_time)
+        anchors = _anchor_arrays(view, request.key, loaded.anchors.spacing, source)
+        values = [np.ascontiguousarray(host_array(tensor)) for tensor in edited.gaussians.tensors()]
         has_changes = request.shown_as.mode == "changed"
         arrays = GaussianArrays(
             *values,
             key=request.key,
             near_plane=loaded.near_plane,
             source=source,
-            n_still=loaded.parts.part(content).n_constant_rows(),
-            still_key=(request.model_key, content),
-            births=loaded.parts.births(content, clip_time),
-            changes=loaded.parts.changes(content, clip_time, gaussians) if has_changes else None,
+            n_still=edited.n_still,
+            still_key=(request.model_key, content, request.effects.digest),
+            births=loaded.parts.births(edited.rows),
+            changes=loaded.parts.changes(edited.gaussians, edited.rows) if has_changes else None,
+            rows=edited.rows,
         )
         shown = ShownFrame(arrays, anchors)
         if self.worker.is_still_wanted:

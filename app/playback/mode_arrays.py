@@ -84,6 +84,7 @@ def _anchors_alone(shown: ShownFrame) -> GaussianArrays:
         colors=colors,
         births=None,
         changes=None,
+        rows=None,
         n_still=0,
         still_key=None,
     )

@@ -10,13 +10,13 @@ only: see FLAT_SHARE.
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
 
 from app.playback.rig_views import camera_fov, camera_pose, fitted_K, free_pose, home_camera
-from app.playback.scene_axes import UP_AXES, axis_rotation, horizontal_axes, rig_radius
+from app.playback.scene_axes import RIG_UP, UP_AXES, axis_rotation, horizontal_axes, rig_radius
 from app.playback.view_angles import angles_of, rotation_of
 from app.playback.view_motion import Pose, ViewMotion, between, blended
 from engine.camera.rig import CameraRig
@@ -49,6 +49,7 @@ class OrbitView:
         is_orthographic: Whether parallel lines stay parallel in the free view.
         up_axis: One of UP_AXES.
         up: Unit vector. [3]
+        scene_up: What is up in the scene, where the user has said so, instead of what the cameras agree on. [3]
         look_through: Index of a capture camera, or None.
         is_eased: Whether jumps are shown as short moves.
         radius: Of the scene, scene units.
@@ -63,7 +64,8 @@ class OrbitView:
         self.roll = 0.0
         self.fov_y = math.radians(50.0)
         self.is_orthographic = False
-        self.up_axis = "rig"
+        self.up_axis = RIG_UP
+        self.scene_up: np.ndarray | None = None
         self.up = np.array([0.0, -1.0, 0.0]) if rig is None else rig.up_direction()
         self.look_through: int | None = None
         self.is_eased = False
@@ -342,10 +344,22 @@ class OrbitView:
             self.up_axis = name
             if axis is not None:
                 self.up = np.array(axis)
+            elif self.scene_up is not None:
+                self.up = self.scene_up.copy()
             else:
                 self.up = np.array([0.0, -1.0, 0.0]) if self.rig is None else self.rig.up_direction()
             self._aim(forward)
             self.roll = 0.0
+
+    def set_scene_up(self, up: Sequence[float] | None) -> None:
+        """Say what is up in the scene; None for what the cameras agree on. A view that stands as the scene does
+        follows."""
+        known = None if self.scene_up is None else self.scene_up.tolist()
+        if known == (None if up is None else list(up)):
+            return
+        self.scene_up = None if up is None else np.array(up, dtype=np.float64)
+        if self.up_axis == RIG_UP:
+            self.set_up_axis(RIG_UP)
 
     @contextmanager
     def jump(self) -> Iterator[None]:

@@ -22,13 +22,14 @@ from app.playback.mode_arrays import ModeArrays
 from app.playback.orbit_view import OrbitView
 from app.playback.render import Look, Renderer
 from app.playback.timeline import Timeline
-from app.playback.trails import TrailMaker, TrailRequest, Trails
+from app.playback.trails import TrailMaker, TrailRequest, Trails, trail_frames
 from app.playback.view_modes import PLAIN, ShownAs, decoded_as
 from app.project.opened_project import OpenedProject
 from app.status import WantedFrame
 from app.training.service import ShownState
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
+from engine.editing.effects import EditStack
 
 StateOf = Callable[[int], ShownState | None]
 """The state of a clip to look at; None where it has none."""
@@ -65,6 +66,7 @@ class Playback:
         self.ahead = Ahead(self.decoder, self.renderer)
         self._modes, self._coverage, self._trails = ModeArrays(), CoverageFinder(), TrailMaker()
         self._opened: OpenedProject | None = None
+        self._stack = EditStack()
         self._state_of = state_of
         self._n_ahead_seen = 0
         self._inherited: dict[int, Path | None] = {}
@@ -103,6 +105,12 @@ class Playback:
         request = self._request(timeline)
         return None if request is None or not request.is_live else self.decoder.anchors(request)
 
+    def gaussians_per_anchor(self, timeline: Timeline) -> int | None:
+        """K of the clip under the playhead, as of all clips of its project; None until it is loaded."""
+        request = self._request(timeline)
+        model = None if request is None else self.decoder.model(request)
+        return None if model is None else model.decoder.gaussians_per_anchor
+
     def coverage(self, timeline: Timeline) -> Coverage | None:
         """What inherited anchors cover in the clip under the playhead; None until it is loaded and measured."""
         request = self._request(timeline)
@@ -112,10 +120,11 @@ class Playback:
     def trails(self, timeline: Timeline) -> Trails | None:
         """Trails that end at the playhead, or the newest ones of its clip until those are made."""
         request = self._request(timeline)
-        model = None if request is None else self.decoder.model(request)
-        if request is None or model is None:
+        loaded = None if request is None else self.decoder.loaded(request)
+        if request is None or loaded is None:
             return None
-        return self._trails.trails(TrailRequest(request.model_key, request.frame_index, model, request.clip))
+        effects = tuple(map(self._edits().at, trail_frames(request.clip, request.frame_index)))
+        return self._trails.trails(TrailRequest(request.model_key, request.frame_index, effects, loaded.parts))
 
     def is_loaded(self, timeline: Timeline) -> bool:
         """Whether the file of the clip under the playhead is not needed any more. Asks for what is missing."""
@@ -237,13 +246,14 @@ class Playback:
 
     def cached_frames(self) -> list[tuple[int, int]]:
         """Frames that can be shown at once, as they are looked at now: first and stop of each run, in order."""
-        return self.ahead.runs(self._state_of, self._is_current)
+        return self.ahead.runs(lambda clip_index: (self._state_of(clip_index), self._edits()), self._is_current)
 
     def _is_current(self, key: FrameKey) -> bool:
-        generation, path, clip_index, revision, _, _ = key
+        generation, path, clip_index, revision, digest, _, frame_index = key
         state = self._state_of(clip_index)
         is_open = self._opened is not None and self._opened.generation == generation
-        return is_open and state is not None and (str(state.file), state.revision) == (path, revision)
+        is_edited_so = digest == self._edits().at(frame_index).digest
+        return is_open and is_edited_so and state is not None and (str(state.file), state.revision) == (path, revision)
 
     def _request(self, timeline: Timeline, shown_as: ShownAs = PLAIN) -> FrameRequest | None:
         """What is to be decoded for the playhead; None where nothing is trained."""
@@ -277,7 +287,15 @@ class Playback:
             clip=clip,
             is_live=state.is_live,
             shown_as=decoded_as(shown_as),
+            effects=self._edits().at(frame_index),
         )
+
+    def _edits(self) -> EditStack:
+        """Those of the document as it is now; frames that a change of them leaves alone stay as they are."""
+        edits = () if self._opened is None else self._opened.project.document.edits
+        if edits is not self._stack.edits:
+            self._stack = EditStack(edits)
+        return self._stack
 
     def _inherited_path(self, opened: OpenedProject, clip_index: int) -> Path | None:
         """Kept: it is asked for many times in every turn of the loop, and follows from all settings."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from app.playback.markers import Markers
-from engine.capture.clip import Clip
+from engine.capture.clip import Clip, ClipSpans
 
 SPEEDS = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
 """How fast a capture can be played, as multiples of its own speed."""
@@ -21,6 +21,7 @@ class Timeline:
 
     Attributes:
         frame_index: The playhead, in [0, n_frames).
+        spans: Finds the clip of a frame.
         n_frames: Frames of the capture.
         fps: Frames per second of the capture.
         is_playing, is_looping: Play state.
@@ -30,11 +31,12 @@ class Timeline:
         in_frame, out_frame: Where playing begins and ends; None where the capture does. in_frame <= out_frame.
         around: Frames that are played over and over for the moment, whatever in_frame and out_frame say; None else.
         is_following: Whether the playhead goes along with the training. Ends when the user moves it.
-        markers: Frames that the user wants to find again.
+        markers: Frames that the user wants to find again; put here by who owns the document.
     """
 
     def __init__(self, clips: Sequence[Clip] = (), *, fps: float = 30.0) -> None:
         self.clips = list(clips)
+        self.spans = ClipSpans(self.clips)
         self.n_frames = self.clips[-1].stop if self.clips else 0
         self.fps = fps if math.isfinite(fps) and fps > 0 else 30.0
         self.frame_index = 0
@@ -54,7 +56,6 @@ class Timeline:
         """Go on where another timeline of the same frames is, as when they are cut into other clips."""
         for name in ("is_looping", "is_every_frame", "speed", "markers"):
             setattr(self, name, getattr(other, name))
-        self.markers.keep_below(self.n_frames)
         self.set_range(other.in_frame, other.out_frame)
         self.seek(other.frame_index)
 
@@ -125,9 +126,9 @@ class Timeline:
         """The first frame of the clip whose beginning is nearest to the playhead; None with a single clip."""
         if len(self.clips) < 2:
             return None
-        length = self.clips[0].clip_length
-        place = min(max(round(self.frame_index / length), 1), len(self.clips) - 1)
-        return self.clips[place].start
+        before = self.spans.index_of(self.frame_index)
+        near = [self.clips[place].start for place in (before, before + 1) if 0 < place < len(self.clips)]
+        return min(near, key=lambda start: abs(start - self.frame_index))
 
     def play_around(self, seam_frame: int, reach: int = SEAM_REACH) -> None:
         """Play the frames on either side of a clip's first frame over and over."""
@@ -225,7 +226,7 @@ class Timeline:
         """The clip of a frame; None outside the capture."""
         if not self.clips or not 0 <= frame_index < self.n_frames:
             return None
-        return self.clips[frame_index // self.clips[0].clip_length]
+        return self.clips[self.spans.index_of(frame_index)]
 
     @property
     def clip(self) -> Clip | None:

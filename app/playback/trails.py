@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -11,11 +11,12 @@ import numpy as np
 from app.background.kernels import prepare_decoding
 from app.background.latest import LatestWorker
 from app.playback import hues
-from app.playback.contents import part_of
+from app.playback.contents import ClipParts
 from engine.capture.clip import Clip
+from engine.editing.effects import Effects
 
 if TYPE_CHECKING:
-    from engine.model.clip_model import ClipModel
+    from engine.editing.edited_clip import EditedClip
 
 N_FRAMES = 8
 """As many frames back."""
@@ -44,12 +45,16 @@ class Trails:
 
 @dataclass(frozen=True, slots=True)
 class TrailRequest:
-    """Trails that end at a frame of a clip. Equal keys are equal states of equal clips."""
+    """Trails that end at a frame of a clip. Equal keys are equal states of equal clips.
+
+    Attributes:
+        effects: Of the edits that hold in the frames of `trail_frames`.
+    """
 
     model_key: Hashable
     frame_index: int
-    model: ClipModel = field(compare=False)
-    clip: Clip = field(compare=False)
+    effects: tuple[Effects, ...]
+    parts: ClipParts = field(compare=False)
 
 
 class TrailMaker:
@@ -57,7 +62,7 @@ class TrailMaker:
 
     def __init__(self) -> None:
         self.worker: LatestWorker[TrailRequest, Trails] = LatestWorker("trails", self._make, prepare=prepare_decoding)
-        self._part: tuple[Hashable, ClipModel] | None = None
+        self._part: tuple[Hashable, EditedClip] | None = None
 
     def trails(self, request: TrailRequest) -> Trails | None:
         """The trails if they are ready, otherwise the newest ones of the same clip; None before the first."""
@@ -76,40 +81,39 @@ class TrailMaker:
 
     def _make(self, request: TrailRequest) -> Trails:
         if self._part is None or self._part[0] != request.model_key:
-            self._part = (request.model_key, part_of(request.model, "dynamic"))
-        paths, opacities = paths_of(self._part[1], request.clip, request.frame_index)
+            self._part = (request.model_key, request.parts.apart("dynamic"))
+        paths, opacities = paths_of(self._part[1], request.frame_index, request.effects)
         vertices, colors = trail_lines(paths, opacities)
         return Trails(vertices, colors, (request.model_key, request.frame_index))
 
 
-def paths_of(part: ClipModel, clip: Clip, frame_index: int) -> tuple[np.ndarray, np.ndarray]:
+def trail_frames(clip: Clip, frame_index: int) -> range:
+    """Frames of the clip through which a trail goes that ends at one of them."""
+    return range(max(clip.start, frame_index - N_FRAMES + 1), frame_index + 1)
+
+
+def paths_of(part: EditedClip, frame_index: int, effects: Sequence[Effects]) -> tuple[np.ndarray, np.ndarray]:
     """Where the Gaussians of a frame were in the frames before it, within the clip.
 
     Args:
         part: Anchors that move.
+        effects: Of each frame of `trail_frames`.
     Returns:
-        paths: Oldest first, the frame itself last; NaN where the anchor did not exist. [T, N, 3] float32
+        paths: Oldest first, the frame itself last; NaN where there was no such Gaussian. [T, N, 3] float32
         opacities: At the frame itself. [N]
     """
-    import torch
-
     from engine.model.host_array import host_array
 
-    frames = range(max(clip.start, frame_index - N_FRAMES + 1), frame_index + 1)
-    if not part.roles():
-        return np.zeros((len(frames), 0, 3), np.float32), np.zeros(0, np.float32)
-    k, now = part.decoder.gaussians_per_anchor, clip.clip_time(frame_index)
-    rows = {role: part.alive(role, now) for role in part.roles()}
-    paths, opacities = [], np.zeros(0, np.float32)
-    with torch.no_grad():
-        for frame in frames:
-            clip_time = clip.clip_time(frame)
-            gaussians = part.decode(clip_time, rows)
-            is_there = [np.isin(host_array(rows[role]), host_array(part.alive(role, clip_time))) for role in rows]
-            exists = np.repeat(np.concatenate(is_there), k)
-            paths.append(np.where(exists[:, None], host_array(gaussians.means), np.nan).astype(np.float32))
-            opacities = host_array(gaussians.opacities)
-    return np.stack(paths), opacities
+    clip = part.clip
+    now = part.decode(clip.clip_time(frame_index), effects[-1])
+    place = part.rows.indices_of(now.rows)
+    paths = []
+    for frame, held in zip(trail_frames(clip, frame_index), effects, strict=True):
+        then = now if frame == frame_index else part.decode(clip.clip_time(frame), held)
+        known = np.full((part.rows.n, 3), np.nan, np.float32)
+        known[part.rows.indices_of(then.rows)] = host_array(then.gaussians.means)
+        paths.append(known[place])
+    return np.stack(paths), host_array(now.gaussians.opacities)
 
 
 def trail_lines(paths: np.ndarray, opacities: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ that everything that draws or reacts to the pointer there needs to know of one v
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -94,6 +94,11 @@ class Views:
         """Take up another capture: each view frames it anew, and keeps its overlays."""
         for look in self._looks:
             look.view = OrbitView(rig)
+
+    def set_scene_up(self, up: Sequence[float] | None) -> None:
+        """Say what is up in the scene; see OrbitView.set_scene_up."""
+        for look in self._looks:
+            look.view.set_scene_up(up)
 
     def correct(self, rig: CameraRig) -> None:
         """Show the same cameras as a training has corrected them; free views stay where they are."""

@@ -11,11 +11,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.project.header_cache import FoundHeader
+from app.project.metrics_file import read_metrics
 from app.project.project import Project
-from app.project.project_files import read_metrics
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.roles import REFERENCE_ROLES
 
+_ROLE_REASONS = {
+    "source": "It was trained on another clip as the reference; it is the reference itself now.",
+    "reference": "It was trained as the reference, which is clip {} now.",
+}
+"""Why a clip is out of date that was trained before another clip was made the reference."""
 REPORT_EVERY = 32
 """Clips read between two reports of progress."""
 
@@ -133,6 +138,19 @@ class ClipCatalog:
                 return True
         return False
 
+    def dependents(self, clip_index: int) -> list[int]:
+        """Finished clips that were trained on what this one is now."""
+        header = self._good(clip_index)
+        if header is None:
+            return []
+        return [
+            index
+            for index in range(len(self))
+            if index != clip_index
+            and (other := self._good(index)) is not None
+            and header.fingerprint in (other.reference_fingerprint, other.previous_fingerprint)
+        ]
+
     def outdated_by(self, clip_index: int) -> list[int]:
         """Clips that are good now and would be out of date if this one were trained again with another result."""
         now, then = self._bases(), self._bases(replaced=clip_index)
@@ -196,6 +214,8 @@ class ClipCatalog:
             needed += [before] if self._goes_on and before is not None else []
             blocker = next((found for other in needed if (found := self._blocker(other, bases)) is not None), None)
             return Basis(blocked_by=blocker)
+        if self._inherits and (header.role == "source") != (index != first):
+            return Basis(_ROLE_REASONS[header.role].format(first))
         if header.role == "source":
             if self._is_damaged(first):
                 return Basis(f"Clip {first}, which it was trained on, is damaged.", first)

@@ -15,10 +15,12 @@ from pathlib import Path
 
 from app.project.project import Project
 from engine.clip_files.clip_header import ClipHeader
-from engine.clip_files.clip_state import read_clip_state
+from engine.clip_files.clip_state import ClipState, read_clip_state
 from engine.errors import ProjectError
 from engine.storage.files import atomic_path, disk_error, replace_file
 
+DAMAGED = "damaged"
+"""Folder of damaged files that were put aside."""
 MAX_VERSIONS = 3
 """Of one clip; the one that was set aside first goes."""
 
@@ -56,7 +58,7 @@ def version_path(project: Project, clip_index: int, number: int) -> Path:
 
 def versions_dir(project: Project, clip_index: int) -> Path:
     """Where the versions of a clip lie."""
-    return project.folder / "versions" / f"{clip_index:04d}"
+    return project.folder / "versions" / project.clip_name(clip_index)
 
 
 def list_versions(project: Project, clip_index: int) -> list[ClipVersion]:
@@ -89,6 +91,8 @@ def _numbers(project: Project, clip_index: int) -> list[int]:
 def set_aside(project: Project, clip_index: int, *, unless: str = "") -> int | None:
     """Keep the finished clip and its curves as a version, under their names as well. See `forget_oldest`.
 
+    A damaged clip is no version; it is kept as well, see `put_damaged_aside`.
+
     Args:
         unless: Fingerprint of what comes in its place: an equal clip is not kept twice.
     Returns:
@@ -97,7 +101,10 @@ def set_aside(project: Project, clip_index: int, *, unless: str = "") -> int | N
         DiskError: The disk refused; the clip stays where it is.
     """
     found = project.headers.read(project.clip_path(clip_index))
-    if found is None or found.header is None or found.header.fingerprint == unless:
+    if found is None or (found.header is not None and found.header.fingerprint == unless):
+        return None
+    if found.header is None or not _is_whole(project.clip_path(clip_index)):
+        put_damaged_aside(project, clip_index)
         return None
     number = max(_numbers(project, clip_index), default=0) + 1
     target = version_path(project, clip_index, number)
@@ -110,6 +117,67 @@ def set_aside(project: Project, clip_index: int, *, unless: str = "") -> int | N
     with suppress(OSError):  # curves are worth less than the clip
         _link_or_copy(project.metrics_path(clip_index), target.with_suffix(".jsonl"))
     return number
+
+
+def put_damaged_aside(project: Project, clip_index: int) -> Path | None:
+    """Keep the damaged file of a clip in the folder "damaged", under its name as well, for whoever can still make use
+    of it. Returns where; None where there is no file.
+
+    Raises:
+        DiskError: The disk refused; the file stays where it is.
+    """
+    path, folder = project.clip_path(clip_index), project.folder / DAMAGED
+    if not path.is_file():
+        return None
+    name = project.clip_name(clip_index)
+    try:
+        folder.mkdir(exist_ok=True)
+        taken = set(os.listdir(folder))
+        number = next(n for n in range(1, len(taken) + 2) if f"{name}-{n}.safetensors" not in taken)
+        target = folder / f"{name}-{number}.safetensors"
+        _link_or_copy(path, target)
+    except OSError as error:
+        raise disk_error(error, what="The damaged file of the clip", path=folder) from error
+    return target
+
+
+def best_version(project: Project, clip_index: int) -> ClipVersion | None:
+    """The version of a clip that was set aside last and could come back now; None without one. Reads headers only."""
+    for version in list_versions(project, clip_index):
+        if version.header is not None and not why_not(project, clip_index, version.header):
+            return version
+    return None
+
+
+def recovery_hint(project: Project, clip_index: int) -> str:
+    """What can be done about a damaged clip, as a sentence for an error."""
+    version = best_version(project, clip_index)
+    if version is None:
+        return f"Restore it from a copy, or train clip {clip_index} again."
+    return (
+        f"Bring back what it was before: clipgstream versions PROJECT --clip {clip_index} --restore {version.number}. "
+        f"Or restore it from a copy, or train clip {clip_index} again."
+    )
+
+
+def read_finished(project: Project, clip_index: int) -> ClipState:
+    """A finished clip.
+
+    Raises:
+        ProjectError: It is damaged; says which version of it could come back.
+    """
+    try:
+        return read_clip_state(project.clip_path(clip_index))
+    except ProjectError as error:
+        raise ProjectError(error.message, hint=recovery_hint(project, clip_index), path=error.path) from error
+
+
+def _is_whole(path: Path) -> bool:
+    try:
+        read_clip_state(path)
+    except ProjectError:
+        return False
+    return True
 
 
 def forget_oldest(project: Project, clip_index: int) -> None:
@@ -183,15 +251,19 @@ def restore_version(project: Project, clip_index: int, number: int) -> None:
 
 def why_not(project: Project, clip_index: int, header: ClipHeader) -> str:
     """Why a clip file cannot be clip `clip_index` of this project now; empty where it can."""
-    if header.clip_index != clip_index:
-        return f"The version is of clip {header.clip_index}, not of clip {clip_index}."
+    start, stop = project.frames_of(clip_index)
+    if header.start != start or (stop is not None and header.start + header.n_frames > stop):
+        last = header.start + header.n_frames - 1
+        return f"The version is of frames {header.start} to {last}, not of clip {clip_index}."
+    base = project.inherited_index(clip_index)
+    if header.role != ("reference" if base is None else "source"):
+        return "The version was trained before another clip was made the reference."
     found = project.headers.read(project.clip_path(clip_index))
     current = None if found is None else found.header
     if current is not None:
-        of_project = (current.start, current.n_frames, current.clip_length, current.camera_names, current.role)
-        if (header.start, header.n_frames, header.clip_length, header.camera_names, header.role) != of_project:
+        of_project = (current.start, current.n_frames, current.clip_length, current.camera_names)
+        if (header.start, header.n_frames, header.clip_length, header.camera_names) != of_project:
             return "The version belongs to another project: its frames or cameras are others."
-    base = project.inherited_index(clip_index)
     known = None if base is None else project.headers.read(project.clip_path(base))
     if header.role == "source" and base is not None:
         fingerprint = None if known is None or known.header is None else known.header.fingerprint

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from app.background.jobs import JobContext
 from app.project.clip_catalog import ClipCatalog
+from app.project.clip_names import finished_files
 from app.project.opening_answers import OpeningAnswers, window_scale
 from app.project.project import (
     PROJECT_FILE,
@@ -170,7 +171,7 @@ def projects_of(capture: Capture, recent: Sequence[RecentProject] = ()) -> list[
         except ProjectError:
             continue
         if settings.fingerprint == capture.fingerprint:
-            n_trained = sum(1 for _ in (folder / "clips").glob("[0-9]*.safetensors"))
+            n_trained = len(finished_files(folder, settings.clip_bounds, settings.clip_length))
             first, stop = settings.frames or (0, capture.layout.n_frames)
             n_clips = len(settings.clips(stop - first))
             name = project_name(folder, capture.path)

@@ -1,10 +1,10 @@
 """Project: the folder that keeps what was learned about one capture. Paths, settings and the lock; no training.
 
-project.json                 settings, see ProjectSettings
-gate.json                    regions in which the user overrules the gate, where there are any
-camera_paths.json            camera paths, where there are any, see CameraPath
+project.json                 the document: settings, regions, camera paths, edits and so on, see ProjectDocument
 clips/0000.safetensors       finished clips
+clips/000030-000035.safetensors  one of frames 30 to 34, after a split or merge; see app.project.clip_names
 versions/0000/               what was trained before it was trained again
+damaged/0000-1.safetensors   damaged files that were put aside
 checkpoints/0000.safetensors unfinished clips: everything needed to go on
 live/                        snapshots of the running training; swept when the project is opened for writing
 prep/                        what clips share, such as backgrounds
@@ -18,28 +18,22 @@ from __future__ import annotations
 import logging
 import os
 import shutil
-from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.project.camera_paths import CAMERA_PATHS_FILE, read_camera_paths, write_camera_paths
+from app.document.document_file import PROJECT_FILE, write_document
+from app.document.document_store import DocumentStore
+from app.document.history import Changed, DocumentHistory, Event, Placed
+from app.document.project_document import ProjectDocument
+from app.document.project_settings import ProjectSettings
+from app.project.clip_names import clip_name, finished_files
 from app.project.header_cache import HeaderCache
 from app.project.lock import ProcessLock, is_process_alive
-from app.project.project_files import (
-    GATE_FILE,
-    PROJECT_FILE,
-    ProjectSettings,
-    read_regions,
-    read_settings,
-    write_regions,
-    write_settings,
-)
-from engine.camera.camera_path import CameraPath
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.errors import ProjectError
-from engine.gate.regions import GateRegion
 from engine.storage.files import PARTIAL_PREFIX, is_left_over
 from engine.user_folders import data_dir
 
@@ -55,14 +49,26 @@ class Project:
     """An opened project folder. Use `create_project` or `open_project`.
 
     Attributes:
+        history: The document and the way back. The window sets it, and keeps it by itself a moment later.
+        store: Where the document is kept.
         headers: Of its clips and checkpoints, read once for everybody who asks.
     """
 
-    def __init__(self, folder: Path, settings: ProjectSettings, lock: ProcessLock | None) -> None:
+    def __init__(self, folder: Path, history: DocumentHistory, lock: ProcessLock | None) -> None:
         self.folder = folder
-        self.settings = settings
+        self.history, self.store = history, DocumentStore(folder)
         self.headers = HeaderCache()
         self._lock = lock
+
+    @property
+    def document(self) -> ProjectDocument:
+        """What the project is made to be."""
+        return self.history.present
+
+    @property
+    def settings(self) -> ProjectSettings:
+        """What every clip has in common."""
+        return self.history.present.settings
 
     @property
     def is_writable(self) -> bool:
@@ -84,21 +90,36 @@ class Project:
         """A rough cloud to look at before anything is trained."""
         return self.prep_dir / "first_cloud.safetensors"
 
+    def clip_name(self, clip_index: int) -> str:
+        """The name of a clip's files, see app.project.clip_names."""
+        return clip_name(clip_index, self.settings.clip_bounds, self.settings.clip_length)
+
+    def frames_of(self, clip_index: int) -> tuple[int, int | None]:
+        """First frame of a clip, and one past its last; None of the last where only the capture knows it."""
+        bounds, length = self.settings.clip_bounds, self.settings.clip_length
+        if bounds is not None and 0 <= clip_index < len(bounds) - 1:
+            return bounds[clip_index], bounds[clip_index + 1]
+        return clip_index * length, None if self.settings.config().field == "joint" else (clip_index + 1) * length
+
+    def finished_clips(self) -> list[tuple[int, Path]]:
+        """Index and file of every finished clip, damaged ones included, in order."""
+        return finished_files(self.folder, self.settings.clip_bounds, self.settings.clip_length)
+
     def clip_path(self, clip_index: int) -> Path:
         """A finished clip."""
-        return self.folder / "clips" / f"{clip_index:04d}.safetensors"
+        return self.folder / "clips" / f"{self.clip_name(clip_index)}.safetensors"
 
     def checkpoint_path(self, clip_index: int) -> Path:
         """An unfinished clip."""
-        return self.folder / "checkpoints" / f"{clip_index:04d}.safetensors"
+        return self.folder / "checkpoints" / f"{self.clip_name(clip_index)}.safetensors"
 
     def metrics_path(self, clip_index: int) -> Path:
         """Curves of a finished clip."""
-        return self.folder / "metrics" / f"{clip_index:04d}.jsonl"
+        return self.folder / "metrics" / f"{self.clip_name(clip_index)}.jsonl"
 
     def unfinished_metrics_path(self, clip_index: int) -> Path:
         """Curves of a training that is not finished. Beside the others, so that those of an earlier one stand."""
-        return self.folder / "metrics" / f"{clip_index:04d}.unfinished.jsonl"
+        return self.folder / "metrics" / f"{self.clip_name(clip_index)}.unfinished.jsonl"
 
     def curve_path(self, clip_index: int, *, is_finished: bool) -> Path:
         """Curves of the finished clip, or of its training that was stopped."""
@@ -109,7 +130,7 @@ class Project:
 
     def log_path(self, clip_index: int) -> Path:
         """Log of a clip's worker."""
-        return self.folder / "logs" / f"clip-{clip_index:04d}.log"
+        return self.folder / "logs" / f"clip-{self.clip_name(clip_index)}.log"
 
     def is_trained(self, clip_index: int) -> bool:
         """Whether the clip is finished."""
@@ -163,49 +184,29 @@ class Project:
                 path=self.folder,
             )
 
+    def change(self, document: ProjectDocument, name: str) -> None:
+        """Replace the document, on disk first, as a step of its history. name: See Changed.
+
+        Raises:
+            ProjectError: The project is read-only, or the document cannot be kept.
+            DiskError: The disk refused.
+        """
+        self.happen(Changed(name, document))
+
+    def happen(self, event: Event) -> None:
+        """Let something happen to the document, on disk first. Raises what `change` raises."""
+        self.check_writable()
+        history = self.history.after(event)
+        self.store.write([event], history)
+        self.history = history
+
     def update(self, settings: ProjectSettings) -> None:
-        """Replace the settings, on disk first.
-
-        Raises:
-            ProjectError: The project is read-only, or the disk refused.
-        """
-        self.check_writable()
-        write_settings(self.folder, settings)
-        self.settings = settings
-
-    def gate_regions(self) -> tuple[GateRegion, ...]:
-        """Where the user overrules the gate; later ones overrule earlier ones. Clips trained from now on heed them.
-
-        Raises:
-            ProjectError: The file is damaged or holds something that is not a region.
-        """
-        return read_regions(self.folder / GATE_FILE)
-
-    def set_gate_regions(self, regions: Sequence[GateRegion]) -> None:
-        """Replace the regions, on disk.
-
-        Raises:
-            ProjectError: The project is read-only, or the disk refused.
-        """
-        self.check_writable()
-        write_regions(self.folder / GATE_FILE, regions)
-
-    def camera_paths(self) -> tuple[CameraPath, ...]:
-        """Camera paths in the user's order.
-
-        Raises:
-            ProjectError: The file is damaged or holds something that is not a camera path.
-        """
-        return read_camera_paths(self.folder)
-
-    def set_camera_paths(self, paths: Sequence[CameraPath]) -> None:
-        """Replace the camera paths, on disk.
-
-        Raises:
-            ProjectError: The project is read-only, or the disk refused.
-        """
-        self.check_writable()
-        write_camera_paths(self.folder, paths)
+        """Replace the settings; see `change`. Another place of the capture alone is not a step of the history."""
+        before = self.settings
+        if replace(settings, capture=before.capture, follow_links=before.follow_links) == before:
+            self.happen(Placed(settings))
+        else:
+            self.change(replace(self.document, settings=settings), "change settings")
 
     def discard_progress(self, clip_index: int) -> None:
         """Forget the unfinished training of a clip; a finished clip and its curves stay."""
@@ -230,13 +231,17 @@ class Project:
 
     def remove_files(self) -> None:
         """Take back a project that has learned nothing: its own files and folders go, other things stay."""
-        for name in ("clips", "versions", "checkpoints", "live", "prep", "metrics", "logs"):
+        for name in ("clips", "versions", "damaged", "checkpoints", "live", "prep", "metrics", "logs"):
             shutil.rmtree(self.folder / name, ignore_errors=True)
-        for name in (PROJECT_FILE, GATE_FILE, CAMERA_PATHS_FILE):
-            (self.folder / name).unlink(missing_ok=True)
+        (self.folder / PROJECT_FILE).unlink(missing_ok=True)
 
 
 # ---------------------------------------------------------------- opening
+
+
+def read_settings(folder: Path) -> ProjectSettings:
+    """The settings of a project that is not opened. Raises what DocumentStore.read raises."""
+    return DocumentStore(folder).read().present.settings
 
 
 def is_project(folder: Path) -> bool:
@@ -333,11 +338,12 @@ def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
     try:
         if (folder / PROJECT_FILE).exists():  # made while this one looked
             raise ProjectError("There is a project already.", hint="Open it instead.", path=folder)
-        write_settings(folder, settings)
+        document = ProjectDocument(settings)
+        write_document(folder, document)
     except ProjectError:
         lock.release()
         raise
-    return Project(folder, settings, lock)
+    return Project(folder, DocumentHistory(document), lock)
 
 
 def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
@@ -347,12 +353,17 @@ def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
         ProjectError: The folder is not a project, is damaged, of a newer schema, or open for writing elsewhere.
     """
     folder = Path(folder)
-    settings = read_settings(folder)
+    history = DocumentStore(folder).read()
     lock = None
     if is_writable:
         lock = ProcessLock(folder / LOCK_FILE)
         lock.acquire()
-    project = Project(folder, settings, lock)
+        try:
+            history = DocumentStore(folder).read()  # another program may have changed it until now
+        except ProjectError:
+            lock.release()
+            raise
+    project = Project(folder, history, lock)
     if is_writable:
         sweep(project)
     return project

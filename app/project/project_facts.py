@@ -92,7 +92,7 @@ def read_facts(folder: Path, name: str, *, leave_out_damaged: bool = False) -> P
         ProjectError: It is not a project, nothing is trained yet, or a clip cannot be read.
     """
     project = open_project(folder, is_writable=False)
-    found = [_read_clip(path) for path in sorted((folder / "clips").glob("[0-9]*.safetensors"))]
+    found = [_read_clip(path, index) for index, path in project.finished_clips()]
     clips = [clip for clip in found if isinstance(clip, ClipFacts)]
     damaged = tuple(clip for clip in found if isinstance(clip, DamagedClip))
     if damaged and not (clips and leave_out_damaged):
@@ -104,13 +104,13 @@ def read_facts(folder: Path, name: str, *, leave_out_damaged: bool = False) -> P
     return ProjectFacts(name, project, sorted(clips, key=lambda clip: clip.clip_index), damaged)
 
 
-def _read_clip(path: Path) -> ClipFacts | DamagedClip | None:
+def _read_clip(path: Path, clip_index: int) -> ClipFacts | DamagedClip | None:
     header = look_at_clip(path)
     if not isinstance(header, ClipHeader):
         return header
     try:
         return ClipFacts(
-            clip_index=header.clip_index,
+            clip_index=clip_index,
             start=header.start,
             n_frames=header.n_frames,
             role=header.role,

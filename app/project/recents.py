@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from app.project.project_files import PROJECT_FILE
+from app.document.document_file import PROJECT_FILE
 from engine.user_folders import data_dir
 
 MAX_RECENT = 12

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
+from app.document.camera_paths import check_paths
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.playback.view_place import ViewPlace
 from app.playback.views import Views
-from app.project.camera_paths import check_paths
 from app.session.edit_status import PathsStatus
-from app.session.history import History
-from app.session.kept_document import KeptDocument
+from app.session.editing.kept_document import KeptDocument
 from app.session.path_commands import ChooseCameraKey, ChooseCameraPath, LookAlongPath, PathCommand
 from app.session.path_edits import edited
 from engine.camera.camera_path import CameraPath
@@ -21,28 +21,23 @@ from engine.errors import ProjectError
 
 
 class CameraPaths:
-    """For one thread.
+    """For one thread. document: Holds and keeps the paths."""
 
-    Attributes:
-        document: Holds and keeps the paths.
-    """
-
-    def __init__(self, history: History) -> None:
-        self.document: KeptDocument[tuple[CameraPath, ...]] = KeptDocument(
-            "camera paths",
-            empty=(),
-            read=lambda project: project.camera_paths(),
-            write=lambda project, paths: project.set_camera_paths(paths),
-            history=history,
-        )
+    def __init__(self, document: KeptDocument) -> None:
+        self._document = document
         self._chosen: int | None = None
         self._key: int | None = None
         self._along: tuple[int, OrbitView] | None = None  # the view that goes along, and its index
         self._led: tuple[ViewPlace, Any] | None = None  # where it was put, and for what
 
+    @property
+    def _paths(self) -> tuple[CameraPath, ...]:
+        content = self._document.content
+        return () if content is None else content.camera_paths
+
     def status(self) -> PathsStatus:
         """Everything as one value."""
-        paths, why_not = self.document.content, self.document.why_not()
+        paths, why_not = self._paths, self._document.why_not()
         chosen = None if not paths else min(self._chosen or 0, len(paths) - 1)
         n_keys = 0 if chosen is None else len(paths[chosen].keys)
         key = None if self._key is None or self._key >= n_keys else self._key
@@ -70,10 +65,10 @@ class CameraPaths:
             case LookAlongPath(is_on=is_on):
                 self._look_along(status, views, is_on)
             case _:
-                self.document.checked()
+                document = self._document.checked().document
                 result = edited(status, command, view, timeline)
                 check_paths(result.paths)
-                self.document.change(result.paths, result.name, result.merge)
+                self._document.change(replace(document, camera_paths=result.paths), result.name, result.merge)
                 self._chosen, self._key = result.chosen, result.chosen_key
 
     def _choose_key(self, status: PathsStatus, index: int | None) -> None:
@@ -91,9 +86,9 @@ class CameraPaths:
     @contextmanager
     def showing_change(self) -> Iterator[None]:
         """What is taken back in here, or done again, is chosen, so that one sees it."""
-        before = self.document.content
+        before = self._paths
         yield
-        after = self.document.content
+        after = self._paths
         changed = [row for row, path in enumerate(after) if row >= len(before) or before[row] is not path]
         if changed:
             self._chosen = changed[0]

@@ -11,6 +11,9 @@ from pathlib import Path
 from app.calibration.job import CalibrationRequest
 from app.export.export_choices import ExportChoices
 from app.project.opening_answers import OpeningAnswers
+from app.session.clips.clip_commands import ClipCommand
+from app.session.editing.edit_commands import EditCommand, GoToStep
+from app.session.editing.selection_commands import SelectionCommand
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
@@ -457,6 +460,7 @@ Command = (
     | OpenProject
     | TrainNextClip
     | QueueCommand
+    | ClipCommand
     | PauseTraining
     | ResumeTraining
     | StopTraining
@@ -470,8 +474,11 @@ Command = (
     | SettingCommand
     | MarkCommand
     | PathCommand
+    | EditCommand
+    | SelectionCommand
     | Undo
     | Redo
+    | GoToStep
     | CalibrationCommand
     | SynchronisationCommand
     | HomeView

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
+from app.document.project_document import AS_CAPTURED, World
 from engine.camera.camera_path import CameraKey, CameraPath
+from engine.editing.edit import Edit
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,10 +16,41 @@ class HistoryStatus:
 
     Attributes:
         undo, redo: What that would be, as a word or two; empty where there is nothing.
+        past: Names of the steps that led here, the oldest first.
+        future: Names of the steps that were taken back, the one that would be done again next first.
     """
 
     undo: str = ""
     redo: str = ""
+    past: tuple[str, ...] = ()
+    future: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class EditsStatus:
+    """Edits of the open project, and what else the user has said of it.
+
+    Attributes:
+        edits: The stack, bottom first.
+        labels: The user's own names of clips and cameras, by kind and name; see app.document.project_document.Label.
+        world: Up and scale.
+        can_edit: Whether anything can be changed now.
+        why_not: The reason if not, and what to do.
+    """
+
+    edits: tuple[Edit, ...] = ()
+    labels: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    world: World = AS_CAPTURED
+    can_edit: bool = False
+    why_not: str = ""
+
+    def edit(self, edit_id: int | None) -> Edit | None:
+        """The edit of that number; None without one."""
+        return next((edit for edit in self.edits if edit.edit_id == edit_id), None)
+
+    def label(self, kind: str, name: str) -> str:
+        """The user's own name for a clip or a camera; empty without one."""
+        return self.labels.get((kind, name), "")
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from app.training.curves import CurveReader, Curves
 from app.training.messages import ENDINGS, Event, SnapshotWritten
 from app.training.service import Launch, ShownState, TrainingService
 from app.training.train_queue import OwnSettings
-from engine.errors import EngineError
+from engine.errors import EngineError, ProjectError
 
 logger = logging.getLogger(__name__)
 
@@ -116,6 +116,18 @@ class LiveTraining:
     def is_busy(self) -> bool:
         """Whether a clip of the open project trains."""
         return self.service is not None and self.service.worker is not None
+
+    def check_idle(self) -> None:
+        """See that nothing trains or waits to be trained, so that clips may be cut otherwise.
+
+        Raises:
+            ProjectError: Something does.
+        """
+        if self.service is not None and (self.service.worker is not None or self.service.queue):
+            raise ProjectError(
+                "Clips are being trained, or wait for it, as they are now.",
+                hint="Stop the training first: what was learned is kept.",
+            )
 
     def state_of(self, clip_index: int) -> ShownState | None:
         """The state of a clip to look at."""

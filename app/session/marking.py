@@ -5,10 +5,10 @@ the clips it reaches. `Marking` holds the list of the open project.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from app.session.commands import MarkCommand, MarkRegion, RemoveRegion
-from app.session.history import History
-from app.session.kept_document import KeptDocument
+from app.session.editing.kept_document import KeptDocument
 from app.status import ClipStatus, RegionsStatus
 from engine.errors import ProjectError
 from engine.gate.regions import GateRegion, sphere_region
@@ -59,20 +59,16 @@ def _clip_names(indices: Sequence[int]) -> str:
 
 
 class Marking:
-    """The regions of the open project. For one thread.
+    """The regions of the open project. For one thread. document: Holds and keeps them."""
 
-    Attributes:
-        document: Holds and keeps them.
-    """
+    def __init__(self, document: KeptDocument) -> None:
+        self._document = document
 
-    def __init__(self, history: History) -> None:
-        self.document: KeptDocument[tuple[GateRegion, ...]] = KeptDocument(
-            "marked regions",
-            empty=(),
-            read=lambda project: project.gate_regions(),
-            write=lambda project, regions: project.set_gate_regions(regions),
-            history=history,
-        )
+    @property
+    def regions(self) -> tuple[GateRegion, ...]:
+        """Those of the open project; none without one."""
+        content = self._document.content
+        return () if content is None else content.regions
 
     def apply(self, command: MarkCommand) -> None:
         """Carry out a command.
@@ -82,8 +78,7 @@ class Marking:
         """
         match command:
             case MarkRegion(treat=treat, center=center, radius=radius):
-                marked = after_marking(self.document.content, [sphere_region(treat, center, radius)])
-                self.document.change(marked, "mark a region")
+                self._change(after_marking(self.regions, [sphere_region(treat, center, radius)]), "mark a region")
             case RemoveRegion(index=index):
                 self.remove(index)
 
@@ -93,17 +88,20 @@ class Marking:
         Raises:
             ProjectError: There is no such region, or nothing can be changed now.
         """
-        regions = self.document.content
+        regions = self.regions
         if not 0 <= index < len(regions):
             raise ProjectError(f"There is no region {index + 1}; {len(regions)} are marked.")
-        self.document.change((*regions[:index], *regions[index + 1 :]), "remove a region")
+        self._change((*regions[:index], *regions[index + 1 :]), "remove a region")
+
+    def _change(self, regions: tuple[GateRegion, ...], name: str) -> None:
+        self._document.change(replace(self._document.checked().document, regions=regions), name)
 
     def status(self, clips: Sequence[ClipStatus]) -> RegionsStatus:
         """Everything as one value. clips: Of the project."""
-        why_not, project = self.document.why_not(), self.document.project
+        why_not, project = self._document.why_not(), self._document.project
         started = [index for index, clip in enumerate(clips) if clip.state in STARTED]
         return RegionsStatus(
-            regions=self.document.content,
+            regions=self.regions,
             can_mark=not why_not,
             why_not=why_not,
             effect="" if project is None else effect_text(started, gate=project.settings.config().gate),

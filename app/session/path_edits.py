@@ -27,7 +27,7 @@ class Edited:
     Attributes:
         paths, chosen, chosen_key: As of PathsStatus.
         name: What was done, for the history.
-        merge: See app.session.history.History.note.
+        merge: See app.document.history.Changed.
     """
 
     paths: tuple[CameraPath, ...]

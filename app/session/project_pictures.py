@@ -20,7 +20,7 @@ from engine.kernels.cache import is_cache_warm
 
 logger = logging.getLogger(__name__)
 
-NO_KEY = (0, "", 0, "", PLAIN, 0)
+NO_KEY = (0, "", 0, "", "", PLAIN, 0)
 """Of the frame: nobody asks for this picture again."""
 CLOSE_S = 3.0
 """The last picture is waited for no longer than this."""

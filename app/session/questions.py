@@ -8,6 +8,7 @@ from app.project.capture_report import CaptureReport
 from app.project.clip_catalog import ClipCatalog
 from app.project.opening_answers import OpeningAnswers
 from app.project.recents import RecentProject
+from app.session.clips.clip_questions import ClipQuestion
 from engine.capture.writers.capture_json import Corrections
 
 
@@ -126,7 +127,7 @@ class OpeningPage:
     follow_links: bool
 
 
-Question = RetrainQuestion | SettingsQuestion | ProjectQuestion | CorrectionQuestion
+Question = RetrainQuestion | SettingsQuestion | ProjectQuestion | CorrectionQuestion | ClipQuestion
 
 
 def retrain_question(catalog: ClipCatalog, clip_index: int) -> RetrainQuestion:

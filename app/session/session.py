@@ -2,28 +2,34 @@
 finished work in. Belongs to one thread; nothing here blocks. Draws nothing.
 
 It composes: `playback` prepares what is shown, `live_training` trains, `residuals` compares with what the cameras took,
-`marking` and `camera_paths` hold what is edited, `edits` the way back, `recent` what was opened before. What is open is
-one immutable value that each of them is handed.
+`document` holds what is edited and the way back, `editing`, `marking` and `camera_paths` change parts of it, `recent`
+what was opened before. What is open is one immutable value that each of them is handed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
+
+import numpy as np
 
 from app.background.jobs import Jobs
 from app.background.log_reader import LogLine, LogView
 from app.background.usage import UsageMeter
+from app.document.project_document import ProjectDocument
 from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
 from app.playback.bookmarks import Bookmarks
 from app.playback.coverage import Coverage
+from app.playback.markers import Markers
 from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
 from app.playback.trails import Trails
 from app.playback.view_modes import CONTENTS, MODES, ShownAs
 from app.playback.views import Views
+from app.project.disk.use import DiskUse
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.opening_answers import answers_to_keep
@@ -39,11 +45,17 @@ from app.session.camera_paths import CameraPaths
 from app.session.capture_doctor import CaptureDoctor
 from app.session.capture_opening import CaptureOpening
 from app.session.clip_versions import Versions
+from app.session.clips.clip_commands import ClipCommand, CompareVersion
+from app.session.clips.clip_work import ClipWork
+from app.session.clips.comparing import show_version
 from app.session.doctor_status import DoctorStatus
-from app.session.edit_status import HistoryStatus, PathsStatus
+from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
+from app.session.editing.edits import Edits
+from app.session.editing.kept_document import KeptDocument
+from app.session.editing.selecting import Selecting, SelectionStatus
+from app.session.editing.shown_to_select import ShownToSelect
 from app.session.exporting import Exporting
 from app.session.following import follow_training
-from app.session.history import History
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
 from app.session.notices import Notices
@@ -51,7 +63,7 @@ from app.session.project_opener import ProjectOpener
 from app.session.questions import ProjectQuestion, Question
 from app.session.queue_commands import QueueCommands
 from app.session.recent_projects import RecentProjects
-from app.session.setting_changes import changed_settings
+from app.session.setting_changes import changed_settings, is_other_cut
 from app.session.settings import Settings
 from app.session.synchronising import Synchronising
 from app.status import (
@@ -59,6 +71,7 @@ from app.status import (
     COMPARE_MODES,
     OVERLAY_NAMES,
     ClipStatus,
+    DependencyStatus,
     JobStatus,
     Overlays,
     PlanStatus,
@@ -78,7 +91,9 @@ from app.training.service import Launch, ShownState
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.errors import EngineError
+from engine.editing.selection.ranges import Spread
+from engine.editing.selection.seen_from import SeenFrom
+from engine.errors import EngineError, ProjectError
 
 
 class Session:
@@ -87,9 +102,9 @@ class Session:
     Attributes:
         opened: What is open; None before.
         timeline, views, bookmarks: What the user looks at; the window may change them directly.
-        training, queue, clip_states, plan, regions, paths, history, usage, project_status: Status values, remade by
-            `poll` and `dispatch`. The plan is that of the next clip; None while something trains or nothing is left to
-            train.
+        training, queue, clip_states, plan, regions, paths, edits, history, usage, project_status: Status values,
+            remade by `poll` and `dispatch`. The plan is that of the next clip; None while something trains or nothing
+            is left to train.
         versions: What clips were before they were trained again.
         log: What program and training have said.
         question: What the user has to answer; None while there is nothing to ask.
@@ -150,9 +165,15 @@ class Session:
         self._usage, self.log = UsageMeter(), LogView()
         self.playback = Playback(self.live_training.state_of)
         self.residuals = Residuals(self.playback)
-        self.edits = History()
-        self.marking, self.camera_paths = Marking(self.edits), CameraPaths(self.edits)
-        self._documents = (self.marking.document, self.camera_paths.document)
+        self.document = KeptDocument(guard=self._check_change, on_change=self._follow_change)
+        self.clip_work = ClipWork(self._jobs, self.notices, self.live_training, self.document, self._take_question)
+        self.marking, self.camera_paths = Marking(self.document), CameraPaths(self.document)
+        self.selecting = Selecting(
+            ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self.overlays.content)
+        )
+        self.selection = SelectionStatus()
+        self.editing = Edits(self.document, self.selecting)
+        self.edits: EditsStatus = self.editing.status()
         self.regions: RegionsStatus = self.marking.status([])
         self.paths: PathsStatus = self.camera_paths.status()
         self.history = HistoryStatus()
@@ -285,6 +306,11 @@ class Session:
             case _ if isinstance(command, commands.QueueCommand):
                 self.question = None
                 self.question = self._queue_commands.obey(command)
+            case CompareVersion():
+                show_version(command, self.timeline, self.overlays)
+            case _ if isinstance(command, ClipCommand):
+                self.question = None
+                self.question = self.clip_work.obey(command)
             case commands.PauseTraining():
                 live.pause()
             case commands.ResumeTraining():
@@ -349,11 +375,15 @@ class Session:
                     self.doctor.correct(corrections)
             case _ if isinstance(command, commands.MarkCommand):
                 self.marking.apply(command)
+            case _ if isinstance(command, commands.SelectionCommand):
+                self.selecting.apply(command)
             case _ if isinstance(command, commands.PathCommand):
                 self.camera_paths.apply(command, self.views, self.timeline)
-            case commands.Undo() | commands.Redo():
+            case _ if isinstance(command, commands.EditCommand):
+                self.editing.apply(command)
+            case commands.Undo() | commands.Redo() | commands.GoToStep():
                 with self.camera_paths.showing_change():
-                    (self.edits.undo if isinstance(command, commands.Undo) else self.edits.redo)()
+                    self.editing.go(_n_steps(command))
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
@@ -362,7 +392,7 @@ class Session:
         catalog = () if service is None else service.catalog
         trained = tuple(i for i in range(len(catalog)) if catalog[i].state == "trained")
         names = tuple(path.name for path in self.paths.paths)
-        self.exporting.ask(self.opened, self.timeline, trained, names, settle=self.camera_paths.document.settle)
+        self.exporting.ask(self.opened, self.timeline, trained, names, settle=self.document.settle)
 
     def _change_settings(self, command: commands.SettingCommand) -> None:
         """Replace settings that every clip shares; only while nothing was learned with the old ones."""
@@ -379,12 +409,48 @@ class Session:
             )
             return
         check_settings(changed, opened.capture)
-        opened.project.update(changed)
+        name = _SETTING_NAMES.get(type(command), "change settings")
+        self.document.change(replace(opened.project.document, settings=changed), name)
+
+    def _take_question(self, question: Question) -> None:
+        if self.question is None:  # what is asked already comes first
+            self.question = question
+
+    def _check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
+        """See that nothing was learned with settings that change. Raises ProjectError."""
+        opened = self.opened
+        if opened is None or before.settings == after.settings:
+            return
+        if is_other_cut(before.settings, after.settings):
+            self.live_training.check_idle()
+            check_settings(after.settings, opened.capture)
+            return
+        if opened.project.has_progress or self.live_training.is_busy:
+            raise ProjectError(
+                "What all clips share is fixed once training has begun.",
+                hint="What was learned with them would be worthless. Use another project folder for other values.",
+            )
+
+    def _follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
+        """The document has changed: show what follows from it."""
+        if before.settings != after.settings:
+            self._follow_settings()
+        self._show_notes(after)
+
+    def _show_notes(self, document: ProjectDocument) -> None:
+        """Let the timeline show the document's markers, and views stand upright as it says."""
+        self.timeline.markers = Markers(document.markers)
+        self.views.set_scene_up(document.world.up)
+
+    def _follow_settings(self) -> None:
+        opened = self.opened
+        assert opened is not None
         before = self.timeline
         changed_project = opened_project(opened.capture, opened.project, opened.generation)
         self._show(changed_project)
         self.live_training.open(changed_project)
         self.versions.open(changed_project)
+        self.clip_work.open(changed_project)
         self._open_residuals(changed_project)
         self.timeline.take_over(before)
 
@@ -415,15 +481,17 @@ class Session:
         self._keep_recent()  # the one that is left
         generation = 1 if self.opened is None else self.opened.generation + 1
         opened = opened_project(found.capture, found.project, generation)
-        for document in self._documents:  # first: they keep what was edited in the project that is left
-            document.open(found.project)
+        self.document.open(found.project)  # first: it keeps what was edited in the project that is left
         self.camera_paths.leave()
+        self.selecting.open()
         self._show(opened)
         self.live_training.open(opened, found.catalog)
         self.versions.open(opened)
+        self.clip_work.open(opened)
         self._open_residuals(opened)
         self.doctor.open(opened)
         self.views.look_at(opened.rig)
+        self._show_notes(opened.project.document)
         self.bookmarks = Bookmarks()
         self._keep_recent()
         for sentence in opened.capture.warnings:
@@ -452,7 +520,7 @@ class Session:
         self.notices.add_failure(f"{job_name} has failed", error)
 
     def _launch_worker(self, job: TrainJob, project: Project) -> Worker:
-        self.marking.document.settle()  # a region marked a moment ago is meant to count
+        self.document.settle()  # a region marked a moment ago is meant to count
         return self._launch(job, project)
 
     # ---------------------------------------------------------------- letting finished work in
@@ -466,7 +534,7 @@ class Session:
         if any(isinstance(event, ENDINGS) for event in events):
             self._keep_recent()
         self._release_snapshot()
-        has_changed |= bool(events) | any([document.poll() for document in self._documents])
+        has_changed |= bool(events) | self.document.poll() | self.selecting.poll()
         has_changed |= self.lead_view()
         is_training = self.live_training.is_busy and self.training.state != "paused"
         has_changed |= self.exporting.poll(is_training=is_training)
@@ -475,6 +543,7 @@ class Session:
             self.residuals.look_at(self.timeline, self.view.look_through)
         has_changed |= self.residuals.poll(is_busy=is_training or is_attended)
         self._tell_failures()
+        self.clip_work.look_for_damage()
         self.playback.work_ahead(self.timeline, is_busy=self.live_training.is_busy)
         rig = self.playback.rig(self.timeline)
         if rig is not None and rig is not self.view.rig:  # a view that looks through a camera follows it
@@ -499,7 +568,9 @@ class Session:
             *self.calibrating.finished,
             *self.synchronising.finished,
             *self.exporting.finished,
+            self.selecting.finished,
             looked,
+            self.clip_work.finished,
             jobs,
             self.notices.revision,
             self.recent.missing,
@@ -523,8 +594,12 @@ class Session:
             if failure.is_of_clip:
                 self.live_training.note_damage(failure.error)
             told.append((failure.title, failure.error))
-        unkept = [(document.what, document.take_error()) for document in self._documents]
-        told += [(f"The {what} could not be read or kept", error) for what, error in unkept if error is not None]
+        unselected = self.selecting.take_error()
+        if unselected is not None:
+            told.append(("That cannot be selected", unselected))
+        unkept = self.document.take_error()
+        if unkept is not None:
+            told.append(("What was edited could not be read or kept", unkept))
         for title, error in told:
             if not self.notices.has_told(error):
                 self.notices.add_failure(title, error)
@@ -538,7 +613,9 @@ class Session:
         self.clip_states = live.clip_states()
         self.regions = self.marking.status(self.clip_states)
         self.lead_view()
-        self.paths, self.history = self.camera_paths.status(), self.edits.status()
+        self.paths, self.history = self.camera_paths.status(), self.document.status()
+        self.edits = self.editing.status()
+        self.selection = self.selecting.status()
         self.plan, self.queue = live.plan(), live.queue()
         self.usage = self._usage.sample(None if live.service is None else live.service.worker_pid)
         if opened is not None:
@@ -550,15 +627,15 @@ class Session:
 
     def wake_by(self, wake: Callable[[], None]) -> None:
         """Call this, on some thread, when a frame or picture that was asked for is there; it must not block."""
-        self.playback.renderer.on_picture = self.playback.decoder.on_frame = wake
+        self.playback.renderer.on_picture = self.playback.decoder.on_frame = self.selecting.on_found = wake
 
     def close(self) -> None:
         """End workers and threads, keeping what was learned. Blocks for a few seconds at most. May be called twice."""
         if self._is_closed:
             return
         self._is_closed = True
-        for document in self._documents:
-            document.close()
+        self.document.close()
+        self.selecting.close()
         self.live_training.close()
         self._keep_recent()
         if self.project is not None:
@@ -573,6 +650,7 @@ class Session:
         self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)
         self.playback.close()
         self.versions.close()
+        self.clip_work.close()
         self.log.close()
         if self.capture is not None:
             self.capture.close()
@@ -587,6 +665,14 @@ class Session:
     def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]:
         """What a clip was before it was trained again, newest first; none until that was read."""
         return self.versions.statuses(clip_index)
+
+    def clip_dependencies(self, clip_index: int) -> DependencyStatus:
+        """What a clip depends on, and what depends on it."""
+        return self.clip_work.dependencies(clip_index)
+
+    def disk_use(self) -> DiskUse | None:
+        """What the project takes on the disk; None until that was looked up."""
+        return self.clip_work.disk_use()
 
     def version_state(self, clip_index: int, version: int) -> ShownState | None:
         """An earlier version of a clip as a file to show; None until it was read, and where it cannot be shown."""
@@ -620,6 +706,18 @@ class Session:
         trained."""
         shown = self.playback.frame(self.timeline, self._shown_as)
         return None if shown is None else shown.gaussians
+
+    def selected(self, gaussians: GaussianArrays) -> np.ndarray:
+        """Which Gaussians of a frame are selected. [N] bool"""
+        return self.selecting.mask(gaussians)
+
+    def selected_share(self, gaussians: GaussianArrays, view: SeenFrom) -> np.ndarray | None:
+        """Where selected Gaussians are seen; see Selecting.share."""
+        return self.selecting.share(gaussians, view, self.views.current_index)
+
+    def attribute_spread(self, attribute: str) -> Spread | None:
+        """How an attribute is spread over the shown frame; see Selecting.spread."""
+        return self.selecting.spread(attribute)
 
     def shown_anchors(self) -> AnchorArrays | None:
         """Anchors that exist at the shown frame; those of the newest frame there is until it was decoded."""
@@ -688,12 +786,25 @@ class Session:
         return None if camera_index is None else self.residuals.heat(self.timeline, camera_index, kind)
 
 
+def _n_steps(command: commands.Undo | commands.Redo | commands.GoToStep) -> int:
+    if isinstance(command, commands.GoToStep):
+        return command.n_steps
+    return -1 if isinstance(command, commands.Undo) else 1
+
+
+_SETTING_NAMES: dict[type, str] = {
+    commands.SetHoldout: "choose held-out cameras",
+    commands.SetClipLength: "change the clip length",
+    commands.SetTrainSetting: "change a setting",
+    commands.SetPreset: "take a preset",
+}
 _TITLES: dict[type, str] = {
     commands.TrainClip: "The clip cannot be trained",
     commands.TrainNextClip: "The clip cannot be trained",
     commands.TrainClips: "The clips cannot be trained",
     commands.TrainAll: "The clips cannot be trained",
     commands.AskTrainSettings: "The clip cannot be trained",
+    **dict.fromkeys(get_args(ClipCommand), "That cannot be done with the clips"),
     commands.RestoreVersion: "The version cannot be brought back",
     commands.RemoveVersion: "The version cannot be removed",
     commands.SetHoldout: "These cameras cannot be held out",
@@ -701,10 +812,13 @@ _TITLES: dict[type, str] = {
     commands.SetTrainSetting: "The setting cannot be changed",
     commands.SetPreset: "The preset cannot be taken",
     commands.SynchroniseCameras: "The cameras cannot be synchronised",
+    **dict.fromkeys(get_args(commands.SelectionCommand), "That cannot be selected"),
     commands.MarkRegion: "The region cannot be marked",
     commands.RemoveRegion: "The region cannot be removed",
     commands.Undo: "The last change cannot be taken back",
     commands.Redo: "The change cannot be made again",
+    commands.GoToStep: "That step of the history cannot be reached",
+    **dict.fromkeys(get_args(commands.EditCommand), "That cannot be edited"),
     **dict.fromkeys(get_args(commands.PathCommand), "That cannot be done with the camera path"),
     commands.CorrectCapture: "The capture cannot be corrected",
 }

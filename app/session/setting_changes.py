@@ -22,9 +22,17 @@ def changed_settings(settings: ProjectSettings, command: SettingCommand, rig: Ca
         case SetHoldout(camera_indices=indices):
             return replace(settings, holdout=tuple(rig.names[i] for i in sorted(set(indices)) if 0 <= i < len(rig)))
         case SetClipLength(n_frames=n_frames):
-            return replace(settings, clip_length=int(n_frames))
+            return replace(settings, clip_length=int(n_frames), clip_bounds=None)
         case SetTrainSetting(name=name, value=value):
             overrides = {**settings.overrides, name: value}
         case SetPreset(name=name):
             overrides = preset(name)
     return replace(settings, overrides=replace(settings, overrides=overrides).config().difference())
+
+
+def is_other_cut(before: ProjectSettings, after: ProjectSettings) -> bool:
+    """Whether nothing differs but where clips begin and which is the reference: what may change at any time, because
+    clips that do not fit keep their files and are out of use or out of date."""
+    return (
+        before != after and replace(before, clip_bounds=after.clip_bounds, reference_clip=after.reference_clip) == after
+    )

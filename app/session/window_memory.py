@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from app.document.project_document import MAX_TEXT_CHARACTERS
 from app.playback.bookmarks import Bookmarks, read_bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import SPEEDS, Timeline
@@ -208,13 +209,12 @@ def show_again(session: Viewed, kept: dict[str, Any]) -> None:
 
 
 def _playing_of(timeline: Timeline) -> dict[str, Any]:
-    """How the capture is played, and what is marked in it."""
+    """How the capture is played."""
     return {
         "is_looping": timeline.is_looping,
         "speed": timeline.speed,
         "in_frame": timeline.in_frame,
         "out_frame": timeline.out_frame,
-        "markers": [[marker.frame_index, marker.name] for marker in timeline.markers],
     }
 
 
@@ -225,12 +225,17 @@ def _play_again(timeline: Timeline, kept: dict[str, Any]) -> None:
         timeline.speed = float(kept["speed"])
     ends = [_number(kept.get(name), 0, timeline.last_frame) for name in ("in_frame", "out_frame")]
     timeline.set_range(*(None if end is None else int(end) for end in ends))
-    markers = kept.get("markers")
+
+
+def markers_of(kept: dict[str, Any], timeline: Timeline) -> list[tuple[int, str]]:
+    """Frames and names of markers that an earlier version has kept here; now they are part of the project."""
+    markers, found = kept.get("markers"), []
     for marker in markers if isinstance(markers, list) else []:
         if isinstance(marker, list) and len(marker) == 2 and isinstance(marker[1], str):
             frame_index = _number(marker[0], 0, timeline.last_frame)
             if frame_index is not None:
-                timeline.markers.put(int(frame_index), marker[1])
+                found.append((int(frame_index), marker[1][:MAX_TEXT_CHARACTERS]))
+    return found
 
 
 def _word(value: Any) -> str:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from app.background.kernels import warm_up_reporting
+from app.project.clip_versions import read_finished
 from app.project.project import Project, open_project
 from app.training.interface import Training
 from app.training.messages import TrainJob
 from engine.backends.table import backend_called
 from engine.capture.capture import open_capture
-from engine.clip_files.clip_state import ClipState, read_clip_state
+from engine.clip_files.clip_state import ClipState
 from engine.errors import ProjectError
 from engine.progress import Progress, ReportProgress
 from engine.training.config import config_of
@@ -39,7 +40,7 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
     if not 0 <= job.clip_index < len(clips):
         raise ProjectError(f"There is no clip {job.clip_index}; the capture has {len(clips)}.", path=job.project)
     base = project.inherited_index(job.clip_index)
-    reference = None if base is None else read_clip_state(project.clip_path(base))
+    reference = None if base is None else read_finished(project, base)
     config = config_of(job.overrides)
     previous = None
     is_first = job.clip_index == project.settings.reference_clip
@@ -57,7 +58,7 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
         prep_dir=project.prep_dir,
         report=report,
         previous=previous,
-        regions=project.gate_regions(),
+        regions=project.document.regions,
     )
 
 
@@ -73,4 +74,4 @@ def _read_previous(project: Project, clip_index: int) -> ClipState:
             f"Clip {clip_index} goes on where clip {before} ends, which is not trained.",
             hint=f"Train clip {before} first.",
         )
-    return read_clip_state(project.clip_path(before))
+    return read_finished(project, before)

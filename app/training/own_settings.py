@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from app.document.project_settings import ProjectSettings
 from app.project.project import Project
-from app.project.project_files import ProjectSettings
 from engine.clip_files.clip_header import SettingValue
 from engine.errors import ProjectError
 from engine.training.config import LENGTH, LOSS, RATES, SETTINGS, TrainConfig, config_of

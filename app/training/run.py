@@ -18,8 +18,8 @@ from typing import Any
 
 from app.background.memory import peak_bytes
 from app.project.clip_versions import forget_oldest, set_aside
+from app.project.metrics_file import read_metrics
 from app.project.project import Project, open_project
-from app.project.project_files import read_metrics
 from app.project.stage_seconds import stages_of
 from app.training.interface import MakeTraining, Training
 from app.training.keeping import FolderWatch, ProjectGone, Refusals, Retries

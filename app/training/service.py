@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.project.clip_catalog import ClipCatalog
+from app.project.clip_versions import recovery_hint
 from app.project.project import Project
 from app.status import ClipStatus, TrainingStatus
 from app.training.curves import CurveReader, Curves, append_thinned, read_curves
@@ -200,6 +201,11 @@ class TrainingService:
             if record.state not in ("trained", "damaged") and record.blocked_by is None
         ]
 
+    @property
+    def stale(self) -> list[int]:
+        """Clips that are out of date and can be trained again, in the order of training; also those on their way."""
+        return [index for index in self.unfinished if self.catalog[index].state == "stale"]
+
     def enqueue(self, clip_index: int, own: OwnSettings | None = None) -> None:
         """Train a clip when its turn comes; at once when nothing else does. Who trains a finished one has asked.
 
@@ -229,7 +235,7 @@ class TrainingService:
         if self.catalog[base].state == "damaged":
             raise ProjectError(
                 f"Clip {clip_index} needs {kind} {base}, whose file is damaged.",
-                hint=f"Restore it from a copy, or train clip {base} again.",
+                hint=recovery_hint(self.project, base),
                 path=self.project.clip_path(base),
             )
         if not self.project.is_trained(base):

@@ -7,12 +7,16 @@ class Timeline {
     this.nFrames = nFrames;
     this.bar.setAttribute("aria-valuemax", nFrames - 1);
     const bands = document.getElementById("bands");
+    let band = null, first = null;
     for (const clip of header.clips) {
-      const band = document.createElement("div");
-      band.style.left = `${(100 * clip.first) / nFrames}%`;
-      band.style.width = `${(100 * clip.moving.n.length) / nFrames}%`;
-      band.textContent = `Clip ${clip.clip_index}`;
-      bands.append(band);
+      if (first === null || first.clip_index !== clip.clip_index) {
+        band = document.createElement("div");
+        band.style.left = `${(100 * clip.first) / nFrames}%`;
+        band.textContent = `Clip ${clip.clip_index}`;
+        bands.append(band);
+        first = clip;
+      }
+      band.style.width = `${(100 * (clip.first + clip.moving.n.length - first.first)) / nFrames}%`;
     }
     const pick = (event) => {
       const box = this.bar.getBoundingClientRect();

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 
@@ -12,8 +15,9 @@ class Clip:
     Attributes:
         clip_index: Position in the capture, from 0.
         start: First frame_index.
-        n_frames: Frames in this clip; the last clip may be shorter than clip_length.
-        clip_length: M, the divisor of clip_time for every clip, partial ones too.
+        n_frames: Frames in this clip; one that was split, or the last one, may be shorter than clip_length.
+        clip_length: M, the divisor of clip_time: that of the project for every clip, partial ones too, and n_frames
+            for a clip that was merged to more than that.
     """
 
     clip_index: int
@@ -47,3 +51,34 @@ def split_clips(n_frames: int, clip_length: int) -> list[Clip]:
         raise ValueError(f"n_frames and clip_length must be at least 1, got {n_frames} and {clip_length}")
     starts = range(0, n_frames, clip_length)
     return [Clip(i, start, min(clip_length, n_frames - start), clip_length) for i, start in enumerate(starts)]
+
+
+def cut_clips(bounds: Sequence[int], clip_length: int) -> list[Clip]:
+    """Clips between bounds: the first frame of each, and at the end the number of frames.
+
+    Args:
+        bounds: Rise from 0.
+        clip_length: M of every clip that is not longer.
+    """
+    pairs = enumerate(itertools.pairwise(bounds))
+    return [Clip(i, start, stop - start, max(clip_length, stop - start)) for i, (start, stop) in pairs]
+
+
+class ClipSpans:
+    """Finds the clip of a frame among clips of any lengths.
+
+    Args:
+        clips: Of a whole capture, in order, without gaps.
+
+    Attributes:
+        usual_length: Frames of the clip in the middle, by length.
+    """
+
+    def __init__(self, clips: Sequence[Clip]) -> None:
+        self._starts = [clip.start for clip in clips]
+        lengths = sorted(clip.n_frames for clip in clips)
+        self.usual_length = lengths[len(lengths) // 2] if lengths else 1
+
+    def index_of(self, frame_index: int) -> int:
+        """Index of the clip that holds a frame; the first or last one for frames outside. There has to be a clip."""
+        return min(max(bisect_right(self._starts, frame_index) - 1, 0), len(self._starts) - 1)

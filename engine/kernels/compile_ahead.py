@@ -32,11 +32,12 @@ GROUPS = (
     ("loss and optimiser", "engine.backends.cpu.step.warm", 5.0),
     ("figures", "engine.metrics.pictures.warm", 1.5),
     ("view modes", "engine.backends.inspection.warm", 1.5),
+    ("selection", "engine.editing.selection.warm", 4.0),
 )
 """Name, module, and about how long compiling takes, of each group. Every module has a `warm_up()` that runs each of its
 kernels once. Groups share no cached kernel but the entry of `routines.run`, or two processes would compile it at the
 same time."""
-_FOR_LATER = ("point clouds", "figures", "view modes")
+_FOR_LATER = ("point clouds", "figures", "view modes", "selection")
 """Groups that are not part of a training step, and quick to load at their first use."""
 
 MAX_PROCESSES = 4

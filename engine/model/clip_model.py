@@ -53,6 +53,17 @@ class AnchorView:
     own_reasons: np.ndarray
     inherited_reasons: np.ndarray
 
+    def chosen(self, inherited: np.ndarray, own: np.ndarray) -> AnchorView:
+        """Some of them. inherited: [A0] bool, own: [A] bool"""
+        return AnchorView(
+            inherited_positions=self.inherited_positions[inherited],
+            own_positions=self.own_positions[own],
+            own_roles=self.own_roles[own],
+            inherited_roles=self.inherited_roles[inherited],
+            own_reasons=self.own_reasons[own],
+            inherited_reasons=self.inherited_reasons[inherited],
+        )
+
 
 class ClipModel(nn.Module):
     """Anchor sets, field and decoder of one clip. Owns no pixels, no optimiser, no files.

@@ -61,17 +61,22 @@ def write_checkpoint(path: Path | str, checkpoint: Checkpoint) -> None:
     write_clip_state(path, ClipState(arrays, header), is_durable=True)
 
 
-def read_checkpoint(path: Path | str, *, clip_index: int, camera_names: Sequence[str], seed: int) -> Checkpoint:
+def read_checkpoint(
+    path: Path | str, *, frames: tuple[int, int, int], camera_names: Sequence[str], seed: int
+) -> Checkpoint:
     """Inverse of `write_checkpoint`.
 
     Args:
         path: The file.
-        clip_index, camera_names, seed: Of the training that goes on.
+        frames: First frame, number of frames and clip_length of the clip that goes on.
+        camera_names, seed: Of its training.
     Raises:
         ProjectError: The file is damaged, or of another training.
     """
     kept = read_clip_state(path)
-    for name, value in (("clip_index", clip_index), ("camera_names", list(camera_names)), ("seed", seed)):
+    start, n_frames, clip_length = frames
+    of_clip = (("start", start), ("n_frames", n_frames), ("clip_length", clip_length))
+    for name, value in (*of_clip, ("camera_names", list(camera_names)), ("seed", seed)):
         if getattr(kept.header, name) != value:
             raise ProjectError(
                 f"The checkpoint has {name} {getattr(kept.header, name)}, the training {value}.",

@@ -433,7 +433,8 @@ class ClipTraining:
         Raises:
             ProjectError: The checkpoint is damaged or belongs to another clip, reference or set of cameras.
         """
-        kept = read_checkpoint(path, clip_index=self.clip.clip_index, camera_names=self.rig.names, seed=self.seed)
+        frames = (self.clip.start, self.clip.n_frames, self.clip.clip_length)
+        kept = read_checkpoint(path, frames=frames, camera_names=self.rig.names, seed=self.seed)
         self.pictures = self._preparation.read_pictures()
         try:
             self._go_on(kept)

@@ -20,6 +20,7 @@ import shutil
 import sys
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ from tests.faults.tally import Case, Outcome, fuzz_main, judge, start_memory, ta
 N_FRAMES = 4
 BACKGROUNDS_KEY = {"capture": "none", "cameras": ["a", "b"], "size": [13, 6], "frames": 5, "is_corrected": True}
 PLACE = {"phases": [["static", 3], ["joint", 5]], "phase_index": 1, "steps_in_phase": 2, "generator": [1, 2, 250]}
-EXPECTED = {"clip_index": 1, "camera_names": ["a", "b", "c"], "seed": 0}
+EXPECTED = {"frames": (N_FRAMES, N_FRAMES, N_FRAMES), "camera_names": ["a", "b", "c"], "seed": 0}
 CONTENT = {"schema": 3, "clip": "abc", "cameras": ["a"]}
 """What the kept figures depend on."""
 _said: list[str] = []
@@ -46,9 +47,9 @@ OLD = "old-"
 
 def make_project(folder: Path) -> None:
     """Two trained clips, checkpoint, live snapshot, curves, regions, paths, caches; beside them files of the user."""
+    from app.document.project_settings import ProjectSettings
     from app.evaluation.kept_figures import KeptFigures
     from app.project.project import create_project
-    from app.project.project_files import ProjectSettings
     from app.project.recents import RecentProject
     from app.session.settings import Settings
     from engine.camera.path_presets import turntable
@@ -63,8 +64,9 @@ def make_project(folder: Path) -> None:
     reference, source = _states()
     settings = ProjectSettings("nowhere", "abc", holdout=("b",), clip_length=N_FRAMES, overrides={"passes": 6.0})
     project = create_project(folder, settings)
-    project.set_gate_regions([parse_region({"treat": "dynamic", "box": [[0, 0, 0], [1, 2, 3]]})])
-    project.set_camera_paths([turntable(np.zeros(3), np.array([0.0, 0.0, 1.0]), 2.0, 0.3, (0, 9))])
+    regions = (parse_region({"treat": "dynamic", "box": [[0, 0, 0], [1, 2, 3]]}),)
+    paths = (turntable(np.zeros(3), np.array([0.0, 0.0, 1.0]), 2.0, 0.3, (0, 9)),)
+    project.change(replace(project.document, regions=regions, camera_paths=paths), "mark")
     project.close()
     project.clip_path(0).parent.mkdir()
     write_compact_clip(project.clip_path(0), reference)
@@ -171,25 +173,11 @@ def _read_checkpoint(project: Path, path: Path) -> Any:
     return read_checkpoint(path, **EXPECTED)
 
 
-def _read_settings(project: Path, path: Path) -> Any:
-    from app.project.project_files import read_settings
+def _read_document(project: Path, path: Path) -> Any:
+    from app.document.document_store import DocumentStore
+    from app.document.stored_document import plain_document
 
-    return read_settings(project)
-
-
-def _read_regions(project: Path, path: Path) -> Any:
-    from app.project.project_files import read_regions
-
-    return read_regions(path)
-
-
-def _read_camera_paths(project: Path, path: Path) -> Any:
-    from app.project.camera_paths import read_camera_paths
-
-    return [
-        (path.name, path.is_closed, [(key.frame, key.fov_y_rad, key.world_to_camera.tolist()) for key in path.keys])
-        for path in read_camera_paths(project)
-    ]
+    return plain_document(DocumentStore(project).read().present)
 
 
 def _read_curves(project: Path, path: Path) -> Any:
@@ -223,9 +211,7 @@ FILES: dict[str, tuple[str, Read, int]] = {
     "source clip": ("clips/0001.safetensors", _read_clip, 6),
     "live": ("live/clip-0001-r0001.safetensors", _read_clip, 3),
     "checkpoint": ("checkpoints/0001.safetensors", _read_checkpoint, 6),
-    "project.json": ("project.json", _read_settings, 5),
-    "gate.json": ("gate.json", _read_regions, 4),
-    "camera_paths.json": ("camera_paths.json", _read_camera_paths, 3),
+    "project.json": ("project.json", _read_document, 12),
     "curves": ("metrics/0000.jsonl", _read_curves, 4),
     "backgrounds": ("prep/backgrounds.safetensors", _read_backgrounds, 3),
     "first cloud": ("prep/first_cloud.safetensors", _read_cloud, 2),

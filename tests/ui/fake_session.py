@@ -12,17 +12,21 @@ from pathlib import Path
 import numpy as np
 
 from app.background.log_reader import LogLine
+from app.document.project_document import ProjectDocument
+from app.document.project_settings import ProjectSettings
 from app.export.export_choices import ExportChoices
 from app.export.export_plan import ExportPlan
 from app.export.export_status import ExportStatus
-from app.playback.arrays import AnchorArrays, Picture, PointArrays
+from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
 from app.playback.bookmarks import Bookmarks
+from app.playback.markers import Markers
 from app.playback.orbit_view import OrbitView
 from app.playback.picture_source import PictureSource
 from app.playback.timeline import Timeline
 from app.playback.view_modes import MODES, ShownAs
 from app.playback.views import Views
 from app.project.capture_report import RefusedFolder
+from app.project.disk.use import DiskUse
 from app.project.opening_answers import OpeningAnswers
 from app.project.recents import RecentProject
 from app.residuals.anchor_heat import AnchorHeat
@@ -30,7 +34,10 @@ from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands, path_commands
 from app.session.calibration_page import CalibrationPage
 from app.session.doctor_status import DoctorStatus
-from app.session.edit_status import HistoryStatus, PathsStatus
+from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
+from app.session.editing.edit_commands import EditCommand
+from app.session.editing.edits import changed, edits_status
+from app.session.editing.selecting import SelectionStatus
 from app.session.exporting import ExportPage
 from app.session.marking import after_marking
 from app.session.notices import Notices
@@ -40,6 +47,7 @@ from app.session.synchronisation_page import SynchronisationPage
 from app.status import (
     CELL_RANGES,
     ClipStatus,
+    DependencyStatus,
     JobStatus,
     OpeningForecast,
     Overlays,
@@ -58,6 +66,8 @@ from app.status import (
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.clip import Clip, split_clips
 from engine.doctor.finding import Finding
+from engine.editing.selection.ranges import Spread, spread_of
+from engine.editing.selection.seen_from import SeenFrom
 from engine.gate.regions import GateRegion, sphere_region
 
 
@@ -194,6 +204,7 @@ class FakeSession:
         self.exporting = FakeExporting()
         self.queue = QueueStatus()
         self.usage = UsageStatus(window_mb=412.0, window_cores=0.1, n_cores=2)
+        self.disk: DiskUse | None = None
         self.versions: dict[int, tuple[VersionStatus, ...]] = {}
         self.curves: dict[int, tuple[list[tuple[int, float]], list[tuple[int, float]]]] = {}
         self.lines: tuple[LogLine, ...] = ()
@@ -224,8 +235,13 @@ class FakeSession:
             inherited_reasons=np.where(inherited_roles == 2, 2, 255).astype(np.uint8),
             own_reasons=np.full(300, 255, np.uint8),
         )
+        self.selection = SelectionStatus()
         self.regions = RegionsStatus(why_not="Open a capture first.")
         self.paths, self.history = PathsStatus(why_not="Open a capture first."), HistoryStatus()
+        self.edits, self.content = (
+            EditsStatus(why_not="Open a capture first."),
+            ProjectDocument(ProjectSettings("", "")),
+        )
         self.capture: FakeCapture | None = None
         self.rig: CameraRig = NO_CAMERAS
         self.clips: list[Clip] = []
@@ -278,6 +294,18 @@ class FakeSession:
             positions, values, column, (column, frame_index), 0, frame_index, n_cameras=8, n_cameras_all=8
         )
 
+    def selected(self, gaussians: GaussianArrays) -> np.ndarray:
+        """Nothing."""
+        return np.zeros(len(gaussians), np.bool_)
+
+    def selected_share(self, gaussians: GaussianArrays, view: SeenFrom) -> np.ndarray | None:
+        """Nothing."""
+        return None
+
+    def attribute_spread(self, attribute: str) -> Spread | None:
+        """Rises evenly from 0 to 1; residuals are not known."""
+        return None if attribute in ("error", "flicker") else spread_of(np.linspace(0.0, 1.0, 1000))
+
     def cached_frames(self) -> list[tuple[int, int]]:
         """Runs of frames in memory."""
         return self.cached
@@ -304,6 +332,7 @@ class FakeSession:
         self.timeline = Timeline(self.clips, fps=capture.fps)
         self.views.look_at(capture.rig)
         self.paths, self.history = PathsStatus(can_edit=True), HistoryStatus()
+        self.edits = EditsStatus(can_edit=True)
         self.regions = RegionsStatus(can_mark=True, effect="Marks apply to clips whose training starts from now on.")
 
     def dispatch(self, command: commands.Command) -> None:
@@ -355,6 +384,11 @@ class FakeSession:
                 result = edited(self.paths, command, self.view, self.timeline)
                 self.paths = PathsStatus(result.paths, result.chosen, result.chosen_key, can_edit=True)
                 self.history = HistoryStatus(undo=result.name)
+            case _ if isinstance(command, EditCommand):
+                change = changed(self.content, command)
+                self.content, self.edits = change.document, edits_status(change.document)
+                self.history = HistoryStatus(undo=change.name, past=(*self.history.past, change.name))
+                self.timeline.markers = Markers(change.document.markers)
             case commands.TrainClip(clip_index=clip_index, is_confirmed=False):
                 if self.clip_states[clip_index].state == "trained":
                     self.question = RetrainQuestion(clip_index, False, "", 29.7, (), None, True, None, None)
@@ -396,6 +430,17 @@ class FakeSession:
     def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]:
         """What a test put there."""
         return self.versions.get(clip_index, ())
+
+    def clip_dependencies(self, clip_index: int) -> DependencyStatus:
+        """The reference is needed by all others."""
+        n = len(self.clips)
+        if clip_index == self.reference_index:
+            return DependencyStatus(needed_by=tuple(i for i in range(n) if i != clip_index))
+        return DependencyStatus(needs=(self.reference_index,))
+
+    def disk_use(self) -> DiskUse | None:
+        """What a test put there."""
+        return self.disk
 
     def log_lines(self) -> tuple[LogLine, ...]:
         """What a test put there."""

@@ -6,6 +6,8 @@ import random
 
 import numpy as np
 
+from app.document.project_document import Marker
+from app.playback.markers import Markers
 from app.playback.timeline import Timeline
 from app.status import ClipStatus, ResidualStatus, SeamStatus
 from engine.capture.clip import split_clips
@@ -39,8 +41,9 @@ def long_session(
     session.measured = ResidualStatus(seams, cells, is_held_out, revision=1)
     session.cached = [(0, 12), (13, 40), (n_frames // 2, n_frames // 2 + n_frames // 15)]
     session.timeline = Timeline(session.clips, fps=fps)
-    for place, name in enumerate(MARKERS):
-        session.timeline.markers.put((place * 2 + 1) * n_frames // 7, name)
+    session.timeline.markers = Markers(
+        [Marker((place * 2 + 1) * n_frames // 7, name) for place, name in enumerate(MARKERS)]
+    )
     session.timeline.seek(n_frames // 3)
     return session
 

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
-from app.project.camera_paths import MAX_NAME_CHARACTERS
+from app.document.camera_paths import MAX_NAME_CHARACTERS
 from app.session.edit_status import HistoryStatus, PathsStatus
 from app.session.path_commands import (
     AimCameraKey,

@@ -7,8 +7,10 @@ from typing import Protocol
 
 from imgui_bundle import imgui
 
+from app.session.clips.clip_commands import TrainStale
 from app.session.commands import AskTrainSettings, RemoveFromQueue, TrainAll, TrainClip, TrainClips
 from app.status import ClipStatus, ProjectStatus, QueueStatus, TrainingStatus
+from engine.text import duration_text
 from ui.panels.clip_versions import VersionNeeds, draw_versions_menu
 from ui.panels.state import Dispatch, UiState
 from ui.style.numbers import format_count
@@ -78,6 +80,12 @@ def draw_clip_training(
     words = f"{Icon.LAYERS}  Train all that is not trained ({format_count(len(everything))})"
     if _item(ui, "train all", words, is_enabled=is_writable and bool(everything)):
         dispatch(TrainAll())
+    stale = session.queue.stale
+    if stale is not None:
+        cost = "" if stale.seconds is None else f", about {duration_text(stale.seconds)}"
+        words = f"{Icon.CLOCK_BACK}  Train all that is out of date ({format_count(stale.n_clips)}{cost})"
+        if _item(ui, "train stale", words, is_enabled=is_writable):
+            dispatch(TrainStale())
     label = f"{Icon.GEAR}  Train with other settings ..."
     if _item(ui, "settings", label, is_enabled=can_train and has_reference):
         dispatch(AskTrainSettings(clip_index))

@@ -6,9 +6,10 @@ from typing import Protocol
 
 from imgui_bundle import imgui
 
+from app.session.clips.clip_commands import CompareVersion
 from app.session.commands import RemoveVersion, RestoreVersion
 from app.status import VersionStatus
-from ui.panels.queue import size_text
+from engine.text import size_text
 from ui.panels.state import Dispatch, UiState
 from ui.style.numbers import format_count
 from ui.style.theme import Icon
@@ -53,6 +54,9 @@ def draw_versions_menu(session: VersionNeeds, dispatch: Dispatch, ui: UiState, c
                 imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + 320.0)
                 imgui.text_disabled(version.why_not)
                 imgui.pop_text_wrap_pos()
+            if imgui.menu_item(f"{Icon.COLUMNS}  Compare, side by side", "Shift+G", False, True)[0]:
+                dispatch(CompareVersion(clip_index, version.number))
+            ui.mark(f"clip menu.compare{version.number}")
             if imgui.menu_item(f"{Icon.UNDO}  Bring it back", "", False, not version.why_not)[0]:
                 dispatch(RestoreVersion(clip_index, version.number))
             ui.mark(f"clip menu.restore{version.number}")

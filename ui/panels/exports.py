@@ -17,8 +17,7 @@ from app.session.commands import (
     RetryExport,
     ShowExport,
 )
-from engine.text import duration_text, one_line
-from ui.panels.queue import size_text
+from engine.text import duration_text, one_line, size_text
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, elided_path, primary_button, text_wrapped, text_wrapped_dim
 from ui.style import theme

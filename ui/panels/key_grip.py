@@ -52,7 +52,8 @@ class KeyGrip:
         if pointer.drag is None:
             ui.paths.dragged = None
         is_pressed = imgui.is_item_activated() and pointer.button == imgui.MouseButton_.left
-        is_free = imgui.is_item_hovered() and not ui.regions.is_active and pane.contains(*_pointer())
+        is_choosing = ui.regions.is_active or ui.selecting.is_active
+        is_free = imgui.is_item_hovered() and not is_choosing and pane.contains(*_pointer())
         is_resting = pointer.drag is None and not pointer.is_moving
         layer.pointed_key = None
         if is_free and (is_resting or (is_pressed and pointer.drag != "wipe")):

@@ -15,6 +15,9 @@ from app.status import version_number
 from ui.panels.actions.action import ActionNeeds
 from ui.panels.clip_versions import VersionNeeds
 from ui.panels.comparison import covered_share, is_held, kind_words, missing_words, other_label, shown_compare
+from ui.panels.editing.select_drawing import draw_hint, draw_tool
+from ui.panels.editing.select_grip import DRAG as SELECT
+from ui.panels.editing.select_grip import SelectGrip
 from ui.panels.gizmo import draw_gizmo, gizmo_rect
 from ui.panels.heat_overlay import HeatNeeds, HeatOverlay
 from ui.panels.hud import Hud, HudNeeds
@@ -45,6 +48,7 @@ class PicturePane:
         self.scene, self.heat = scene, heat
         self.pointer = Pointer()
         self.keys = KeyGrip()
+        self.selecting = SelectGrip()
         self.hud = Hud()
         self._aimed_at = (0.0, 0.0)
         self._captured_frame: int | None = None
@@ -107,10 +111,13 @@ class PicturePane:
         free = self.heat.beside(area)
         legend_x = free.x1 - 12 if gizmo is None else min(free.x1 - 12, gizmo.x0 - 8)
         self.hud.draw(session, ui, free, self.scene, value=value, legend_x=legend_x)
-        if ui.regions.is_active and is_active:
+        if (ui.regions.is_active or ui.selecting.is_active) and is_active:
             top = panes.captured.y0 + 44 if panes.captured is not None else area.y0 + 12  # below what names the pane
             free = Rect(area.x0 + 12, top, area.x1, area.y1)
-            draw_chosen_sphere(ui, imgui.get_window_draw_list(), free, self.scene.regions.counts)
+            if ui.regions.is_active:
+                draw_chosen_sphere(ui, imgui.get_window_draw_list(), free, self.scene.regions.counts)
+            else:
+                draw_hint(imgui.get_window_draw_list(), ui.selecting, free)
         return is_used
 
     # ---- picture ---------------------------------------------------------------------------------------------
@@ -128,8 +135,10 @@ class PicturePane:
         density = imgui.get_io().display_framebuffer_scale.x
         view = self._scene_view(session, pane)
         self.scene.marks.pixels_per_unit = self.scene.path.pixels_per_unit = density
+        self.scene.selection.pixels_per_unit = density
         self.keys.follow(session, dispatch, ui, self.scene.path, self.pointer, view, pane, density)
         self._point_at_camera(session, ui, view, pane, density)
+        self._select(session, dispatch, ui, view, pane, density)
         if is_active:
             self._aim(session, ui, view, pane, density)
             command = ui.regions.take_accepted()
@@ -141,9 +150,11 @@ class PicturePane:
         composed = self.scene.compose(session, view, shown)
         draw.add_image(imgui.ImTextureRef(composed.texture.glo), pane.low, pane.high)
         self.heat.draw(session, ui, pane)
+        if is_active or self.pointer.drag == SELECT:
+            draw_tool(draw, ui.selecting, view, pane, density, np.asarray(session.view.up, np.float64))
         if self.pointer.is_moving:
             ui.redraw_within(MOVING_S)
-        elif imgui.is_item_hovered() and self.pointer.drag is None and not tool.is_active:
+        elif imgui.is_item_hovered() and self.pointer.drag is None and not (tool.is_active or ui.selecting.is_active):
             camera, key = self.scene.marks.pointed_camera, self.scene.path.pointed_key
             if key is not None:
                 words = f"{key_words(session.paths, key)}\nDrag moves it, with Ctrl along the view"
@@ -194,7 +205,8 @@ class PicturePane:
 
     def _point_at_camera(self, session: PictureNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """The camera under the pointer stands out; one that was pressed is remembered for the click."""
-        is_free = imgui.is_item_hovered() and not ui.regions.is_active and self.scene.path.pointed_key is None
+        is_choosing = ui.regions.is_active or ui.selecting.is_active
+        is_free = imgui.is_item_hovered() and not is_choosing and self.scene.path.pointed_key is None
         is_pressing = imgui.is_item_activated() and self.pointer.button == imgui.MouseButton_.left
         marks = self.scene.marks
         if is_free and (is_pressing or (self.pointer.drag is None and not self.pointer.is_moving)):
@@ -206,6 +218,23 @@ class PicturePane:
         if marks.pointed_camera is not None:
             marks.pointed_anchor = None
             imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
+
+    def _select(
+        self, session: PictureNeeds, dispatch: Dispatch, ui: UiState, view: SceneView, pane: Rect, density: float
+    ) -> None:
+        anchors = session.shown_anchors() if ui.selecting.is_active else None
+        spacing = 0.0 if anchors is None else anchors.spacing
+        self.selecting.follow(
+            session,
+            dispatch,
+            ui,
+            self.pointer,
+            view,
+            pane,
+            density,
+            lambda x, y: self._pick(session, pane, x, y),
+            spacing,
+        )
 
     def _aim(self, session: PictureNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """Lead the sphere that is being chosen: to the middle at first, then by the pointer, until a click fixes it."""

@@ -19,6 +19,7 @@ from ui.panels.gestures import Button, Gesture, modifier_words
 from ui.panels.gizmo import gizmo_rect, tip_under
 from ui.panels.panes import Panes
 from ui.panels.state import Dispatch, Rect, UiState
+from ui.viewport.editing.select_tool import SIZED
 from ui.viewport.region_tool import GROWTH
 
 MOVING_S = 0.22
@@ -138,6 +139,8 @@ class Pointer:
         if across == 0.0 and steps == 0.0:
             return
         gesture = ui.navigation.preset.turn(_modifiers())
+        if ui.selecting.is_active and io.key_ctrl and ui.selecting.kind in SIZED:
+            return  # it is meant for the tool
         if tool.sphere is not None:
             if not io.key_ctrl:
                 tool.set_radius(tool.radius * GROWTH**steps)
@@ -188,7 +191,7 @@ class Pointer:
             self.drag = "wipe"
         elif is_left and rect is not None and rect.contains(*self.pressed_at):
             self.drag = "gizmo"
-        elif is_second and not ui.regions.is_active:
+        elif is_second and not (ui.regions.is_active or ui.selecting.is_active):
             point = None if self._is_click_taken else pick(*self.pressed_at)
             if point is not None:
                 self.drag = "nothing"

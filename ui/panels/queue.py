@@ -11,7 +11,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from app.session.commands import MoveInQueue, RemoveFromQueue, SetLiveView, StopAfterClip, TrainAll, TrainClip
 from app.status import QueueStatus, SequenceForecast, TrainingStatus, UsageStatus
-from engine.text import duration_text
+from engine.text import duration_text, size_text
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, text_right, text_wrapped_dim
 from ui.style import theme
@@ -60,13 +60,6 @@ def forecast_text(forecast: SequenceForecast) -> str:
     if forecast.disk_mb is not None:
         parts.append(f"{size_text(forecast.disk_mb)} on disk")
     return ", ".join(parts)
-
-
-def size_text(megabytes: float) -> str:
-    """An amount of memory or disk, in two or three digits."""
-    if megabytes >= 999.5:
-        return f"{megabytes / 1e3:.1f} GB"
-    return f"{megabytes:.0f} MB" if megabytes >= 9.95 else f"{megabytes:.1f} MB"
 
 
 def room_text(queue: QueueStatus) -> str:

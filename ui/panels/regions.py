@@ -41,6 +41,7 @@ def begin_choosing(session: RegionsNeeds, ui: UiState) -> None:
     """Start choosing a sphere, or switch what it means; where nothing can be marked the panel says why."""
     ui.wanted_panel = REGIONS
     if session.regions.can_mark:
+        ui.selecting.kind, ui.selecting.points = None, []
         ui.regions.begin()
     else:
         ui.regions.leave()

@@ -21,13 +21,15 @@ from ui.panels.timeline.view_state import TimelineView
 from ui.panels.wishes import Wishes
 from ui.style.fonts import Fonts
 from ui.style.ui_scale import UiScale
+from ui.viewport.editing.select_tool import SelectTool
 from ui.viewport.path_tool import PathTool
 from ui.viewport.region_tool import RegionTool
 
 VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
+SELECTION = "Selection"
 RESIDUALS, LOG, DOCTOR = "Residuals", "Log", "Capture doctor"
 PATHS, EXPORTS = "Camera path", "Exports"
-PANELS = (CAPTURE, TRAINING, REGIONS, RESIDUALS, PATHS, TIMELINE, LOG, DOCTOR, EXPORTS)
+PANELS = (CAPTURE, TRAINING, REGIONS, SELECTION, RESIDUALS, PATHS, TIMELINE, LOG, DOCTOR, EXPORTS)
 """Titles of the panels around the picture."""
 LAYOUT_WORDS = {"Standard": "as in the beginning", "Long capture": "with a tall timeline, for long captures"}
 LAYOUTS = tuple(LAYOUT_WORDS)
@@ -74,6 +76,7 @@ class UiState:
         keyed_panel: Title of the panel that arrow keys, Enter and Space belong to, or None.
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
         regions: The region that is being chosen, and the one that stands out.
+        selecting: The tool that selects, and its options.
         paths: What is being done to the keys of the camera path.
         navigation: What mouse and keys do over a picture.
         curves: What the plots of the training panel show.
@@ -97,6 +100,7 @@ class UiState:
     wishes: Wishes = field(default_factory=Wishes)
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
+    selecting: SelectTool = field(default_factory=SelectTool)
     paths: PathTool = field(default_factory=PathTool)
     navigation: Navigation = field(default_factory=Navigation)
     pointed_anchor: np.ndarray | None = None

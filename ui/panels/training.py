@@ -13,6 +13,7 @@ from engine.capture.clip import Clip
 from engine.text import duration_text
 from ui.panels.clip_quality import draw_clip_quality
 from ui.panels.clip_training_menu import ClipMenuNeeds, draw_clip_training
+from ui.panels.clips.section import ClipSectionNeeds, draw_clip_section, draw_stale
 from ui.panels.curves import CurveNeeds, draw_curves
 from ui.panels.plan import draw_plan
 from ui.panels.queue import QueueNeeds, draw_live_view, draw_queue, draw_train_all, draw_usage
@@ -31,7 +32,7 @@ Reference clip: reference anchors, which later clips inherit.
 Later clips: inherited + residual anchors."""
 
 
-class TrainingNeeds(QueueNeeds, CurveNeeds, ClipMenuNeeds, Protocol):
+class TrainingNeeds(QueueNeeds, CurveNeeds, ClipMenuNeeds, ClipSectionNeeds, Protocol):
     """What this panel reads."""
 
     @property
@@ -66,6 +67,7 @@ def draw_training(session: TrainingNeeds, dispatch: Dispatch, ui: UiState) -> No
         draw_usage(session.usage, ui)
         draw_live_view(session, dispatch, ui)
     draw_train_all(session, dispatch, ui)
+    draw_stale(session, dispatch, ui)
     draw_queue(session, dispatch, ui)
     imgui.set_next_item_open(True, imgui.Cond_.once)
     is_open = imgui.collapsing_header("Curves")
@@ -73,6 +75,7 @@ def draw_training(session: TrainingNeeds, dispatch: Dispatch, ui: UiState) -> No
     if is_open:
         draw_curves(session, ui)
     draw_clip_quality(session.clip_states, ui)
+    draw_clip_section(session, dispatch, ui)
     imgui.spacing()
     _draw_clips(session, dispatch, ui)
 

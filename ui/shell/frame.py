@@ -24,6 +24,7 @@ from ui.panels.actions.table import ACTIONS, handle_keys
 from ui.panels.camera_path import PathPanelNeeds, draw_paths
 from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.doctor.panel import DoctorNeeds, DoctorPanel
+from ui.panels.editing.select_panel import SelectionPanelNeeds, draw_selection
 from ui.panels.exports import draw_exports
 from ui.panels.heat_overlay import HeatOverlay
 from ui.panels.log import LogNeeds, LogPanel
@@ -42,6 +43,7 @@ from ui.panels.state import (
     PATHS,
     REGIONS,
     RESIDUALS,
+    SELECTION,
     TIMELINE,
     TRAINING,
     VIEWPORT,
@@ -95,6 +97,7 @@ SESSION = "Session"
 class FrameNeeds(
     ViewportNeeds,
     CaptureNeeds,
+    SelectionPanelNeeds,
     TimelineNeeds,
     MenuNeeds,
     PaletteNeeds,
@@ -207,6 +210,7 @@ class Frame:
             (CAPTURE, self.capture.draw, True),
             (TRAINING, draw_training, True),
             (REGIONS, draw_regions, True),
+            (SELECTION, draw_selection, True),
             (RESIDUALS, self.residuals.draw, True),
             (PATHS, draw_paths, True),
             (TIMELINE, draw_timeline, True),

@@ -10,11 +10,13 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, imgui
 
+from app.session.clips.clip_questions import ClipQuestion
 from app.session.commands import CloseQuestion, Command, CorrectCapture, OpenCapture, OpenProject, TrainClip
 from app.session.questions import CorrectionQuestion, ProjectQuestion, Question, RetrainQuestion, SettingsQuestion
 from engine.text import duration_text
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, primary_button, text_wrapped_dim
+from ui.shell.clip_questions import clip_question_title, draw_clip_question
 from ui.shell.train_settings import SettingsDialog
 from ui.style import theme
 from ui.style.numbers import format_count
@@ -70,6 +72,8 @@ class QuestionDialogs:
             answer = self._draw_settings(question, ui, is_agreed)
         elif isinstance(question, CorrectionQuestion):
             answer = _draw_correction(question, ui, is_agreed)
+        elif isinstance(question, ClipQuestion):
+            answer = draw_clip_question(question, ui, is_agreed)
         else:
             answer = self._draw_projects(question, ui, is_agreed)
         imgui.pop_text_wrap_pos()
@@ -138,6 +142,8 @@ class QuestionDialogs:
 
 
 def _title(question: Question) -> str:
+    if isinstance(question, ClipQuestion):
+        return clip_question_title(question)
     if isinstance(question, SettingsQuestion):
         return f"Train clip {question.clip_index} with other settings###question"
     if isinstance(question, RetrainQuestion):
@@ -211,7 +217,7 @@ def retrain_texts(question: RetrainQuestion) -> list[str]:
     if question.is_damaged:
         texts = [
             f"{clip} was finished, but cannot be read. {question.reason}",
-            "Training it again replaces the file for good. If you have a copy of it, restore that instead.",
+            'Training it again puts the damaged file aside in the project\'s folder "damaged".',
         ]
     else:
         figure = "" if question.held_out_psnr is None else f" with a held-out PSNR of {question.held_out_psnr:.1f} dB"

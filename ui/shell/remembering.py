@@ -6,19 +6,22 @@ Written a while after something changed and when the window closes, so that a ki
 from __future__ import annotations
 
 import time
-from typing import Protocol
+from typing import Any, Protocol
 
 from imgui_bundle import imgui
 
 from app.project.project import Project
+from app.session.commands import Command
+from app.session.edit_status import EditsStatus
+from app.session.editing.edit_commands import PutMarker
 from app.session.notices import Notices
 from app.session.preferences import PreferencesFile
-from app.session.window_memory import Viewed, WindowMemory, show_again, view_of
+from app.session.window_memory import Viewed, WindowMemory, markers_of, show_again, view_of
 from ui.panels.capture import CaptureFacts
 from ui.panels.state import UiState
 
 SAVE_AFTER_S = 5.0
-LAYOUT_VERSION = "; panels of ClipGStream Studio, version 5\n"
+LAYOUT_VERSION = "; panels of ClipGStream Studio, version 6\n"
 """Comes first in the kept layout; another version has other panels and is not taken."""
 
 
@@ -50,6 +53,11 @@ class RememberNeeds(Viewed, Protocol):
 
     @property
     def notices(self) -> Notices: ...
+
+    @property
+    def edits(self) -> EditsStatus: ...
+
+    def dispatch(self, command: Command) -> None: ...
 
 
 class Remembering:
@@ -96,11 +104,19 @@ class Remembering:
             self._folder = folder
             if folder in memory.views:
                 show_again(session, memory.views[folder])
+                self._take_over_markers(session, memory.views[folder])
         if is_due:
             self._keep(session)
             memory.save_soon()
         elif folder is not None:
             memory.keep_view(folder, view_of(session))
+
+    def _take_over_markers(self, session: RememberNeeds, kept: dict[str, Any]) -> None:
+        """Markers that an earlier version has kept beside the project become part of it, once."""
+        if session.edits.can_edit and not session.timeline.markers:
+            gesture = self._ui.timeline.begin_gesture()
+            for frame_index, text in markers_of(kept, session.timeline):
+                session.dispatch(PutMarker(frame_index, text, gesture))
 
     def save(self, session: RememberNeeds) -> None:
         """Keep everything now."""

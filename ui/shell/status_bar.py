@@ -7,6 +7,7 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
+from app.session.editing.selecting import SelectionStatus
 from app.session.notices import Notices
 from app.status import JobStatus, ProjectStatus, QueueStatus, TrainingStatus, UsageStatus
 from engine.text import duration_text
@@ -49,6 +50,9 @@ class StatusNeeds(Protocol):
     @property
     def exporting(self) -> ExportingFacts: ...
 
+    @property
+    def selection(self) -> SelectionStatus: ...
+
 
 def draw_status_bar(session: StatusNeeds, ui: UiState, *, is_software: bool) -> None:
     """Work and its progress on the left; notices and the kind of drawing on the right."""
@@ -88,7 +92,9 @@ def status_text(session: StatusNeeds) -> str:
         return f"{words[status.state]} clip {status.clip_index}  {stage_words(status)}  {status.message or ''}"
     if session.capture is None:
         return "Open a capture or a project to begin"
-    return "" if session.project_status is None else session.project_status.trained_text
+    trained = "" if session.project_status is None else session.project_status.trained_text
+    selected = session.selection.words
+    return f"{selected} selected    {trained}" if selected else trained
 
 
 def _exports_text(session: StatusNeeds) -> str:

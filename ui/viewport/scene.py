@@ -23,6 +23,7 @@ from app.playback.view_modes import MODES, ShownAs
 from app.status import CAPTURED as CAPTURED_PICTURE
 from app.status import RegionsStatus, WantedFrame
 from engine.camera.projection import camera_center
+from engine.editing.selection.seen_from import SeenFrom
 from ui.gl import (
     NEAR,
     ImageTexture,
@@ -33,6 +34,7 @@ from ui.gl import (
 )
 from ui.viewport.anchor_heat_layer import AnchorHeatLayer, AnchorHeatNeeds
 from ui.viewport.anchor_marks import nearest_under
+from ui.viewport.editing.selection_layer import SelectionLayer, SelectionNeeds
 from ui.viewport.explaining_layer import ExplainingLayer, ExplainingNeeds
 from ui.viewport.hud_text import CAPTURED, CLOUD, FIRST_CLOUD, HINT, RENDERED, ShownPicture
 from ui.viewport.mark_layer import AnchorCounts, MarkLayer, MarkNeeds
@@ -48,7 +50,7 @@ _CLOUD_KINDS = {"static": CLOUD, "moment": FIRST_CLOUD, "pictures": HINT}
 NO_REGIONS = ShownRegions()
 
 
-class SceneNeeds(MarkNeeds, AnchorHeatNeeds, ExplainingNeeds, PathNeeds, Protocol):
+class SceneNeeds(MarkNeeds, AnchorHeatNeeds, ExplainingNeeds, PathNeeds, SelectionNeeds, Protocol):
     """What the picture is made from."""
 
     @property
@@ -104,6 +106,11 @@ class SceneView:
         return self.world_to_camera, self.K, self.width, self.height, max(NEAR, self.near)
 
     @property
+    def seen_from(self) -> SeenFrom:
+        """The same, as what selects knows it."""
+        return SeenFrom(self.world_to_camera, self.K, self.width, self.height, self.near, self.set_back)
+
+    @property
     def key(self) -> Hashable:
         """Differs whenever the picture would."""
         matrices = (np.asarray(m, dtype=np.float64).tobytes() for m in (self.world_to_camera, self.K))
@@ -149,6 +156,7 @@ class Scene:
         self.marks = MarkLayer(ctx)
         self.regions = RegionLayer(ctx)
         self.path = PathLayer(ctx)
+        self.selection = SelectionLayer(ctx)
         self._anchor_heat = AnchorHeatLayer(ctx)
         self.explaining = ExplainingLayer(ctx)
         self._drawn_key: Hashable = None
@@ -176,6 +184,7 @@ class Scene:
             self.marks,
             self.regions,
             self.path,
+            self.selection,
             self._anchor_heat,
             self.explaining,
         )
@@ -248,6 +257,7 @@ class Scene:
         marks_key = self.marks.take(session, view, gaussians)
         heat_key = self._anchor_heat.take(session, view, gaussians)
         explaining_key = self.explaining.take(session, view)
+        selection_key = self.selection.take(session, view, gaussians)
         regions_key = self.regions.take(regions, None if regions.sphere is None else session.shown_anchors(), view.eye)
         self.shown = shown
         if self.is_software and is_rendered and self._has_no_marks(session, regions):
@@ -258,6 +268,7 @@ class Scene:
             marks_key,
             regions_key,
             explaining_key,
+            selection_key,
             heat_key,
             self.path.take(session),
             session.overlays.heat_opacity,
@@ -273,6 +284,7 @@ class Scene:
     def _has_no_marks(self, session: SceneNeeds, regions: ShownRegions) -> bool:
         """Is nothing to be drawn over the picture?"""
         are_empty = regions.is_empty and self.explaining.is_empty and self._anchor_heat.is_empty
+        are_empty &= self.selection.is_empty
         return are_empty and self.marks.is_empty(session) and self.path.is_empty(session)
 
     def captured(self, session: SceneNeeds, width_px: int) -> CapturedPicture | None:
@@ -454,6 +466,7 @@ class Scene:
             target.draw_image(self._captured)
         self._anchor_heat.draw(target, view, session.overlays.heat_opacity, self.marks.pixels_per_unit)
         self.explaining.draw(target, view, self.marks.pixels_per_unit)
+        self.selection.draw(target, view)
         self.marks.draw(target, view, session)
         self.regions.draw(target, view.camera)
         self.path.draw(target, view, session)

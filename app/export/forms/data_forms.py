@@ -38,6 +38,7 @@ METRICS = Form(
     options=_metrics_options,
     suffix=lambda answers: f".{answers['format']}",
     make_job=_metrics,
+    takes_edits=False,
     needs_trained=False,
 )
 CAMERAS = Form(
@@ -46,5 +47,6 @@ CAMERAS = Form(
     options=_cameras_options,
     suffix=lambda answers: "",
     make_job=_cameras,
+    takes_edits=False,
     has_frames=False,
 )

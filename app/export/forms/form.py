@@ -15,6 +15,8 @@ from app.export.export_choices import ExportChoices, ExportContext
 from app.export.export_jobs import KINDS, Job
 from app.export.picked_frames import PickedFrames
 
+WITHOUT = "without"
+"""The answer by which edits are left out."""
 Value = TypeVar("Value", bound=str)
 
 
@@ -54,6 +56,7 @@ class Form:
         make_job: Of the answers.
         has_frames: Whether frames are asked for.
         has_step: Whether it can be every so many of them.
+        takes_edits: Whether edits change what is written.
         needs_trained: Whether all of the frames have to be trained, whatever else was answered.
     """
 
@@ -64,7 +67,11 @@ class Form:
     make_job: Callable[[Answers], Job]
     has_frames: bool = True
     has_step: bool = True
+    takes_edits: bool = True
     needs_trained: bool = True
+
+
+EDITS = Option("edits", "Edits", (("", "Applied"), (WITHOUT, "As it was trained")))
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +85,13 @@ class Answers:
     @property
     def options(self) -> tuple[Option, ...]:
         """The questions."""
-        return self.form.options(self.context, self.choices)
+        options = self.form.options(self.context, self.choices)
+        return (*options, EDITS) if self.form.takes_edits and self.context.has_edits else options
+
+    @property
+    def has_edits(self) -> bool:
+        """Whether edits are applied."""
+        return self[EDITS.name] != WITHOUT
 
     def __getitem__(self, name: str) -> str:
         """The answer to a question; empty where it is not asked."""

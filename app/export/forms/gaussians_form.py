@@ -63,6 +63,7 @@ def _job(answers: Answers) -> Job:
         up=answers["up"] or None,
         scale=float(answers["scale"]),
         axes=answers.one_of(("ply", "rub"), "axes"),
+        has_edits=answers.has_edits,
     )
 
 

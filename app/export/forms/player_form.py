@@ -21,7 +21,7 @@ def _job(answers: Answers) -> Job:
     from app.export.player_job import PlayerJob
 
     has_folder = {"file": False, "folder": True}.get(answers["data"])
-    return PlayerJob(answers.out, answers.job_frames, has_folder)
+    return PlayerJob(answers.out, answers.job_frames, has_folder, answers.has_edits)
 
 
 PLAYER = Form(

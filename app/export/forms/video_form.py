@@ -92,6 +92,7 @@ def _job(answers: Answers) -> Job:
         background=_BACKGROUNDS.get(background, (0, 0, 0)),
         is_transparent=background == "clear",
         sound=answers["sound"] or None,
+        has_edits=answers.has_edits,
     )
 
 

@@ -71,6 +71,7 @@ class VideoJob:
             any case.
         sound: Name of the capture camera whose sound goes along; None for silence.
         features: Which features of the anchors are used, see engine.metrics.clips.features_apart.
+        has_edits: Whether the edits of the project are applied.
     """
 
     out: Path
@@ -89,6 +90,7 @@ class VideoJob:
     is_transparent: bool = False
     sound: str | None = None
     features: Features = "both"
+    has_edits: bool = True
 
     def check(self) -> None:
         """See that it can be understood, whatever the project.

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.document.camera_paths import camera_path_named
 from app.evaluation.headless import TrainedProject
 from app.export.scene_frames import SceneFrames
 from app.export.staging import check_target
@@ -15,7 +16,6 @@ from app.export.video.moments import Moment, moments_of
 from app.export.video.views import ViewOf, camera_view, path_view, turntable_view
 from app.export.video.writers.sequence import depth_unit
 from app.playback.view_modes import rig_distance
-from app.project.camera_paths import camera_path_named
 from engine.camera.camera_path import CameraPath
 from engine.capture.capture import Capture
 from engine.capture.frame_runs import runs_of
@@ -64,6 +64,11 @@ class VideoPlan:
         return f"picture_{number:06d}{suffix}"
 
 
+def _path_named(scene: SceneFrames, name: str) -> CameraPath:
+    project = scene.opened.project
+    return camera_path_named(project.document.camera_paths, name, project.folder)
+
+
 def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
     """See that a job can be done, and how. Writes nothing.
 
@@ -77,7 +82,7 @@ def plan_video(job: VideoJob, scene: SceneFrames) -> VideoPlan:
     capture = scene.opened.capture
     fps = capture.fps if job.fps is None else job.fps
     step = job.speed * capture.fps / fps
-    path = None if job.path is None else camera_path_named(scene.opened.project.folder, job.path)
+    path = None if job.path is None else _path_named(scene, job.path)
     runs = _runs(job, scene, path)
     if not runs:
         raise ProjectError("There are no frames to render.", path=scene.opened.project.folder)

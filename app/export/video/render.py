@@ -74,7 +74,8 @@ def render_video(
         DiskError: The disk refused; nothing is left behind.
         JobCancelled: `is_cancelled` said so; nothing is left behind.
     """
-    scene = SceneFrames(opened, n_threads=n_threads, features=job.features)
+    edits = None if job.has_edits else ()
+    scene = SceneFrames(opened, n_threads=n_threads, features=job.features, edits=edits)
     plan = plan_video(job, scene)
     painter = Painter(scene, job, plan.moments, plan.view_of, plan.step)
     n, rate = len(plan.moments), Rate()

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from app.cli.cli import main
-from app.project.project import ProjectSettings, create_project, open_project
+from app.project.project import ProjectSettings, create_project
 from engine.clip_files.clip_state import ClipState, write_clip_state
-from engine.errors import ProjectError
 from engine.gate.reasons import STILL
 from engine.gate.regions import GateRegion
 from tests.app.fakes import anchor_arrays
@@ -31,26 +30,6 @@ def run(capsys, *arguments) -> tuple[int, str, str]:
     code = main([str(argument) for argument in ("gate", *arguments)])
     said = capsys.readouterr()
     return code, said.out, said.err
-
-
-def test_regions_come_back_as_they_were_and_settings_stay(folder):
-    before = (folder / "project.json").read_bytes()
-    project = open_project(folder)
-    assert project.gate_regions() == ()
-    project.set_gate_regions([BOX, BALL])
-    assert project.gate_regions() == (BOX, BALL)
-    project.close()
-    assert open_project(folder, is_writable=False).gate_regions() == (BOX, BALL)
-    assert (folder / "project.json").read_bytes() == before
-    with pytest.raises(ProjectError, match="reading only"):
-        open_project(folder, is_writable=False).set_gate_regions([])
-
-
-@pytest.mark.parametrize("text", ["{", "[]", '{"regions": 3}', '{"regions": [{"treat": "static"}]}'])
-def test_a_damaged_file_of_regions_is_named(folder, text):
-    (folder / "gate.json").write_text(text)
-    with pytest.raises(ProjectError, match=r"regions|no region"):
-        open_project(folder, is_writable=False).gate_regions()
 
 
 def test_regions_are_marked_in_the_order_of_the_command_line(folder, capsys):

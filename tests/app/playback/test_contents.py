@@ -9,25 +9,31 @@ import torch
 from app.playback.contents import BORN_HERE, LEARNED_ON, OF_REFERENCE, ClipParts, part_of
 from app.playback.view_modes import CONTENTS
 from engine.clip_files.clip_state import ClipState
+from engine.model.clip_model import ClipModel
 from tests.app.playback.clip_models import CLIP, reference, source
 from tests.clip_headers import make_header
 from tests.engine.metrics.tiny_clips import CLIP_LENGTH, make_model
+
+
+def parts_of(model: ClipModel, state: ClipState, base: ClipState | None) -> ClipParts:
+    return ClipParts(model, CLIP, state, base)
 
 
 @pytest.mark.parametrize("content", CONTENTS)
 @pytest.mark.parametrize("frame", range(CLIP_LENGTH))
 def test_births_and_changes_belong_to_the_gaussians_of_every_part(content: str, frame: int) -> None:
     _, state = reference()
-    parts = ClipParts(*source(state), state)
-    gaussians = parts.decode(content, CLIP.clip_time(frame))
-    assert len(parts.births(content, CLIP.clip_time(frame))) == len(gaussians)
-    assert parts.changes(content, CLIP.clip_time(frame), gaussians).shape == (len(gaussians),)
+    parts = parts_of(*source(state), state)
+    found = parts.part(content).decode(CLIP.clip_time(frame))
+    assert len(parts.births(found.rows)) == len(found.rows) == len(found.gaussians)
+    assert parts.changes(found.gaussians, found.rows).shape == (len(found.gaussians),)
 
 
 def test_static_and_dynamic_together_are_everything() -> None:
     _, state = reference()
-    parts = ClipParts(*source(state), state)
-    everything, static, dynamic = (parts.decode(content, 0.0) for content in ("all", "static", "dynamic"))
+    parts = parts_of(*source(state), state)
+    contents = ("all", "static", "dynamic")
+    everything, static, dynamic = (parts.part(content).decode(0.0).gaussians for content in contents)
     for name in ("means", "quats", "scales", "opacities", "colors"):
         joined = torch.cat([getattr(static, name), getattr(dynamic, name)])
         torch.testing.assert_close(joined, getattr(everything, name), rtol=0, atol=0)
@@ -35,17 +41,18 @@ def test_static_and_dynamic_together_are_everything() -> None:
 
 def test_a_clip_in_which_nothing_moves_has_an_empty_dynamic_part() -> None:
     model = make_model(has_motion=False)
-    parts = ClipParts(model, ClipState({}, make_header(spacing=0.2)), None)
-    empty = parts.decode("dynamic", 0.0)
-    assert len(empty) == 0
-    assert len(parts.births("dynamic", 0.0)) == len(parts.changes("dynamic", 0.0, empty)) == 0
+    parts = parts_of(model, ClipState({}, make_header(spacing=0.2)), None)
+    empty = parts.part("dynamic").decode(0.0)
+    assert len(empty.gaussians) == 0
+    assert len(parts.births(empty.rows)) == len(parts.changes(empty.gaussians, empty.rows)) == 0
 
 
 @pytest.mark.parametrize("adapted", [False, True])
 def test_births_say_which_clip_brought_what(adapted: bool) -> None:
     _, state = reference()
     model, own = source(state, adapted=adapted)
-    births = ClipParts(model, own, state).births("all", 0.0)
+    parts = parts_of(model, own, state)
+    births = parts.births(parts.part("all").decode(0.0).rows)
     k, n_static = model.decoder.gaussians_per_anchor, len(model.anchor_set("static"))
     moving = LEARNED_ON if adapted else OF_REFERENCE
     n_moving, n_residual = len(model.alive("adapted" if adapted else "moving", 0.0)), 1
@@ -57,11 +64,11 @@ def test_births_say_which_clip_brought_what(adapted: bool) -> None:
 
 def test_a_reference_clip_is_all_its_own_and_only_what_moves_has_changed() -> None:
     model, state = reference()
-    parts = ClipParts(model, state, None)
-    gaussians = parts.decode("all", 0.0)
-    changes = parts.changes("all", 0.0, gaussians)
+    parts = parts_of(model, state, None)
+    found = parts.part("all").decode(0.0)
+    changes = parts.changes(found.gaussians, found.rows)
     n_static = model.decoder.gaussians_per_anchor * len(model.anchor_set("static"))
-    assert not parts.births("all", 0.0).any()
+    assert not parts.births(found.rows).any()
     np.testing.assert_allclose(changes[:n_static], 0.0, atol=1e-6)
     assert (changes[n_static:] > 1e-3).all(), "the field is far from zero"
 
@@ -70,9 +77,9 @@ def test_a_reference_clip_is_all_its_own_and_only_what_moves_has_changed() -> No
 def test_changes_are_the_largest_of_colour_opacity_and_way(adapted: bool) -> None:
     base, state = reference()
     model, own = source(state, adapted=adapted)
-    parts = ClipParts(model, own, state)
-    gaussians = parts.decode("all", 0.0)
-    changes = parts.changes("all", 0.0, gaussians)
+    parts = parts_of(model, own, state)
+    found = parts.part("all").decode(0.0)
+    gaussians, changes = found.gaussians, parts.changes(found.gaussians, found.rows)
     k = model.decoder.gaussians_per_anchor
     roles = np.concatenate([np.repeat(role, k * len(model.alive(role, 0.0))) for role in model.roles()])
     assert np.isnan(changes[roles == "residual"]).all()

@@ -7,6 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from app.document.project_document import Marker
+from app.playback.markers import Markers
 from app.playback.timeline import SEAM_REACH, SPEEDS, Timeline
 from engine.capture.clip import split_clips
 
@@ -169,7 +171,7 @@ def test_who_moves_the_playhead_or_plays_follows_no_more():
 
 def test_the_same_frames_in_other_clips_keep_what_the_user_has_set():
     timeline, other = timeline_of(50), Timeline(split_clips(50, 7), fps=10.0)
-    timeline.markers.put(20, "foul")
+    timeline.markers = Markers([Marker(20, "foul")])
     timeline.set_range(5, 30)
     timeline.speed, timeline.is_looping = 0.5, False
     timeline.seek(22)

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from app.playback.contents import part_of
+from app.playback.contents import ClipParts
 from app.playback.trails import N_TRAILS, TrailMaker, TrailRequest, paths_of, trail_lines
+from engine.editing.edit import Edit, Everything, Hide, Scope
+from engine.editing.effects import NO_EFFECTS, EditStack
 from tests.app.playback.clip_models import CLIP, reference, source
 
 WAIT_S = 60.0
@@ -14,22 +16,34 @@ WAIT_S = 60.0
 
 def test_paths_are_where_the_gaussians_were() -> None:
     _, state = reference()
-    model, _ = source(state)
-    part = part_of(model, "dynamic")
-    paths, opacities = paths_of(part, CLIP, 2)
+    model, own = source(state)
+    part = ClipParts(model, CLIP, own, state).apart("dynamic")
+    paths, opacities = paths_of(part, 2, [NO_EFFECTS] * 3)
     assert len(paths) == 3, "a trail does not leave its clip"
     for frame in range(3):
-        np.testing.assert_array_equal(paths[frame], part.decode(CLIP.clip_time(frame)).means.numpy())
+        np.testing.assert_array_equal(paths[frame], part.decode(CLIP.clip_time(frame)).gaussians.means.numpy())
     assert len(opacities) == paths.shape[1]
 
 
 def test_a_path_begins_where_its_anchor_begins_to_exist() -> None:
-    model, _ = reference()  # its moving anchors exist in frames 0 and 2 only
-    paths, opacities = paths_of(part_of(model, "dynamic"), CLIP, 2)
+    model, state = reference()  # its moving anchors exist in frames 0 and 2 only
+    paths, opacities = paths_of(ClipParts(model, CLIP, state, None).apart("dynamic"), 2, [NO_EFFECTS] * 3)
     assert np.isnan(paths[1]).all()
     assert np.isfinite(paths[[0, 2]]).all()
     vertices, colors = trail_lines(paths, opacities)
     assert len(vertices) == len(colors) == 0, "no step of it is whole"
+
+
+def test_a_path_has_a_gap_where_an_edit_hides_it() -> None:
+    _, state = reference()
+    model, own = source(state)
+    part = ClipParts(model, CLIP, own, state).apart("dynamic")
+    stack = EditStack((Edit(0, "", Everything(), Hide(), Scope(1, 2)),))
+    plain, _ = paths_of(part, 2, [NO_EFFECTS] * 3)
+    paths, _ = paths_of(part, 2, [stack.at(frame) for frame in range(3)])
+    assert np.isfinite(plain[1]).any()
+    assert np.isnan(paths[1]).all()
+    np.testing.assert_array_equal(paths[[0, 2]], plain[[0, 2]])
 
 
 def test_the_longest_trails_are_drawn_and_fade() -> None:
@@ -56,14 +70,15 @@ def test_what_stands_still_has_no_trail(n_frames: int) -> None:
 
 
 def test_trails_of_another_clip_are_not_shown() -> None:
-    model, _ = reference()
+    model, state = reference()
+    parts, effects = ClipParts(model, CLIP, state, None), (NO_EFFECTS,) * 3
     maker = TrailMaker()
     try:
-        request = TrailRequest("one", 2, model, CLIP)
+        request = TrailRequest("one", 2, effects, parts)
         assert maker.trails(request) is None
         assert maker.worker.wait_idle(WAIT_S)
         assert maker.worker.take_error() is None
         assert maker.trails(request) is not None
-        assert maker.trails(TrailRequest("two", 2, model, CLIP)) is None
+        assert maker.trails(TrailRequest("two", 2, effects, parts)) is None
     finally:
         maker.close()

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from app.project.metrics_file import read_metrics
 from app.project.project import (
     ProjectSettings,
     create_project,
@@ -17,7 +18,6 @@ from app.project.project import (
     open_project,
     read_settings,
 )
-from app.project.project_files import read_metrics
 from engine.capture.capture import open_capture
 from engine.errors import ProjectError
 
@@ -71,7 +71,8 @@ def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch):
 def test_a_bad_project_file_is_named(tmp_path, change, expected):
     create_project(tmp_path / "p", SETTINGS).close()
     path = tmp_path / "p" / "project.json"
-    edited = json.loads(path.read_text()) | change
+    edited = json.loads(path.read_text())
+    (edited if change.keys() & {"schema", "extra"} else edited["settings"]).update(change)
     path.write_text(json.dumps(edited))
     with pytest.raises(ProjectError, match=r'edited by hand, take out its entry "checksum"'):
         read_settings(tmp_path / "p")

@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from app.project.camera_paths import CAMERA_PATHS_FILE, read_camera_paths
-from app.project.project import Project
+from app.document.document_store import DocumentStore
 from app.session import commands as c
 from app.session import path_commands as p
 from engine.camera.projection import camera_center
@@ -32,8 +31,8 @@ def session(make_session):
 
 
 def on_disk(session):
-    session.camera_paths.document.settle()
-    return read_camera_paths(session.project.folder)
+    session.document.settle()
+    return DocumentStore(session.project.folder).read().present.camera_paths
 
 
 def frames(session) -> list[float]:
@@ -286,26 +285,6 @@ def test_paths_come_back_when_the_project_is_opened_again(make_session):
     assert again.history.undo == ""
 
 
-def test_a_damaged_file_costs_the_paths_alone_and_is_not_written_over(make_session):
-    first = ready(make_session())
-    add_keys(first, 0)
-    first.dispatch(BALL)
-    path = first.project.folder / CAMERA_PATHS_FILE
-    first.close()
-    damaged = path.read_text()[:-40]
-    path.write_text(damaged)
-    session = make_session()
-    poll_until(session, lambda: len(session.notices) > 0, what="a notice")
-    assert session.notices[0].title == "The camera paths could not be read or kept"
-    poll_until(session, lambda: session.regions.can_mark, what="the regions, which another thread reads")
-    assert len(session.regions.regions) == 1
-    assert not session.paths.can_edit
-    assert "cannot be read" in session.paths.why_not
-    session.dispatch(p.SetCameraKey())
-    session.camera_paths.document.settle()
-    assert path.read_text() == damaged
-
-
 def test_what_could_not_be_kept_is_not_shown_as_if_it_were(session, monkeypatch):
     add_keys(session, 0)
     assert len(on_disk(session)[0].keys) == 1
@@ -313,7 +292,7 @@ def test_what_could_not_be_kept_is_not_shown_as_if_it_were(session, monkeypatch)
     def refuse(*_):
         raise ProjectError("The project could not be saved (No space left on device).", hint="Free some space.")
 
-    monkeypatch.setattr(Project, "set_camera_paths", refuse)
+    monkeypatch.setattr(DocumentStore, "write", refuse)
     add_keys(session, 3)
     poll_until(session, lambda: len(session.notices) > 0 and session.paths.can_edit, what="a notice")
     assert "No space left" in session.notices[0].detail

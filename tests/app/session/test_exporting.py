@@ -341,7 +341,7 @@ def test_a_session_asks_and_closes(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     session = Session(settings=Settings(tmp_path / "settings.json"), is_preloading=False)
     waits: list[str] = []
     try:
-        monkeypatch.setattr(session.camera_paths.document, "settle", lambda: waits.append("settle"))
+        monkeypatch.setattr(session.document, "settle", lambda: waits.append("settle"))
         session.dispatch(commands.AskExport())  # nothing is open
         assert session.exporting.page is None
         session.dispatch(commands.CancelExport(5))

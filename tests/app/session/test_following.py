@@ -1,6 +1,7 @@
 """Following the training, and training many clips at once."""
 
 from app.session import commands as c
+from app.session.editing.edit_commands import PutMarker
 from tests.app.conftest import poll_until
 from tests.app.fakes import make_slow
 
@@ -69,7 +70,7 @@ def test_clips_without_their_reference_are_trained_after_it(make_session):
 
 def test_another_clip_length_keeps_the_place_and_the_markers(make_session):
     session = make_session()
-    session.timeline.markers.put(3, "foul")
+    session.dispatch(PutMarker(3, "foul"))
     session.timeline.seek(4)
     session.dispatch(c.SetClipLength(2))
     assert session.timeline.frame_index == 4

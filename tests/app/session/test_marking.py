@@ -6,8 +6,9 @@ from functools import partial
 import pytest
 
 from app.cli.cli import main
-from app.project.project import Project, open_project
-from app.project.project_files import read_regions
+from app.document.document_store import DocumentStore
+from app.document.stored_document import plain_document
+from app.project.project import open_project
 from app.session import commands as c
 from app.session.marking import effect_text, region_text
 from app.training.build import build_training
@@ -30,8 +31,8 @@ def ready(session):
 
 
 def on_disk(session) -> tuple[GateRegion, ...]:
-    session.marking.document.settle()
-    return open_project(session.project.folder, is_writable=False).gate_regions()
+    session.document.settle()
+    return open_project(session.project.folder, is_writable=False).document.regions
 
 
 def building(job, report, *, monkeypatch, seen):
@@ -54,23 +55,23 @@ def test_a_mark_reaches_the_file_and_the_next_training(make_session, monkeypatch
     assert session.regions.regions == (BALL,)  # at once, not when the disk is done
     train_next(session)
     assert seen == [(), (BALL,)]
-    assert read_regions(session.project.folder / "gate.json") == (BALL,)
+    assert on_disk(session) == (BALL,)
     assert list(session.notices) == [n for n in session.notices if n.kind == "info"]
 
 
 def test_a_training_starts_when_what_was_marked_just_before_is_on_disk(make_session, monkeypatch):
-    seen, keep = [], Project.set_gate_regions
+    seen, keep = [], DocumentStore.write
 
     def launch(job, project):
-        seen.append(project.gate_regions())
+        seen.append(open_project(project.folder, is_writable=False).document.regions)
         return inline(job, project)
 
-    def slowly(project, regions):
+    def slowly(store, events, history):
         threading.Event().wait(0.5)
-        keep(project, regions)
+        keep(store, events, history)
 
     session = ready(make_session(launch=launch))
-    monkeypatch.setattr(Project, "set_gate_regions", slowly)
+    monkeypatch.setattr(DocumentStore, "write", slowly)
     session.dispatch(MARK_BALL)
     session.dispatch(c.TrainNextClip())
     assert seen == [(BALL,)]
@@ -80,14 +81,13 @@ def test_window_and_command_line_keep_the_same_file(make_session, capsys):
     session = ready(make_session())
     session.dispatch(MARK_OTHER)
     session.dispatch(MARK_BALL)
-    by_window = session.project.folder / "gate.json"
     session.close()
-    text = by_window.read_bytes()
-    by_window.unlink()
     folder = str(session.project.folder)
+    by_window = plain_document(open_project(folder, is_writable=False).document)
+    assert main(["gate", folder, "--forget"]) == 0
     sphere = ["--static-sphere", "0", "0", "0", "2", "--dynamic-sphere", "0.25", "-0.5", "1", "0.125"]
     assert main(["gate", folder, *sphere]) == 0
-    assert by_window.read_bytes() == text
+    assert plain_document(open_project(folder, is_writable=False).document) == by_window
     said = capsys.readouterr().out
     assert "static in the sphere of 2 around (0, 0, 0)" in said
     assert "Marks apply to clips whose training starts from now on." in said
@@ -188,21 +188,6 @@ def test_a_project_that_another_program_writes_to_is_left_alone(make_session, ca
     assert "open for writing" in capsys.readouterr().err
 
 
-def test_a_damaged_file_is_told_and_not_written_over(make_session):
-    first = ready(make_session())
-    path = first.project.folder / "gate.json"
-    first.close()
-    path.write_text('{"regions": [{"treat": "static"}]}')
-    session = make_session()
-    poll_until(session, lambda: len(session.notices) > 0, what="a notice")
-    assert session.notices[0].kind == "error"
-    assert not session.regions.can_mark
-    assert "is not a region" in session.regions.why_not
-    session.dispatch(MARK_BALL)
-    session.marking.document.settle()
-    assert path.read_text() == '{"regions": [{"treat": "static"}]}'
-
-
 def test_what_could_not_be_kept_is_not_shown_as_if_it_were(make_session, monkeypatch):
     session = ready(make_session())
     session.dispatch(MARK_OTHER)
@@ -211,7 +196,7 @@ def test_what_could_not_be_kept_is_not_shown_as_if_it_were(make_session, monkeyp
     def refuse(*_):
         raise ProjectError("The project could not be saved (No space left on device).", hint="Free some space.")
 
-    monkeypatch.setattr(Project, "set_gate_regions", refuse)
+    monkeypatch.setattr(DocumentStore, "write", refuse)
     session.dispatch(MARK_BALL)
     poll_until(session, lambda: len(session.notices) > 0 and session.regions.can_mark, what="a notice")
     assert "No space left" in session.notices[0].detail
@@ -245,7 +230,7 @@ def test_another_capture_brings_its_own_regions(make_session, tmp_path, capture_
     poll_until(session, lambda: session.project.folder == folder and session.regions.can_mark, what="the other one")
     assert session.regions.regions == (OTHER,)
     assert not bool(session.history.undo)
-    assert open_project(tmp_path / "p", is_writable=False).gate_regions() == (BALL,)
+    assert open_project(tmp_path / "p", is_writable=False).document.regions == (BALL,)
 
 
 def test_regions_in_words():

@@ -132,6 +132,7 @@ def test_waiting_clips_are_reordered_taken_out_and_held(session: Session) -> Non
 
 
 def test_a_clip_moved_before_what_it_needs_waits_no_more(session: Session) -> None:
+    session.document.settle()
     project_of(session).update(replace(project_of(session).settings, overrides={"field": "continue"}))
     session.dispatch(c.TrainAll())
     session.dispatch(c.RemoveFromQueue(2))

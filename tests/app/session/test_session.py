@@ -99,6 +99,7 @@ def test_links_outside_are_followed_when_the_user_says_so_and_then_by_the_projec
     session.dispatch(c.OpenCapture(capture, follow_links=True))
     poll_until(session, lambda: session.capture is not None)
     assert session.capture.follow_links
+    session.document.settle()
     assert read_settings(session.project.folder).follow_links
     assert len(session.notices) == 0
 
@@ -224,6 +225,7 @@ def test_training_a_clip_again_makes_those_stale_that_went_on_from_it(make_sessi
     session = make_session()
     session.dispatch(c.SetClipLength(2))
     overrides: dict[str, object] = {"field": "continue"} if goes_on else {}
+    session.document.settle()
     session.project.update(replace(session.project.settings, overrides=overrides))
     n_clips = len(session.clip_states)
     assert n_clips >= 3
@@ -282,6 +284,7 @@ def test_what_was_learned_fixes_clip_length_and_hold_out(make_session):
     session = make_session()
     session.dispatch(c.SetHoldout((1,)))
     assert session.holdout == (1,)
+    session.document.settle()
     assert read_settings(session.project.folder).holdout == ("1",)
     session.dispatch(c.SetHoldout((0, 1, 2)))
     assert "leaves 1 for training" in session.notices[-1].detail
@@ -311,8 +314,10 @@ def test_the_next_clip_has_a_plan_that_follows_the_settings(make_session):
     assert after.summary.startswith("350 steps, ")
     (changed,) = [setting for setting in after.settings if setting.is_set]
     assert (changed.name, changed.value) == ("joint_steps", 50)
+    session.document.settle()
     assert read_settings(session.project.folder).overrides == {"joint_steps": 50}
     session.dispatch(c.SetTrainSetting("joint_steps", 0))  # derived again
+    session.document.settle()
     assert read_settings(session.project.folder).overrides == {}
     assert planned(session) == before
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import app.session.window_memory
-from app.session.window_memory import MAX_PROJECTS, WindowMemory, read_window_memory, show_again, view_of
+from app.session.window_memory import MAX_PROJECTS, WindowMemory, markers_of, read_window_memory, show_again, view_of
 from tests.ui.fake_session import FakeSession
 
 
@@ -55,19 +55,20 @@ def test_a_session_goes_back_to_what_it_showed() -> None:
     assert other.view.look_through is None
 
 
-def test_how_it_was_played_and_what_was_marked_comes_back() -> None:
+def test_how_it_was_played_comes_back() -> None:
     left, other = FakeSession(), FakeSession()
     left.timeline.set_range(3, 20)
     left.timeline.speed, left.timeline.is_looping = 0.25, False
-    for frame_index, name in ((4, "foul"), (9, "50 % ## of\nall")):
-        left.timeline.markers.put(frame_index, name)
     show_again(other, json.loads(json.dumps(view_of(left))))
     assert (other.timeline.play_range, other.timeline.speed, other.timeline.is_looping) == ((3, 20), 0.25, False)
-    assert [*other.timeline.markers] == [*left.timeline.markers]
-    wrong = view_of(left) | {"markers": [[4], 7, ["a", "b"], [1e9, "far"], [True, "x"], [5, 5], [6, "good"]]}
-    third = FakeSession()
-    show_again(third, wrong)
-    assert third.timeline.markers.frames == [6]
+
+
+def test_markers_of_an_earlier_version_are_found_where_they_make_sense() -> None:
+    session = FakeSession()
+    kept = {"markers": [[4], 7, ["a", "b"], [1e9, "far"], [True, "x"], [5, 5], [6, "good"], [9, "50 % ## of\nall"]]}
+    assert markers_of(kept, session.timeline) == [(6, "good"), (9, "50 % ## of\nall")]
+    for nonsense in NONSENSE:
+        assert markers_of({"markers": nonsense}, session.timeline) == []
 
 
 NONSENSE = [None, True, -1, 10**30, 1e308, -0.5, "", "cam99", [], [1.0, "a", 2.0], [1e300] * 3, {"a": 1}]

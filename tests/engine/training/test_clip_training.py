@@ -232,7 +232,7 @@ def test_every_damage_to_a_checkpoint_is_an_error_that_names_the_file(source, tm
     for at in rng.integers(0, len(good), 20):
         kept.write_bytes(good[:at] + bytes([good[at] ^ 0x10]) + good[at + 1 :])
         with pytest.raises(ProjectError):
-            read_checkpoint(kept, clip_index=1, camera_names=[], seed=0)
+            read_checkpoint(kept, frames=(0, 1, 1), camera_names=[], seed=0)
     values = to_builtins(state.header, builtin_types=())
     write_values(kept, state.arrays, values | {"resume": json.dumps(values["resume"])})
     other = source()

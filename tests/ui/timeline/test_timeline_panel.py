@@ -297,7 +297,7 @@ def test_markers_are_made_named_visited_and_removed(pilot: Pilot) -> None:
     pilot.type("50 % ## %s")
     pilot.key(key.RETURN)
     pilot.draw(2)
-    assert timeline.markers.at(7).name == "50 % ## %s"
+    assert timeline.markers.at(7).text == "50 % ## %s"
     assert not pilot.studio.frame.ui.regions.is_active, "M with Ctrl marks no sphere"
     timeline.seek(21)
     pilot.key(key.M, modifiers=(CTRL,))

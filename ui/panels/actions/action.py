@@ -8,18 +8,22 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+from app.playback.arrays import AnchorArrays
 from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.playback.views import Views
 from app.session.edit_status import HistoryStatus, PathsStatus
-from app.status import Overlays, QueueStatus, TrainingStatus, WantedFrame
+from app.session.editing.selecting import SelectionStatus
+from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
+from ui.viewport.editing.select_tool import TOOLS
 
 TIME, PLAY, VIEW, COMPARE = "Time", "Play and timeline", "View", "Show and compare"
 MARK, PATH, TRAIN, WINDOW = "Mark regions", "Camera path", "Train", "Window"
+SELECT = "Select"
 NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
@@ -56,6 +60,12 @@ class ActionNeeds(RegionsNeeds, Protocol):
     @property
     def queue(self) -> QueueStatus: ...
 
+    @property
+    def selection(self) -> SelectionStatus: ...
+
+    def shown_anchors(self) -> AnchorArrays | None: ...
+    def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]: ...
+
     def wanted_frame(self) -> WantedFrame | None: ...
 
 
@@ -74,6 +84,7 @@ class Action:
             Empty where it has none.
         needs_capture: Ignored until a capture is open.
         needs_choosing: Ignored unless a region is being chosen.
+        needs_tool: Ignored unless a tool that selects is in use: this one, or "any". Empty where that does not matter.
         moves_keys: Not ignored either where a key of the camera path is chosen.
         repeats: Holding the key repeats the action.
         is_in_help: Shown on the help sheet; of a row of keys that do alike, one is enough there.
@@ -89,6 +100,7 @@ class Action:
     keys: tuple[str, ...] = ()
     needs_capture: bool = True
     needs_choosing: bool = False
+    needs_tool: str = ""
     moves_keys: bool = False
     repeats: bool = False
     is_on: Callable[[ActionNeeds], bool] | None = None
@@ -104,6 +116,8 @@ class Action:
         """Why it cannot be run now, as a sentence; empty when it can."""
         if self.needs_capture and session.capture is None:
             return "Open a capture or a project first."
+        if self.needs_tool and ui.selecting.kind not in ((self.needs_tool,) if self.needs_tool != "any" else TOOLS):
+            return "Only while a tool that selects is in use."
         if self.needs_choosing and not ui.regions.is_active:
             if not self.moves_keys:
                 return "Only while a region is being chosen."

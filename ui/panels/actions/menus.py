@@ -16,6 +16,7 @@ from ui.panels.actions.action import (
     NAVIGATE,
     PATH,
     PLAY,
+    SELECT,
     TIME,
     TRAIN,
     VIEW,
@@ -26,12 +27,13 @@ from ui.panels.actions.table import ACTIONS
 
 MOST_ITEMS = 24
 """As many fit into the smallest window."""
-MENUS = ("File", "View", "Time", "Train", "Mark", "Camera", "Window")
+MENUS = ("File", "View", "Time", "Train", "Select", "Mark", "Camera", "Window")
 """From left to right; others follow before the last."""
 _MENU_OF_GROUP = {
     TIME: "Time",
     VIEW: "View",
     COMPARE: "View",
+    SELECT: "Select",
     MARK: "Mark",
     PATH: "Camera",
     TRAIN: "Train",

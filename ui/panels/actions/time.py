@@ -6,6 +6,7 @@ import numpy as np
 
 from app.playback.timeline import Timeline
 from app.session.commands import FollowTraining, SetFrame, TogglePlay
+from app.session.editing.edit_commands import RemoveMarker
 from ui.panels.actions.action import TIME, Action, ActionNeeds, Run
 from ui.panels.state import TIMELINE, Dispatch, UiState
 from ui.panels.timeline.marker_box import mark_playhead
@@ -75,8 +76,13 @@ def _jump(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _mark(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    mark_playhead(session.timeline, ui)
+    mark_playhead(session.timeline, dispatch, ui)
     ui.wanted_panel = TIMELINE
+
+
+def _unmark(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    if session.timeline.markers.at(session.timeline.frame_index) is not None:
+        dispatch(RemoveMarker(session.timeline.frame_index))
 
 
 ACTIONS = (
@@ -100,6 +106,7 @@ ACTIONS = (
     Action("time.next_clip", "Start of the next clip", TIME, _next_clip, keys=("Down",), repeats=True),
     Action("time.jump", "Go to a frame, time or clip", TIME, _jump, keys=("Ctrl+G",)),
     Action("time.mark", "Mark this frame, or name its marker", TIME, _mark, keys=("Ctrl+M",)),
+    Action("time.unmark", "Remove the marker of this frame", TIME, _unmark, keys=("Ctrl+Shift+M",)),
     Action("time.previous_marker", "Previous marker", TIME, _marker_by(-1), keys=("Shift+Up",), repeats=True),
     Action("time.next_marker", "Next marker", TIME, _marker_by(1), keys=("Shift+Down",), repeats=True),
 )

@@ -14,6 +14,8 @@ from ui.panels.state import Dispatch, UiState
 
 def _camera_by(step: int) -> Run:
     def hop(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        if ui.selecting.kind == "brush":  # these keys change its size
+            return
         n_cameras = len(session.rig)
         shown = session.view.look_through
         if shown is None:

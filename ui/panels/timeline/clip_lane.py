@@ -30,9 +30,9 @@ def clips_in_sight(session: TimelineNeeds, scale: TimeScale) -> tuple[int, int]:
     n_clips = min(len(session.clips), len(session.clip_states))
     if n_clips == 0:
         return 0, 0
-    length = session.clips[0].clip_length
-    first = min(max(int(scale.shown.start) // length, 0), n_clips - 1)
-    return first, min(max(-(-int(scale.shown.stop) // length), first + 1) + 1, n_clips)
+    spans = session.timeline.spans
+    first = min(spans.index_of(int(scale.shown.start)), n_clips - 1)
+    return first, min(max(spans.index_of(int(scale.shown.stop) - 1), first) + 2, n_clips)
 
 
 def draw_clip_lane(stage: Stage, session: TimelineNeeds) -> None:
@@ -40,7 +40,7 @@ def draw_clip_lane(stage: Stage, session: TimelineNeeds) -> None:
     first, stop = clips_in_sight(session, stage.scale)
     if first == stop:
         return
-    clip_width = session.clips[0].clip_length * stage.scale.per_frame
+    clip_width = session.timeline.spans.usual_length * stage.scale.per_frame
     if clip_width >= MIN_BAND_WIDTH:
         for index in range(first, stop):
             band = _band(stage, session, index, index)
@@ -57,10 +57,10 @@ def _draw_runs(stage: Stage, session: TimelineNeeds, in_sight: tuple[int, int]) 
     row, scale, draw, rects = stage.rows[CLIPS], stage.scale, stage.draw, stage.ui.rects
     y0, y1 = row.y0, row.y1
     packed = {state: theme.u32(theme.faded(theme.status_color(state), 0.62)) for state in STATES}
-    x_of_start, per_clip = scale.left_of(0.0), session.clips[0].clip_length * scale.per_frame
+    clips, x_of_start, per_frame = session.clips, scale.left_of(0.0), scale.per_frame
     for begin, last, state in state_runs(session, stage, in_sight, MIN_GROUP_WIDTH):
-        if (last - begin + 1) * per_clip < MIN_HATCH_WIDTH:
-            x0, x1 = x_of_start + begin * per_clip, x_of_start + (last + 1) * per_clip
+        x0, x1 = x_of_start + clips[begin].start * per_frame, x_of_start + clips[last].stop * per_frame
+        if x1 - x0 < MIN_HATCH_WIDTH:
             draw.add_rect_filled(ImVec2(x0, y0), ImVec2(x1, y1), packed[state])
             rects[f"timeline.clip{begin}"] = Rect(x0, y0, x1, y1)
         else:
@@ -75,7 +75,7 @@ def state_runs(
     """First clip, last clip and state of every run. Clips that are narrower than `smallest` count together, as the one
     among them that matters most."""
     first, stop = in_sight
-    size = group_size(session.clips[0].clip_length * stage.scale.per_frame, smallest)
+    size = group_size(session.timeline.spans.usual_length * stage.scale.per_frame, smallest)
     first -= first % size  # the same clips together wherever the view is moved to
     codes = largest_of_groups(stage.ui.timeline.columns(session.clip_states).states[first:stop], size)
     return [

@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 from app.session.commands import SetFrame
 from engine.capture.clip import Clip
 from ui.panels.clip_training_menu import draw_clip_training
+from ui.panels.clips.menu import draw_cutting
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import clip_title, state_words
 from ui.panels.timeline.needs import TimelineNeeds
@@ -36,6 +37,9 @@ def draw_clip_menu(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> 
         imgui.text_disabled(f"{clip_title(clip.clip_index, session.reference_index)}: {state_words(state)}")
         imgui.separator()
         draw_clip_training(session, dispatch, ui, clip.clip_index, is_by_key=is_by_key)
+        imgui.separator()
+        frame, n_clips = ui.timeline.menu_frame, len(session.clips)
+        draw_cutting(session, dispatch, ui, clip, frame_index=frame, n_clips=n_clips)
         imgui.separator()
         _draw_time(clip, session, dispatch, ui)
     imgui.end_popup()

@@ -71,7 +71,7 @@ def _draw_rows(session: TimelineNeeds, dispatch: Dispatch, ui: UiState) -> None:
     draw_clip_menu(stage, session, dispatch)
     _draw_track(stage, session)
     draw_jump_box(session, dispatch, ui, track)
-    draw_marker_box(session.timeline, ui, track)
+    draw_marker_box(session.timeline, dispatch, ui, track)
 
 
 def _stage(

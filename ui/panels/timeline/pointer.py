@@ -1,5 +1,5 @@
-"""What the pointer does over the track: scrub, zoom, pan, play around a seam, go to a marker or edit it, and move keys
-of the camera path.
+"""What the pointer does over the track: scrub, zoom, pan, play around a seam, go to a marker, move or edit it, and move
+keys of the camera path.
 """
 
 from __future__ import annotations
@@ -7,10 +7,11 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from app.session.commands import SetFrame
+from app.session.editing.edit_commands import MoveMarker
 from ui.panels.state import Dispatch
 from ui.panels.timeline.marker_box import edit_marker
 from ui.panels.timeline.needs import TimelineNeeds
-from ui.panels.timeline.path_lane import handle_keys_of_path
+from ui.panels.timeline.path_lane import DRAG_FROM, handle_keys_of_path
 from ui.panels.timeline.seam_lane import seam_at
 from ui.panels.timeline.small_lanes import marker_at
 from ui.panels.timeline.stage import Stage
@@ -50,7 +51,7 @@ def _handle_middle_drag(stage: Stage, session: TimelineNeeds) -> None:
 
 def _handle_left(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> None:
     view, timeline = stage.ui.timeline, session.timeline
-    if handle_keys_of_path(stage, session, dispatch):
+    if handle_keys_of_path(stage, session, dispatch) or _drag_marker(stage, session, dispatch):
         return
     if imgui.is_item_activated():
         seam = seam_at(stage, session)
@@ -67,9 +68,33 @@ def _handle_left(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> No
     if stage.pointer is not None and imgui.is_mouse_double_clicked(LEFT):
         marker = marker_at(stage, timeline)
         if marker is not None:
-            edit_marker(timeline, stage.ui, marker.frame_index)
+            edit_marker(timeline, dispatch, stage.ui, marker.frame_index)
         elif view.pressed_seam is None:
             view.show_all()
+
+
+def _drag_marker(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> bool:
+    """Whether the pointer moves a marker, and does nothing else. A press alone goes to its frame, as any other does."""
+    view, timeline, x = stage.ui.timeline, session.timeline, imgui.get_io().mouse_pos.x
+    if imgui.is_item_activated():
+        marker = marker_at(stage, timeline)
+        view.pressed_marker = None if marker is None else marker.frame_index
+        view.marker_from = x
+        view.begin_gesture()
+        return False
+    is_held = imgui.is_item_active() or imgui.is_item_deactivated()
+    if view.pressed_marker is None or not is_held:
+        view.pressed_marker = None
+        return False
+    if view.marker_from is not None and abs(x - view.marker_from) >= DRAG_FROM:
+        view.marker_from = None
+    frame_index = timeline.clamped(stage.scale.frame_at(x))
+    if view.marker_from is None and frame_index != view.pressed_marker and timeline.markers.at(frame_index) is None:
+        dispatch(MoveMarker(view.pressed_marker, frame_index, view.gesture))
+        if timeline.markers.at(frame_index) is not None:  # it was not refused
+            view.pressed_marker = frame_index
+            dispatch(SetFrame(frame_index))
+    return True
 
 
 def _scrub(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> None:

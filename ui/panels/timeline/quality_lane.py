@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from imgui_bundle import imgui
@@ -30,17 +32,25 @@ def draw_quality_lane(stage: Stage, session: TimelineNeeds) -> None:
         return
     if len(frames) == scale.n_frames:
         in_sight = math.floor(scale.shown.start), math.ceil(scale.shown.stop)
-        _draw_steps(stage, frames, in_sight, 1, MIN_FRAME_GROUP_WIDTH, theme.SKY, 1.0)
+        _draw_steps(stage, frames, in_sight, lambda places: places, 1, MIN_FRAME_GROUP_WIDTH, theme.SKY, 1.0)
     clips = stage.ui.timeline.columns(session.clip_states).psnr
-    _draw_steps(stage, clips, (first, stop), session.clips[0].clip_length, MIN_GROUP_WIDTH, theme.GREEN, 2.0)
+    length = session.timeline.spans.usual_length
+    _draw_steps(stage, clips, (first, stop), partial(_starts, session), length, MIN_GROUP_WIDTH, theme.GREEN, 2.0)
     if stage.is_pointed_at(QUALITY) and stage.pointer is not None:
         _draw_note(session, scale.frame_at(stage.pointer[0]), frames)
+
+
+def _starts(session: TimelineNeeds, places: np.ndarray) -> np.ndarray:
+    """First frames of clips; of one past the last clip the number of frames."""
+    clips = session.clips
+    return np.array([clips[place].start if place < len(clips) else clips[-1].stop for place in places.tolist()])
 
 
 def _draw_steps(
     stage: Stage,
     values: np.ndarray,
     in_sight: tuple[int, int],
+    starts_of: Callable[[np.ndarray], np.ndarray],
     n_frames: int,
     smallest: float,
     color: theme.Color,
@@ -51,7 +61,8 @@ def _draw_steps(
     Args:
         values: dB; NaN leaves a gap. [n]
         in_sight: The first value to draw, and one past the last.
-        n_frames: That each value is of.
+        starts_of: The frame that each of these values begins with; one past the last value counts, too.
+        n_frames: That a value is of usually.
         smallest: Width of a step, units of the screen.
     """
     row, scale, draw = stage.rows[QUALITY], stage.scale, stage.draw
@@ -59,7 +70,8 @@ def _draw_steps(
     first = in_sight[0] - in_sight[0] % size
     means = means_of_groups(values[first : in_sight[1]], size)
     levels = np.round(2 * (row.y1 - 2 - (row.height - 4) * _shares(means))) / 2  # to half a unit
-    edges = scale.left_of(first * n_frames) + np.arange(len(levels) + 1) * (size * n_frames * scale.per_frame)
+    places = np.minimum(first + np.arange(len(levels) + 1) * size, len(values))
+    edges = scale.left_of(0.0) + starts_of(places) * scale.per_frame
     xs = np.clip(edges, scale.x0, min(scale.x1, scale.left_of(scale.n_frames))).tolist()
     ys = levels.tolist()
     packed = theme.u32(color)

@@ -58,7 +58,7 @@ def seams_in_sight(stage: Stage, session: TimelineNeeds) -> list[tuple[int, floa
     first = max(first, 1)
     if first >= stop:
         return []
-    size = group_size(session.clips[0].clip_length * stage.scale.per_frame, MIN_MARK_DISTANCE)
+    size = group_size(session.timeline.spans.usual_length * stage.scale.per_frame, MIN_MARK_DISTANCE)
     first -= (first - 1) % size
     ratios = stage.ui.timeline.ratios(session.residual_status.seams, n_clips)[first:stop]
     if size == 1:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 
-from app.playback.markers import Marker
+from app.document.project_document import Marker
 from app.playback.timeline import Timeline
 from ui.panels.state import Rect
 from ui.panels.timeline.columns import merged_spans
@@ -53,8 +53,8 @@ def draw_marker_lane(stage: Stage, timeline: Timeline) -> None:
     if pointed is not None:
         imgui.begin_tooltip()
         imgui.text_unformatted(f"Marker at frame {pointed.frame_index}")
-        if pointed.name:
-            imgui.text_unformatted(pointed.name)
+        if pointed.text:
+            imgui.text_unformatted(pointed.text)
         imgui.end_tooltip()
 
 
@@ -66,8 +66,8 @@ def _draw_marker(stage: Stage, marker: Marker, x: float, room: float) -> None:
     stage.draw.add_quad_filled(
         ImVec2(x, y - half), ImVec2(x + half, y), ImVec2(x, y + half), ImVec2(x - half, y), theme.u32(theme.YELLOW)
     )
-    if marker.name and room > 16:
-        name = " ".join(marker.name.split("\n"))
+    if marker.text and room > 16:
+        name = " ".join(marker.text.split("\n"))
         if small_width(name) > min(room, MAX_NAME_WIDTH):
             name = elided(name, min(room, MAX_NAME_WIDTH) * imgui.get_font_size() / SMALL_TEXT)
         small_text(stage.draw, x + half + 4, y - 7, name, theme.TEXT)

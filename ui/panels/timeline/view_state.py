@@ -36,6 +36,9 @@ class TimelineView:
         menu_frame: The frame whose clip the menu is of.
         jump_text, jump_words: In the box that takes a time.
         marker_frame, marker_name: The marker whose name is being written.
+        pressed_marker: Frame of the marker that is held with the pointer; None while none is.
+        marker_from: Where it was pressed, units of the screen; None once that has become a drag.
+        gesture: Number of what is done to markers; see app.session.editing.edit_commands.
     """
 
     shown: TimeRange | None = None
@@ -52,6 +55,9 @@ class TimelineView:
     jump_words: str = ""
     marker_frame: int = 0
     marker_name: str = ""
+    pressed_marker: int | None = None
+    marker_from: float | None = None
+    gesture: int = 0
     _of: object = None
     _seen_frame: int = 0
     _columns: tuple[tuple[ClipStatus, ...], ClipColumns] | None = field(default=None, repr=False)
@@ -67,6 +73,11 @@ class TimelineView:
             if timeline.frame_index != self._seen_frame:
                 self.shown = self.shown.showing(timeline.frame_index, timeline.n_frames)
         self._seen_frame = timeline.frame_index
+
+    def begin_gesture(self) -> int:
+        """Start something that is taken back at once. Returns its number."""
+        self.gesture += 1
+        return self.gesture
 
     def range_of(self, n_frames: int) -> TimeRange:
         """What is shown of so many frames."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import shutil
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +18,11 @@ from app.export.video.job import VideoJob
 from app.export.video.render import WrittenVideo, render_video
 from app.export.video.views import camera_view
 from app.project.project import open_project
-from engine.assets import asset_path
 from engine.metrics.pictures.colors import to_levels
+from tests.app.stored_project import copy_stored
 
 CAMERA = 2
 """Of the made project's four, or the sample's twenty: one that was trained on."""
-STORED = Path(__file__).parents[3] / "data" / "stored_project"
 
 
 class Films:
@@ -65,10 +62,7 @@ def films(opened: TrainedProject, tmp_path: Path) -> Films:
 @pytest.fixture(scope="session")
 def stored(tmp_path_factory: pytest.TempPathFactory) -> TrainedProject:
     """A small training of the sample's first two clips, frames 0 to 5 of 30, 80 x 60 pixels. Not to be changed."""
-    folder = tmp_path_factory.mktemp("stored") / "p"
-    shutil.copytree(STORED, folder)
-    content = json.loads((folder / "project.json").read_text())
-    (folder / "project.json").write_text(json.dumps(content | {"capture": str(asset_path("sample"))}))
+    folder = copy_stored(tmp_path_factory.mktemp("stored") / "p")
     return open_trained(open_project(folder, is_writable=False))
 
 

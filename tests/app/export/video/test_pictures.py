@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import av
 import numpy as np
 import pytest
 
+from app.document.history import Changed
 from app.export.scene_frames import SceneFrames
 from app.export.video.drawing import draw
 from app.export.video.job import Turntable
 from app.export.video.views import camera_view
-from app.project.camera_paths import write_camera_paths
 from engine.camera.camera_path import CameraKey, CameraPath
 from engine.camera.projection import pinhole_K, vertical_fov
 from engine.camera.rig import CameraRig
@@ -172,11 +174,17 @@ def test_a_turntable_goes_round_and_can_be_looped(sample_films: Films):
     assert min(picture.std() for picture in quarter) > 10.0  # there is something to be seen from all sides
 
 
+def have_path(films: Films, path: CameraPath) -> None:
+    project = films.opened.project
+    document = replace(project.document, camera_paths=(path,))
+    project.history = project.history.after(Changed("new camera path", document))
+
+
 def test_a_camera_path_is_followed_while_time_runs_or_stands_still(sample_films: Films):
     films, rig = sample_films, sample_films.opened.capture.rig
     fov = vertical_fov(rig.Ks[1, 1, 1], 60.0)
     keys = (CameraKey(1.0, rig.world_to_camera[1], fov), CameraKey(4.5, rig.world_to_camera[CAMERA], fov))
-    write_camera_paths(films.opened.project.folder, [CameraPath("Way in", keys)])
+    have_path(films, CameraPath("Way in", keys))
     assert films.render("path", "png", path="Way in").n_pictures == 4  # from key to key
     films.render("held", "png", path="Way in", hold=0.0)
     running, held = (images_in(films.folder / name) for name in ("path", "held"))
@@ -190,9 +198,7 @@ def test_a_camera_path_is_followed_while_time_runs_or_stands_still(sample_films:
     assert psnr_of(running[0], held[0]) < 40.0
     with pytest.raises(ProjectError, match="no camera path called"):
         films.render("none", "png", path="Way out")
-    write_camera_paths(
-        films.opened.project.folder, [CameraPath("Late", (keys[0].at_frame(90.0), keys[1].at_frame(99.0)))]
-    )
+    have_path(films, CameraPath("Late", (keys[0].at_frame(90.0), keys[1].at_frame(99.0))))
     with pytest.raises(ProjectError, match="where the capture has no frames"):
         films.render("late", "png", path="Late")
     assert films.render("late", "png", path="Late", hold=0.0, size=(8, 6)).n_pictures == 10

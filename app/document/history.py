@@ -1,0 +1,133 @@
+"""DocumentHistory: a document with the way it has come and the way back, as one immutable value."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
+
+from app.document.project_document import ProjectDocument
+from app.document.project_settings import ProjectSettings
+
+MAX_STEPS = 500
+"""Steps that can be taken back; the oldest go."""
+MAX_NAME_CHARACTERS = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Changed:
+    """The document was changed.
+
+    Attributes:
+        name: What was done, as a word or two that can follow "Undo".
+        document: What it is now.
+        merge: Changes in a row with the same one count as one step, such as those of a drag.
+    """
+
+    name: str
+    document: ProjectDocument
+    merge: Hashable = None
+
+
+@dataclass(frozen=True, slots=True)
+class Undone:
+    """The last step was taken back."""
+
+
+@dataclass(frozen=True, slots=True)
+class Redone:
+    """The step that was taken back last was done again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """The capture is found in another place, or may follow links now. Not a step: undo does not take it back.
+
+    Attributes:
+        settings: Of the document, with the new place.
+    """
+
+    settings: ProjectSettings
+
+
+Event = Changed | Undone | Redone | Placed
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step of the past or of the future.
+
+    Attributes:
+        name: See Changed.
+        document: Of the past: what the document was before the step. Of the future: what it is after it.
+        merge: See Changed; None where the step is over.
+    """
+
+    name: str
+    document: ProjectDocument
+    merge: Hashable = None
+
+
+@dataclass(frozen=True, slots=True)
+class DocumentHistory:
+    """Everything that undo and redo need.
+
+    Attributes:
+        present: The document.
+        past: Steps that led here, the oldest first.
+        future: Steps that were taken back, the one that would be done again next last.
+    """
+
+    present: ProjectDocument
+    past: tuple[Step, ...] = ()
+    future: tuple[Step, ...] = ()
+
+    @property
+    def undo_name(self) -> str:
+        """What would be taken back; empty where there is nothing."""
+        return self.past[-1].name if self.past else ""
+
+    @property
+    def redo_name(self) -> str:
+        """What would be done again; empty where there is nothing."""
+        return self.future[-1].name if self.future else ""
+
+    def after(self, event: Event) -> DocumentHistory:
+        """The history after something has happened. Where there is nothing to take back or do again, it stays."""
+        match event:
+            case Changed(name=name, document=document, merge=merge):
+                last = self.past[-1] if self.past else None
+                if last is not None and merge is not None and last.merge == merge and not self.future:
+                    return replace(self, present=document)
+                step = Step(name[:MAX_NAME_CHARACTERS], self.present, merge)
+                return DocumentHistory(document, (*self.past, step)[-MAX_STEPS:])
+            case Undone():
+                return self._undone() if self.past else self
+            case Redone():
+                return self._redone() if self.future else self
+            case Placed(settings=settings):
+                return replace(self, present=replace(self.present, settings=settings))
+
+    def _undone(self) -> DocumentHistory:
+        step = self.past[-1]
+        back = Step(step.name, self.present)
+        return DocumentHistory(self._in_place(step.document), _closed(self.past[:-1]), (*self.future, back))
+
+    def _redone(self) -> DocumentHistory:
+        step = self.future[-1]
+        past = (*_closed(self.past), Step(step.name, self.present))
+        return DocumentHistory(self._in_place(step.document), past, self.future[:-1])
+
+    def _in_place(self, document: ProjectDocument) -> ProjectDocument:
+        """A document of another time, with the capture where it is now."""
+        now, then = self.present.settings, document.settings
+        if (now.capture, now.follow_links) == (then.capture, then.follow_links):
+            return document
+        settings = replace(then, capture=now.capture, follow_links=now.follow_links)
+        return replace(document, settings=settings)
+
+
+def _closed(steps: tuple[Step, ...]) -> tuple[Step, ...]:
+    """What is done from here on is a step of its own."""
+    if not steps or steps[-1].merge is None:
+        return steps
+    return (*steps[:-1], replace(steps[-1], merge=None))

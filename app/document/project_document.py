@@ -1,0 +1,159 @@
+"""ProjectDocument: everything that a user decides about a project, as one immutable value."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from app.document.project_settings import ProjectSettings
+from engine.camera.camera_path import CameraPath
+from engine.editing.edit import Edit, Vector
+from engine.gate.regions import GateRegion
+
+MAX_TEXT_CHARACTERS = 200
+_Count = Annotated[int, Meta(ge=0, lt=2**31)]
+_Text = Annotated[str, Meta(max_length=MAX_TEXT_CHARACTERS)]
+_Share = Annotated[float, Meta(ge=-1.0, le=2.0)]
+
+
+class Marker(Struct, frozen=True, forbid_unknown_fields=True):
+    """A named moment on the timeline."""
+
+    frame_index: _Count
+    text: _Text
+
+
+class Label(Struct, frozen=True, forbid_unknown_fields=True):
+    """The user's own name for a clip or a camera.
+
+    Attributes:
+        kind: "clip" or "camera".
+        name: First frame of the clip as text, or the name of the camera in the capture.
+        text: What is shown beside it.
+    """
+
+    kind: Annotated[str, Meta(pattern=r"\A(clip|camera)\Z")]
+    name: _Text
+    text: _Text
+
+
+class ExcludedFrames(Struct, frozen=True, forbid_unknown_fields=True):
+    """Pictures that training never sees.
+
+    Attributes:
+        camera: Its name; None for all cameras.
+        first, stop: Frames [first, stop).
+
+    Raises:
+        ValueError: There is no frame in it.
+    """
+
+    camera: str | None
+    first: _Count
+    stop: _Count
+
+    def __post_init__(self) -> None:
+        if self.stop <= self.first:
+            raise ValueError(f"frames {self.first} to before {self.stop} are none")
+
+
+class Stroke(Struct, frozen=True, forbid_unknown_fields=True):
+    """One stroke of a brush over a picture.
+
+    Attributes:
+        points: x as a share of the picture's width, y as a share of its height; slightly outside is allowed.
+        radius: As a share of the picture's width.
+        is_erasing: Whether it takes away from what earlier strokes have covered.
+    """
+
+    points: Annotated[tuple[tuple[_Share, _Share], ...], Meta(min_length=1, max_length=100_000)]
+    radius: Annotated[float, Meta(gt=0.0, le=1.0)]
+    is_erasing: bool = False
+
+
+class PaintedMask(Struct, frozen=True, forbid_unknown_fields=True):
+    """A part of a camera's pictures that training does not look at.
+
+    Attributes:
+        camera: Its name.
+        first, stop: Frames [first, stop).
+        strokes: In the order in which they were painted.
+
+    Raises:
+        ValueError: There is no frame in it.
+    """
+
+    camera: str
+    first: _Count
+    stop: _Count
+    strokes: tuple[Stroke, ...]
+
+    def __post_init__(self) -> None:
+        if self.stop <= self.first:
+            raise ValueError(f"frames {self.first} to before {self.stop} are none")
+
+
+class Exclusions(Struct, frozen=True, forbid_unknown_fields=True):
+    """What training never sees, beside the cameras that are held out for measuring.
+
+    Attributes:
+        cameras: Names of cameras that are left out altogether.
+        frames: Pictures.
+        masks: Parts of pictures.
+    """
+
+    cameras: tuple[str, ...] = ()
+    frames: tuple[ExcludedFrames, ...] = ()
+    masks: tuple[PaintedMask, ...] = ()
+
+
+class World(Struct, frozen=True, forbid_unknown_fields=True):
+    """How the scene lies in the world.
+
+    Attributes:
+        up: Direction that is up, in scene axes, of unit length; None for that which the cameras suggest.
+        meters_per_unit: Length of a scene unit, m; None where nobody has said.
+
+    Raises:
+        ValueError: The direction is not of unit length, or the length not positive.
+    """
+
+    up: Vector | None = None
+    meters_per_unit: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.up is not None and not abs(math.sqrt(sum(x * x for x in self.up)) - 1.0) <= 1e-3:
+            raise ValueError(f"the direction {self.up} is not of unit length")
+        if self.meters_per_unit is not None and not 1e-9 <= self.meters_per_unit <= 1e9:
+            raise ValueError(f"a scene unit of {self.meters_per_unit} m is out of range")
+
+
+NOTHING_EXCLUDED, AS_CAPTURED = Exclusions(), World()
+
+
+@dataclass(frozen=True, slots=True)
+class ProjectDocument:
+    """What a project is made to be. Changed by making another one with dataclasses.replace.
+
+    Attributes:
+        settings: What all clips have in common.
+        regions: Where the user overrules the gate; later ones overrule earlier ones.
+        camera_paths: In the user's order.
+        edits: The stack, bottom first.
+        markers: On the timeline, by frame.
+        labels: The user's own names.
+        exclusions: What training never sees.
+        world: Up and scale.
+    """
+
+    settings: ProjectSettings
+    regions: tuple[GateRegion, ...] = ()
+    camera_paths: tuple[CameraPath, ...] = ()
+    edits: tuple[Edit, ...] = ()
+    markers: tuple[Marker, ...] = ()
+    labels: tuple[Label, ...] = ()
+    exclusions: Exclusions = NOTHING_EXCLUDED
+    world: World = AS_CAPTURED

@@ -1,0 +1,81 @@
+"""ProjectSettings: what every clip of a project has in common."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from msgspec import Meta
+
+from engine.capture.clip import Clip, cut_clips, split_clips
+from engine.clip_files.clip_header import SettingValue
+from engine.errors import ProjectError
+from engine.training.config import TrainConfig, config_of
+
+
+@dataclass(frozen=True, slots=True)
+class ProjectSettings:
+    """What every clip of a project has in common. A value, part of the document.
+
+    Attributes:
+        capture: Folder of the capture.
+        fingerprint: Of the capture, to notice another one in its place.
+        scale: Share of the original picture size, in (0, 1].
+        clip_length: M, frames per clip.
+        holdout: Names of the cameras that training never sees.
+        seed: Fixes initial values and the order of pictures.
+        overrides: Training settings that differ from the defaults.
+        reference_clip: Index of the clip that the others inherit from.
+        follow_links: Whether the user allowed the capture's files to lie outside of its folder.
+        frames: First frame of the capture that is worked on, and the one after the last; None for all.
+        clip_bounds: Where clips were split or merged: the first frame of every clip, and at the end the number of
+            frames. None where every clip has clip_length frames, the last one what is left.
+    """
+
+    capture: Annotated[str, Meta(pattern=r"\A[^\0]*\Z")]
+    fingerprint: str
+    scale: Annotated[float, Meta(gt=0, le=1)] = 1.0
+    clip_length: Annotated[int, Meta(ge=1, lt=2**31)] = 10
+    holdout: tuple[str, ...] = ()
+    seed: Annotated[int, Meta(ge=0, lt=2**32)] = 0
+    overrides: dict[str, SettingValue] = field(default_factory=dict)
+    reference_clip: Annotated[int, Meta(ge=0, lt=2**31)] = 0
+    follow_links: bool = False
+    frames: tuple[Annotated[int, Meta(ge=0, lt=2**31)], Annotated[int, Meta(ge=1, lt=2**31)]] | None = None
+
+    clip_bounds: tuple[Annotated[int, Meta(ge=0, lt=2**31)], ...] | None = None
+
+    def clips(self, n_frames: int) -> list[Clip]:
+        """The clips of a capture of that many frames.
+
+        Raises:
+            ProjectError: The clips were cut from a capture of another length.
+        """
+        if self.config().field == "joint":
+            return split_clips(n_frames, n_frames)
+        if self.clip_bounds is None:
+            return split_clips(n_frames, self.clip_length)
+        if self.clip_bounds[-1] != n_frames:
+            raise ProjectError(
+                f"The clips of the project end at frame {self.clip_bounds[-1]}, the capture at frame {n_frames}.",
+                hint="Put the original capture back, or make a new project.",
+            )
+        return cut_clips(self.clip_bounds, self.clip_length)
+
+    def config(self) -> TrainConfig:
+        """The training settings. Raises ProjectError for an unknown one or a value that it may not have."""
+        return config_of(self.overrides)
+
+
+def check_bounds(clip_bounds: tuple[int, ...] | None) -> None:
+    """See that clips can be cut so.
+
+    Raises:
+        ProjectError: They do not rise from 0.
+    """
+    if clip_bounds is None:
+        return
+    rises = all(start < stop for start, stop in itertools.pairwise(clip_bounds))
+    if len(clip_bounds) < 2 or clip_bounds[0] != 0 or not rises:
+        raise ProjectError("The bounds of the clips have to rise from 0 to the number of frames.")

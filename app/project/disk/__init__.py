@@ -1,0 +1,1 @@
+"""What a project takes on the disk, and making room there."""

@@ -1,0 +1,72 @@
+"""Commands about clips: where they are cut, what they inherit from, what is out of date, and room on the disk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class TrainStale:
+    """Train every clip again that is out of date, one after the other."""
+
+
+@dataclass(frozen=True, slots=True)
+class CompareVersion:
+    """Put an earlier version of a clip beside what it is now, at the same frame and from the same view. The playhead
+    goes into the clip where it is not in it. version: None ends that."""
+
+    clip_index: int
+    version: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class SplitClip:
+    """Let a clip begin at this frame. What is trained of the clip that held it is out of use; asks first."""
+
+    frame_index: int
+    is_confirmed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class MergeClips:
+    """Make a clip and the one after it one clip. What is trained of both is out of use; asks first."""
+
+    clip_index: int
+    is_confirmed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SetReferenceClip:
+    """Let the other clips inherit from this one. All that is trained is out of date then; asks first."""
+
+    clip_index: int
+    is_confirmed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class AskFreeSpace:
+    """Ask whether files may go. what: A name of app.project.disk.room.WHAT. clip_index: Of one clip; None for all."""
+
+    what: str
+    clip_index: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FreeSpace:
+    """Delete these files for good; see AskFreeSpace."""
+
+    what: str
+    clip_index: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AskAboutDamage:
+    """Ask what is to become of a damaged clip."""
+
+    clip_index: int
+
+
+CutCommand = SplitClip | MergeClips | SetReferenceClip
+"""What changes the document, and can be taken back."""
+ClipCommand = TrainStale | CompareVersion | CutCommand | AskFreeSpace | FreeSpace | AskAboutDamage
+"""What is done about clips beside training them."""

@@ -1,0 +1,1 @@
+"""Editing in the window: what is selected, and what becomes of it."""

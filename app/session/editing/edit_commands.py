@@ -1,0 +1,165 @@
+"""Commands that change the edits, markers, labels and the world of a project, as frozen dataclasses in the imperative.
+
+A gesture is the number of a drag, or of presses of a key that belong together: changes with the same one are taken
+back at once. 0 stands for a change of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from engine.editing.edit import EVERYWHERE, Action, Edit, Scope, Target, Vector
+
+
+@dataclass(frozen=True, slots=True)
+class AddEdit:
+    """Put a new edit on top of the stack."""
+
+    action: Action
+    target: Target | None = None
+    """None for what is selected, which is not selected any more where it disappears."""
+    scope: Scope = EVERYWHERE
+    is_inverted: bool = False
+    """Whether it acts on everything but the target."""
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeEdit:
+    """Put an edit in the place of the one that has its number."""
+
+    edit: Edit
+    gesture: int = 0
+    verb: str = "change"
+    """What is done to it, for the history."""
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveEdit:
+    """Take an edit out of the stack."""
+
+    edit_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class DuplicateEdit:
+    """Put a copy of an edit right above it."""
+
+    edit_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class MoveEdit:
+    """Bring an edit to another position of the stack, counted from 0 at the bottom."""
+
+    edit_id: int
+    position: int
+
+
+@dataclass(frozen=True, slots=True)
+class ToggleEdit:
+    """Let an edit count, or not."""
+
+    edit_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class RenameEdit:
+    """Give an edit another name; an empty one lets what it does stand for it."""
+
+    edit_id: int
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class PutMarker:
+    """Mark a frame, or give its marker another name."""
+
+    frame_index: int
+    text: str = ""
+    gesture: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveMarker:
+    """Forget the marker of a frame."""
+
+    frame_index: int
+
+
+@dataclass(frozen=True, slots=True)
+class MoveMarker:
+    """Bring the marker of a frame to another one."""
+
+    frame_index: int
+    to_frame: int
+    gesture: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class SetLabel:
+    """Give a clip or a camera a name of the user's own; see app.document.project_document.Label."""
+
+    kind: Literal["clip", "camera"]
+    name: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class SetUp:
+    """Say which direction of the scene is up; None for that which the cameras suggest."""
+
+    direction: Vector | None
+
+
+@dataclass(frozen=True, slots=True)
+class SetUpByGround:
+    """Let what stands upright on the ground be up. points: Three of the ground, scene units."""
+
+    points: tuple[Vector, Vector, Vector]
+    toward: Vector
+    """A point above the ground, such as where the cameras stand."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetScaleByLength:
+    """Two points are known to be so far apart. a, b: Scene units."""
+
+    a: Vector
+    b: Vector
+    length_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class SetScale:
+    """Say how long a scene unit is, m; None where nobody knows."""
+
+    meters_per_unit: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class GoToStep:
+    """Take back so many steps of the history, or do so many again where the number is positive."""
+
+    n_steps: int
+
+
+EditCommand = (
+    AddEdit
+    | ChangeEdit
+    | RemoveEdit
+    | DuplicateEdit
+    | MoveEdit
+    | ToggleEdit
+    | RenameEdit
+    | PutMarker
+    | RemoveMarker
+    | MoveMarker
+    | SetLabel
+    | SetUp
+    | SetUpByGround
+    | SetScale
+    | SetScaleByLength
+)
+"""What changes edits, markers, labels and the world, and can be taken back."""

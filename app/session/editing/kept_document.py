@@ -1,0 +1,214 @@
+"""KeptDocument: the document of the open project. A change holds at once and reaches the disk a moment later, on a
+thread; `settle` waits for that.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
+
+from app.background.latest import LatestWorker
+from app.document.history import Changed, DocumentHistory, Event, Redone, Undone
+from app.document.project_document import ProjectDocument
+from app.project.project import Project
+from app.session.edit_status import HistoryStatus
+from engine.errors import EngineError, ProjectError
+
+logger = logging.getLogger(__name__)
+
+SETTLE_S = 2.0
+"""A disk that takes longer than this to write a few lines is not waited for."""
+Guard = Callable[[ProjectDocument, ProjectDocument], None]
+"""Sees whether one document may take the place of another; raises ProjectError where not."""
+
+
+@dataclass(frozen=True, slots=True)
+class DocumentRequest:
+    """Keep what has happened, or read what the project holds.
+
+    Attributes:
+        number: Of the request; a later one is another request.
+    """
+
+    number: int
+    is_reading: bool
+    project: Project = field(compare=False)
+    history: DocumentHistory = field(compare=False)
+
+
+class KeptDocument:
+    """For one thread, which never waits for the disk.
+
+    Args:
+        guard: Asked before every change, undo and redo.
+        on_change: Told the documents before and after each of them.
+    """
+
+    def __init__(self, *, guard: Guard, on_change: Callable[[ProjectDocument, ProjectDocument], None]) -> None:
+        self._guard, self._on_change = guard, on_change
+        self._files: LatestWorker[DocumentRequest, DocumentHistory] = LatestWorker("document", self._keep_or_read)
+        self._project: Project | None = None
+        self._number = 0
+        self._awaited: int | None = None
+        self._problem = ""
+        self._lock = threading.Lock()
+        self._pending: list[Event] = []
+        self._told: tuple[DocumentHistory | None, HistoryStatus] = (None, HistoryStatus())
+
+    @property
+    def project(self) -> Project | None:
+        """Whose document it is."""
+        return self._project
+
+    @property
+    def content(self) -> ProjectDocument | None:
+        """The document; None where no project is open."""
+        return None if self._project is None else self._project.document
+
+    def status(self) -> HistoryStatus:
+        """What can be taken back and done again."""
+        if self._project is None:
+            return HistoryStatus()
+        history = self._project.history
+        if history is not self._told[0]:  # asked at every turn of the window's loop
+            past, future = (tuple(step.name for step in steps) for steps in (history.past, history.future[::-1]))
+            self._told = history, HistoryStatus(history.undo_name, history.redo_name, past, future)
+        return self._told[1]
+
+    def open(self, project: Project) -> None:
+        """Take another project, with what it holds."""
+        self.leave()
+        self._project = project
+
+    def leave(self) -> None:
+        """Let go of the project once everything is kept."""
+        self._settle_for_good()
+        self._files.forget()
+        self._project = None
+        self._pending = []
+        self._awaited, self._problem = None, ""
+
+    # ---------------------------------------------------------------- changes
+
+    def change(self, document: ProjectDocument, name: str, merge: Hashable = None) -> None:
+        """Hold something else. name, merge: See app.document.history.Changed.
+
+        Raises:
+            ProjectError: Nothing can be changed now, or not to this.
+        """
+        self._happen(Changed(name, document, merge))
+
+    def undo(self) -> None:
+        """Take back the last step; nothing happens without one.
+
+        Raises:
+            ProjectError: It cannot be taken back now; the step stays.
+        """
+        if self._project is not None and self._project.history.past:
+            self._happen(Undone())
+
+    def redo(self) -> None:
+        """Do again what was taken back last; nothing happens when nothing was, or something else was done since.
+
+        Raises:
+            ProjectError: It cannot be done now; the step stays.
+        """
+        if self._project is not None and self._project.history.future:
+            self._happen(Redone())
+
+    def _happen(self, event: Event) -> None:
+        project = self.checked()
+        before, history = project.document, project.history.after(event)
+        self._guard(before, history.present)
+        with self._lock:
+            project.history = history
+            self._pending.append(event)
+        self._request(project, is_reading=False)
+        self._on_change(before, history.present)
+
+    def checked(self) -> Project:
+        """The project, if something can be changed in it.
+
+        Raises:
+            ProjectError: Not now; says why.
+        """
+        if self._project is None:
+            raise ProjectError("No capture is open.", hint="Open a capture first; its project keeps what is edited.")
+        self._project.check_writable()
+        if self._problem:
+            raise ProjectError(self._problem)
+        if self._awaited is not None:
+            raise ProjectError("The project file is being read again.", hint="Try again in a moment.")
+        return self._project
+
+    def why_not(self) -> str:
+        """Why nothing can be changed now, in one line; empty when it can."""
+        try:
+            self.checked()
+        except ProjectError as error:
+            return _sentence(error)
+        return ""
+
+    # ---------------------------------------------------------------- files
+
+    def _request(self, project: Project, *, is_reading: bool) -> None:
+        self._number += 1
+        if is_reading:
+            self._awaited = self._number
+        self._files.request(DocumentRequest(self._number, is_reading, project, project.history))
+
+    def _keep_or_read(self, request: DocumentRequest) -> DocumentHistory:
+        store = request.project.store
+        if request.is_reading:
+            return store.read()
+        with self._lock:  # those of later requests too: their own find nothing more to do
+            events, self._pending = self._pending, []
+            history = request.project.history
+        store.write(events, history)
+        return history
+
+    def take_error(self) -> Exception | None:
+        """The last failure, once. After one of writing, what the project holds is read again."""
+        found = self._files.take_error()
+        if found is None or self._project is None or found[0].project is not self._project:
+            return None
+        request, error = found
+        if not request.is_reading:
+            with self._lock:
+                self._pending = []
+            self._request(self._project, is_reading=True)
+        elif request.number == self._awaited:
+            self._awaited, self._problem = None, _sentence(error)
+        return error
+
+    def poll(self) -> bool:
+        """Take in what was read. Whether there was something."""
+        newest = self._files.newest
+        if self._project is None or newest is None or newest[0].number != self._awaited:
+            return False
+        before = self._project.document
+        self._project.history, self._awaited = newest[1], None
+        self._on_change(before, self._project.document)
+        return True
+
+    def settle(self) -> None:
+        """Wait until what was changed is on disk; longer than a moment only where the disk is at fault."""
+        self._files.wait_idle(SETTLE_S)
+
+    def close(self) -> None:
+        """Keep what was changed, end the thread."""
+        self._settle_for_good()
+        self._files.close()
+
+    def _settle_for_good(self) -> None:
+        self.settle()
+        found = self._files.take_error()
+        if found is not None:  # nobody will ask any more
+            logger.error("the project file could not be read or kept: %s", found[1])
+
+
+def _sentence(error: Exception) -> str:
+    """Cause and hint in one line, without the path: the panel that shows it is narrow."""
+    return f"{error.message} {error.hint}".strip() if isinstance(error, EngineError) else str(error)

@@ -1,0 +1,349 @@
+"""Selecting: what is selected in the open project, and the thread that finds it. For one thread; nothing here waits.
+
+Commands are carried out one after the other, each on the frame that was shown when it was given.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from app.background.latest import LatestWorker, nothing
+from app.playback.arrays import GaussianArrays
+from app.session.editing.attributes import ATTRIBUTES, AnchorValues, values_of
+from app.session.editing.finding import Ground, found_by
+from app.session.editing.selection import NOTHING_SELECTED, Selection, selection_words, whole_anchors
+from app.session.editing.selection_commands import (
+    ClearSelection,
+    GrowSelection,
+    How,
+    InvertSelection,
+    Reselect,
+    SelectAll,
+    SelectAnchor,
+    SelectByAttribute,
+    SelectionCommand,
+    ShrinkSelection,
+)
+from engine.editing.gaussian_rows import GaussianRows
+from engine.editing.selection.projected import project_gaussians
+from engine.editing.selection.ranges import Spread, spread_of
+from engine.editing.selection.seen_from import SeenFrom
+from engine.editing.selection.set_algebra import combined
+from engine.editing.selection.share import selected_share
+from engine.errors import ProjectError
+
+FIND, SPREAD, SHARE = "find", "spread", "share"
+"""Lanes of the thread."""
+
+
+@dataclass(frozen=True, slots=True)
+class SelectionStatus:
+    """What the window shows of the selection.
+
+    Attributes:
+        words: "1,240 Gaussians, 96 anchors, 3 clips"; empty where nothing is selected.
+        n_gaussians, n_shown: Selected ones, and those of them that exist in the shown frame.
+        is_busy: Whether something is being looked for.
+        has_before: Whether there is a selection to go back to.
+        can_select: Whether there are Gaussians to select.
+        revision: Differs whenever the selection does.
+    """
+
+    words: str = ""
+    n_gaussians: int = 0
+    n_shown: int = 0
+    is_busy: bool = False
+    has_before: bool = False
+    can_select: bool = False
+    revision: int = 0
+
+
+class Shown(Protocol):
+    """What is shown, as a session knows it when a command comes."""
+
+    def selectable(self) -> GaussianArrays | None:
+        """Gaussians of the shown frame in their own colours; None where nothing is trained."""
+        ...
+
+    def anchor_values(self, column: str) -> AnchorValues | None:
+        """Anchors of that frame; with a column, their residuals. None while those are not known."""
+        ...
+
+    def gaussians_per_anchor(self) -> int:
+        """K of the open project; 1 while that is not known."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class _Find:
+    """Work for the thread: what a command means."""
+
+    number: int
+    command: SelectionCommand = field(compare=False)
+    ground: Ground = field(compare=False)
+
+    def answer(self) -> np.ndarray:
+        return found_by(self.command, self.ground)
+
+
+@dataclass(frozen=True, slots=True)
+class _SpreadWork:
+    """Work for the thread: how an attribute is spread."""
+
+    key: tuple[object, ...]
+    attribute: str = field(compare=False)
+    gaussians: GaussianArrays = field(compare=False)
+    anchors: AnchorValues | None = field(compare=False)
+
+    def answer(self) -> Spread | None:
+        values = values_of(self.attribute, self.gaussians, self.anchors)
+        return spread_of(values, is_log=ATTRIBUTES[self.attribute].is_log)
+
+
+@dataclass(frozen=True, slots=True)
+class _ShareWork:
+    """Work for the thread: where selected Gaussians are seen."""
+
+    key: tuple[object, ...]
+    view: SeenFrom = field(compare=False)
+    gaussians: GaussianArrays = field(compare=False)
+    selected: np.ndarray = field(compare=False)
+
+    def answer(self) -> np.ndarray:
+        gaussians = self.gaussians
+        view = replace(self.view, near=max(self.view.near, gaussians.near_plane))
+        projected = project_gaussians(gaussians.means, gaussians.quats, gaussians.scales, view)
+        return selected_share(projected, gaussians.opacities, self.selected)
+
+
+class Selecting:
+    """The selection of the open project.
+
+    Args:
+        shown: Where commands find what they act on.
+
+    Attributes:
+        selection: What is selected.
+        on_found: Called on the thread when something was found, to wake somebody up.
+    """
+
+    def __init__(self, shown: Shown) -> None:
+        self.selection = NOTHING_SELECTED
+        self.on_found: Callable[[], None] = nothing
+        self._shown = shown
+        self._before: Selection | None = None
+        self._waiting: deque[tuple[SelectionCommand, GaussianArrays, AnchorValues | None]] = deque()
+        self._running: _Find | None = None
+        self._numbers = itertools.count(1)
+        self._revision = 0
+        self._mask: tuple[GaussianRows, int, np.ndarray] | None = None
+        self._share_lanes: dict[object, None] = {}
+        self._words: tuple[int, int, str] | None = None
+        self._worker: LatestWorker[Any, Any] = LatestWorker(
+            "selecting", lambda work: work.answer(), prepare=_prepare, on_done=lambda: self.on_found()
+        )
+        self._worker.active_lane = FIND
+
+    def open(self) -> None:
+        """Another project is open: what was selected belongs to the one before."""
+        self._worker.forget()
+        self._waiting.clear()
+        self._running, self._mask, self._before = None, None, None
+        self._take(NOTHING_SELECTED)
+        self._before = None
+
+    def close(self) -> None:
+        """End the thread."""
+        self._worker.close()
+
+    # ---------------------------------------------------------------- commands
+
+    def apply(self, command: SelectionCommand) -> None:
+        """Carry out a command; what takes long is found by a thread and taken up in `poll`.
+
+        Raises:
+            ProjectError: There is nothing to select, or the command makes no sense.
+        """
+        if isinstance(command, ClearSelection | Reselect) and not self._is_busy:
+            self._change(command)
+            return
+        gaussians = self._shown.selectable()
+        if gaussians is None or gaussians.rows is None:
+            raise ProjectError("There are no Gaussians to select here.", hint="Go to a frame that is trained.")
+        anchors = None
+        if isinstance(command, SelectByAttribute):
+            if command.attribute not in ATTRIBUTES:
+                raise ProjectError(f"There is no attribute {command.attribute!r} to select by.")
+            anchors = self._residuals_of(command.attribute)
+        elif isinstance(command, SelectAnchor):
+            anchors = self._shown.anchor_values("")
+        self._waiting.append((command, gaussians, anchors))
+        self._go_on()
+
+    def select(self, selection: Selection) -> None:
+        """Select this and nothing else, for instance what an edit acts on."""
+        self._take(selection)
+
+    @property
+    def _is_busy(self) -> bool:
+        return self._running is not None or bool(self._waiting)
+
+    def _go_on(self) -> None:
+        """Carry out what waits, up to the first that the thread has to look for."""
+        while self._running is None and self._waiting:
+            command, gaussians, anchors = self._waiting.popleft()
+            if isinstance(command, ClearSelection | Reselect):
+                self._change(command)
+                continue
+            ground = Ground(gaussians, self.mask(gaussians), anchors, self._shown.gaussians_per_anchor())
+            work = _Find(next(self._numbers), command, ground)
+            if isinstance(command, SelectAll | InvertSelection):  # found in no time
+                self._take_found(work, work.answer())
+            else:
+                self._running = work
+                self._worker.request(work, lane=FIND)
+
+    def _change(self, command: ClearSelection | Reselect) -> None:
+        if isinstance(command, ClearSelection):
+            self._take(NOTHING_SELECTED)
+        elif self._before is not None:
+            self._take(self._before)
+
+    def _take_found(self, work: _Find, found: np.ndarray) -> None:
+        ground, rows = work.ground, work.ground.gaussians.rows
+        assert rows is not None  # looked at in `apply`
+        how, keeps_others = _how(work.command)
+        if how.is_whole_anchors:
+            found = whole_anchors(rows, found, ground.gaussians_per_anchor)
+        self._take(
+            self.selection.with_mask(rows, combined(ground.selected, found, how.mode), keeps_others=keeps_others)
+        )
+
+    def _take(self, selection: Selection) -> None:
+        if selection != self.selection:
+            self._before, self.selection = self.selection, selection
+            self._revision += 1
+
+    def poll(self) -> bool:
+        """Take up what was found. Whether anything changed. Failures are kept for `take_error`."""
+        running, newest = self._running, self._worker.newest_in(FIND)
+        if running is None:
+            return False
+        if newest is not None and newest[0] == running:
+            self._running = None
+            self._take_found(running, newest[1])
+        elif self._worker.has_failed(running):
+            self._running = None
+        else:
+            return False
+        self._go_on()
+        return True
+
+    def take_error(self) -> Exception | None:
+        """Why something could not be looked for, once."""
+        failure = self._worker.take_error()
+        return None if failure is None else failure[1]
+
+    @property
+    def finished(self) -> object:
+        """Another value means that there is something new to see."""
+        newest = [self._worker.newest_in(lane) for lane in (FIND, SPREAD, *self._share_lanes)]
+        return tuple(None if found is None else found[0] for found in newest)
+
+    # ---------------------------------------------------------------- what is shown of it
+
+    @property
+    def revision(self) -> int:
+        """Another number whenever something else is selected."""
+        return self._revision
+
+    def mask(self, gaussians: GaussianArrays) -> np.ndarray:
+        """Which Gaussians of a frame are selected. The newest answer is kept; do not change it. [N] bool"""
+        rows, known = gaussians.rows, self._mask
+        if rows is None:
+            return np.zeros(len(gaussians), np.bool_)
+        if known is None or known[0] is not rows or known[1] != self._revision:
+            self._mask = known = (rows, self._revision, self.selection.mask(rows))
+        return known[2]
+
+    def status(self) -> SelectionStatus:
+        """Everything as one value."""
+        gaussians, k = self._shown.selectable(), self._shown.gaussians_per_anchor()
+        if self._words is None or self._words[:2] != (self._revision, k):
+            self._words = (self._revision, k, selection_words(self.selection, k))
+        is_any = gaussians is not None and len(self.selection) > 0
+        return SelectionStatus(
+            self._words[2],
+            len(self.selection),
+            int(np.count_nonzero(self.mask(gaussians))) if is_any and gaussians is not None else 0,
+            self._is_busy,
+            self._before is not None,
+            gaussians is not None and gaussians.rows is not None,
+            self._revision,
+        )
+
+    def spread(self, attribute: str) -> Spread | None:
+        """How an attribute is spread over the shown frame; the last one until that is known, None before.
+
+        Raises:
+            ValueError: There is no such attribute.
+        """
+        if attribute not in ATTRIBUTES:
+            raise ValueError(f"attributes are {', '.join(ATTRIBUTES)}, not {attribute!r}")
+        gaussians = self._shown.selectable()
+        if gaussians is None:
+            return None
+        anchors = self._residuals_of(attribute)
+        n_known = 0 if anchors is None else int(np.isfinite(anchors.values).sum())
+        work = _SpreadWork((gaussians.key, attribute, n_known), attribute, gaussians, anchors)
+        newest = self._worker.newest_in(SPREAD)
+        if newest is None or newest[0] != work:
+            self._worker.request(work, lane=SPREAD)
+        return newest[1] if newest is not None and newest[0].attribute == attribute else None
+
+    def share(self, gaussians: GaussianArrays, view: SeenFrom, view_id: object) -> np.ndarray | None:
+        """How much of each pixel of a view the selected Gaussians of a frame make up, see
+        engine.editing.selection.share; None until that is known, and where none of them is selected. [h, w] float32
+
+        Args:
+            view_id: Of the place where it is shown: each has one newest request.
+        """
+        selected = self.mask(gaussians)
+        if gaussians.rows is None or not selected.any():
+            return None
+        matrices = (np.asarray(m, np.float64).tobytes() for m in (view.world_to_camera, view.K))
+        work = _ShareWork((gaussians.key, self._revision, *matrices, *view.size), view, gaussians, selected)
+        lane = (SHARE, view_id)
+        self._share_lanes[lane] = None
+        newest = self._worker.newest_in(lane)
+        if newest is not None and newest[0] == work:
+            return newest[1]
+        self._worker.request(work, lane=lane)
+        return None
+
+    def _residuals_of(self, attribute: str) -> AnchorValues | None:
+        column = ATTRIBUTES[attribute].column
+        return self._shown.anchor_values(column) if column else None
+
+
+def _how(command: SelectionCommand) -> tuple[How, bool]:
+    """What becomes of the selection, and whether what does not exist in the frame stays in it."""
+    match command:
+        case GrowSelection() | ShrinkSelection():
+            return How(), True
+        case InvertSelection() | SelectAll() | ClearSelection() | Reselect():
+            return How(), False
+        case _:
+            return command.how, command.how.mode in ("add", "subtract")
+
+
+def _prepare() -> None:
+    from app.background.kernels import prepare_selecting
+
+    prepare_selecting()

@@ -1,0 +1,157 @@
+"""Commands that select, as frozen dataclasses in the imperative. See app.session.commands.
+
+They act on the frame that is shown. What is selected is not part of the document: undo does not touch it, `Reselect`
+brings the selection before back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from engine.editing.edit import Box, Sphere, Vector
+from engine.editing.selection.seen_from import SeenFrom
+from engine.editing.selection.set_algebra import SelectMode
+
+
+@dataclass(frozen=True, slots=True)
+class Rectangle:
+    """Between two corners, px of the picture."""
+
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+
+
+@dataclass(frozen=True, slots=True)
+class Lasso:
+    """A line that is closed from its end to its beginning, px of the picture."""
+
+    points: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Brush:
+    """A disc that is moved along a line, px of the picture."""
+
+    points: tuple[tuple[float, float], ...]
+    radius: float
+
+
+Shape = Rectangle | Lasso | Brush
+
+
+@dataclass(frozen=True, slots=True)
+class How:
+    """What becomes of what was selected before, and of anchors that are found in part.
+
+    Attributes:
+        mode: See engine.editing.selection.set_algebra.
+        is_whole_anchors: Whether all Gaussians of an anchor are meant with one of them.
+    """
+
+    mode: SelectMode = "replace"
+    is_whole_anchors: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SelectInPicture:
+    """Select what lies under a shape in the picture of a view."""
+
+    shape: Shape
+    view: SeenFrom
+    how: How = field(default_factory=How)
+    is_visible_only: bool = False
+    """Only what is not hidden behind something else."""
+    is_by_extent: bool = False
+    """As far as a Gaussian is seen, and not by its centre alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class SelectVolume:
+    """Select what lies in a box or a sphere."""
+
+    volume: Box | Sphere
+    how: How = field(default_factory=How)
+    is_by_extent: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SelectFlood:
+    """Select what hangs together with the Gaussian nearest to a place, over neighbours of like colour."""
+
+    place: Vector
+    distance: float
+    """Between neighbours, scene units."""
+    color_tolerance: float
+    """Of each channel, 0..1."""
+    how: How = field(default_factory=How)
+
+
+@dataclass(frozen=True, slots=True)
+class SelectByAttribute:
+    """Select Gaussians whose attribute lies in a range, both ends included."""
+
+    attribute: str
+    """See app.session.editing.attributes."""
+    low: float
+    high: float
+    how: How = field(default_factory=How)
+
+
+@dataclass(frozen=True, slots=True)
+class SelectAnchor:
+    """Select all Gaussians of the anchor nearest to a place, such as that of the mark that was clicked."""
+
+    place: Vector
+    how: How = field(default_factory=How)
+
+
+@dataclass(frozen=True, slots=True)
+class GrowSelection:
+    """Select what lies within a distance of what is selected, too. Scene units"""
+
+    distance: float
+
+
+@dataclass(frozen=True, slots=True)
+class ShrinkSelection:
+    """Leave out what lies within a distance of what is not selected. Scene units"""
+
+    distance: float
+
+
+@dataclass(frozen=True, slots=True)
+class InvertSelection:
+    """Select what is shown and not selected, and nothing else."""
+
+
+@dataclass(frozen=True, slots=True)
+class SelectAll:
+    """Select everything that is shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClearSelection:
+    """Select nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reselect:
+    """Bring back what was selected before; again brings back what is selected now."""
+
+
+SelectionCommand = (
+    SelectInPicture
+    | SelectVolume
+    | SelectFlood
+    | SelectByAttribute
+    | SelectAnchor
+    | GrowSelection
+    | ShrinkSelection
+    | InvertSelection
+    | SelectAll
+    | ClearSelection
+    | Reselect
+)
+"""What is selected."""

@@ -1,0 +1,83 @@
+"""Effects: what a stack of edits does at one moment, without names and switches. Equal effects leave equal Gaussians:
+they are part of the identity of a frame.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from bisect import bisect_right
+from dataclasses import dataclass
+
+import msgspec
+from msgspec import Struct
+
+from engine.editing.edit import Action, Edit, Target, edits_at
+
+
+class Effect(Struct, frozen=True):
+    """What one edit does where it holds. See Edit and Scope."""
+
+    target: Target
+    action: Action
+    is_inverted: bool = False
+    is_reference_only: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Effects:
+    """Those of a moment, in the order of the stack. A value; compared and hashed by what it does.
+
+    Attributes:
+        all: Each acts on what those before it have left.
+        digest: The same for equal effects; empty where there are none.
+    """
+
+    all: tuple[Effect, ...] = ()
+    digest: str = ""
+
+    def __bool__(self) -> bool:
+        return bool(self.all)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Effects) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    @classmethod
+    def of(cls, edits: tuple[Edit, ...]) -> Effects:
+        """Of edits that hold at a moment."""
+        if not edits:
+            return NO_EFFECTS
+        effects = tuple(
+            Effect(edit.target, edit.action, edit.is_inverted, edit.scope.is_reference_only) for edit in edits
+        )
+        return cls(effects, hashlib.sha256(_ENCODER.encode(effects)).hexdigest()[:20])
+
+
+NO_EFFECTS = Effects()
+_ENCODER = msgspec.msgpack.Encoder()
+
+
+class EditStack:
+    """The edits of a document, asked moment by moment: quick, as the window asks for every frame it may show next.
+
+    Args:
+        edits: In the order of the stack.
+    """
+
+    def __init__(self, edits: tuple[Edit, ...] = ()) -> None:
+        self.edits = edits
+        scopes = [edit.scope for edit in edits if edit.is_on]
+        bounds = {scope.first for scope in scopes} | {scope.stop for scope in scopes if scope.stop is not None}
+        self._bounds = sorted(bounds - {0})
+        self._effects: dict[int, Effects] = {}
+
+    def at(self, frame: float) -> Effects:
+        """What holds at a moment, in frames of the capture; between two frames that of the one before."""
+        place = bisect_right(self._bounds, math.floor(frame))
+        if place not in self._effects:
+            first = self._bounds[place - 1] if place else 0
+            self._effects[place] = Effects.of(edits_at(self.edits, first))
+        return self._effects[place]

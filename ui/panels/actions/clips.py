@@ -1,0 +1,109 @@
+"""Actions on the clip under the playhead: versions, cuts, the reference, and what is out of date."""
+
+from __future__ import annotations
+
+from app.session.clips.clip_commands import (
+    AskFreeSpace,
+    CompareVersion,
+    MergeClips,
+    SetReferenceClip,
+    SplitClip,
+    TrainStale,
+)
+from ui.panels.actions.action import TRAIN, Action, ActionNeeds
+from ui.panels.clips.comparing import compared_version, next_version
+from ui.panels.state import Dispatch, UiState
+
+
+def _compare_version(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """The newest version first, an older one with every press, and none after the oldest."""
+    clip = session.timeline.clip
+    if clip is None:
+        return
+    shown = compared_version(session.overlays)
+    number = next_version(session.clip_versions(clip.clip_index), shown)
+    if number is not None or shown is not None:
+        dispatch(CompareVersion(clip.clip_index, number))
+
+
+def _no_version(session: ActionNeeds) -> str:
+    clip = session.timeline.clip
+    has_one = clip is not None and bool(session.clip_versions(clip.clip_index))
+    is_shown = compared_version(session.overlays) is not None
+    return "" if has_one or is_shown else "The clip under the playhead has no earlier version."
+
+
+def _train_stale(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(TrainStale())
+
+
+def _nothing_stale(session: ActionNeeds) -> str:
+    return "No clip is out of date." if session.queue.stale is None else ""
+
+
+def _split(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(SplitClip(session.timeline.frame_index))
+
+
+def _cannot_split(session: ActionNeeds) -> str:
+    clip = session.timeline.clip
+    if clip is None or session.timeline.frame_index == clip.start:
+        return "Move the playhead behind the first frame of a clip."
+    return _something_trains(session)
+
+
+def _merge(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    clip = session.timeline.clip
+    if clip is not None:
+        dispatch(MergeClips(clip.clip_index))
+
+
+def _cannot_merge(session: ActionNeeds) -> str:
+    clip = session.timeline.clip
+    if clip is None or clip.stop >= session.timeline.n_frames:
+        return "There is no clip after the one under the playhead."
+    return _something_trains(session)
+
+
+def _make_reference(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    clip = session.timeline.clip
+    if clip is not None:
+        dispatch(SetReferenceClip(clip.clip_index))
+
+
+def _something_trains(session: ActionNeeds) -> str:
+    return "" if session.training.state in ("idle", "failed") else "Stop the training first: what was learned is kept."
+
+
+def _free_versions(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(AskFreeSpace("versions"))
+
+
+ACTIONS = (
+    Action(
+        "clips.compare_version",
+        "Compare this clip with what it was before, side by side",
+        TRAIN,
+        _compare_version,
+        keys=("Shift+G",),
+        lacks=_no_version,
+    ),
+    Action(
+        "clips.train_stale",
+        "Train every clip again that is out of date",
+        TRAIN,
+        _train_stale,
+        keys=("Alt+T",),
+        lacks=_nothing_stale,
+    ),
+    Action("clips.split", "Split this clip at the playhead", TRAIN, _split, keys=("Alt+C",), lacks=_cannot_split),
+    Action("clips.merge", "Merge this clip with the next one", TRAIN, _merge, keys=("Alt+M",), lacks=_cannot_merge),
+    Action(
+        "clips.reference",
+        "Let the other clips inherit from this one",
+        TRAIN,
+        _make_reference,
+        lacks=_something_trains,
+    ),
+    Action("clips.free", "Make room: delete earlier versions of clips", TRAIN, _free_versions),
+)

@@ -1,0 +1,1 @@
+"""Panels and pointer of what is edited."""

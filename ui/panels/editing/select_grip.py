@@ -1,0 +1,108 @@
+"""Selecting with the pointer over one picture: presses that a tool takes, what they draw, and the command in the end.
+
+For the item drawn last, the picture's button.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from imgui_bundle import imgui
+
+from app.session.editing.selection_commands import SelectAnchor, SelectVolume
+from engine.editing.selection.set_algebra import SelectMode
+from ui.panels.actions.action import ActionNeeds
+from ui.panels.pointer import Pointer
+from ui.panels.state import Dispatch, Rect, UiState
+from ui.viewport.editing.select_tool import SelectTool
+from ui.viewport.scene import SceneView
+
+DRAG = "select"
+"""Of Pointer.drag: a tool that selects has taken the press."""
+Pick = Callable[[float, float], np.ndarray | None]
+
+
+class SelectGrip:
+    """Leads the tool in one picture."""
+
+    def follow(
+        self,
+        session: ActionNeeds,
+        dispatch: Dispatch,
+        ui: UiState,
+        pointer: Pointer,
+        view: SceneView,
+        pane: Rect,
+        density: float,
+        pick: Pick,
+        spacing: float,
+    ) -> None:
+        """Take up what the pointer did since the last frame.
+
+        Args:
+            pick: The place that is seen at a point of the window.
+            spacing: Distance between anchors, scene units.
+        """
+        tool, (x, y) = ui.selecting, _pointer()
+        if tool.is_active and imgui.is_item_hovered() and pane.contains(x, y):
+            self._turn_wheel(dispatch, tool)
+        if pointer.drag == DRAG:
+            if not tool.is_dragging:  # Escape has ended it
+                return
+            tool.extend(x, y)
+            ui.redraw_within(0.0)
+            if imgui.is_item_deactivated():
+                self._finish(session, dispatch, tool, pointer, view, pane, density, pick, spacing)
+            return
+        if not tool.is_active or (pointer.drag is None and tool.is_dragging):
+            tool.points, tool.surface = [], None
+        is_pressed = imgui.is_item_activated() and pointer.button == imgui.MouseButton_.left
+        if tool.is_active and is_pressed and pointer.drag in ("view", "nothing") and pane.contains(x, y):
+            pointer.take_press(DRAG)
+            tool.begin(*pointer.pressed_at, _mode(tool), pick(*pointer.pressed_at) if _needs_surface(tool) else None)
+
+    def _finish(
+        self,
+        session: ActionNeeds,
+        dispatch: Dispatch,
+        tool: SelectTool,
+        pointer: Pointer,
+        view: SceneView,
+        pane: Rect,
+        density: float,
+        pick: Pick,
+        spacing: float,
+    ) -> None:
+        up = np.asarray(session.view.up, np.float64)
+        command = tool.command(view.seen_from, (pane.x0, pane.y0), density, up, spacing)
+        mode, tool.points, tool.surface = tool.held_mode, [], None
+        if tool.kind in ("rectangle", "lasso") and not pointer.is_beyond_click():
+            place = pick(*pointer.pressed_at)  # a click means an anchor
+            command = None if place is None else SelectAnchor(_vector(place), tool.how(mode))
+        if command is not None:
+            dispatch(command)
+
+    def _turn_wheel(self, dispatch: Dispatch, tool: SelectTool) -> None:
+        io = imgui.get_io()
+        if io.mouse_wheel and io.key_ctrl and tool.resize(io.mouse_wheel) and tool.volume is not None:
+            dispatch(SelectVolume(tool.volume, tool.how(), tool.is_by_extent))
+
+
+def _vector(place: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in place)
+    return x, y, z
+
+
+def _needs_surface(tool: SelectTool) -> bool:
+    return tool.kind in ("box", "sphere", "flood")
+
+
+def _mode(tool: SelectTool) -> SelectMode:
+    io = imgui.get_io()
+    return tool.mode_held(is_shift=io.key_shift, is_ctrl=io.key_ctrl, is_alt=io.key_alt)
+
+
+def _pointer() -> tuple[float, float]:
+    position = imgui.get_io().mouse_pos
+    return position.x, position.y

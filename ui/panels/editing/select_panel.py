@@ -1,0 +1,176 @@
+"""The selection panel: what is selected, the tools that select, and what can be done with it by buttons and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from imgui_bundle import ImVec2, imgui
+
+from app.playback.arrays import AnchorArrays
+from app.playback.orbit_view import OrbitView
+from app.session.editing.selecting import SelectionStatus
+from app.session.editing.selection_commands import (
+    ClearSelection,
+    GrowSelection,
+    InvertSelection,
+    Reselect,
+    SelectAll,
+    ShrinkSelection,
+)
+from engine.editing.selection.ranges import Spread
+from engine.editing.selection.set_algebra import SELECT_MODES
+from ui.panels.editing.select_attribute import draw_attribute
+from ui.panels.editing.select_volume import draw_volume_numbers
+from ui.panels.state import Dispatch, UiState
+from ui.panels.widgets import segment, text_wrapped, text_wrapped_dim
+from ui.viewport.editing.select_tool import MODE_WORDS, TOOL_HINTS, TOOL_WORDS, TOOLS, SelectTool
+
+GAP = 4.0
+CLAMPED = imgui.SliderFlags_.always_clamp
+
+
+class SelectionPanelNeeds(Protocol):
+    """What this panel reads."""
+
+    @property
+    def capture(self) -> object | None: ...
+
+    @property
+    def view(self) -> OrbitView: ...
+
+    @property
+    def selection(self) -> SelectionStatus: ...
+
+    def shown_anchors(self) -> AnchorArrays | None: ...
+
+    def attribute_spread(self, attribute: str) -> Spread | None: ...
+
+
+class HasAnchors(Protocol):
+    """Knows the anchors of the shown frame."""
+
+    def shown_anchors(self) -> AnchorArrays | None: ...
+
+
+def near_distance(session: HasAnchors, tool: SelectTool) -> float:
+    """How far apart neighbours are at most, scene units; 0 while anchors are not known."""
+    anchors = session.shown_anchors()
+    return 0.0 if anchors is None else tool.near_share * anchors.spacing
+
+
+def draw_selection(session: SelectionPanelNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """Everything of it, from top to bottom."""
+    status, tool = session.selection, ui.selecting
+    if session.capture is None:
+        text_wrapped_dim("What you select in the picture is counted here when a capture is open.")
+        return
+    if not status.can_select:
+        text_wrapped_dim("There are no Gaussians to select in this frame: it is not trained, or anchors are shown.")
+    _draw_counts(status, ui)
+    imgui.begin_disabled(not status.can_select)
+    imgui.separator_text("Tool")
+    _draw_tools(tool, ui)
+    _draw_options(tool, ui)
+    imgui.separator_text("Change")
+    _draw_changes(session, dispatch, ui)
+    imgui.separator_text("By attribute")
+    draw_attribute(session, dispatch, ui)
+    imgui.separator_text("Box or sphere by numbers")
+    draw_volume_numbers(session, dispatch, ui)
+    imgui.end_disabled()
+
+
+def _draw_counts(status: SelectionStatus, ui: UiState) -> None:
+    if status.is_busy:
+        ui.redraw_within(0.1)
+    text_wrapped(status.words or "Nothing is selected")
+    ui.mark("selection.counts")
+    if status.words and status.n_shown != status.n_gaussians:
+        text_wrapped_dim(f"{status.n_shown:,} of them exist in the shown frame")
+
+
+def _draw_tools(tool: SelectTool, ui: UiState) -> None:
+    width = _width_of(3)
+    for index, kind in enumerate(TOOLS):
+        if index % 3:
+            imgui.same_line(0, GAP)
+        if segment(f"{TOOL_WORDS[kind]}##{kind}", tool.kind == kind, width):
+            tool.choose(kind)
+            ui.regions.leave()
+        ui.mark(f"selection.{kind}")
+        imgui.set_item_tooltip(TOOL_HINTS[kind])
+    width = _width_of(len(SELECT_MODES))
+    for index, mode in enumerate(SELECT_MODES):
+        if index:
+            imgui.same_line(0, GAP)
+        if segment(f"{MODE_WORDS[mode]}##{mode}", tool.mode == mode, width):
+            tool.mode = mode
+        ui.mark(f"selection.{mode}")
+    if tool.kind == "brush":
+        tool.brush_px = _slider("Size", tool.brush_px, 2.0, 400.0, "%.0f px", ui, is_log=True)
+    elif tool.kind == "flood":
+        tool.color_tolerance = _slider("Tolerance", tool.color_tolerance, 0.01, 1.0, "%.2f", ui)
+
+
+def _draw_options(tool: SelectTool, ui: UiState) -> None:
+    rows = (
+        ("is_visible_only", "Visible only", "Leave out what is hidden behind something else"),
+        ("is_by_extent", "As far as they are seen", "A Gaussian counts where it is seen, not by its centre alone"),
+        ("is_whole_anchors", "Whole anchors", "With one Gaussian of an anchor, all of them"),
+    )
+    for name, label, tooltip in rows:
+        is_changed, is_on = imgui.checkbox(label, getattr(tool, name))
+        if is_changed:
+            setattr(tool, name, is_on)
+        ui.mark(f"selection.{name}")
+        imgui.set_item_tooltip(tooltip)
+
+
+def _draw_changes(session: SelectionPanelNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    status, tool = session.selection, ui.selecting
+    buttons: tuple[tuple[str, str, Callable[[], Any], bool], ...] = (
+        ("All", "Ctrl+A", SelectAll, True),
+        ("None", "Ctrl+Shift+A", ClearSelection, bool(status.words)),
+        ("Invert", "Ctrl+I", InvertSelection, True),
+        ("Before", "Alt+Z: the selection before this one", Reselect, status.has_before),
+    )
+    width = _width_of(len(buttons))
+    for index, (label, tooltip, command, is_possible) in enumerate(buttons):
+        if index:
+            imgui.same_line(0, GAP)
+        imgui.begin_disabled(not is_possible)
+        if imgui.button(label, ImVec2(width, 0)):
+            dispatch(command())
+        ui.mark(f"selection.{label.lower()}")
+        imgui.end_disabled()
+        imgui.set_item_tooltip(tooltip)
+    distance = near_distance(session, tool)
+    imgui.begin_disabled(not status.words or distance <= 0.0)
+    width = _width_of(2)
+    if imgui.button("Grow", ImVec2(width, 0)):
+        dispatch(GrowSelection(distance))
+    ui.mark("selection.grow")
+    imgui.set_item_tooltip("Ctrl+]")
+    imgui.same_line(0, GAP)
+    if imgui.button("Shrink", ImVec2(width, 0)):
+        dispatch(ShrinkSelection(distance))
+    ui.mark("selection.shrink")
+    imgui.set_item_tooltip("Ctrl+[")
+    imgui.end_disabled()
+    tool.near_share = _slider("Reach", tool.near_share, 0.1, 20.0, "%.1f anchors", ui, is_log=True)
+    imgui.set_item_tooltip("How far neighbours lie apart at most, in distances between anchors; for flood, too")
+
+
+def _slider(
+    label: str, value: float, low: float, high: float, words: str, ui: UiState, *, is_log: bool = False
+) -> float:
+    imgui.set_next_item_width(-imgui.calc_text_size("Tolerance  ").x)
+    flags = CLAMPED | imgui.SliderFlags_.logarithmic if is_log else CLAMPED
+    moved = imgui.slider_float(label, value, low, high, words, flags)[1]
+    ui.mark(f"selection.{label.lower()}")
+    return moved
+
+
+def _width_of(n_buttons: int) -> float:
+    return (imgui.get_content_region_avail().x - GAP * (n_buttons - 1)) / n_buttons

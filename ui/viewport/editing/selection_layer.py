@@ -1,0 +1,130 @@
+"""How selected Gaussians show over the picture: striped and outlined where they are seen, and dots at some of their
+centres, which stand there at once and show through what lies before them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import TYPE_CHECKING, Protocol
+
+import moderngl
+import numpy as np
+
+from app.playback.arrays import GaussianArrays
+from app.session.editing.selecting import SelectionStatus
+from engine.editing.selection.seen_from import SeenFrom
+from ui.gl import PointRenderer, Target
+from ui.gl.shaders import load_program
+from ui.style.colors import YELLOW
+
+if TYPE_CHECKING:
+    from ui.viewport.scene import SceneView
+
+MAX_DOTS, FEW_DOTS = 3_000, 300
+"""At most so many centres are marked, evenly thinned: until it is known where they are seen, and from then on."""
+HUE = np.array(YELLOW, np.float32)
+DOT_SIZE, RIM = 4.0, 1.2
+"""Diameter, and the width of its dark rim; units."""
+
+
+class SelectionNeeds(Protocol):
+    """What is drawn here."""
+
+    @property
+    def selection(self) -> SelectionStatus: ...
+
+    def selected(self, gaussians: GaussianArrays) -> np.ndarray: ...
+
+    def selected_share(self, gaussians: GaussianArrays, view: SeenFrom) -> np.ndarray | None: ...
+
+
+class SelectionLayer:
+    """Owns the GL objects. GL thread only.
+
+    Attributes:
+        pixels_per_unit: Of the target that is drawn into.
+        is_share_shown: Whether it shows where they are seen, and not their centres alone.
+    """
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self.pixels_per_unit = 1.0
+        self.is_share_shown = False
+        self._ctx = ctx
+        self._dots, self._few = PointRenderer(ctx), PointRenderer(ctx)
+        self._program: moderngl.Program | None = None
+        self._quad: moderngl.VertexArray | None = None
+        self._share: moderngl.Texture | None = None
+        self._shown: np.ndarray | None = None
+        self._dots_key: Hashable = None
+
+    def release(self) -> None:
+        """Free every GL object."""
+        self._dots.release()
+        self._few.release()
+        for thing in (self._quad, self._program, self._share):
+            if thing is not None:
+                thing.release()
+        self._quad = self._program = self._share = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Is there nothing to draw?"""
+        return len(self._dots) == 0 and not self.is_share_shown
+
+    def take(self, session: SelectionNeeds, view: SceneView, gaussians: GaussianArrays | None) -> Hashable:
+        """Take up what is selected now.
+
+        Args:
+            gaussians: Of the picture below; None where it is something else.
+        Returns:
+            A key that differs whenever what is drawn does.
+        """
+        if gaussians is None or not session.selection.n_gaussians:
+            self._dots.set(np.zeros((0, 3), np.float32), HUE, key="nothing")
+            self._dots_key, self.is_share_shown = None, False
+            return None
+        dots_key = (gaussians.key, session.selection.revision)
+        if dots_key != self._dots_key:
+            rows = np.flatnonzero(session.selected(gaussians))
+            for dots, most in ((self._dots, MAX_DOTS), (self._few, FEW_DOTS)):
+                thinned = rows[np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(np.int64)]
+                dots.set(gaussians.means[thinned], HUE, key=dots_key)
+            self._dots_key = dots_key
+        share = session.selected_share(gaussians, view.seen_from)
+        self.is_share_shown = share is not None
+        if share is not None and share is not self._shown:
+            self._upload(share)
+        return (*dots_key, id(share), self.pixels_per_unit)
+
+    def draw(self, target: Target, view: SceneView) -> None:
+        """Draw over what the target holds."""
+        unit = self.pixels_per_unit
+        if self.is_share_shown and self._share is not None:
+            self._draw_share(target, view)
+        dots = self._few if self.is_share_shown else self._dots
+        dots.draw(target, *view.camera, shape="circle", size=DOT_SIZE * unit, outline_px=RIM * unit)
+
+    def _draw_share(self, target: Target, view: SceneView) -> None:
+        assert self._share is not None
+        if self._program is None:
+            self._program = load_program(self._ctx, "selection")
+            self._quad = self._ctx.vertex_array(self._program, [])
+        assert self._quad is not None
+        target.use(moderngl.BLEND)
+        self._share.use(0)
+        self._program["share"] = 0
+        self._program["size_px"] = target.size
+        self._program["unit_px"] = self.pixels_per_unit
+        self._program["hue"] = YELLOW[:3]
+        self._quad.render(moderngl.TRIANGLE_STRIP, vertices=4)
+
+    def _upload(self, share: np.ndarray) -> None:
+        height, width = share.shape
+        if self._share is None or self._share.size != (width, height):
+            if self._share is not None:
+                self._share.release()
+            self._share = self._ctx.texture((width, height), 1, dtype="f4")
+            self._share.filter = (moderngl.LINEAR, moderngl.LINEAR)
+            self._share.repeat_x = self._share.repeat_y = False
+        self._share.write(np.ascontiguousarray(share))
+        self._shown = share
