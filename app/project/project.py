@@ -3,6 +3,7 @@
 project.json                 the document: settings, regions, camera paths, edits and so on, see ProjectDocument
 clips/0000.safetensors       finished clips
 clips/000030-000035.safetensors  one of frames 30 to 34, after a split or merge; see app.project.clip_names
+mends/0001.json              what was mended, with figures before and after
 versions/0000/               what was trained before it was trained again
 damaged/0000-1.safetensors   damaged files that were put aside
 checkpoints/0000.safetensors unfinished clips: everything needed to go on
@@ -30,6 +31,7 @@ from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.project.clip_names import clip_name, finished_files
 from app.project.header_cache import HeaderCache
+from app.project.interrupted import finish_interrupted
 from app.project.lock import ProcessLock, is_process_alive
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -231,7 +233,7 @@ class Project:
 
     def remove_files(self) -> None:
         """Take back a project that has learned nothing: its own files and folders go, other things stay."""
-        for name in ("clips", "versions", "damaged", "checkpoints", "live", "prep", "metrics", "logs"):
+        for name in ("clips", "mends", "versions", "damaged", "checkpoints", "live", "prep", "metrics", "logs"):
             shutil.rmtree(self.folder / name, ignore_errors=True)
         (self.folder / PROJECT_FILE).unlink(missing_ok=True)
 
@@ -366,6 +368,7 @@ def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
     project = Project(folder, history, lock)
     if is_writable:
         sweep(project)
+        finish_interrupted(project)
     return project
 
 

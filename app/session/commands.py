@@ -14,6 +14,7 @@ from app.project.opening_answers import OpeningAnswers
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, GoToStep
 from app.session.editing.selection_commands import SelectionCommand
+from app.session.mending.mend_commands import MendCommand
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
@@ -461,6 +462,7 @@ Command = (
     | TrainNextClip
     | QueueCommand
     | ClipCommand
+    | MendCommand
     | PauseTraining
     | ResumeTraining
     | StopTraining

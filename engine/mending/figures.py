@@ -22,16 +22,16 @@ class StretchFigures(msgspec.Struct, frozen=True):
             clips: at a boundary the seam score of `eval`. Mean over the training cameras.
         worst: The largest E on static pixels among all pairs of the stretch, mean over the training cameras.
         elsewhere: Likewise among the other pairs of the clips, boundaries to the clips beside them included.
-        psnr: By clip index, on the training cameras.
+        psnr: On the training cameras, by clip index as text: files know no other names.
         held_out_excess, held_out_psnr: The same of the cameras that were held out: told, and decided by never.
     """
 
     excess: float | None
     worst: float | None
     elsewhere: float | None
-    psnr: dict[int, float]
+    psnr: dict[str, float]
     held_out_excess: float | None = None
-    held_out_psnr: dict[int, float] = {}
+    held_out_psnr: dict[str, float] = {}
 
     def is_better_than(self, other: StretchFigures, original: StretchFigures) -> bool:
         """Whether an attempt is kept: less excess than the best before it, not bought with anything else.

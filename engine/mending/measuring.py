@@ -107,13 +107,13 @@ class StretchMeasuring:
             found += [score_of(row.excess_static, normal) for row in of_camera if row.frame_index in asked]
         return mean_of(found)
 
-    def _psnr(self, rows: Sequence[EvalRow], *, is_held_out: bool) -> dict[int, float]:
+    def _psnr(self, rows: Sequence[EvalRow], *, is_held_out: bool) -> dict[str, float]:
         found = {}
         for index in self._stretch.clip_indices:
             chosen = [row for row in rows if row.clip_index == index and row.is_held_out == is_held_out]
             mean = mean_of([row.figures["psnr"] for row in chosen])
             if mean is not None:
-                found[index] = mean
+                found[str(index)] = mean
         return found
 
 

@@ -24,6 +24,7 @@ from ui.panels.actions.table import ACTIONS, handle_keys
 from ui.panels.camera_path import PathPanelNeeds, draw_paths
 from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.doctor.panel import DoctorNeeds, DoctorPanel
+from ui.panels.editing.mend_panel import HasMending, draw_mending
 from ui.panels.editing.select_panel import SelectionPanelNeeds, draw_selection
 from ui.panels.exports import draw_exports
 from ui.panels.heat_overlay import HeatOverlay
@@ -107,6 +108,7 @@ class FrameNeeds(
     HasOpening,
     HasCalibrating,
     HasSynchronising,
+    HasMending,
     RememberNeeds,
     NoticesNeeds,
     LogNeeds,
@@ -354,6 +356,7 @@ class Frame:
         self._guard("Synchronisation", lambda: self.synchronisation.draw(session, dispatch, ui))
         self._guard("Calibration", lambda: self.calibration.draw(session, dispatch, ui))
         self._guard("Export", lambda: self.export.draw(session, dispatch, ui))
+        self._guard("Mend", lambda: draw_mending(session, dispatch, ui))
         self._guard("Question", lambda: self.questions.draw(session, dispatch, ui))
         size = imgui.get_main_viewport().size
         whole = Rect(0.0, 0.0, size.x, size.y - STATUS_BAR_HEIGHT)

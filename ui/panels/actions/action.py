@@ -17,6 +17,7 @@ from app.session.edit_status import HistoryStatus, PathsStatus
 from app.session.editing.selecting import SelectionStatus
 from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
 from engine.camera.rig import CameraRig
+from ui.panels.editing.mend_panel import HasMending
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.editing.select_tool import TOOLS
@@ -27,7 +28,7 @@ SELECT = "Select"
 NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
-class ActionNeeds(RegionsNeeds, Protocol):
+class ActionNeeds(RegionsNeeds, HasMending, Protocol):
     """What actions act on."""
 
     @property
