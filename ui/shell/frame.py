@@ -24,6 +24,9 @@ from ui.panels.actions.table import ACTIONS, handle_keys
 from ui.panels.camera_path import PathPanelNeeds, draw_paths
 from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.doctor.panel import DoctorNeeds, DoctorPanel
+from ui.panels.editing.edits_panel import EditsPanelNeeds, draw_edits
+from ui.panels.editing.history_panel import HistoryPanel
+from ui.panels.editing.mend_panel import HasMending, draw_mending
 from ui.panels.editing.select_panel import SelectionPanelNeeds, draw_selection
 from ui.panels.exports import draw_exports
 from ui.panels.heat_overlay import HeatOverlay
@@ -37,7 +40,9 @@ from ui.panels.residuals.panel import ResidualsNeeds, ResidualsPanel
 from ui.panels.state import (
     CAPTURE,
     DOCTOR,
+    EDITS,
     EXPORTS,
+    HISTORY,
     LAYOUTS,
     LOG,
     PATHS,
@@ -98,6 +103,7 @@ class FrameNeeds(
     ViewportNeeds,
     CaptureNeeds,
     SelectionPanelNeeds,
+    EditsPanelNeeds,
     TimelineNeeds,
     MenuNeeds,
     PaletteNeeds,
@@ -107,6 +113,7 @@ class FrameNeeds(
     HasOpening,
     HasCalibrating,
     HasSynchronising,
+    HasMending,
     RememberNeeds,
     NoticesNeeds,
     LogNeeds,
@@ -211,8 +218,10 @@ class Frame:
             (TRAINING, draw_training, True),
             (REGIONS, draw_regions, True),
             (SELECTION, draw_selection, True),
+            (EDITS, draw_edits, True),
             (RESIDUALS, self.residuals.draw, True),
             (PATHS, draw_paths, True),
+            (HISTORY, HistoryPanel().draw, True),
             (TIMELINE, draw_timeline, True),
             (LOG, self.log.draw, True),
             (DOCTOR, self.doctor.draw, True),
@@ -352,6 +361,7 @@ class Frame:
         self._guard("Synchronisation", lambda: self.synchronisation.draw(session, dispatch, ui))
         self._guard("Calibration", lambda: self.calibration.draw(session, dispatch, ui))
         self._guard("Export", lambda: self.export.draw(session, dispatch, ui))
+        self._guard("Mend", lambda: draw_mending(session, dispatch, ui))
         self._guard("Question", lambda: self.questions.draw(session, dispatch, ui))
         size = imgui.get_main_viewport().size
         whole = Rect(0.0, 0.0, size.x, size.y - STATUS_BAR_HEIGHT)
