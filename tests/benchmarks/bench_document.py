@@ -63,7 +63,7 @@ def large(folder: Path) -> None:
         history = history.after(event)
         times.append(timed(lambda event=event, history=history: store.write([event], history)))
         undone = history.after(Undone())
-        undos.append(timed(lambda: store.write([Undone()], undone)))
+        undos.append(timed(lambda undone=undone: store.write([Undone()], undone)))
         history = undone
     print(f"switch one of them off: median {statistics.median(times):.1f} ms, slowest {max(times):.0f} ms")
     print(f"undo: median {statistics.median(undos):.1f} ms")
