@@ -90,12 +90,15 @@ class KillTest:
     """Kills programs that edit one project. work: An empty folder."""
 
     def __init__(self, work: Path, rng: random.Random) -> None:
-        from app.document.project_settings import ProjectSettings
-        from app.project.project import create_project
-
         self.tally = Tally()
         self.folder = work / "project"
         self._rng = rng
+        self._make()
+
+    def _make(self) -> None:
+        from app.document.project_settings import ProjectSettings
+        from app.project.project import create_project
+
         create_project(self.folder, ProjectSettings(capture="none", fingerprint="none")).close()
 
     def run(self, n_kills: int) -> None:
@@ -125,7 +128,8 @@ class KillTest:
         except EngineError as error:
             self.tally.faults.append(f"{where}: it does not open: {error}")
             shutil.rmtree(self.folder)
-            raise
+            self._make()
+            return
         found, notes = project.history, project.store.notes
         if self._rng.random() < 0.3:
             project.close()
