@@ -8,13 +8,13 @@ from typing import Any
 from app.session.editing.selection_commands import (
     ClearSelection,
     GrowSelection,
-    InvertSelection,
     Reselect,
     SelectAll,
     SelectByAttribute,
     ShrinkSelection,
 )
 from ui.panels.actions.action import SELECT, Action, ActionNeeds, Run
+from ui.panels.editing.edit_subject import invert_selection
 from ui.panels.editing.select_panel import near_distance
 from ui.panels.state import SELECTION, Dispatch, UiState
 from ui.viewport.editing.select_tool import TOOL_WORDS, ToolKind
@@ -27,6 +27,10 @@ def _tool(kind: ToolKind) -> Run:
         ui.wanted_panel = SELECTION if ui.selecting.is_active else ui.wanted_panel
 
     return take
+
+
+def _invert(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    invert_selection(dispatch, ui)
 
 
 def _send(make: Callable[[], Any]) -> Run:
@@ -86,7 +90,7 @@ ACTIONS = (
     ),
     Action("select.all", "Select everything that is shown", SELECT, _send(SelectAll), keys=("Ctrl+A",), **_ANY),
     Action("select.none", "Select nothing", SELECT, _send(ClearSelection), keys=("Ctrl+Shift+A",), **_SOME),
-    Action("select.invert", "Select what is not selected", SELECT, _send(InvertSelection), keys=("Ctrl+I",), **_ANY),
+    Action("select.invert", "Select what is not selected", SELECT, _invert, keys=("Ctrl+I",), **_ANY),
     Action("select.before", "Back to the selection before", SELECT, _send(Reselect), keys=("Alt+Z",), lacks=_no_before),
     Action("select.grow", "Grow the selection", SELECT, _by_distance(GrowSelection), keys=("Ctrl+]",), **_SOME),
     Action("select.shrink", "Shrink the selection", SELECT, _by_distance(ShrinkSelection), keys=("Ctrl+[",), **_SOME),
