@@ -53,6 +53,11 @@ COMMANDS = {
         "app.cli.eval_command",
         "The result was not written.",
     ),
+    "apply": Command(
+        "take what edits delete out of the clips for good",
+        "app.cli.apply_command",
+        "Edits and clips fit together, before or after.",
+    ),
     "render": Command(
         "render the scene as a video or a sequence of pictures",
         "app.cli.render_command",
