@@ -46,10 +46,13 @@ class Permanence:
         if self._is_busy:  # a second click
             return
         self._is_busy = True
-        project, clips = opened.project, opened.clips
+        project, clips, edits = opened.project, opened.clips, opened.project.document.edits
 
         def find(context: JobContext) -> Deletions:
-            return find_deletions(project, clips, lambda n_done, n_all: context.report(n_done / max(n_all, 1)))
+            def report(n_done: int, n_all: int) -> None:
+                context.report(n_done / max(n_all, 1))
+
+            return find_deletions(project, clips, report, edits=edits)
 
         if not command.is_confirmed:
             self._jobs.start("Looking for what is deleted everywhere", find, self._found, self._failed)
