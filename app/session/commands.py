@@ -15,7 +15,9 @@ from app.project.project_choices import AS_USUAL, ProjectChoices
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, GoToStep
 from app.session.editing.selection_commands import SelectionCommand
+from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.files.file_commands import FileCommand
+from app.session.mending.mend_commands import MendCommand
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
@@ -231,6 +233,16 @@ class MarkRegion:
 
 
 @dataclass(frozen=True, slots=True)
+class MarkBox:
+    """Mark a box along the axes of the scene as MarkRegion marks a sphere."""
+
+    treat: str
+    low: tuple[float, float, float]
+    """Scene units."""
+    high: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class RemoveRegion:
     """Forget the marked region at this position of the list."""
 
@@ -361,7 +373,7 @@ class StopCalibration:
     """End the calibration that runs; nothing is written."""
 
 
-MarkCommand = MarkRegion | RemoveRegion
+MarkCommand = MarkRegion | MarkBox | RemoveRegion
 """What changes the marked regions, and can be taken back."""
 
 SettingCommand = SetHoldout | SetClipLength | SetTrainSetting | SetPreset
@@ -467,6 +479,8 @@ Command = (
     | TrainNextClip
     | QueueCommand
     | ClipCommand
+    | ExclusionCommand
+    | MendCommand
     | PauseTraining
     | ResumeTraining
     | StopTraining
