@@ -89,10 +89,12 @@ COMMANDS = {
         "list what clips were before they were trained again, bring it back, make room on the disk",
         "app.cli.versions_command",
     ),
+    "exclude": Command("leave cameras and pictures out of training", "app.cli.exclude_command"),
     "edit": Command(
         "list and change the edits of a project, and take steps back", "app.cli.edit_command", "Nothing was changed."
     ),
     "gate": Command("say what is static in a project and why, and overrule it", "app.cli.gate_command"),
+    "repair": Command("say what is left of a damaged project, and go on with it", "app.cli.repair_command"),
     "doctor": Command(
         "look at this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.doctor_command"
     ),

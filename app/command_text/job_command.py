@@ -97,6 +97,8 @@ def _export_arguments(values: Mapping[str, Any]) -> list[str]:
                 arguments += ["--up" if value.startswith("+") else "--down", value[1:]]
             case "scale":
                 arguments += ["--scale", number(float(value))]
+            case "has_edits":
+                arguments += [] if value else ["--without-edits"]
             case "has_folder":
                 arguments.append("--data-folder" if value else "--one-file")
             case "scene_up":
@@ -142,6 +144,8 @@ def _video_arguments(values: Mapping[str, Any]) -> list[str]:
                 arguments += ["--background", "#{:02x}{:02x}{:02x}".format(*value)]
             case "is_transparent":
                 arguments.append("--transparent")
+            case "has_edits":
+                arguments += [] if value else ["--without-edits"]
             case "sound":
                 arguments += option("--sound", value)
             case _:

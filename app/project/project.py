@@ -34,6 +34,7 @@ from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.document.recovery import plain_history, recover
 from app.document.replay import JOURNAL_FOLDER
+from app.project.clip_exchange import finish_exchange
 from app.project.clip_names import clip_name, finished_files
 from app.project.header_cache import HeaderCache
 from app.project.lock import ProcessLock, is_process_alive
@@ -391,6 +392,11 @@ def open_project(
             raise
     project = Project(folder, history, lock, store=store, why_read_only=why_read_only)
     if is_writable:
+        try:
+            finish_exchange(folder)
+        except ProjectError:
+            project.close()
+            raise
         sweep(project)
     return project
 

@@ -56,6 +56,8 @@ from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.selecting import Selecting, SelectionStatus
 from app.session.editing.shown_to_select import ShownToSelect
+from app.session.exclusions.excluding import apply_exclusion
+from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.exporting import Exporting
 from app.session.files.project_files import ProjectFiles
 from app.session.following import follow_training
@@ -94,6 +96,7 @@ from app.training.service import Launch, ShownState
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.editing.selection.ranges import Spread
 from engine.editing.selection.seen_from import SeenFrom
 from engine.errors import EngineError
@@ -249,6 +252,12 @@ class Session:
         return ShownAs(self.overlays.mode, self.overlays.content)
 
     @property
+    def exclusions(self) -> Exclusions:
+        """What of the open capture training never sees."""
+        content = self.document.content
+        return NOTHING_EXCLUDED if content is None else content.exclusions
+
+    @property
     def residual_status(self) -> ResidualStatus:
         """What is measured of every picture."""
         return self.residuals.status
@@ -324,6 +333,9 @@ class Session:
             case _ if isinstance(command, ClipCommand):
                 self.question = None
                 self.question = self.clip_work.obey(command)
+            case _ if isinstance(command, ExclusionCommand):
+                n_frames = 0 if self.capture is None else self.capture.n_frames
+                apply_exclusion(command, self.document, self.rig.names, n_frames)
             case commands.PauseTraining():
                 live.pause()
             case commands.ResumeTraining():
@@ -400,7 +412,7 @@ class Session:
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
-    def _ask(self, question: Question) -> None:
+    def _ask(self, question: Question | None) -> None:
         self.question = question
 
     def _ask_export(self) -> None:
@@ -445,6 +457,10 @@ class Session:
         """The document has changed: show what follows from it."""
         if before.settings != after.settings:
             self._follow_settings()
+        elif before.exclusions != after.exclusions and self.opened is not None:
+            if self.live_training.service is not None:
+                self.live_training.service.catalog.judge_anew()
+            self._open_residuals(self.opened)
         self._show_notes(after)
 
     def _show_notes(self, document: ProjectDocument) -> None:
@@ -814,6 +830,7 @@ _TITLES: dict[type, str] = {
     commands.TrainClips: "The clips cannot be trained",
     commands.TrainAll: "The clips cannot be trained",
     commands.AskTrainSettings: "The clip cannot be trained",
+    **dict.fromkeys(get_args(ExclusionCommand), "That cannot be excluded"),
     **dict.fromkeys(get_args(ClipCommand), "That cannot be done with the clips"),
     commands.RestoreVersion: "The version cannot be brought back",
     commands.RemoveVersion: "The version cannot be removed",

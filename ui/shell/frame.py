@@ -60,7 +60,7 @@ from ui.panels.timeline.panel import draw_timeline
 from ui.panels.training import draw_training
 from ui.panels.viewport import ViewportNeeds, ViewportPanel
 from ui.shell.calibration_dialog import CalibrationDialog, HasCalibrating
-from ui.shell.dialogs import CALIBRATE, OPEN, OpenFolderDialog, draw_help
+from ui.shell.dialogs import OpenFolderDialog, draw_help
 from ui.shell.export_dialog import ExportDialog, HasExporting
 from ui.shell.imgui_backend import ImGuiBackend
 from ui.shell.layout import hold_sizes, is_laid_out, lay_out
@@ -349,9 +349,7 @@ class Frame:
             if title == VIEWPORT or not ui.is_picture_only:
                 self._draw_panel(title, draw_panel, has_padding)
         hold_sizes(self._dock_ids)
-        if ui.is_open_requested or ui.wishes.is_calibration:
-            self.dialog.open(purpose=CALIBRATE if ui.wishes.is_calibration else OPEN)
-            ui.is_open_requested = ui.wishes.is_calibration = False
+        self.dialog.open_wished(ui)
         self._guard("Open dialog", lambda: self.dialog.draw(dispatch, ui))
         self._guard("Help", lambda: draw_help(ui))
         self._guard("Layouts", lambda: self.layouts.draw(ui))
