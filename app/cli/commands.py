@@ -53,6 +53,11 @@ COMMANDS = {
         "app.cli.eval_command",
         "The result was not written.",
     ),
+    "mend": Command(
+        "make a seam between two clips smaller, or a stretch that flickers, and measure it",
+        "app.cli.mend_command",
+        "All clips are as they were.",
+    ),
     "render": Command(
         "render the scene as a video or a sequence of pictures",
         "app.cli.render_command",

@@ -17,6 +17,7 @@ from app.session.editing.edit_commands import EditCommand, GoToStep
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.files.file_commands import FileCommand
+from app.session.mending.mend_commands import MendCommand
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
@@ -479,6 +480,7 @@ Command = (
     | QueueCommand
     | ClipCommand
     | ExclusionCommand
+    | MendCommand
     | PauseTraining
     | ResumeTraining
     | StopTraining

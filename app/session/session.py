@@ -63,6 +63,8 @@ from app.session.files.project_files import ProjectFiles
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
+from app.session.mending.mend_commands import MendCommand
+from app.session.mending.mending import Mending
 from app.session.notices import Notices
 from app.session.project_opener import ProjectOpener
 from app.session.questions import ProjectQuestion, Question
@@ -117,6 +119,7 @@ class Session:
         opening: What is asked about a capture that has no project yet.
         calibrating: Plain videos on their way to a capture.
         synchronising: How far the cameras of the open capture are ahead of each other.
+        mending: A seam, or a stretch with flicker, that is mended.
         exporting: What leaves the project for other programs: what is asked, and the queue.
         recent: What was opened lately.
         files: Repairing, relocating and copying projects.
@@ -174,6 +177,7 @@ class Session:
         self.residuals = Residuals(self.playback)
         self.document = KeptDocument(guard=self._check_change, on_change=self._follow_change)
         self.clip_work = ClipWork(self._jobs, self.notices, self.live_training, self.document, self._take_question)
+        self.mending = Mending(self.live_training, lambda: self.overlays)
         self.marking, self.camera_paths = Marking(self.document), CameraPaths(self.document)
         self.selecting = Selecting(
             ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self.overlays.content)
@@ -328,6 +332,8 @@ class Session:
             case _ if isinstance(command, commands.QueueCommand):
                 self.question = None
                 self.question = self._queue_commands.obey(command)
+            case _ if isinstance(command, MendCommand):
+                self.mending.apply(command, self.timeline)
             case CompareVersion():
                 show_version(command, self.timeline, self.overlays)
             case _ if isinstance(command, ClipCommand):
@@ -477,6 +483,7 @@ class Session:
         self.live_training.open(changed_project)
         self.versions.open(changed_project)
         self.clip_work.open(changed_project)
+        self.mending.open(changed_project)
         self._open_residuals(changed_project)
         self.timeline.take_over(before)
 
@@ -514,6 +521,7 @@ class Session:
         self.live_training.open(opened, found.catalog)
         self.versions.open(opened)
         self.clip_work.open(opened)
+        self.mending.open(opened)
         self._open_residuals(opened)
         self.doctor.open(opened)
         self.views.look_at(opened.rig)
@@ -556,6 +564,7 @@ class Session:
         has_changed = self._jobs.poll()
         self.recent.poll()
         has_changed |= self.opening.poll() | self.calibrating.poll() | self.synchronising.poll()
+        has_changed |= self.mending.poll()
         events = self.live_training.poll()
         if any(isinstance(event, ENDINGS) for event in events):
             self._keep_recent()
@@ -594,6 +603,7 @@ class Session:
             *self.calibrating.finished,
             *self.synchronising.finished,
             *self.exporting.finished,
+            *self.mending.finished,
             self.selecting.finished,
             looked,
             self.clip_work.finished,
@@ -677,6 +687,7 @@ class Session:
         self.playback.close()
         self.versions.close()
         self.clip_work.close()
+        self.mending.close()
         self.log.close()
         if self.capture is not None:
             self.capture.close()
@@ -831,6 +842,7 @@ _TITLES: dict[type, str] = {
     commands.TrainAll: "The clips cannot be trained",
     commands.AskTrainSettings: "The clip cannot be trained",
     **dict.fromkeys(get_args(ExclusionCommand), "That cannot be excluded"),
+    **dict.fromkeys(get_args(MendCommand), "That cannot be mended"),
     **dict.fromkeys(get_args(ClipCommand), "That cannot be done with the clips"),
     commands.RestoreVersion: "The version cannot be brought back",
     commands.RemoveVersion: "The version cannot be removed",

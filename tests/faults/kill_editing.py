@@ -197,7 +197,9 @@ def kill_windows(work: Path, n_kills: int, rng: random.Random, tally: Tally) -> 
         scratch.mkdir()
         desk = Desk(scratch, [str(capture if folder is None else folder)])
         try:
-            desk.wait_for("the project", lambda state: state["can_mark"] and "viewport.canvas" in state["rects"], START_S)
+            desk.wait_for(
+                "the project", lambda state: state["can_mark"] and "viewport.canvas" in state["rects"], START_S
+            )
             desk.focus()
             if desk.state["n_keys"] != n_before:
                 tally.faults.append(f"window {number}: {desk.state['n_keys']} keys at the start, not {n_before}")

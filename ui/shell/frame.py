@@ -26,6 +26,7 @@ from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.doctor.panel import DoctorNeeds, DoctorPanel
 from ui.panels.editing.edits_panel import EditsPanelNeeds, draw_edits
 from ui.panels.editing.history_panel import HistoryPanel
+from ui.panels.editing.mend_panel import HasMending, draw_mending
 from ui.panels.editing.select_panel import SelectionPanelNeeds, draw_selection
 from ui.panels.exports import draw_exports
 from ui.panels.heat_overlay import HeatOverlay
@@ -112,6 +113,7 @@ class FrameNeeds(
     HasOpening,
     HasCalibrating,
     HasSynchronising,
+    HasMending,
     RememberNeeds,
     NoticesNeeds,
     LogNeeds,
@@ -359,6 +361,7 @@ class Frame:
         self._guard("Synchronisation", lambda: self.synchronisation.draw(session, dispatch, ui))
         self._guard("Calibration", lambda: self.calibration.draw(session, dispatch, ui))
         self._guard("Export", lambda: self.export.draw(session, dispatch, ui))
+        self._guard("Mend", lambda: draw_mending(session, dispatch, ui))
         self._guard("Question", lambda: self.questions.draw(session, dispatch, ui))
         size = imgui.get_main_viewport().size
         whole = Rect(0.0, 0.0, size.x, size.y - STATUS_BAR_HEIGHT)
