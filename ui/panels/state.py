@@ -22,6 +22,7 @@ from ui.panels.wishes import Wishes
 from ui.style.fonts import Fonts
 from ui.style.ui_scale import UiScale
 from ui.viewport.editing.select_tool import SelectTool
+from ui.viewport.excluding.mask_tool import MaskTool
 from ui.viewport.path_tool import PathTool
 from ui.viewport.region_tool import RegionTool
 
@@ -77,6 +78,7 @@ class UiState:
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
         regions: The region that is being chosen, and the one that stands out.
         selecting: The tool that selects, and its options.
+        masks: The brush that paints what training does not see.
         paths: What is being done to the keys of the camera path.
         navigation: What mouse and keys do over a picture.
         curves: What the plots of the training panel show.
@@ -101,6 +103,7 @@ class UiState:
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
     selecting: SelectTool = field(default_factory=SelectTool)
+    masks: MaskTool = field(default_factory=MaskTool)
     paths: PathTool = field(default_factory=PathTool)
     navigation: Navigation = field(default_factory=Navigation)
     pointed_anchor: np.ndarray | None = None

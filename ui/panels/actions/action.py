@@ -17,6 +17,7 @@ from app.session.edit_status import HistoryStatus, PathsStatus
 from app.session.editing.selecting import SelectionStatus
 from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
 from engine.camera.rig import CameraRig
+from engine.capture.exclusions import Exclusions
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.editing.select_tool import TOOLS
@@ -64,6 +65,10 @@ class ActionNeeds(RegionsNeeds, Protocol):
     def selection(self) -> SelectionStatus: ...
 
     def shown_anchors(self) -> AnchorArrays | None: ...
+
+    @property
+    def exclusions(self) -> Exclusions: ...
+
     def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]: ...
 
     def wanted_frame(self) -> WantedFrame | None: ...
