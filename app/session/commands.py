@@ -231,6 +231,16 @@ class MarkRegion:
 
 
 @dataclass(frozen=True, slots=True)
+class MarkBox:
+    """Mark a box along the axes of the scene as MarkRegion marks a sphere."""
+
+    treat: str
+    low: tuple[float, float, float]
+    """Scene units."""
+    high: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class RemoveRegion:
     """Forget the marked region at this position of the list."""
 
@@ -361,7 +371,7 @@ class StopCalibration:
     """End the calibration that runs; nothing is written."""
 
 
-MarkCommand = MarkRegion | RemoveRegion
+MarkCommand = MarkRegion | MarkBox | RemoveRegion
 """What changes the marked regions, and can be taken back."""
 
 SettingCommand = SetHoldout | SetClipLength | SetTrainSetting | SetPreset

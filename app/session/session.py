@@ -824,6 +824,7 @@ _TITLES: dict[type, str] = {
     commands.SynchroniseCameras: "The cameras cannot be synchronised",
     **dict.fromkeys(get_args(commands.SelectionCommand), "That cannot be selected"),
     commands.MarkRegion: "The region cannot be marked",
+    commands.MarkBox: "The region cannot be marked",
     commands.RemoveRegion: "The region cannot be removed",
     commands.Undo: "The last change cannot be taken back",
     commands.Redo: "The change cannot be made again",

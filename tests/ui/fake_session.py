@@ -38,6 +38,7 @@ from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edit_commands import EditCommand
 from app.session.editing.edits import changed, edits_status
 from app.session.editing.selecting import SelectionStatus
+from app.session.editing.selection import NOTHING_SELECTED, Selection
 from app.session.exporting import ExportPage
 from app.session.marking import after_marking
 from app.session.notices import Notices
@@ -159,6 +160,17 @@ class FakeSynchronising:
 
 
 @dataclass
+class FakeSelecting:
+    """What the panels read of Selecting."""
+
+    selection: Selection = NOTHING_SELECTED
+
+    def mask(self, gaussians: GaussianArrays) -> np.ndarray:
+        """Nothing of it is selected."""
+        return np.zeros(len(gaussians), np.bool_)
+
+
+@dataclass
 class FakeExporting:
     """What the window reads of Exporting; `asked` are the choices that a plan was wanted for.
 
@@ -235,7 +247,7 @@ class FakeSession:
             inherited_reasons=np.where(inherited_roles == 2, 2, 255).astype(np.uint8),
             own_reasons=np.full(300, 255, np.uint8),
         )
-        self.selection = SelectionStatus()
+        self.selection, self.selecting = SelectionStatus(), FakeSelecting()
         self.regions = RegionsStatus(why_not="Open a capture first.")
         self.paths, self.history = PathsStatus(why_not="Open a capture first."), HistoryStatus()
         self.edits, self.content = (

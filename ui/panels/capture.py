@@ -10,9 +10,12 @@ from imgui_bundle import ImVec2, imgui
 
 from app.playback.orbit_view import OrbitView
 from app.session.commands import LookThrough
+from app.session.edit_status import EditsStatus
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
+from engine.text import one_line
 from ui.gl.image import ImageTexture
+from ui.panels.editing.labels import draw_label_field, with_label
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.thumbnails import ThumbnailNeeds, Thumbnails
 from ui.panels.widgets import elided, pop_bold, push_bold, text_wrapped_dim
@@ -59,6 +62,9 @@ class CaptureNeeds(ThumbnailNeeds, Protocol):
 
     @property
     def holdout(self) -> tuple[int, ...]: ...
+
+    @property
+    def edits(self) -> EditsStatus: ...
 
 
 class CapturePanel:
@@ -127,6 +133,10 @@ class CapturePanel:
             low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
             if is_visible:
                 ui.mark(f"capture.camera{index}")
+            if imgui.begin_popup_context_item("camera menu"):
+                imgui.text_disabled(one_line(name))
+                draw_label_field(session, dispatch, ui, "camera", name)
+                imgui.end_popup()
             if is_clicked:
                 dispatch(LookThrough(None if shown == index else index))
             if shown == index and shown != self._shown_camera:
@@ -135,7 +145,7 @@ class CapturePanel:
             if is_visible:
                 row = Rect(top_left.x, low.y, high.x, high.y)
                 if self._draw_row(session, ui, row, index, index in held_out, is_shown=shown == index):
-                    imgui.set_item_tooltip(name)
+                    imgui.set_item_tooltip(with_label(session, "camera", name, name))
             imgui.pop_id()
         if shown is None:
             self._shown_camera = None
@@ -154,7 +164,8 @@ class CapturePanel:
         x, room = box.x1 + 10, row.x1 - box.x1 - 14
         if is_shown:
             push_bold(ui, ui.fonts.body_size)
-        name = elided(rig.names[index], room)
+        title = with_label(session, "camera", rig.names[index], rig.names[index])
+        name = elided(title, room)
         draw.add_text(ImVec2(x, row.y0 + 6), theme.u32(theme.TEXT), name)
         if is_shown:
             pop_bold(ui)
@@ -170,4 +181,4 @@ class CapturePanel:
             tag = Rect(left, row.y0 + 25, left + imgui.calc_text_size(label).x + 14, row.y0 + 44)
             draw.add_rect(tag.low, tag.high, theme.u32(theme.HELD_OUT), 4)
             draw.add_text(ImVec2(tag.x0 + 7, tag.y0 + 1), theme.u32(theme.HELD_OUT), label)
-        return name != rig.names[index]
+        return name != title

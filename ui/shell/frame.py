@@ -24,6 +24,8 @@ from ui.panels.actions.table import ACTIONS, handle_keys
 from ui.panels.camera_path import PathPanelNeeds, draw_paths
 from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.doctor.panel import DoctorNeeds, DoctorPanel
+from ui.panels.editing.edits_panel import EditsPanelNeeds, draw_edits
+from ui.panels.editing.history_panel import HistoryPanel
 from ui.panels.editing.select_panel import SelectionPanelNeeds, draw_selection
 from ui.panels.exports import draw_exports
 from ui.panels.heat_overlay import HeatOverlay
@@ -37,7 +39,9 @@ from ui.panels.residuals.panel import ResidualsNeeds, ResidualsPanel
 from ui.panels.state import (
     CAPTURE,
     DOCTOR,
+    EDITS,
     EXPORTS,
+    HISTORY,
     LAYOUTS,
     LOG,
     PATHS,
@@ -98,6 +102,7 @@ class FrameNeeds(
     ViewportNeeds,
     CaptureNeeds,
     SelectionPanelNeeds,
+    EditsPanelNeeds,
     TimelineNeeds,
     MenuNeeds,
     PaletteNeeds,
@@ -211,8 +216,10 @@ class Frame:
             (TRAINING, draw_training, True),
             (REGIONS, draw_regions, True),
             (SELECTION, draw_selection, True),
+            (EDITS, draw_edits, True),
             (RESIDUALS, self.residuals.draw, True),
             (PATHS, draw_paths, True),
+            (HISTORY, HistoryPanel().draw, True),
             (TIMELINE, draw_timeline, True),
             (LOG, self.log.draw, True),
             (DOCTOR, self.doctor.draw, True),

@@ -104,6 +104,7 @@ class SetLabel:
     kind: Literal["clip", "camera"]
     name: str
     text: str
+    gesture: int = 0
 
 
 @dataclass(frozen=True, slots=True)

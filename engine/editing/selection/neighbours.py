@@ -67,7 +67,7 @@ def flooded(means: np.ndarray, colors: np.ndarray, seed: int, distance: float, c
 
 def _points(means: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     points = np.ascontiguousarray(means, np.float64)
-    is_sound: np.ndarray = np.isfinite(points).all(axis=1)
+    is_sound = np.all(np.isfinite(points), axis=1, keepdims=True)[:, 0]
     return points, is_sound
 
 
