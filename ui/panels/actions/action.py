@@ -17,6 +17,7 @@ from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.selecting import SelectionStatus
 from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
 from engine.camera.rig import CameraRig
+from ui.panels.copying import CopyNeeds
 from ui.panels.editing.edit_subject import Selects
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
@@ -27,7 +28,7 @@ SELECT, EDIT = "Select", "Edit"
 NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
-class ActionNeeds(RegionsNeeds, Protocol):
+class ActionNeeds(CopyNeeds, RegionsNeeds, Protocol):
     """What actions act on."""
 
     @property
