@@ -9,8 +9,9 @@ from typing import Any
 from msgspec import Struct, to_builtins
 
 from app.document.camera_paths import StoredPath, check_paths, stored_path, to_path
-from app.document.project_document import Exclusions, Label, Marker, ProjectDocument, World
+from app.document.project_document import Label, Marker, ProjectDocument, World
 from app.document.project_settings import ProjectSettings, check_bounds
+from engine.capture.exclusions import Exclusions
 from engine.editing.edit import Edit, Picked
 from engine.editing.picks import unpack_rows
 from engine.errors import ProjectError

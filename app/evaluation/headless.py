@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -177,6 +177,11 @@ class TrainedProject:
     capture: Capture
     clips: list[Clip]
     reference: ClipState | None
+
+    @property
+    def measured(self) -> TrainedProject:
+        """The same with the capture as it is measured: without what the document excludes."""
+        return replace(self, capture=self.capture.without(self.project.document.exclusions))
 
     @property
     def rig(self) -> CameraRig:

@@ -171,7 +171,11 @@ def _open_project(
     if choices.capture is not None:
         settings = replace(settings, capture=str(choices.capture.resolve()))
     if capture is None:
-        capture = open_capture_of(settings, folder)
+        try:
+            capture = open_capture_of(settings, folder)
+        except OtherCapture as error:
+            error.known = Path(stored.capture)
+            raise
     else:
         check_capture(capture, settings, folder)
         capture = (

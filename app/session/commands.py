@@ -15,7 +15,9 @@ from app.project.project_choices import AS_USUAL, ProjectChoices
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, GoToStep
 from app.session.editing.selection_commands import SelectionCommand
+from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.files.file_commands import FileCommand
+from app.session.mending.mend_commands import MendCommand
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
@@ -477,6 +479,8 @@ Command = (
     | TrainNextClip
     | QueueCommand
     | ClipCommand
+    | ExclusionCommand
+    | MendCommand
     | PauseTraining
     | ResumeTraining
     | StopTraining

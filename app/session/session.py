@@ -57,11 +57,15 @@ from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.selecting import Selecting, SelectionStatus
 from app.session.editing.shown_to_select import ShownToSelect
+from app.session.exclusions.excluding import apply_exclusion
+from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.exporting import Exporting
 from app.session.files.project_files import ProjectFiles
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
+from app.session.mending.mend_commands import MendCommand
+from app.session.mending.mending import Mending
 from app.session.notices import Notices
 from app.session.project_opener import ProjectOpener
 from app.session.questions import ProjectQuestion, Question
@@ -95,6 +99,7 @@ from app.training.service import Launch, ShownState
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.editing.selection.ranges import Spread
 from engine.editing.selection.seen_from import SeenFrom
 from engine.errors import EngineError
@@ -115,6 +120,7 @@ class Session:
         opening: What is asked about a capture that has no project yet.
         calibrating: Plain videos on their way to a capture.
         synchronising: How far the cameras of the open capture are ahead of each other.
+        mending: A seam, or a stretch with flicker, that is mended.
         exporting: What leaves the project for other programs: what is asked, and the queue.
         recent: What was opened lately.
         files: Repairing, relocating and copying projects.
@@ -173,6 +179,7 @@ class Session:
         self.residuals = Residuals(self.playback)
         self.document = KeptDocument(guard=self._check_change, on_change=self._follow_change)
         self.clip_work = ClipWork(self._jobs, self.notices, self.live_training, self.document, self._take_question)
+        self.mending = Mending(self.live_training, lambda: self.overlays)
         self.marking, self.camera_paths = Marking(self.document), CameraPaths(self.document)
         self.selecting = Selecting(
             ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self.overlays.content)
@@ -252,6 +259,12 @@ class Session:
         return ShownAs(self.overlays.mode, self.overlays.content)
 
     @property
+    def exclusions(self) -> Exclusions:
+        """What of the open capture training never sees."""
+        content = self.document.content
+        return NOTHING_EXCLUDED if content is None else content.exclusions
+
+    @property
     def residual_status(self) -> ResidualStatus:
         """What is measured of every picture."""
         return self.residuals.status
@@ -322,11 +335,16 @@ class Session:
             case _ if isinstance(command, commands.QueueCommand):
                 self.question = None
                 self.question = self._queue_commands.obey(command)
+            case _ if isinstance(command, MendCommand):
+                self.mending.apply(command, self.timeline)
             case CompareVersion():
                 show_version(command, self.timeline, self.overlays)
             case _ if isinstance(command, ClipCommand):
                 self.question = None
                 self.question = self.clip_work.obey(command)
+            case _ if isinstance(command, ExclusionCommand):
+                n_frames = 0 if self.capture is None else self.capture.n_frames
+                apply_exclusion(command, self.document, self.rig.names, n_frames)
             case commands.PauseTraining():
                 live.pause()
             case commands.ResumeTraining():
@@ -403,7 +421,7 @@ class Session:
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
-    def _ask(self, question: Question) -> None:
+    def _ask(self, question: Question | None) -> None:
         self.question = question
 
     def _ask_export(self) -> None:
@@ -448,6 +466,10 @@ class Session:
         """The document has changed: show what follows from it."""
         if before.settings != after.settings:
             self._follow_settings()
+        elif before.exclusions != after.exclusions and self.opened is not None:
+            if self.live_training.service is not None:
+                self.live_training.service.catalog.judge_anew()
+            self._open_residuals(self.opened)
         self._show_notes(after)
 
     def _show_notes(self, document: ProjectDocument) -> None:
@@ -464,6 +486,7 @@ class Session:
         self.live_training.open(changed_project)
         self.versions.open(changed_project)
         self.clip_work.open(changed_project)
+        self.mending.open(changed_project)
         self._open_residuals(changed_project)
         self.timeline.take_over(before)
 
@@ -501,6 +524,7 @@ class Session:
         self.live_training.open(opened, found.catalog)
         self.versions.open(opened)
         self.clip_work.open(opened)
+        self.mending.open(opened)
         self._open_residuals(opened)
         self.doctor.open(opened)
         self.views.look_at(opened.rig)
@@ -543,6 +567,7 @@ class Session:
         has_changed = self._jobs.poll()
         self.recent.poll()
         has_changed |= self.opening.poll() | self.calibrating.poll() | self.synchronising.poll()
+        has_changed |= self.mending.poll()
         events = self.live_training.poll()
         if any(isinstance(event, ENDINGS) for event in events):
             self._keep_recent()
@@ -581,6 +606,7 @@ class Session:
             *self.calibrating.finished,
             *self.synchronising.finished,
             *self.exporting.finished,
+            *self.mending.finished,
             self.selecting.finished,
             looked,
             self.clip_work.finished,
@@ -664,6 +690,7 @@ class Session:
         self.playback.close()
         self.versions.close()
         self.clip_work.close()
+        self.mending.close()
         self.log.close()
         if self.capture is not None:
             self.capture.close()
@@ -817,6 +844,8 @@ _TITLES: dict[type, str] = {
     commands.TrainClips: "The clips cannot be trained",
     commands.TrainAll: "The clips cannot be trained",
     commands.AskTrainSettings: "The clip cannot be trained",
+    **dict.fromkeys(get_args(ExclusionCommand), "That cannot be excluded"),
+    **dict.fromkeys(get_args(MendCommand), "That cannot be mended"),
     **dict.fromkeys(get_args(ClipCommand), "That cannot be done with the clips"),
     commands.RestoreVersion: "The version cannot be brought back",
     commands.RemoveVersion: "The version cannot be removed",

@@ -11,19 +11,16 @@ import pytest
 
 from app.document.document_file import BACKUP_FILE, MAX_DOCUMENT_BYTES, read_document, write_document
 from app.document.project_document import (
-    ExcludedFrames,
-    Exclusions,
     Label,
     Marker,
-    PaintedMask,
     ProjectDocument,
-    Stroke,
     World,
 )
 from app.document.project_settings import ProjectSettings
 from app.document.stored_document import plain_document
 from app.project.project import create_project, open_project
 from engine.camera.path_presets import turntable
+from engine.capture.exclusions import ExcludedFrames, Exclusions, PaintedMask, Stroke
 from engine.editing.edit import Box, Delete, Edit, Expose, Picked, PickedRows, Scope, Sphere, Transform
 from engine.editing.picks import pack_rows
 from engine.errors import ProjectError

@@ -19,6 +19,7 @@ from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, Wan
 from engine.camera.rig import CameraRig
 from ui.panels.copying import CopyNeeds
 from ui.panels.editing.edit_subject import Selects
+from ui.panels.editing.mend_panel import HasMending
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
 
@@ -28,7 +29,7 @@ SELECT, EDIT = "Select", "Edit"
 NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
-class ActionNeeds(CopyNeeds, RegionsNeeds, Protocol):
+class ActionNeeds(CopyNeeds, RegionsNeeds, HasMending, Protocol):
     """What actions act on."""
 
     @property

@@ -46,6 +46,7 @@ _MENU_OF_TOPIC = {
     "compare": "View/Compare",
     "content": "View/Draw only",
     "heat": "View/Residuals",
+    "mend": "Train/Mend",
     "mode": "View/Mode",
     "navigation": "View/Navigate/Mouse",
     "play": "Time/Play",
