@@ -33,6 +33,7 @@ from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands, path_commands
 from app.session.calibration_page import CalibrationPage
+from app.session.copying.command_texts import CommandTexts
 from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edit_commands import EditCommand
@@ -250,6 +251,7 @@ class FakeSession:
             own_reasons=np.full(300, 255, np.uint8),
         )
         self.selection, self.selecting = SelectionStatus(), FakeSelecting()
+        self.command_texts = CommandTexts(lambda: None, lambda clip_index: False)
         self.regions = RegionsStatus(why_not="Open a capture first.")
         self.paths, self.history = PathsStatus(why_not="Open a capture first."), HistoryStatus()
         self.edits, self.content = (
