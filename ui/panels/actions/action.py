@@ -17,6 +17,8 @@ from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.selecting import SelectionStatus
 from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
 from engine.camera.rig import CameraRig
+from engine.capture.exclusions import Exclusions
+from ui.panels.copying import CopyNeeds
 from ui.panels.editing.edit_subject import Selects
 from ui.panels.editing.mend_panel import HasMending
 from ui.panels.regions import RegionsNeeds
@@ -28,7 +30,7 @@ SELECT, EDIT = "Select", "Edit"
 NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
-class ActionNeeds(RegionsNeeds, HasMending, Protocol):
+class ActionNeeds(CopyNeeds, RegionsNeeds, HasMending, Protocol):
     """What actions act on."""
 
     @property
@@ -71,6 +73,10 @@ class ActionNeeds(RegionsNeeds, HasMending, Protocol):
     def edits(self) -> EditsStatus: ...
 
     def shown_anchors(self) -> AnchorArrays | None: ...
+
+    @property
+    def exclusions(self) -> Exclusions: ...
+
     def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]: ...
 
     def shown_gaussians(self) -> GaussianArrays | None: ...
