@@ -110,7 +110,7 @@ def in_rect(at: np.ndarray, rect: Rect) -> tuple[np.ndarray, np.ndarray]:
     """Whether points lie in a rectangle, and how far from its border."""
     off = np.stack([at[:, 0] - rect.x0, rect.x1 - at[:, 0], at[:, 1] - rect.y0, rect.y1 - at[:, 1]], axis=1)
     with np.errstate(invalid="ignore"):
-        return (off > 0.0).all(axis=1), np.abs(off).min(axis=1)
+        return np.asarray((off > 0.0).all(axis=1)), np.abs(off).min(axis=1)
 
 
 def yellow(pilot: Pilot, rect: Rect) -> int:
