@@ -47,9 +47,9 @@ def panel(open_pilot: Callable[..., Pilot], monkeypatch: pytest.MonkeyPatch) -> 
     return pilot
 
 
-def about(value: float, **tolerance: float) -> Any:
+def about(value: float, *, abs: float | None = None) -> Any:
     """Equal to numbers near it, in the place of one."""
-    return pytest.approx(value, **tolerance)
+    return pytest.approx(value, abs=abs)
 
 
 def tool(pilot: Pilot) -> SelectTool:
