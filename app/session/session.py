@@ -54,6 +54,7 @@ from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
+from app.session.editing.lost_edits import LostEdits
 from app.session.editing.selecting import Selecting, SelectionStatus
 from app.session.editing.shown_to_select import ShownToSelect
 from app.session.exclusions.excluding import apply_exclusion
@@ -183,7 +184,7 @@ class Session:
             ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self.overlays.content)
         )
         self.selection = SelectionStatus()
-        self.editing = Edits(self.document, self.selecting)
+        self.editing = Edits(self.document, self.selecting, LostEdits(lambda: self.live_training.service))
         self.edits: EditsStatus = self.editing.status()
         self.regions: RegionsStatus = self.marking.status([])
         self.paths: PathsStatus = self.camera_paths.status()
