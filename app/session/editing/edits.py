@@ -58,7 +58,7 @@ class Edits:
         return replace(edits_status(content, why_not), lost=self._lost.of(content.edits))
 
     def apply(self, command: c.EditCommand) -> None:
-        """Carry out a command; one that changes nothing is no step of the history.
+        """Carry out a command; one that changes nothing does not become a step of the history.
 
         Raises:
             ProjectError: It cannot be done now, or makes no sense.

@@ -17,10 +17,11 @@ from msgspec import structs
 from app.cli.cli import main
 from app.command_text.step_command import step_command
 from app.document.note_changes import put_marker, set_label
-from app.document.project_document import ExcludedFrames, Exclusions, ProjectDocument, World
+from app.document.project_document import ProjectDocument, World
 from app.document.world_changes import set_scale
 from app.project.project import Project, open_project
 from app.scripting import scripted_project
+from engine.capture.exclusions import ExcludedFrames, Exclusions
 from engine.editing.edit import Delete, Edit, Everything, Hide, Sphere
 from engine.gate.regions import GateRegion
 from tests.app.command_text.documents import EDITS, HARD_NAMES, NAMES, STACKS
