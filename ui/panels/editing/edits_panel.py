@@ -8,9 +8,10 @@ from imgui_bundle import ImVec2, imgui
 
 from app.document.edit_words import edit_title, scope_text, target_text
 from app.playback.orbit_view import OrbitView
+from app.session.clips.clip_commands import ApplyDeletions
 from app.session.edit_status import HistoryStatus
 from app.session.editing.edit_commands import DuplicateEdit, MoveEdit, RemoveEdit, ToggleEdit
-from engine.editing.edit import Edit
+from engine.editing.edit import Delete, Edit
 from engine.text import one_line
 from ui.panels.copying import CopyNeeds, draw_copy_entries
 from ui.panels.editing.details import draw_details
@@ -86,6 +87,17 @@ def _draw_stack(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> No
                 _draw_row(session, dispatch, ui, edits[position], position)
                 imgui.pop_id()
     imgui.end_child()
+    if any(edit.is_on and isinstance(edit.action, Delete) for edit in edits):
+        _draw_permanence(session, dispatch, ui)
+
+
+def _draw_permanence(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    imgui.begin_disabled(not session.edits.can_edit)
+    if imgui.button("Apply deletions permanently..."):
+        dispatch(ApplyDeletions())
+    ui.mark("edits.permanent")
+    imgui.set_item_tooltip("Writes clips without what is deleted in all of their frames; asks first")
+    imgui.end_disabled()
 
 
 def _draw_row(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: Edit, position: int) -> None:
@@ -109,7 +121,12 @@ def _draw_row(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: E
     if edit.name:
         words = f"{target_text(edit.target, is_inverted=edit.is_inverted)}, {words}"
     words = words if edit.is_on else f"off, {words}"
-    draw.add_text(ImVec2(x, low.y + 22), theme.u32(theme.TEXT_DIM), elided(words, room))
+    lost = next((one for one in session.edits.lost if one.edit_id == edit.edit_id), None)
+    if lost is not None:
+        words = f"{Icon.WARNING}  {'all' if lost.is_all else 'some'} of what was picked is gone, {words}"
+    draw.add_text(
+        ImVec2(x, low.y + 22), theme.u32(theme.TEXT_DIM if lost is None else theme.ORANGE), elided(words, room)
+    )
     imgui.set_cursor_screen_pos(ImVec2(low.x + 2, low.y + 8))
     imgui.begin_disabled(not session.edits.can_edit)
     if imgui.button(f"{Icon.EYE if edit.is_on else ' – '}##on", ImVec2(BUTTON_WIDTH, 26)):
