@@ -66,6 +66,7 @@ from app.status import (
 )
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.clip import Clip, split_clips
+from engine.capture.exclusions import NOTHING_EXCLUDED
 from engine.doctor.finding import Finding
 from engine.editing.selection.ranges import Spread, spread_of
 from engine.editing.selection.seen_from import SeenFrom
@@ -217,6 +218,7 @@ class FakeSession:
         self.queue = QueueStatus()
         self.usage = UsageStatus(window_mb=412.0, window_cores=0.1, n_cores=2)
         self.disk: DiskUse | None = None
+        self.exclusions = NOTHING_EXCLUDED
         self.versions: dict[int, tuple[VersionStatus, ...]] = {}
         self.curves: dict[int, tuple[list[tuple[int, float]], list[tuple[int, float]]]] = {}
         self.lines: tuple[LogLine, ...] = ()
