@@ -127,10 +127,9 @@ def test_box_crop_handles_invert_delete_with_scope_undo_toggle_and_open_again(
     session, everything = window.session, {frame: shown(window, frame) for frame in (0, 1)}
     shown(window, 0)
     draw_box(window)
-    at, anchor = window.rects["handle.center"].center, place(window, everything[0][4])
-    pull(window, "center", anchor[0] - at[0], anchor[1] - at[1])
-    drawn = window.studio.frame.ui.selecting.volume
-    assert isinstance(drawn, Box)
+    x, y, z = (float(value) for value in everything[0][4])
+    drawn = window.studio.frame.ui.selecting.volume = Box((x, y, z), (0.5, 0.5, 0.5))  # as if it were typed
+    window.draw(2)
     handle = face(window)
     pull(window, handle, *outward(window, handle, 50))
     box = window.studio.frame.ui.selecting.volume
@@ -173,6 +172,7 @@ def test_box_crop_handles_invert_delete_with_scope_undo_toggle_and_open_again(
     np.testing.assert_array_equal(shown(window, 0), everything[0])
     window.click(f"edits.on{before.edit_id}")
     kept = session.edits.edits
+    window.studio.close()
     session.close()
     again = open_window(tmp_path, open_pilot)
     assert again.session.edits.edits == kept

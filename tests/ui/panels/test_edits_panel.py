@@ -7,6 +7,7 @@ import dataclasses
 import pytest
 from pyglet.window import key, mouse
 
+from app.session.clips.clip_commands import ApplyDeletions
 from app.session.commands import MarkBox, MarkRegion
 from app.session.edit_status import EditsStatus, HistoryStatus
 from app.session.editing.edit_commands import (
@@ -22,7 +23,7 @@ from app.session.editing.edit_commands import (
     SetScale,
     SetUp,
 )
-from engine.editing.edit import Box, Expose, Hide, Scope, Smooth, Sphere
+from engine.editing.edit import Box, Delete, Expose, Hide, Scope, Smooth, Sphere
 from tests.ui.pilot import CTRL, SHIFT, Pilot
 from ui.panels.state import EDITS, HISTORY
 
@@ -113,6 +114,18 @@ def test_details_change_name_scope_and_numbers(panel: Pilot) -> None:
     assert panel.sent(RemoveEdit) == [RemoveEdit(1)]
     panel.draw(2)
     assert panel.studio.frame.ui.editing.chosen is None
+
+
+def test_deletions_are_applied_permanently_once_that_was_asked(panel: Pilot) -> None:
+    panel.session.dispatch(AddEdit(Hide(), BOX))
+    panel.draw(3)
+    panel.click("edits.apply")
+    assert panel.sent(ApplyDeletions) == [], "nothing is deleted"
+    panel.session.dispatch(AddEdit(Delete(), BOX))
+    panel.draw(3)
+    panel.click("edits.apply")
+    assert panel.sent(ApplyDeletions) == [ApplyDeletions()]
+    assert not ApplyDeletions().is_confirmed
 
 
 def test_names_of_users_are_shown_as_they_are(panel: Pilot) -> None:

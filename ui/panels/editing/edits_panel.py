@@ -8,9 +8,10 @@ from imgui_bundle import ImVec2, imgui
 
 from app.document.edit_words import edit_title, scope_text, target_text
 from app.playback.orbit_view import OrbitView
+from app.session.clips.clip_commands import ApplyDeletions
 from app.session.edit_status import HistoryStatus
 from app.session.editing.edit_commands import DuplicateEdit, MoveEdit, RemoveEdit, ToggleEdit
-from engine.editing.edit import Edit
+from engine.editing.edit import Delete, Edit
 from engine.text import one_line
 from ui.panels.editing.details import draw_details
 from ui.panels.editing.making import MakingNeeds, draw_making
@@ -85,6 +86,13 @@ def _draw_stack(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> No
                 _draw_row(session, dispatch, ui, edits[position], position)
                 imgui.pop_id()
     imgui.end_child()
+    is_deleting = any(edit.is_on and isinstance(edit.action, Delete) for edit in edits)
+    imgui.begin_disabled(not (session.edits.can_edit and is_deleting))
+    if imgui.button("Apply permanently ..."):
+        dispatch(ApplyDeletions())
+    ui.mark("edits.apply")
+    imgui.end_disabled()
+    imgui.set_item_tooltip("Writes clips again without what is deleted everywhere, once you have confirmed it")
 
 
 def _draw_row(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: Edit, position: int) -> None:
