@@ -16,6 +16,7 @@ from app.document.stored_document import document_of, plain_document
 from app.export.export_progress import ExportProgress, ExportResult
 from app.export.named_jobs import VIDEO_FORMATS, run_named_job
 from app.project.allowed_changes import check_change
+from app.project.clip_versions import restore_version
 from app.project.opening import open_capture_of
 from app.project.project import Project, open_project
 from app.scripting.actions import action_called
@@ -291,6 +292,18 @@ class ScriptedProject:
             is_again=is_again,
             own=settings,
         )
+
+    def restore_version(self, clip_index: int, number: int) -> None:
+        """Bring back what a clip was before it was trained again; what it is now becomes a version.
+
+        Args:
+            number: Of the version, as `clipgstream versions` lists them.
+        Raises:
+            ProjectError: There is no such version, or it does not go with the reference clip as it is now.
+        """
+        self._check_open()
+        self.clip(clip_index)
+        restore_version(self._project, clip_index, number)
 
     def render(
         self,

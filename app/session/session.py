@@ -50,6 +50,7 @@ from app.session.clip_versions import Versions
 from app.session.clips.clip_commands import ClipCommand, CompareVersion
 from app.session.clips.clip_work import ClipWork
 from app.session.clips.comparing import show_version
+from app.session.copying.command_texts import CommandTexts
 from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edits import Edits
@@ -124,6 +125,7 @@ class Session:
         recent: What was opened lately.
         files: Repairing, relocating and copying projects.
         doctor: What is wrong with the open capture, and what helps.
+        command_texts: What was done, or could be, as commands to copy.
         notices: What the user has to know.
 
     Args:
@@ -184,6 +186,7 @@ class Session:
         )
         self.selection = SelectionStatus()
         self.editing = Edits(self.document, self.selecting)
+        self.command_texts = CommandTexts(lambda: self.project, self.live_training.is_finished)
         self.edits: EditsStatus = self.editing.status()
         self.regions: RegionsStatus = self.marking.status([])
         self.paths: PathsStatus = self.camera_paths.status()

@@ -6,6 +6,7 @@ import ctypes
 import gc
 import os
 import statistics
+import sys
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import suppress
@@ -22,14 +23,14 @@ class Held:
         handles: Open files, pipes and sockets.
         threads: Of the process.
         children: Processes that it has started and that have not ended, or were not waited for.
-        objects: Of Python, as its garbage collector counts.
+        blocks: Of memory that Python objects take.
     """
 
     memory_mb: float
     handles: int
     threads: int
     children: int
-    objects: int
+    blocks: int
 
 
 def held_now() -> Held:
@@ -44,7 +45,7 @@ def held_now() -> Held:
         len(os.listdir("/proc/self/fd")),
         len(os.listdir("/proc/self/task")),
         _n_children(),
-        len(gc.get_objects()),
+        sys.getallocatedblocks(),
     )
 
 

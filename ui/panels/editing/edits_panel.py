@@ -13,6 +13,7 @@ from app.session.edit_status import HistoryStatus
 from app.session.editing.edit_commands import DuplicateEdit, MoveEdit, RemoveEdit, ToggleEdit
 from engine.editing.edit import Delete, Edit
 from engine.text import one_line
+from ui.panels.copying import CopyNeeds, draw_copy_entries
 from ui.panels.editing.details import draw_details
 from ui.panels.editing.making import MakingNeeds, draw_making
 from ui.panels.editing.world_section import draw_world
@@ -27,7 +28,7 @@ LEAST_ROWS, MOST_ROWS = 1.2, 6.2
 PAYLOAD = "edit"
 
 
-class EditsPanelNeeds(MakingNeeds, Protocol):
+class EditsPanelNeeds(MakingNeeds, CopyNeeds, Protocol):
     """What this panel reads."""
 
     @property
@@ -159,3 +160,5 @@ def _draw_menu(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: 
         if imgui.menu_item(label, "", False, can_edit and is_possible)[0]:
             dispatch(command)
         ui.mark(f"edits.menu {label.split(':')[0].lower()}")
+    imgui.separator()
+    draw_copy_entries(ui, "edits.menu", lambda: session.command_texts.edit(edit.edit_id))

@@ -9,13 +9,14 @@ from imgui_bundle import ImVec4, imgui
 from app.session.edit_status import HistoryStatus
 from app.session.editing.edit_commands import GoToStep
 from engine.text import one_line
+from ui.panels.copying import CopyNeeds, draw_copy_entries
 from ui.panels.history_buttons import draw_history
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import elided, text_wrapped_dim
 from ui.style import theme
 
 
-class HistoryNeeds(Protocol):
+class HistoryNeeds(CopyNeeds, Protocol):
     """What this panel reads."""
 
     @property
@@ -47,7 +48,7 @@ class HistoryPanel:
                 clipper.include_item_by_index(present)
             while clipper.step():
                 for row in range(clipper.display_start, clipper.display_end):
-                    is_seen = _draw_step(dispatch, ui, row, names[row], present)
+                    is_seen = _draw_step(session, dispatch, ui, row, names[row], present)
                     if row == present != self._seen:
                         self._seen = present
                         if not is_seen:  # else what was clicked would move away from the pointer
@@ -55,11 +56,14 @@ class HistoryPanel:
         imgui.end_child()
 
 
-def _draw_step(dispatch: Dispatch, ui: UiState, row: int, name: str, present: int) -> bool:
+def _draw_step(session: HistoryNeeds, dispatch: Dispatch, ui: UiState, row: int, name: str, present: int) -> bool:
     """Whether it is in sight."""
     imgui.push_id(row)
     if imgui.selectable("##step", row == present)[0] and row != present:
         dispatch(GoToStep(row - present))
+    if 0 < row <= present and imgui.begin_popup_context_item("menu"):
+        draw_copy_entries(ui, "history.menu", lambda: session.command_texts.step(present - row))
+        imgui.end_popup()
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
     is_seen = imgui.is_item_visible()
     if is_seen:
