@@ -37,7 +37,7 @@ def open_window(folder: Path, open_pilot: Callable[..., Pilot]) -> Pilot:
         poll(session, lambda: session.clip_states[0].state == "trained")
     session.overlays.show_frusta = session.overlays.show_residual = False
     session.overlays.show_inherited = True
-    pilot = open_pilot(session, size=(1280, 960))
+    pilot = open_pilot(session, size=(1280, 1300))
     pilot.studio.frame.ui.wanted_panel = EDITS
     shown(pilot, 0)
     pilot.draw(3)

@@ -49,7 +49,8 @@ def draw_edits(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> Non
     ui.editing.follow(session.edits.edits)
     if session.edits.why_not:
         text_warning(session.edits.why_not)
-    draw_making(session, dispatch, ui)
+    if imgui.collapsing_header("New edit", imgui.TreeNodeFlags_.default_open):
+        draw_making(session, dispatch, ui)
     imgui.separator()
     _draw_stack(session, dispatch, ui)
     imgui.begin_disabled(not session.edits.can_edit)
