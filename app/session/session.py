@@ -182,7 +182,7 @@ class Session:
         self.mending = Mending(self.live_training, lambda: self.overlays)
         self.marking, self.camera_paths = Marking(self.document), CameraPaths(self.document)
         self.selecting = Selecting(
-            ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self.overlays.content)
+            ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self._shown_as)
         )
         self.selection = SelectionStatus()
         self.editing = Edits(self.document, self.selecting)

@@ -67,7 +67,7 @@ def draw_selection(session: SelectionPanelNeeds, dispatch: Dispatch, ui: UiState
         text_wrapped_dim("What you select in the picture is counted here when a capture is open.")
         return
     if not status.can_select:
-        text_wrapped_dim("There are no Gaussians to select in this frame: it is not trained, or anchors are shown.")
+        text_wrapped_dim("There are no Gaussians to select in this frame: it is not trained.")
     _draw_counts(status, ui)
     imgui.begin_disabled(not status.can_select)
     imgui.separator_text("Tool")
