@@ -10,7 +10,6 @@ import pytest
 from pyglet.window import key
 
 from app.playback.arrays import AnchorArrays
-from app.session.editing.selecting import SelectionStatus
 from app.session.editing.selection_commands import (
     ClearSelection,
     GrowSelection,
@@ -23,6 +22,7 @@ from app.session.editing.selection_commands import (
     SelectVolume,
     ShrinkSelection,
 )
+from app.session.editing.selection_status import SelectionStatus
 from engine.editing.edit import Box, Sphere
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
