@@ -18,7 +18,7 @@ from app.cli.edit_arguments import (
     has_scope,
     has_target,
 )
-from app.document import edit_changes
+from app.document.edit_changes import edit_with
 from app.document.edit_words import edit_title, scope_text
 from app.document.stored_document import ENTRIES
 from app.scripting.scripted_project import ScriptedProject, open_scripted
@@ -113,8 +113,7 @@ def _change(options: argparse.Namespace, project: ScriptedProject) -> None:
         edit_id, name = options.rename
         if not edit_id.isdecimal():
             raise ProjectError(f"--rename is '{edit_id}', which is not the number of an edit.")
-        document = edit_changes.rename_edit(project.document, int(edit_id), name)
-        project.change(document, "rename an edit")
+        project.rename_edit(int(edit_id), name)
     elif options.move_to is not None:
         project.move_edit(*options.move_to)
     elif options.replace is not None:
@@ -137,7 +136,7 @@ def _take_steps(options: argparse.Namespace, project: ScriptedProject) -> None:
 
 
 def _replaced(options: argparse.Namespace, project: ScriptedProject) -> Edit:
-    edit = edit_changes.edit_with(project.document, options.replace)
+    edit = edit_with(project.document, options.replace)
     if has_target(options):
         edit = structs.replace(edit, target=chosen_target(options, _text), is_inverted=options.inverted)
     if has_action(options):

@@ -50,10 +50,15 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         nargs=3,
         type=float,
         metavar=("X", "Y", "Z"),
-        help="which way is up in the capture, for --up and --down (default: what its cameras agree on)",
+        help="which way is up in the capture, for --up and --down (default: as the project says, else what its cameras "
+        "agree on)",
     )
     own.add_argument(
-        "--scale", type=float, default=1.0, metavar="S", help="units of the files per unit of the capture (default: 1)"
+        "--scale",
+        type=float,
+        metavar="S",
+        help="units of the files per unit of the capture (default: metres where the project says how long a unit is, "
+        "else 1)",
     )
     own.add_argument(
         "--axes",

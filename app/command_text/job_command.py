@@ -50,6 +50,34 @@ def training_command(
     return CommandText(tuple(arguments), f"project.train_clip({', '.join(said)})", folder)
 
 
+def version_command(folder: Path, clip_index: int, number: int) -> CommandText:
+    """The command that brings back an earlier version of a clip. folder: Of the project."""
+    folder = folder.absolute()
+    arguments = ("versions", str(folder), "--clip", str(clip_index), "--restore", str(number))
+    return CommandText(arguments, f"project.restore_version({clip_index}, {number})", folder)
+
+
+def mend_command(
+    folder: Path, *, after: int | None = None, frames: tuple[int, int] | None = None, method: str = "auto"
+) -> CommandText:
+    """The command that mends a boundary or a stretch of frames.
+
+    Args:
+        folder: Of the project.
+        after: The clip that begins at the boundary; None for frames.
+        frames: First frame and the one after the last; None for a boundary.
+        method: How, see engine.mending.figures.
+    """
+    folder = folder.absolute()
+    said = [f"boundary={after}"] if after is not None else []
+    what = ("--boundary", f"{after - 1}:{after}") if after is not None else ()
+    if frames is not None:
+        said, what = [f"frames=range({frames[0]}, {frames[1]})"], ("--frames", f"{frames[0]}:{frames[1]}")
+    how = () if method == "auto" else ("--method", method)
+    said += [] if method == "auto" else [f"method={method!r}"]
+    return CommandText(("mend", str(folder), *what, *how), f"project.mend({', '.join(said)})", folder)
+
+
 def export_command(folder: Path, kind: str, job: Job) -> CommandText:
     """The command that carries out an export.
 
@@ -97,6 +125,8 @@ def _export_arguments(values: Mapping[str, Any]) -> list[str]:
                 arguments += ["--up" if value.startswith("+") else "--down", value[1:]]
             case "scale":
                 arguments += ["--scale", number(float(value))]
+            case "has_edits":
+                arguments += [] if value else ["--without-edits"]
             case "has_folder":
                 arguments.append("--data-folder" if value else "--one-file")
             case "scene_up":
@@ -142,6 +172,8 @@ def _video_arguments(values: Mapping[str, Any]) -> list[str]:
                 arguments += ["--background", "#{:02x}{:02x}{:02x}".format(*value)]
             case "is_transparent":
                 arguments.append("--transparent")
+            case "has_edits":
+                arguments += [] if value else ["--without-edits"]
             case "sound":
                 arguments += option("--sound", value)
             case _:

@@ -54,10 +54,11 @@ def step_command(folder: Path, before: ProjectDocument, after: ProjectDocument) 
 def edit_command(folder: Path, edit: Edit) -> CommandText:
     """The command that puts such an edit on top of the stack."""
     arguments, stdin = _edit_arguments(edit)
-    values: list[Any] = [edit.action, edit.target]
+    values: list[Any] = [edit.action]
     said = [repr(edit.action)]
     if not isinstance(edit.target, Everything):
         said.append(repr(edit.target))
+        values.append(edit.target)
     if edit.scope != EVERYWHERE:
         said.append(f"scope={edit.scope!r}")
         values.append(edit.scope)
@@ -213,7 +214,7 @@ def _numbers(values: Sequence[float]) -> tuple[str, ...]:
 
 def _names(values: Sequence[Any]) -> tuple[str, ...]:
     """Types that a statement names."""
-    found = [type(value).__name__ for value in values if not isinstance(value, Everything)]
+    found = [type(value).__name__ for value in values]
     if any(isinstance(value, Picked) for value in values):
         found.append(PickedRows.__name__)
     return tuple(found)

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from app.project.clip_versions import read_finished, recovery_hint
 from app.project.opening import open_capture_of
 from app.project.project import Project
@@ -187,6 +189,12 @@ class TrainedProject:
         if self.reference is None:
             return self.capture.rig
         return corrected(self.capture.rig, self.reference.header.camera_names, self.reference.corrections)
+
+    @property
+    def up(self) -> np.ndarray:
+        """What is up in the scene: as the user has said, else what the cameras agree on. [3]"""
+        said = self.project.document.world.up
+        return self.capture.rig.up_direction() if said is None else np.array(said)
 
     @property
     def trained(self) -> list[int]:

@@ -6,6 +6,7 @@ history.json                 the way back from the document of project.json
 project.backup.json          project.json before it was written last
 clips/0000.safetensors       finished clips
 clips/000030-000035.safetensors  one of frames 30 to 34, after a split or merge; see app.project.clip_names
+mends/0001.json              what was mended, with figures before and after
 versions/0000/               what was trained before it was trained again
 damaged/0000-1.safetensors   damaged files that were put aside
 checkpoints/0000.safetensors unfinished clips: everything needed to go on
@@ -34,8 +35,10 @@ from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.document.recovery import plain_history, recover
 from app.document.replay import JOURNAL_FOLDER
+from app.project.clip_exchange import finish_exchange
 from app.project.clip_names import clip_name, finished_files
 from app.project.header_cache import HeaderCache
+from app.project.interrupted import finish_interrupted
 from app.project.lock import ProcessLock, is_process_alive
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -248,7 +251,8 @@ class Project:
 
     def remove_files(self) -> None:
         """Take back a project that has learned nothing: its own files and folders go, other things stay."""
-        for name in ("clips", "versions", "damaged", "checkpoints", "live", "prep", "metrics", "logs", JOURNAL_FOLDER):
+        folders = ("clips", "mends", "versions", "damaged", "checkpoints", "live", "prep", "metrics", "logs")
+        for name in (*folders, JOURNAL_FOLDER):
             shutil.rmtree(self.folder / name, ignore_errors=True)
         for name in (PROJECT_FILE, BACKUP_FILE, HISTORY_FILE):
             (self.folder / name).unlink(missing_ok=True)
@@ -379,19 +383,25 @@ def open_project(
     if not is_journal_used:
         return Project(folder, plain_history(folder), None, why_read_only=why_read_only)
     store = DocumentStore(folder)
-    history = store.read()
     lock = None
-    if is_writable:
+    if is_writable and is_project(folder):  # what is not a project says so below
         lock = ProcessLock(folder / LOCK_FILE)
         lock.acquire()
-        try:
-            history = store.read()  # another program may have changed it until now
-        except ProjectError:
+    try:
+        history = store.read()
+    except ProjectError:
+        if lock is not None:
             lock.release()
-            raise
+        raise
     project = Project(folder, history, lock, store=store, why_read_only=why_read_only)
     if is_writable:
+        try:
+            finish_exchange(folder)
+        except ProjectError:
+            project.close()
+            raise
         sweep(project)
+        finish_interrupted(project)
     return project
 
 

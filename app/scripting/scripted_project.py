@@ -9,23 +9,33 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from app.document import edit_changes
-from app.document.edit_words import edit_title
+from app.document.edit_changes import edit_with
 from app.document.history import Changed, DocumentHistory, Event, Redone, Undone
 from app.document.project_document import ProjectDocument
 from app.document.stored_document import document_of, plain_document
 from app.export.export_progress import ExportProgress, ExportResult
 from app.export.named_jobs import VIDEO_FORMATS, run_named_job
 from app.project.allowed_changes import check_change
+from app.project.clip_versions import restore_version
 from app.project.opening import open_capture_of
 from app.project.project import Project, open_project
 from app.scripting.actions import action_called
+from app.session.editing.edit_commands import (
+    AddEdit,
+    ChangeEdit,
+    EditCommand,
+    MoveEdit,
+    RemoveEdit,
+    RenameEdit,
+    ToggleEdit,
+)
+from app.session.editing.edits import changed
 from app.status import TrainingStatus
 from app.training.process import ProcessWorker
 from app.training.service import Launch
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.editing.edit import EVERYWHERE, Action, Edit, Scope, Target
+from engine.editing.edit import EVERYWHERE, Action, Edit, Everything, Scope, Target
 from engine.errors import ProjectError
 from engine.kernels.cache import use_kernel_cache
 from engine.storage.typed_json import EntryError
@@ -183,7 +193,9 @@ class ScriptedProject:
     def _happen(self, event: Event) -> None:
         self._check_open()
         self._project.check_writable()
-        check_change(self._project, self.capture, self.document, self.history.after(event).present)
+        after = self.history.after(event).present
+        if after.settings != self.document.settings:  # the capture may be gone, which is nothing to an edit
+            check_change(self._project, self.capture, self.document, after)
         self._project.happen(event)
 
     # ---------------------------------------------------------------- edits
@@ -213,33 +225,35 @@ class ScriptedProject:
             ProjectError: A value is out of range or not known, or what `change` raises.
         """
         chosen, inverts = action_called(action, values)
-        document = edit_changes.add_edit(
-            self.document, chosen, target, scope=scope, is_inverted=is_inverted != inverts, name=name
-        )
-        edit = document.edits[-1]
-        self.change(document, edit_title(edit))
-        return edit
+        target = Everything() if target is None else target
+        self._carry_out(AddEdit(chosen, target, scope, is_inverted=is_inverted != inverts, name=name))
+        return self.edits[-1]
 
     def replace_edit(self, edit: Edit) -> None:
         """Put an edit in the place of the one with its number. Raises ProjectError."""
-        self.change(edit_changes.change_edit(self.document, edit), f"change {edit_title(edit)}")
+        self._carry_out(ChangeEdit(edit))
 
     def switch_edit(self, edit_id: int, *, is_on: bool) -> None:
         """Let an edit count or not. Raises ProjectError."""
-        title = edit_title(edit_changes.edit_with(self.document, edit_id))
-        self.change(
-            edit_changes.toggle_edit(self.document, edit_id, is_on), f"switch {title} {'on' if is_on else 'off'}"
-        )
+        if edit_with(self.document, edit_id).is_on != is_on:
+            self._carry_out(ToggleEdit(edit_id))
 
     def remove_edit(self, edit_id: int) -> None:
         """Take an edit out of the stack. Raises ProjectError."""
-        title = edit_title(edit_changes.edit_with(self.document, edit_id))
-        self.change(edit_changes.remove_edit(self.document, edit_id), f"remove {title}")
+        self._carry_out(RemoveEdit(edit_id))
 
     def move_edit(self, edit_id: int, position: int) -> None:
         """Bring an edit to a position of the stack, counted from 0 at the bottom. Raises ProjectError."""
-        title = edit_title(edit_changes.edit_with(self.document, edit_id))
-        self.change(edit_changes.move_edit(self.document, edit_id, position), f"move {title}")
+        self._carry_out(MoveEdit(edit_id, position))
+
+    def rename_edit(self, edit_id: int, name: str) -> None:
+        """Give an edit another name. Raises ProjectError."""
+        self._carry_out(RenameEdit(edit_id, name))
+
+    def _carry_out(self, command: EditCommand) -> None:
+        """What the window does at the same command."""
+        change = changed(self.document, command)
+        self.change(change.document, change.name)
 
     # ---------------------------------------------------------------- jobs
 
@@ -278,6 +292,18 @@ class ScriptedProject:
             is_again=is_again,
             own=settings,
         )
+
+    def restore_version(self, clip_index: int, number: int) -> None:
+        """Bring back what a clip was before it was trained again; what it is now becomes a version.
+
+        Args:
+            number: Of the version, as `clipgstream versions` lists them.
+        Raises:
+            ProjectError: There is no such version, or it does not go with the reference clip as it is now.
+        """
+        self._check_open()
+        self.clip(clip_index)
+        restore_version(self._project, clip_index, number)
 
     def render(
         self,

@@ -17,6 +17,7 @@ from app.session.editing.edit_commands import EditCommand, GoToStep
 from app.session.editing.selection_commands import SelectionCommand
 from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.files.file_commands import FileCommand
+from app.session.mending.mend_commands import MendCommand
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
 
@@ -232,6 +233,16 @@ class MarkRegion:
 
 
 @dataclass(frozen=True, slots=True)
+class MarkBox:
+    """Mark a box along the axes of the scene as MarkRegion marks a sphere."""
+
+    treat: str
+    low: tuple[float, float, float]
+    """Scene units."""
+    high: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class RemoveRegion:
     """Forget the marked region at this position of the list."""
 
@@ -362,7 +373,7 @@ class StopCalibration:
     """End the calibration that runs; nothing is written."""
 
 
-MarkCommand = MarkRegion | RemoveRegion
+MarkCommand = MarkRegion | MarkBox | RemoveRegion
 """What changes the marked regions, and can be taken back."""
 
 SettingCommand = SetHoldout | SetClipLength | SetTrainSetting | SetPreset
@@ -469,6 +480,7 @@ Command = (
     | QueueCommand
     | ClipCommand
     | ExclusionCommand
+    | MendCommand
     | PauseTraining
     | ResumeTraining
     | StopTraining

@@ -50,6 +50,7 @@ from app.session.clip_versions import Versions
 from app.session.clips.clip_commands import ClipCommand, CompareVersion
 from app.session.clips.clip_work import ClipWork
 from app.session.clips.comparing import show_version
+from app.session.copying.command_texts import CommandTexts
 from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edits import Edits
@@ -63,6 +64,8 @@ from app.session.files.project_files import ProjectFiles
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
+from app.session.mending.mend_commands import MendCommand
+from app.session.mending.mending import Mending
 from app.session.notices import Notices
 from app.session.project_opener import ProjectOpener
 from app.session.questions import ProjectQuestion, Question
@@ -117,10 +120,12 @@ class Session:
         opening: What is asked about a capture that has no project yet.
         calibrating: Plain videos on their way to a capture.
         synchronising: How far the cameras of the open capture are ahead of each other.
+        mending: A seam, or a stretch with flicker, that is mended.
         exporting: What leaves the project for other programs: what is asked, and the queue.
         recent: What was opened lately.
         files: Repairing, relocating and copying projects.
         doctor: What is wrong with the open capture, and what helps.
+        command_texts: What was done, or could be, as commands to copy.
         notices: What the user has to know.
 
     Args:
@@ -174,12 +179,14 @@ class Session:
         self.residuals = Residuals(self.playback)
         self.document = KeptDocument(guard=self._check_change, on_change=self._follow_change)
         self.clip_work = ClipWork(self._jobs, self.notices, self.live_training, self.document, self._take_question)
+        self.mending = Mending(self.live_training, lambda: self.overlays)
         self.marking, self.camera_paths = Marking(self.document), CameraPaths(self.document)
         self.selecting = Selecting(
             ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self.overlays.content)
         )
         self.selection = SelectionStatus()
         self.editing = Edits(self.document, self.selecting)
+        self.command_texts = CommandTexts(lambda: self.project, self.live_training.is_finished)
         self.edits: EditsStatus = self.editing.status()
         self.regions: RegionsStatus = self.marking.status([])
         self.paths: PathsStatus = self.camera_paths.status()
@@ -328,6 +335,8 @@ class Session:
             case _ if isinstance(command, commands.QueueCommand):
                 self.question = None
                 self.question = self._queue_commands.obey(command)
+            case _ if isinstance(command, MendCommand):
+                self.mending.apply(command, self.timeline)
             case CompareVersion():
                 show_version(command, self.timeline, self.overlays)
             case _ if isinstance(command, ClipCommand):
@@ -412,7 +421,7 @@ class Session:
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
-    def _ask(self, question: Question) -> None:
+    def _ask(self, question: Question | None) -> None:
         self.question = question
 
     def _ask_export(self) -> None:
@@ -477,6 +486,7 @@ class Session:
         self.live_training.open(changed_project)
         self.versions.open(changed_project)
         self.clip_work.open(changed_project)
+        self.mending.open(changed_project)
         self._open_residuals(changed_project)
         self.timeline.take_over(before)
 
@@ -514,6 +524,7 @@ class Session:
         self.live_training.open(opened, found.catalog)
         self.versions.open(opened)
         self.clip_work.open(opened)
+        self.mending.open(opened)
         self._open_residuals(opened)
         self.doctor.open(opened)
         self.views.look_at(opened.rig)
@@ -556,6 +567,7 @@ class Session:
         has_changed = self._jobs.poll()
         self.recent.poll()
         has_changed |= self.opening.poll() | self.calibrating.poll() | self.synchronising.poll()
+        has_changed |= self.mending.poll()
         events = self.live_training.poll()
         if any(isinstance(event, ENDINGS) for event in events):
             self._keep_recent()
@@ -594,6 +606,7 @@ class Session:
             *self.calibrating.finished,
             *self.synchronising.finished,
             *self.exporting.finished,
+            *self.mending.finished,
             self.selecting.finished,
             looked,
             self.clip_work.finished,
@@ -677,6 +690,7 @@ class Session:
         self.playback.close()
         self.versions.close()
         self.clip_work.close()
+        self.mending.close()
         self.log.close()
         if self.capture is not None:
             self.capture.close()
@@ -831,6 +845,7 @@ _TITLES: dict[type, str] = {
     commands.TrainAll: "The clips cannot be trained",
     commands.AskTrainSettings: "The clip cannot be trained",
     **dict.fromkeys(get_args(ExclusionCommand), "That cannot be excluded"),
+    **dict.fromkeys(get_args(MendCommand), "That cannot be mended"),
     **dict.fromkeys(get_args(ClipCommand), "That cannot be done with the clips"),
     commands.RestoreVersion: "The version cannot be brought back",
     commands.RemoveVersion: "The version cannot be removed",
@@ -841,6 +856,7 @@ _TITLES: dict[type, str] = {
     commands.SynchroniseCameras: "The cameras cannot be synchronised",
     **dict.fromkeys(get_args(commands.SelectionCommand), "That cannot be selected"),
     commands.MarkRegion: "The region cannot be marked",
+    commands.MarkBox: "The region cannot be marked",
     commands.RemoveRegion: "The region cannot be removed",
     commands.Undo: "The last change cannot be taken back",
     commands.Redo: "The change cannot be made again",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from app.background.kernels import warm_up_reporting
 from app.project.clip_versions import read_finished
@@ -10,11 +12,15 @@ from app.project.project import Project, open_project
 from app.training.interface import Training
 from app.training.messages import TrainJob
 from engine.backends.table import backend_called
-from engine.capture.capture import open_capture
+from engine.capture.capture import Capture, open_capture
+from engine.capture.clip import Clip
 from engine.clip_files.clip_state import ClipState
 from engine.errors import ProjectError
 from engine.progress import Progress, ReportProgress
-from engine.training.config import config_of
+from engine.training.config import TrainConfig, config_of
+
+if TYPE_CHECKING:
+    from engine.training.clip_training import ClipTraining
 
 
 def build_training(job: TrainJob, report: ReportProgress) -> Training:
@@ -23,9 +29,6 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
     Raises:
         CaptureError, ProjectError: Files are missing, damaged or do not fit together.
     """
-    from engine.training.clip_training import ClipTraining  # torch takes a second to import
-    from engine.training.variants.variant_method import method_of
-
     report(Progress("Starting", 0.0))
     warm_up_reporting(report)
     project = open_project(job.project, is_writable=False)
@@ -47,15 +50,52 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
     is_first = job.clip_index == project.settings.reference_clip
     if not is_first and (config.field == "continue" or config.start == "previous"):
         previous = _read_previous(project, job.clip_index)
-    return ClipTraining(
+    return clip_training(
+        project,
         capture,
         clips[job.clip_index],
+        config,
+        holdout=job.holdout,
+        seed=job.seed,
+        reference=reference,
+        previous=previous,
+        report=report,
+    )
+
+
+def clip_training(
+    project: Project,
+    capture: Capture,
+    clip: Clip,
+    config: TrainConfig,
+    *,
+    holdout: Sequence[int],
+    seed: int,
+    reference: ClipState | None,
+    report: ReportProgress,
+    previous: ClipState | None = None,
+) -> ClipTraining:
+    """The training of one clip of an open project, with some settings; nothing is prepared yet.
+
+    Args:
+        holdout: Camera indices never trained on.
+        seed: Fixes what is random.
+        reference: What the clip inherits from.
+        report: Told how far a preparation is.
+        previous: The clip that it goes on from.
+    """
+    from engine.training.clip_training import ClipTraining  # torch takes a second to import
+    from engine.training.variants.variant_method import method_of
+
+    return ClipTraining(
+        capture,
+        clip,
         config=config,
         method=method_of(config, previous=previous),
         backend=backend_called(config.backend),
-        holdout=job.holdout,
+        holdout=holdout,
         reference=reference,
-        seed=job.seed,
+        seed=seed,
         prep_dir=project.prep_dir,
         report=report,
         previous=previous,

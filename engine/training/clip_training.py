@@ -20,7 +20,7 @@ from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.capture.exclusions import NOTHING_EXCLUDED, exclusion_key
 from engine.clip_files.anchor_record import AnchorRecord
-from engine.clip_files.array_names import CORRECTIONS, GAINS, LOG_DRIFT
+from engine.clip_files.array_names import CORRECTIONS, DECODER, GAINS, LOG_DRIFT
 from engine.clip_files.clip_header import SCHEMA, ClipHeader, Place
 from engine.clip_files.clip_state import ClipState, fingerprint_of
 from engine.clip_files.compact import CompactClip, compact_clip
@@ -38,8 +38,11 @@ from engine.training.config import TrainConfig
 from engine.training.optimizer.optimizer import PhaseOptimizer, named_parameters
 from engine.training.phases import phase_at, phases_of
 from engine.training.preparation.clip_field import n_alive
-from engine.training.preparation.clip_preparation import ClipParts, ClipPreparation
+from engine.training.preparation.clip_preparation import ClipColors, ClipParts, ClipPreparation
+from engine.training.preparation.cloud_preparation import Backgrounds
+from engine.training.preparation.drift import no_drift
 from engine.training.preparation.method import Method
+from engine.training.preparation.training_pictures import TrainingPictures
 from engine.training.step.active_tiles import ActivePicture, ActiveTiles
 from engine.training.step.losses import photometric_loss
 from engine.training.step.nonfinite import gradient_not_finite, loss_not_finite
@@ -247,7 +250,7 @@ class ClipTraining:
             rest=active.rest,
         )
         loss, mean_square, volume = compared.loss, compared.mean_square, compared.loss.new_zeros(())
-        if self._tiles is not None:
+        if self._tiles is not None and pixels.dtype == torch.uint8:  # sums of what was taken are kept, no others
             mean_square += self._tiles.square_outside(active, item, pixels, self.gains[camera_row])
         if self.config.volume_weight and active.n_all:
             volume = (self.config.volume_weight / active.n_all) * self.backend.volume_sum(
@@ -378,6 +381,61 @@ class ClipTraining:
         self.model = load_clip_model(compact.state, self.reference, backend=self.backend, is_learning=True)
         self._sight = Sight(self.model, self._cameras.first_views, reach=self._reach)
         return compact
+
+    def measured_colors(self) -> ClipColors:
+        """The exposure of the cameras and the light in a clip that inherits, as its preparation measures them.
+
+        Raises:
+            PreparationError, CaptureError: Pictures cannot be read, or the backgrounds cannot be made.
+        """
+        assert self._base is not None
+        return self._preparation.measured_colors(self._base, self._preparation.read_pictures())
+
+    def take_up(
+        self,
+        state: ClipState,
+        pictures: TrainingPictures,
+        items: Sequence[int],
+        *,
+        n_steps: int,
+        learning: tuple[str, ...] = ("",),
+    ) -> None:
+        """Go on from a finished clip instead of `prepare`: some steps more, on pictures that the caller chooses.
+
+        For a clip that inherits from another one. Settings say how fast it learns; rates fall over these steps.
+
+        Args:
+            state: The clip, based on the same reference.
+            pictures: What is compared with, in the exposure of the reference clip; their truth may be any picture.
+            items: What is drawn in a pass: camera row * frames of the clip + frame in the clip.
+            n_steps: How many steps.
+            learning: How the names of what learns begin, as the model names its parameters.
+        Raises:
+            ProjectError: The state is incomplete, or is not of this reference.
+        """
+        assert self._base is not None
+        base, header = self._base, state.header
+        gains = torch.from_numpy(base.arrays[GAINS].copy()).to(self.backend.device, self.backend.dtype)
+        drift = state.drift
+        self.pictures = pictures
+        self._take(
+            ClipParts(
+                load_clip_model(state, self.reference, backend=self.backend, is_learning=True),
+                nn.Parameter(gains, requires_grad=False),
+                no_drift(pictures) if drift is None else drift,
+                Backgrounds.none(),
+                header.spacing,
+                moving_spacing=header.moving_spacing,
+                reasons=_reasons_in(state),
+                coverage=header.coverage,
+            )
+        )
+        for name, parameter in self.model.named_parameters():
+            if not name.startswith((DECODER, *learning)):  # heads that learn are stored, and are so ever after
+                parameter.requires_grad = False
+        self.phases, self.steps_done = [("source", n_steps)], 0
+        self._start_phase(0, 0)
+        self._order = ShuffledOrder(len(items), self.seed, items)
 
     def write_checkpoint(self, path: Path | str) -> None:
         """State, optimiser, order of pictures and random state: enough to go on exactly."""

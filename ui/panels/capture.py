@@ -10,9 +10,12 @@ from imgui_bundle import ImVec2, imgui
 
 from app.playback.orbit_view import OrbitView
 from app.session.commands import LookThrough
+from app.session.edit_status import EditsStatus
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
+from engine.text import one_line
 from ui.gl.image import ImageTexture
+from ui.panels.editing.labels import draw_label_field, with_label
 from ui.panels.excluding.excluded_drawing import ExcludedNeeds
 from ui.panels.excluding.menu import draw_exclusion_menu
 from ui.panels.state import Dispatch, Rect, UiState
@@ -62,6 +65,9 @@ class CaptureNeeds(ThumbnailNeeds, ExcludedNeeds, Protocol):
 
     @property
     def holdout(self) -> tuple[int, ...]: ...
+
+    @property
+    def edits(self) -> EditsStatus: ...
 
 
 class CapturePanel:
@@ -130,19 +136,21 @@ class CapturePanel:
             low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
             if is_visible:
                 ui.mark(f"capture.camera{index}")
-            if is_clicked:
-                dispatch(LookThrough(None if shown == index else index))
-            imgui.open_popup_on_item_click("camera menu", imgui.PopupFlags_.mouse_button_right)
-            if imgui.begin_popup("camera menu"):
+            if imgui.begin_popup_context_item("camera menu"):
+                imgui.text_disabled(one_line(name))
+                draw_label_field(session, dispatch, ui, "camera", name)
+                imgui.separator()
                 draw_exclusion_menu(session, dispatch, ui, index, session.timeline.frame_index)
                 imgui.end_popup()
+            if is_clicked:
+                dispatch(LookThrough(None if shown == index else index))
             if shown == index and shown != self._shown_camera:
                 imgui.set_scroll_here_y(0.5)
                 self._shown_camera = shown
             if is_visible:
                 row = Rect(top_left.x, low.y, high.x, high.y)
                 if self._draw_row(session, ui, row, index, index in held_out, is_shown=shown == index):
-                    imgui.set_item_tooltip(name)
+                    imgui.set_item_tooltip(with_label(session, "camera", name, name))
             imgui.pop_id()
         if shown is None:
             self._shown_camera = None
@@ -161,7 +169,8 @@ class CapturePanel:
         x, room = box.x1 + 10, row.x1 - box.x1 - 14
         if is_shown:
             push_bold(ui, ui.fonts.body_size)
-        name = elided(rig.names[index], room)
+        title = with_label(session, "camera", rig.names[index], rig.names[index])
+        name = elided(title, room)
         draw.add_text(ImVec2(x, row.y0 + 6), theme.u32(theme.TEXT), name)
         if is_shown:
             pop_bold(ui)
@@ -182,4 +191,4 @@ class CapturePanel:
             color = theme.u32(theme.YELLOW if is_excluded else theme.HELD_OUT)
             draw.add_rect(tag.low, tag.high, color, 4)
             draw.add_text(ImVec2(tag.x0 + 7, tag.y0 + 1), color, label)
-        return name != rig.names[index]
+        return name != title

@@ -122,6 +122,7 @@ class Icon:
     UP = "\uf062"
     DOWN = "\uf063"
     LOG = "\uf15c"
+    MEND = "\uf0ad"
 
 
 CLIP_ICONS: dict[str, str] = {

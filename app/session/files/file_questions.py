@@ -49,4 +49,19 @@ class SaveAsQuestion:
     n_bytes: int
 
 
-FileQuestion = RecoveryQuestion | RelocationQuestion | SaveAsQuestion
+SAVING = "Saving the project"
+"""Name of the job."""
+
+
+@dataclass(frozen=True, slots=True)
+class SavingQuestion:
+    """Is the project to go on being copied? It is up while that is done.
+
+    Attributes:
+        folder: Of the copy.
+    """
+
+    folder: Path
+
+
+FileQuestion = RecoveryQuestion | RelocationQuestion | SaveAsQuestion | SavingQuestion

@@ -14,12 +14,18 @@ from app.project.project import Project
 from app.project.project_copy import copy_bytes, copy_project
 from app.session.commands import OpenCapture, OpenProject
 from app.session.files.file_commands import AskSaveAs, CancelSaveAs, FileCommand, SaveProjectAs, ShowProjectFolder
-from app.session.files.file_questions import FileQuestion, RecoveryQuestion, RelocationQuestion, SaveAsQuestion
+from app.session.files.file_questions import (
+    SAVING,
+    FileQuestion,
+    RecoveryQuestion,
+    RelocationQuestion,
+    SaveAsQuestion,
+    SavingQuestion,
+)
 from app.session.notices import Notices
 from engine.errors import ProjectError
 
 T = TypeVar("T")
-SAVING = "Saving the project"
 
 
 class ProjectFiles:
@@ -27,7 +33,7 @@ class ProjectFiles:
 
     Args:
         jobs, notices: Of the session.
-        ask: Puts a question to the user.
+        ask: Puts a question to the user, or withdraws it.
         open_project: Opens a project.
         settle: Waits a moment until what was edited is on disk.
     """
@@ -37,7 +43,7 @@ class ProjectFiles:
         jobs: Jobs,
         notices: Notices,
         *,
-        ask: Callable[[FileQuestion], None],
+        ask: Callable[[FileQuestion | None], None],
         open_project: Callable[[OpenProject], None],
         settle: Callable[[], None],
     ) -> None:
@@ -86,13 +92,22 @@ class ProjectFiles:
         self._settle()
 
         def saved(result: None) -> None:
+            self._ask(None)
             self._notices.add("info", "The project was saved", f"It goes on in {folder}.", "")
             self._open_project(OpenProject(folder))
 
-        self._saving = self._start(SAVING, lambda context: copy_project(project, folder, context.report), saved)
+        def failed(error: Exception) -> None:
+            self._ask(None)
+            self._failed(SAVING, error)
 
-    def _start(self, name: str, work: Callable[[JobContext], T], done: Callable[[T], None]) -> Job:
-        return self._jobs.start(name, work, done, lambda error: self._failed(name, error))
+        def work(context: JobContext) -> None:
+            copy_project(project, folder, context.report)
+
+        self._saving = self._jobs.start(SAVING, work, saved, failed)
+        self._ask(SavingQuestion(folder))
+
+    def _start(self, name: str, work: Callable[[JobContext], T], done: Callable[[T], None]) -> None:
+        self._jobs.start(name, work, done, lambda error: self._failed(name, error))
 
     def _failed(self, name: str, error: Exception) -> None:
         self._notices.add_failure(f"{name} has failed", error)

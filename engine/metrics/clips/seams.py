@@ -125,10 +125,14 @@ def seam_maps(
         is_valid: What the camera sees, None for all; the others are black in all four pictures. [H, W] bool
     """
     change, truth_change = change_of(image, previous_image), change_of(truth, previous_truth)
-    sigma_px = BLUR_PX_PER_640 * max(truth.shape[1] / 640.0, 0.5)
-    blurred = ndimage.gaussian_filter(truth_change, sigma_px, mode="nearest", truncate=3.0)
-    is_static = (blurred < STATIC_THRESHOLD) & ~is_moving
+    is_static = stands_still(truth_change) & ~is_moving
     return SeamMaps(change, truth_change, excess_of(change, truth_change), is_static, is_valid)
+
+
+def stands_still(truth_change: np.ndarray) -> np.ndarray:
+    """Pixels that change by no more than noise does, by how much the truth changes [H, W]. [H, W] bool"""
+    sigma_px = BLUR_PX_PER_640 * max(truth_change.shape[1] / 640.0, 0.5)
+    return ndimage.gaussian_filter(truth_change, sigma_px, mode="nearest", truncate=3.0) < STATIC_THRESHOLD
 
 
 def part_means(values: np.ndarray, is_static: np.ndarray) -> tuple[float | None, float | None]:

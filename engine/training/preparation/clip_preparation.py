@@ -87,6 +87,20 @@ class ClipParts:
     coverage: Coverage | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class ClipColors:
+    """How a source clip's cameras and the light on it differ from the reference clip's.
+
+    Attributes:
+        drift: Exposure of each training camera in each frame. [C, M, 3] float32
+        light: Log brightness of the reference clip's static anchors at the start and the end of the clip; None where
+            it is as in the reference clip, or where they are not inherited as they are. [A, 2] float32
+    """
+
+    drift: np.ndarray
+    light: np.ndarray | None
+
+
 class ClipPreparation:
     """Prepares one clip. See the module docstring.
 
@@ -180,6 +194,26 @@ class ClipPreparation:
             PreparationError: It needs a static cloud of its own and no static point was found.
             ProjectError: The reference was trained with other cameras, or the field before cannot go on.
         """
+        parts = self._inherited_parts(reference, pictures)
+        model = parts.model
+        cloud, moving_spacing = self._moving_cloud(parts, pictures, self._motion_masks(parts, pictures))
+        coverage = add_residual(model, cloud, self._config, self._method.choose_residual)
+        self._method.adapt(model, self._config)
+        self._say("Comparing with the reference", coverage.text)
+        reasons = self._make_dynamic(parts, cloud)
+        return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage)
+
+    def measured_colors(self, reference: ClipState, pictures: TrainingPictures) -> ClipColors:
+        """What `source_parts` measures of a clip's colours, and nothing of what it builds. Removes the pictures' drift.
+
+        Raises:
+            ProjectError: The reference was trained with other cameras.
+        """
+        parts = self._inherited_parts(reference, pictures)
+        return ClipColors(parts.drift, None if parts.model.light is None else host_array(parts.model.light))
+
+    def _inherited_parts(self, reference: ClipState, pictures: TrainingPictures) -> ClipParts:
+        """A clip that takes over what another one has learned, before it is known what moves."""
         gains = self._gains(reference.arrays["gains"].copy(), is_learning=False)
         if reference.header.camera_names != list(self._cameras.rig.names):
             raise ProjectError(
@@ -200,12 +234,7 @@ class ClipPreparation:
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing)
         measure_light(model, pictures, self._cameras.rig, backgrounds, exposures, self._report)
-        cloud, moving_spacing = self._moving_cloud(parts, pictures, self._motion_masks(parts, pictures))
-        coverage = add_residual(model, cloud, self._config, self._method.choose_residual)
-        self._method.adapt(model, self._config)
-        self._say("Comparing with the reference", coverage.text)
-        reasons = self._make_dynamic(parts, cloud)
-        return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage)
+        return parts
 
     def keep_backgrounds(self, model: ClipModel, gains: nn.Parameter, backgrounds: Backgrounds) -> None:
         """Keep a trained reference clip's backgrounds for source clips, unless they are kept already.

@@ -55,6 +55,11 @@ class Backgrounds:
     images: np.ndarray
     is_stable: np.ndarray
 
+    @classmethod
+    def none(cls) -> Backgrounds:
+        """Of no camera: for a clip that goes on without them."""
+        return cls(np.zeros((0, 0, 0, 3), np.uint8), np.zeros((0, 0, 0), bool))
+
     def equals(self, other: Backgrounds) -> bool:
         """Whether both are the same in every pixel."""
         return np.array_equal(self.images, other.images) and np.array_equal(self.is_stable, other.is_stable)

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from msgspec import structs
 
 from app.document.history import Changed, DocumentHistory, Event, Redone, Undone
 from app.document.project_document import Label, Marker, ProjectDocument, World
@@ -36,10 +37,10 @@ def picked_edit(edit_id: int, n_picks: int, rng: random.Random) -> Edit:
 
 
 def random_events(
-    rng: random.Random, n: int, document: ProjectDocument = EMPTY
+    rng: random.Random, n: int, history: DocumentHistory | None = None
 ) -> Iterator[tuple[Event, DocumentHistory]]:
-    """So many events, and the history after each."""
-    history = DocumentHistory(document)
+    """So many events, and the history after each. history: What they go on from."""
+    history = DocumentHistory(EMPTY) if history is None else history
     for number in range(n):
         event: Event = Changed(*_random_change(history.present, rng, number))
         if rng.random() < 0.25 and history.past:
@@ -53,12 +54,13 @@ def random_events(
 def _random_change(document: ProjectDocument, rng: random.Random, number: int) -> tuple[str, ProjectDocument, Any]:
     kind = rng.randrange(10)
     edits = document.edits
+    new_id = max((edit.edit_id for edit in edits), default=-1) + 1
     x, y, z = (rng.uniform(-3, 3) for _ in range(3))
     if kind == 0 or (kind < 5 and not edits):
-        edit = Edit(number, f'edit {number} "%s" ##\n', Sphere((x, y, z), abs(x) + 0.1), Expose(rng.randint(-3, 3)))
+        edit = Edit(new_id, f'edit {number} "%s" ##\n', Sphere((x, y, z), abs(x) + 0.1), Expose(rng.randint(-3, 3)))
         return "add an edit", replace(document, edits=(*edits, edit)), None
     if kind == 1:
-        return "pick", replace(document, edits=(*edits, picked_edit(number, rng.randrange(200), rng))), None
+        return "pick", replace(document, edits=(*edits, picked_edit(new_id, rng.randrange(200), rng))), None
     if kind in (2, 3):
         index = rng.randrange(len(edits))
         changed = _edited(edits[index], rng)
@@ -89,7 +91,6 @@ def _random_change(document: ProjectDocument, rng: random.Random, number: int) -
 
 
 def _edited(edit: Edit, rng: random.Random) -> Edit:
-    values = {name: getattr(edit, name) for name in edit.__struct_fields__}
     first = rng.randrange(20)
     change = rng.choice(
         (
@@ -100,4 +101,4 @@ def _edited(edit: Edit, rng: random.Random) -> Edit:
             {"action": rng.choice((Hide(), Recolor(gains=(1.0, rng.random(), 1.0)), Transform((1, 0, 0))))},
         )
     )
-    return Edit(**(values | change))
+    return structs.replace(edit, **change)

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import structs
 
 from app.document.document_patch import document_difference, document_with
 from app.document.plain_patch import PatchError, difference, patched
@@ -64,8 +65,7 @@ def test_patches_between_documents_give_them_back_byte_for_byte_both_ways() -> N
 def test_switching_one_edit_off_does_not_write_what_it_picked() -> None:
     edits = tuple(picked_edit(i, 5000, random.Random(i)) for i in range(20))
     before = replace(EMPTY, edits=edits)
-    values = {name: getattr(edits[7], name) for name in edits[7].__struct_fields__}
-    after = replace(before, edits=(*edits[:7], Edit(**(values | {"is_on": False})), *edits[8:]))
+    after = replace(before, edits=(*edits[:7], structs.replace(edits[7], is_on=False), *edits[8:]))
     patch = document_difference(before, after)
     assert patch == {"edits": {"items": [[0, 7], {"of": 7, "in": {"is_on": {"is": False}}}, [8, 20]]}}
     read = document_with(before, patch)

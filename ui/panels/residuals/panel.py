@@ -12,6 +12,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.session.commands import LookThrough, SetFrame
+from app.session.mending.mend_commands import AskMend
 from app.status import CELL_COLUMNS, CELL_RANGES, LOW_IS_BAD, ResidualStatus, SeamStatus
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
@@ -75,6 +76,16 @@ def worst_seams(seams: Sequence[SeamStatus], n: int) -> list[tuple[SeamStatus, f
     """The highest ratios first."""
     known = [(seam, ratio) for seam in seams if (ratio := shown_ratio(seam)) is not None]
     return sorted(known, key=lambda pair: -pair[1])[:n]
+
+
+def _draw_seam_menu(seam: SeamStatus, dispatch: Dispatch, ui: UiState) -> None:
+    """The menu of the item drawn last: by the right button."""
+    if not imgui.begin_popup_context_item("seam menu"):
+        return
+    if imgui.menu_item("Mend this seam", "Shift+M", False)[0]:
+        dispatch(AskMend(after=seam.clip_index))
+    ui.mark(f"residuals.mend{seam.clip_index}")
+    imgui.end_popup()
 
 
 def seam_words(seam: SeamStatus, rig: CameraRig) -> str:
@@ -160,6 +171,7 @@ class ResidualsPanel:
             is_clicked = imgui.selectable("##seam", session.timeline.frame_index == seam.frame_index)[0]
             ui.mark(f"residuals.seam{seam.clip_index}")
             imgui.set_item_tooltip(seam_words(seam, session.rig))
+            _draw_seam_menu(seam, dispatch, ui)
             imgui.same_line(0, 0)
             imgui.text_colored(ImVec4(*seam_color(ratio)), Icon.SQUARE)
             imgui.same_line(0, 8)

@@ -5,12 +5,15 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from app.session.commands import SetFrame
+from app.session.mending.mend_commands import AskMend
 from engine.capture.clip import Clip
 from ui.panels.clip_training_menu import draw_clip_training
 from ui.panels.clips.menu import draw_cutting
+from ui.panels.editing.labels import draw_label_field
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import clip_title, state_words
 from ui.panels.timeline.needs import TimelineNeeds
+from ui.panels.timeline.seam_lane import seam_at
 from ui.panels.timeline.stage import Stage
 from ui.style.theme import Icon
 
@@ -22,7 +25,9 @@ def draw_clip_menu(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> 
     ui = stage.ui
     imgui.open_popup_on_item_click(POPUP, imgui.PopupFlags_.mouse_button_right)
     if imgui.is_item_hovered(imgui.HoveredFlags_.allow_when_blocked_by_popup) and imgui.is_mouse_released(1):
-        ui.timeline.menu_frame = stage.scale.frame_at(imgui.get_io().mouse_pos.x)
+        seam = seam_at(stage, session)  # its mark reaches into the clip before
+        at_pointer = stage.scale.frame_at(imgui.get_io().mouse_pos.x)
+        ui.timeline.menu_frame = at_pointer if seam is None else session.clips[seam[0]].start
     is_by_key = ui.timeline.is_menu_wanted
     if is_by_key:
         ui.timeline.is_menu_wanted = False
@@ -35,6 +40,7 @@ def draw_clip_menu(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> 
     if clip is not None:
         state = session.clip_states[clip.clip_index].state
         imgui.text_disabled(f"{clip_title(clip.clip_index, session.reference_index)}: {state_words(state)}")
+        draw_label_field(session, dispatch, ui, "clip", str(clip.start))
         imgui.separator()
         draw_clip_training(session, dispatch, ui, clip.clip_index, is_by_key=is_by_key)
         imgui.separator()
@@ -56,6 +62,8 @@ def _draw_time(clip: Clip, session: TimelineNeeds, dispatch: Dispatch, ui: UiSta
         timeline.clear_range()
     if clip.clip_index > 0 and _item(ui, "seam", f"{Icon.LOOP}  Play around its beginning", "/"):
         timeline.play_around(clip.start)
+    if clip.clip_index > 0 and _item(ui, "mend", f"{Icon.MEND}  Mend the seam at its beginning", "Shift+M"):
+        dispatch(AskMend(after=clip.clip_index))
     if _item(ui, "zoom", f"{Icon.EYE}  Show this clip only", "Z"):
         ui.timeline.show_clip(clip, timeline.n_frames)
     if _item(ui, "whole", f"{Icon.EYE}  Show the whole capture", "Z", is_enabled=ui.timeline.is_zoomed):
