@@ -88,16 +88,23 @@ class Deletions:
         return own + sum(int(rows.sum()) for clip in self.clips.values() for rows in clip.inherited.values())
 
 
-def find_deletions(project: Project, clips: Sequence[Clip], report: Report = lambda n_done, n_all: None) -> Deletions:
+def find_deletions(
+    project: Project,
+    clips: Sequence[Clip],
+    report: Report = lambda n_done, n_all: None,
+    *,
+    edits: tuple[Edit, ...] | None = None,
+) -> Deletions:
     """Look through all finished clips, one at a time; takes about a second each.
 
     Args:
         clips: All of the capture.
         report: What it raises ends the work.
+        edits: The stack; None for that of the document.
     Raises:
         ProjectError: A clip is damaged, an edit is, there is nothing to delete, or the clips share one field.
     """
-    edits = project.document.edits
+    edits = project.document.edits if edits is None else edits
     if not any(edit.is_on and isinstance(edit.action, Delete) for edit in edits):
         raise ProjectError(
             "There is nothing to apply: no edit that is on deletes anything.",

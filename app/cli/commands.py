@@ -53,6 +53,11 @@ COMMANDS = {
         "app.cli.eval_command",
         "The result was not written.",
     ),
+    "apply": Command(
+        "take what edits delete out of the clips for good",
+        "app.cli.apply_command",
+        "Edits and clips fit together, before or after.",
+    ),
     "mend": Command(
         "make a seam between two clips smaller, or a stretch that flickers, and measure it",
         "app.cli.mend_command",

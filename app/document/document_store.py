@@ -126,7 +126,7 @@ class DocumentStore:
         kept, rows, step = known.history, [], known.step
         for event in map(self._to_store, coalesced(events)):
             step += 1
-            rows.append(row_of(event, kept.present, step))
+            rows.append(row_of(event, kept, step))
             kept = kept.after(event)
         if known.journal is None:  # of an earlier schema, or its journal is gone
             self._begin(replace(known, history=kept, step=step))

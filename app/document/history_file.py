@@ -59,7 +59,7 @@ def write_history(folder: Path, history: DocumentHistory, *, step: int, document
     """
     past, future = _chain(history.present, history.past), _chain(history.present, history.future)
     content = {"history": FORMAT, "step": step, "document": document, "past": past, "future": future}
-    write_kept(folder / HISTORY_FILE, kept_text(content, max_bytes=MAX_BYTES))
+    write_kept(folder / HISTORY_FILE, kept_text(content, max_bytes=MAX_BYTES, is_for_people=False))
 
 
 def _chain(present: ProjectDocument, steps: Sequence[Step]) -> list[dict[str, Any]]:

@@ -2,8 +2,9 @@
 
     {"journal": 1, "step": 123, "document": checksum or null, "after": checksum, "checksum": ...}   what it goes on from
     {"step": 124, "do": "change", "name": ..., "merge": ..., "patch": {...}, "after": ..., "checksum": ...}
-    {"step": 125, "do": "undo", "after": ..., "checksum": ...}      or "redo", or "place" with capture and follow_links
-    {"end": 125, "after": ..., "checksum": ...}
+    {"step": 125, "do": "undo", "name": ..., "patch": {...}, "after": ..., "checksum": ...}     or "redo"
+    {"step": 126, "do": "place", "capture": ..., "follow_links": ..., "after": ..., "checksum": ...}
+    {"end": 126, "after": ..., "checksum": ...}
 
 Each line holds the checksum of the line before it as "after", and one of its own over all of it, so that no line can be
 changed, left out or moved without being noticed. The last line says that nothing is missing; the next event is written

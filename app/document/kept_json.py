@@ -57,14 +57,14 @@ class KeptText:
     checksum: str
 
 
-def kept_text(content: dict[str, Any], *, max_bytes: int = MAX_BYTES) -> KeptText:
-    """A file of a project as it is written. max_bytes: What is read again.
+def kept_text(content: dict[str, Any], *, max_bytes: int = MAX_BYTES, is_for_people: bool = True) -> KeptText:
+    """A file of a project as it is written. max_bytes: What is read again. is_for_people: See `checked_text`.
 
     Raises:
         ProjectError: It would be too large, or holds what JSON cannot.
     """
     try:
-        text, checksum = checked_text(content)
+        text, checksum = checked_text(content, is_for_people=is_for_people)
         data = text.encode("utf-8")
     except ValueError as error:  # NaN, or half a Unicode character
         raise ProjectError(f"That cannot be kept ({error}).") from error

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from app.document.document_file import PROJECT_FILE, StoredDocument, read_stored
 from app.document.document_patch import document_difference, document_with
-from app.document.history import Changed, DocumentHistory, Event, Placed, Redone, Undone
+from app.document.history import Changed, DocumentHistory, Event, Placed, Redone, Step, Undone
 from app.document.history_file import StoredHistory, history_of, read_history
 from app.document.journal_file import JournalDamage, JournalFile, Row, read_journal
 from app.document.plain_patch import PatchError
@@ -200,7 +200,7 @@ class _Replay:
             if row["step"] <= self.step:
                 continue
             try:
-                self.history = self.history.after(event_of(row, self.history.present))
+                self.history = history_after(self.history, row)
             except (PatchError, ProjectError) as error:
                 reason = error.message if isinstance(error, ProjectError) else str(error)
                 raise JournalDamage(
@@ -215,8 +215,9 @@ class _Replay:
 # ---------------------------------------------------------------- events
 
 
-def row_of(event: Event, before: ProjectDocument, step: int) -> Row:
-    """An event as a line of the journal.
+def row_of(event: Event, before: DocumentHistory, step: int) -> Row:
+    """An event as a line of the journal. What undo and redo come to is written, too, so that the document never
+    depends on the file of the way back.
 
     Args:
         event: Its merge key is a text.
@@ -225,37 +226,51 @@ def row_of(event: Event, before: ProjectDocument, step: int) -> Row:
     Raises:
         ProjectError: What it changes cannot be kept.
     """
+    after = before.after(event).present
     match event:
-        case Changed(name=name, document=document, merge=merge):
-            row: Row = {"step": step, "do": "change", "name": name, "patch": document_difference(before, document)}
-            return row if merge is None else {**row, "merge": merge}
+        case Changed(name=name, merge=merge):
+            row: Row = {"step": step, "do": "change", "name": name} | ({} if merge is None else {"merge": merge})
         case Undone():
-            return {"step": step, "do": "undo"}
+            row = {"step": step, "do": "undo", "name": before.undo_name}
         case Redone():
-            return {"step": step, "do": "redo"}
+            row = {"step": step, "do": "redo", "name": before.redo_name}
         case Placed(settings=settings):
             place = {"capture": settings.capture, "follow_links": settings.follow_links}
             return {"step": step, "do": "place", **place}
+    return {**row, "patch": document_difference(before.present, after)}
 
 
-def event_of(row: Row, before: ProjectDocument) -> Event:
-    """The event that a line holds. before: The document before it.
+def history_after(history: DocumentHistory, row: Row) -> DocumentHistory:
+    """The history after what a line holds.
 
     Raises:
         PatchError: The line holds something else.
         ProjectError: A value makes no sense.
     """
+    before = history.present
     known = {name: value for name, value in row.items() if name not in ("step", "do")}
     match row.get("do"), known:
+        case "place", {"capture": str(capture), "follow_links": bool(follow_links), **rest} if not rest:
+            return history.after(Placed(replace(before.settings, capture=capture, follow_links=follow_links)))
         case "change", {"name": str(name), "patch": patch, **rest} if rest.keys() <= {"merge"}:
             merge = rest.get("merge")
             if merge is not None and not isinstance(merge, str):
                 raise PatchError("a merge key is not a text")
-            return Changed(name, document_with(before, patch), merge)
-        case "undo", {**rest} if not rest:
-            return Undone()
-        case "redo", {**rest} if not rest:
-            return Redone()
-        case "place", {"capture": str(capture), "follow_links": bool(follow_links), **rest} if not rest:
-            return Placed(replace(before.settings, capture=capture, follow_links=follow_links))
+            return history.after(Changed(name, document_with(before, patch), merge))
+        case "undo" | "redo" as do, {"name": str(name), "patch": patch, **rest} if not rest:
+            return _gone_along(history, document_with(before, patch), name, is_undo=do == "undo")
     raise PatchError("it is not an event")
+
+
+def _gone_along(history: DocumentHistory, present: ProjectDocument, name: str, *, is_undo: bool) -> DocumentHistory:
+    """The history after an undo or redo that leads to a document. Where the way that it goes is not known, because the
+    file that held it is damaged or of a later step, it is known from there on."""
+    event = Undone() if is_undo else Redone()
+    if history.past if is_undo else history.future:
+        return replace(history.after(event), present=present)
+    if present == history.present:
+        return history
+    step = Step(name, history.present)
+    if is_undo:
+        return DocumentHistory(present, (), (*history.future, step))
+    return DocumentHistory(present, (*history.past, step), ())

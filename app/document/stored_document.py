@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -18,6 +19,9 @@ from engine.errors import ProjectError
 from engine.gate.regions import parse_region
 from engine.storage.typed_json import EntryError, to_type
 from engine.training.retired_settings import without_retired
+
+_sound: set[bytes] = set()
+"""Digests of packed numbers that could be unpacked, of this process."""
 
 
 class _Stored(Struct, frozen=True, forbid_unknown_fields=True):
@@ -168,7 +172,10 @@ def check_picks(edit: Edit) -> None:
     """
     if isinstance(edit.target, Picked):
         try:
-            for rows in edit.target.sets:
-                unpack_rows(rows.rows)
+            for picked in edit.target.sets:
+                digest = hashlib.blake2b(picked.rows, digest_size=16).digest()
+                if digest not in _sound:  # unpacking takes far longer, and a document is read again and again
+                    unpack_rows(picked.rows)
+                    _sound.add(digest)
         except ValueError as error:
             raise ProjectError(f"Edit {edit.edit_id} cannot be read: {error}.") from error

@@ -124,6 +124,9 @@ def open_for_window(
             return _open_project(project_dir, current, context, there, follow_links=follow_links, choices=choices)
         return _make_project(project_dir, capture, answers, choices, is_asking=is_asking)
     found = projects_of(capture, recent)
+    if not found and not is_new_project:
+        for folder in _kept_dirs(capture):
+            _read_settings(folder, choices)  # one that is damaged is asked about, not passed over
     if is_new_project or not found:
         return _make_project(new_project_dir(capture), capture, answers, choices, is_asking=is_asking)
     if len(found) > 1:
@@ -242,7 +245,7 @@ def _recovered(project: Project) -> list[Note]:
 def projects_of(capture: Capture, recent: Sequence[RecentProject] = ()) -> list[RecentProject]:
     """Projects of a capture: those that the window keeps, and those of the recent ones that were made for it."""
     place = Path(capture.path).resolve()
-    kept = sorted(default_project_dir(capture).parent.glob(f"{default_project_dir(capture).name}*"))
+    kept = _kept_dirs(capture)
     folders = [entry.folder for entry in recent if entry.project and Path(entry.capture) == place]
     found = []
     for folder in dict.fromkeys(path.resolve() for path in [*folders, *kept]):
@@ -258,6 +261,12 @@ def projects_of(capture: Capture, recent: Sequence[RecentProject] = ()) -> list[
             opened = next((entry.opened for entry in recent if entry.folder == folder), "")
             found.append(RecentProject(str(folder), str(place), name, n_trained, n_clips, opened))
     return found
+
+
+def _kept_dirs(capture: Capture) -> list[Path]:
+    """Folders of projects of a capture that the window has made."""
+    usual = default_project_dir(capture)
+    return [folder for folder in sorted(usual.parent.glob(f"{usual.name}*")) if is_project(folder)]
 
 
 def new_project_dir(capture: Capture) -> Path:

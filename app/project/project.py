@@ -383,16 +383,16 @@ def open_project(
     if not is_journal_used:
         return Project(folder, plain_history(folder), None, why_read_only=why_read_only)
     store = DocumentStore(folder)
-    history = store.read()
     lock = None
-    if is_writable:
+    if is_writable and is_project(folder):  # what is not a project says so below
         lock = ProcessLock(folder / LOCK_FILE)
         lock.acquire()
-        try:
-            history = store.read()  # another program may have changed it until now
-        except ProjectError:
+    try:
+        history = store.read()
+    except ProjectError:
+        if lock is not None:
             lock.release()
-            raise
+        raise
     project = Project(folder, history, lock, store=store, why_read_only=why_read_only)
     if is_writable:
         try:

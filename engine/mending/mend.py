@@ -9,6 +9,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from msgspec.structs import replace as with_entries
+
 from engine.backends.table import backend_called
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
@@ -126,11 +128,13 @@ class Mending:
             )
         found = diagnose(self._capture, self._shown, self._stretch, self._cameras)
         attempts: list[Attempt] = []
-        for name in ("light", "fade", "joint") if method == "auto" else (method,):
+        for name, is_other in self._plan(method):
             if method == "auto" and (best.is_enough(before) or (name == "light" and not found.is_light_likely)):
                 continue
+            if is_other and best.is_enough(before):
+                continue
             started_s = time.monotonic()
-            words, tried = _WAYS[name](self, best)
+            words, tried = self._try(name, is_other=is_other)
             if not tried:
                 continue
             shown = self._shown | {index: self._trained(index, clip.state) for index, clip in tried.items()}
@@ -145,12 +149,26 @@ class Mending:
         if self._kept:
             self._say(MEASURING, 0.95, "the result")
             best = self._measuring.measure(self._shown, with_held_out=True)
+            self._kept = {
+                index: _with_psnr(clip, best.held_out_psnr.get(str(index))) for index, clip in self._kept.items()
+            }
         self._say(MEASURING, 1.0, "")
         return Mended(self._stretch, before, best if self._kept else before, tuple(attempts), self._kept, found)
 
     # ---------------------------------------------------------------- ways to mend
 
-    def _light(self, best: StretchFigures) -> tuple[str, dict[int, CompactClip]]:
+    def _plan(self, method: str) -> list[tuple[str, bool]]:
+        """What to try, in order: a way, and whether with the other clip, where one was tried and it did not suffice."""
+        names = ["light", "fade", "joint"] if method == "auto" else [method]
+        plan = [(name, False) for name in names]
+        return [*plan, ("joint", True)] if "joint" in names and len(self._open) > 1 else plan
+
+    def _try(self, name: str, *, is_other: bool) -> tuple[str, dict[int, CompactClip]]:
+        if name == "light":
+            return self._light()
+        return self._fade() if name == "fade" else self._joint(is_other=is_other)
+
+    def _light(self) -> tuple[str, dict[int, CompactClip]]:
         start, _ = _SHARES["light"]
         self._say(LIGHT, start, "exposure and light of the clips")
         tried = {}
@@ -160,7 +178,7 @@ class Mending:
                 tried[index] = clip
         return f"Exposure and light of {_named(tried)} were measured again", tried
 
-    def _fade(self, best: StretchFigures) -> tuple[str, dict[int, CompactClip]]:
+    def _fade(self) -> tuple[str, dict[int, CompactClip]]:
         looks = self._looks()
         indices = self._moving(looks)
         frames = [frame for index in indices for frame in self._stretch.frames_in(self._clips[index])]
@@ -172,9 +190,9 @@ class Mending:
         whom = "each other" if len(tried) > 1 else "what lies beside it"
         return f"{len(span)} frames of {_named(tried)} go over into {whom}", tried
 
-    def _joint(self, best: StretchFigures) -> tuple[str, dict[int, CompactClip]]:
+    def _joint(self, *, is_other: bool) -> tuple[str, dict[int, CompactClip]]:
         looks = self._looks()
-        index = self._moving(looks, is_one=True)[0]
+        index = self._worse_first(looks)[1 if is_other else 0]
         clip, report = self._clips[index], self._part(TRAINING, "joint", 0, 1, f"clip {index}")
         span = range(clip.start, clip.stop)
         tried = faded(self._states[index], clip, span, looks, self._make, report, is_learning=True)
@@ -183,19 +201,20 @@ class Mending:
     def _looks(self) -> Looks:
         return Looks(self._capture, self._shown, self._cameras)
 
-    def _moving(self, looks: Looks, *, is_one: bool = False) -> list[int]:
-        """Clips that change: of two, one of which shows much worse what stands still, that one.
+    def _moving(self, looks: Looks) -> list[int]:
+        """Clips that fade: of two, one of which shows much worse what stands still, that one."""
+        if len(self._open) < 2:
+            return self._open
+        errors = looks.errors_across(self._clips[self._open[1]].start)
+        is_clear = max(errors) > _CLEAR_RATIO * min(errors)
+        return self._worse_first(looks)[:1] if is_clear else self._open
 
-        Args:
-            looks: Clips as they are.
-            is_one: Whether it has to be one, whichever is worse.
-        """
+    def _worse_first(self, looks: Looks) -> list[int]:
+        """Clips that may change; of two, the one first that shows worse what stands still."""
         if len(self._open) < 2:
             return self._open
         before, after = looks.errors_across(self._clips[self._open[1]].start)
-        worse = self._open[0] if before > after else self._open[1]
-        is_clear = max(before, after) > _CLEAR_RATIO * min(before, after)
-        return [worse] if is_one or is_clear else self._open
+        return self._open if before > after else self._open[::-1]
 
     # ---------------------------------------------------------------- helpers
 
@@ -221,11 +240,8 @@ class Mending:
         self._report(Progress(stage, self._share, message))
 
 
-_WAYS: dict[str, Callable[[Mending, StretchFigures], tuple[str, dict[int, CompactClip]]]] = {
-    "light": Mending._light,
-    "fade": Mending._fade,
-    "joint": Mending._joint,
-}
+def _with_psnr(clip: CompactClip, held_out_psnr: float | None) -> CompactClip:
+    return clip.with_figures(with_entries(clip.state.header.figures, held_out_psnr=held_out_psnr))
 
 
 def _named(clips: Mapping[int, object]) -> str:

@@ -186,14 +186,19 @@ def write_checked_json(
         partial.write_text(text, encoding="utf-8")
 
 
-def checked_text(document: dict[str, Any]) -> tuple[str, str]:
+def checked_text(document: dict[str, Any], *, is_for_people: bool = True) -> tuple[str, str]:
     """What `write_checked_json` writes, and the checksum in it.
+
+    Args:
+        is_for_people: Over many lines, which takes several times as long.
 
     Raises:
         ValueError: The document holds NaN.
     """
     checksum = checksum_of(document)
-    return json.dumps(document | {CHECKSUM: checksum}, indent=2, allow_nan=False) + "\n", checksum
+    return json.dumps(
+        document | {CHECKSUM: checksum}, indent=2 if is_for_people else None, allow_nan=False
+    ) + "\n", checksum
 
 
 def read_checked_json(path: Path | str, *, max_bytes: int = MAX_JSON_BYTES) -> dict[str, Any]:

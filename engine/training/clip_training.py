@@ -432,7 +432,7 @@ class ClipTraining:
         )
         for name, parameter in self.model.named_parameters():
             if not name.startswith((DECODER, *learning)):  # heads that learn are stored, and are so ever after
-                parameter.requires_grad_(requires_grad=False)
+                parameter.requires_grad = False
         self.phases, self.steps_done = [("source", n_steps)], 0
         self._start_phase(0, 0)
         self._order = ShuffledOrder(len(items), self.seed, items)

@@ -36,10 +36,12 @@ _steps: list[tuple[bytes, ...]] = []
 def make_document(folder: Path) -> None:
     """A project with some history, as it is after a kill."""
     from app.document.document_store import DocumentStore
+    from app.document.history import DocumentHistory, Redone, Undone
     from tests.app.document.documents import EMPTY, as_bytes, random_events
 
     store = DocumentStore(folder)
     store.create(EMPTY)
+    history = DocumentHistory(EMPTY)
     _states.add(as_bytes(EMPTY))
     compactions = {N_EVENTS[0], N_EVENTS[0] + N_EVENTS[1]}
     for number, (event, history) in enumerate(random_events(random.Random(11), sum(N_EVENTS)), start=1):
@@ -47,7 +49,11 @@ def make_document(folder: Path) -> None:
         _states.add(as_bytes(history.present))
         if number in compactions:
             store.compact()
-    _steps[:] = [steps_of(store.read())]
+    for event in (*[Undone()] * 15, *[Redone()] * 4):  # beyond the project.json of now
+        history = history.after(event)
+        store.write([event], history)
+        _states.add(as_bytes(history.present))
+    _steps[:] = [steps_of(history)]
 
 
 def steps_of(history: Any) -> tuple[bytes, ...]:

@@ -90,12 +90,15 @@ class KillTest:
     """Kills programs that edit one project. work: An empty folder."""
 
     def __init__(self, work: Path, rng: random.Random) -> None:
-        from app.document.project_settings import ProjectSettings
-        from app.project.project import create_project
-
         self.tally = Tally()
         self.folder = work / "project"
         self._rng = rng
+        self._make()
+
+    def _make(self) -> None:
+        from app.document.project_settings import ProjectSettings
+        from app.project.project import create_project
+
         create_project(self.folder, ProjectSettings(capture="none", fingerprint="none")).close()
 
     def run(self, n_kills: int) -> None:
@@ -125,7 +128,8 @@ class KillTest:
         except EngineError as error:
             self.tally.faults.append(f"{where}: it does not open: {error}")
             shutil.rmtree(self.folder)
-            raise
+            self._make()
+            return
         found, notes = project.history, project.store.notes
         if self._rng.random() < 0.3:
             project.close()
@@ -217,6 +221,9 @@ def kill_windows(work: Path, n_kills: int, rng: random.Random, tally: Tally) -> 
             desk.close()
         if folder is None:
             (folder,) = (path.parent for path in (work / "home").rglob("project.json"))
+        tally.n_steps += n_seen - n_before
+        if n_seen == n_before:
+            tally.faults.append(f"window {number}: no key was set")
         project = open_project(folder, is_writable=False)
         n_before = sum(len(path.keys) for path in project.document.camera_paths)
         tally.kills["of the window"] += 1

@@ -42,6 +42,7 @@ from app.session.editing.selecting import SelectionStatus
 from app.session.editing.selection import NOTHING_SELECTED, Selection
 from app.session.exporting import ExportPage
 from app.session.marking import after_marking
+from app.session.mending.mend_page import MendPage
 from app.session.notices import Notices
 from app.session.path_edits import edited
 from app.session.questions import OpeningPage, Question, RetrainQuestion
@@ -67,6 +68,7 @@ from app.status import (
 )
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.clip import Clip, split_clips
+from engine.capture.exclusions import NOTHING_EXCLUDED
 from engine.doctor.finding import Finding
 from engine.editing.selection.ranges import Spread, spread_of
 from engine.editing.selection.seen_from import SeenFrom
@@ -172,6 +174,14 @@ class FakeSelecting:
 
 
 @dataclass
+class FakeMending:
+    """What the window of mending reads."""
+
+    page: MendPage | None = None
+    progress: JobStatus | None = None
+
+
+@dataclass
 class FakeExporting:
     """What the window reads of Exporting; `asked` are the choices that a plan was wanted for.
 
@@ -215,9 +225,11 @@ class FakeSession:
         self.calibrating = FakeCalibrating()
         self.synchronising = FakeSynchronising()
         self.exporting = FakeExporting()
+        self.mending = FakeMending()
         self.queue = QueueStatus()
         self.usage = UsageStatus(window_mb=412.0, window_cores=0.1, n_cores=2)
         self.disk: DiskUse | None = None
+        self.exclusions = NOTHING_EXCLUDED
         self.versions: dict[int, tuple[VersionStatus, ...]] = {}
         self.curves: dict[int, tuple[list[tuple[int, float]], list[tuple[int, float]]]] = {}
         self.lines: tuple[LogLine, ...] = ()

@@ -46,6 +46,7 @@ def describe(studio: Any) -> dict[str, Any]:
         "notices": [[notice.kind, notice.title, notice.detail, notice.hint] for notice in session.notices],
         "jobs": [job.name for job in session.jobs],
         "exports": [[one.title, one.state, one.done, one.message] for one in session.exporting.statuses],
+        "mending": None if session.mending.page is None else session.mending.page.state,
         "regions": [region.as_dict() for region in session.regions.regions],
         "can_mark": session.regions.can_mark,
         "n_keys": sum(len(path.keys) for path in session.paths.paths),

@@ -16,8 +16,11 @@ from engine.capture.clip import Clip
 from engine.text import one_line
 from ui.gl.image import ImageTexture
 from ui.panels.editing.labels import draw_label_field, with_label
+from ui.panels.excluding.excluded_drawing import ExcludedNeeds
+from ui.panels.excluding.menu import draw_exclusion_menu
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.thumbnails import ThumbnailNeeds, Thumbnails
+from ui.panels.timeline.stage import hatch
 from ui.panels.widgets import elided, pop_bold, push_bold, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
@@ -25,7 +28,7 @@ from ui.style.theme import Icon
 
 ROW_HEIGHT = 50.0
 PICTURE_SIZE = (64.0, 40.0)
-HELD_OUT_WORDS = ("held out", "test")
+HELD_OUT_WORDS, EXCLUDED_WORDS = ("held out", "test"), ("excluded", "out")
 """The longest that there is room for."""
 
 
@@ -48,7 +51,7 @@ class CaptureFacts(Protocol):
     def fps(self) -> float: ...
 
 
-class CaptureNeeds(ThumbnailNeeds, Protocol):
+class CaptureNeeds(ThumbnailNeeds, ExcludedNeeds, Protocol):
     """What this panel reads."""
 
     @property
@@ -136,6 +139,8 @@ class CapturePanel:
             if imgui.begin_popup_context_item("camera menu"):
                 imgui.text_disabled(one_line(name))
                 draw_label_field(session, dispatch, ui, "camera", name)
+                imgui.separator()
+                draw_exclusion_menu(session, dispatch, ui, index, session.timeline.frame_index)
                 imgui.end_popup()
             if is_clicked:
                 dispatch(LookThrough(None if shown == index else index))
@@ -172,13 +177,18 @@ class CapturePanel:
         width, height = (int(v) for v in rig.image_sizes[index])
         size = f"{width} x {height}"
         size_width = imgui.calc_text_size(size).x
-        label = next((word for word in HELD_OUT_WORDS if imgui.calc_text_size(word).x + 14 <= room), "")
-        is_size_shown = not (is_held_out and size_width + imgui.calc_text_size(label).x + 22 > room)
+        is_excluded = rig.names[index] in session.exclusions.cameras
+        if is_excluded:
+            hatch(draw, box, theme.ON_PICTURE.yellow, 9.0)
+        is_marked, words = is_held_out or is_excluded, EXCLUDED_WORDS if is_excluded else HELD_OUT_WORDS
+        label = next((word for word in words if imgui.calc_text_size(word).x + 14 <= room), "")
+        is_size_shown = not (is_marked and size_width + imgui.calc_text_size(label).x + 22 > room)
         if is_size_shown:
             draw.add_text(ImVec2(x, row.y0 + 26), theme.u32(theme.TEXT_DIM), size)
-        if is_held_out and label:
+        if is_marked and label:
             left = row.x1 - 18 - imgui.calc_text_size(label).x if is_size_shown else x
             tag = Rect(left, row.y0 + 25, left + imgui.calc_text_size(label).x + 14, row.y0 + 44)
-            draw.add_rect(tag.low, tag.high, theme.u32(theme.HELD_OUT), 4)
-            draw.add_text(ImVec2(tag.x0 + 7, tag.y0 + 1), theme.u32(theme.HELD_OUT), label)
+            color = theme.u32(theme.YELLOW if is_excluded else theme.HELD_OUT)
+            draw.add_rect(tag.low, tag.high, color, 4)
+            draw.add_text(ImVec2(tag.x0 + 7, tag.y0 + 1), color, label)
         return name != title

@@ -21,6 +21,8 @@ from ui.panels.editing.handle_drawing import draw_edit_hint, draw_handles, draw_
 from ui.panels.editing.select_drawing import draw_hint, draw_tool
 from ui.panels.editing.select_grip import DRAG as SELECT
 from ui.panels.editing.select_grip import SelectGrip
+from ui.panels.excluding.excluded_drawing import ExcludedDrawing
+from ui.panels.excluding.mask_grip import follow_brush
 from ui.panels.gizmo import draw_gizmo, gizmo_rect
 from ui.panels.heat_overlay import HeatNeeds, HeatOverlay
 from ui.panels.hud import Hud, HudNeeds
@@ -53,6 +55,7 @@ class PicturePane:
         self.keys = KeyGrip()
         self.editing = EditGrip()
         self.selecting = SelectGrip()
+        self.excluded = ExcludedDrawing()
         self.hud = Hud()
         self._aimed_at = (0.0, 0.0)
         self._captured_frame: int | None = None
@@ -153,6 +156,7 @@ class PicturePane:
             self.editing.follow(session, dispatch, ui, self.pointer, view, pane, density, pick)
         self._select(session, dispatch, ui, view, pane, density)
         if is_active:
+            follow_brush(session, dispatch, ui, self.pointer, pane)
             self._aim(session, ui, view, pane, density)
             command = ui.regions.take_accepted()
             if command is not None:
@@ -163,6 +167,7 @@ class PicturePane:
         composed = self.scene.compose(session, view, shown)
         draw.add_image(imgui.ImTextureRef(composed.texture.glo), pane.low, pane.high)
         self.heat.draw(session, ui, pane)
+        self.excluded.draw(draw, session, ui, pane)
         if is_active or self.pointer.drag == SELECT:
             draw_tool(draw, ui.selecting, view, pane, density, np.asarray(session.view.up, np.float64))
         subject = subject_of(session, ui)
@@ -171,7 +176,11 @@ class PicturePane:
         draw_points(draw, ui.editing, view, pane, density)
         if self.pointer.is_moving:
             ui.redraw_within(MOVING_S)
-        elif imgui.is_item_hovered() and self.pointer.drag is None and not (tool.is_active or ui.selecting.is_active):
+        elif (
+            imgui.is_item_hovered()
+            and self.pointer.drag is None
+            and not (tool.is_active or ui.selecting.is_active or ui.masks.is_active)
+        ):
             camera, key = self.scene.marks.pointed_camera, self.scene.path.pointed_key
             if key is not None:
                 words = f"{key_words(session.paths, key)}\nDrag moves it, with Ctrl along the view"
@@ -222,7 +231,7 @@ class PicturePane:
 
     def _point_at_camera(self, session: PictureNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """The camera under the pointer stands out; one that was pressed is remembered for the click."""
-        is_choosing = ui.regions.is_active or ui.selecting.is_active
+        is_choosing = ui.regions.is_active or ui.selecting.is_active or ui.masks.is_active
         is_free = imgui.is_item_hovered() and not is_choosing and self.scene.path.pointed_key is None
         is_pressing = imgui.is_item_activated() and self.pointer.button == imgui.MouseButton_.left
         marks = self.scene.marks

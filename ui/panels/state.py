@@ -23,6 +23,7 @@ from ui.style.fonts import Fonts
 from ui.style.ui_scale import UiScale
 from ui.viewport.editing.edit_tool import EditTool
 from ui.viewport.editing.select_tool import SelectTool
+from ui.viewport.excluding.mask_tool import MaskTool
 from ui.viewport.path_tool import PathTool
 from ui.viewport.region_tool import RegionTool
 
@@ -79,6 +80,7 @@ class UiState:
         regions: The region that is being chosen, and the one that stands out.
         selecting: The tool that selects, and its options.
         editing: Which edit is chosen, and what is being done to it.
+        masks: The brush that paints what training does not see.
         paths: What is being done to the keys of the camera path.
         navigation: What mouse and keys do over a picture.
         curves: What the plots of the training panel show.
@@ -104,6 +106,7 @@ class UiState:
     regions: RegionTool = field(default_factory=RegionTool)
     selecting: SelectTool = field(default_factory=SelectTool)
     editing: EditTool = field(default_factory=EditTool)
+    masks: MaskTool = field(default_factory=MaskTool)
     paths: PathTool = field(default_factory=PathTool)
     navigation: Navigation = field(default_factory=Navigation)
     pointed_anchor: np.ndarray | None = None

@@ -221,11 +221,11 @@ class Frame:
             (EDITS, draw_edits, True),
             (RESIDUALS, self.residuals.draw, True),
             (PATHS, draw_paths, True),
-            (HISTORY, HistoryPanel().draw, True),
             (TIMELINE, draw_timeline, True),
             (LOG, self.log.draw, True),
             (DOCTOR, self.doctor.draw, True),
             (EXPORTS, draw_exports, True),
+            (HISTORY, HistoryPanel().draw, True),
             (VIEWPORT, self.viewport.draw, False),  # last: it shows what the others have just changed
         )
 

@@ -65,12 +65,12 @@ def put_in_place(project: Project, record: MendRecord, drafts: Mapping[int, Path
             except OSError as error:
                 raise disk_error(error, what="The mended clip", path=path) from error
         number = keep_record(project, record)
-    except ProjectError:
+    except BaseException:  # an interruption, too
         _take_back(project, record)
+        unfinished.unlink(missing_ok=True)
         raise
-    finally:
-        with suppress(OSError):
-            unfinished.unlink(missing_ok=True)
+    with suppress(OSError):
+        unfinished.unlink(missing_ok=True)
     for clip in record.clips:
         forget_oldest(project, clip.clip_index)
     return number

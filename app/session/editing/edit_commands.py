@@ -134,7 +134,7 @@ class SetScaleByLength:
 
 @dataclass(frozen=True, slots=True)
 class SetScale:
-    """Say how long a scene unit is, m; None where nobody knows."""
+    """Say how long a scene unit is, m; None takes it back."""
 
     meters_per_unit: float | None
 

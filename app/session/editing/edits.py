@@ -54,7 +54,7 @@ class Edits:
         return EditsStatus(why_not=why_not) if content is None else edits_status(content, why_not)
 
     def apply(self, command: c.EditCommand) -> None:
-        """Carry out a command; one that changes nothing is no step of the history.
+        """Carry out a command; one that changes nothing does not become a step of the history.
 
         Raises:
             ProjectError: It cannot be done now, or makes no sense.

@@ -152,6 +152,30 @@ def test_a_project_json_that_was_never_really_renamed_loses_nothing(tmp_path: Pa
     same(DocumentStore(tmp_path).read(), history)
 
 
+@pytest.mark.parametrize("lost", ["project.json", "history.json", "both"])
+def test_going_back_beyond_the_last_project_json_needs_no_history(tmp_path: Path, lost: str) -> None:
+    store, history = made(tmp_path)
+    for frame in range(4):
+        history = happen(store, history, marked(history, frame, f"drag {frame // 2}"))
+    store.compact()
+    old = {name: (tmp_path / name).read_bytes() for name in ("project.json", "history.json")}
+    history = happen(store, history, marked(history, 4, "drag 1"), Undone(), Undone(), Redone(), Undone())
+    history = happen(store, history, Redone(), marked(history, 5), Undone(), Undone())
+    store.compact()
+    history = happen(store, history, Redone(), Redone())
+    for name in old if lost == "both" else [lost]:
+        (tmp_path / name).write_bytes(old[name])
+    store = DocumentStore(tmp_path)
+    found = store.read()
+    assert as_bytes(found.present) == as_bytes(history.present)
+    if lost == "history.json":
+        assert "cannot be taken back" in store.notes[0]
+    else:
+        same(found, history)
+    history = happen(store, found, Undone(), marked(found, 6))
+    same(DocumentStore(tmp_path).read(), history)
+
+
 def test_a_journal_that_breaks_off_costs_the_last_step_and_says_so(tmp_path: Path) -> None:
     store, history = made(tmp_path / "p")
     states = [history]

@@ -17,6 +17,7 @@ from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.selecting import SelectionStatus
 from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
 from engine.camera.rig import CameraRig
+from engine.capture.exclusions import Exclusions
 from ui.panels.editing.edit_subject import Selects
 from ui.panels.editing.mend_panel import HasMending
 from ui.panels.regions import RegionsNeeds
@@ -71,6 +72,10 @@ class ActionNeeds(RegionsNeeds, HasMending, Protocol):
     def edits(self) -> EditsStatus: ...
 
     def shown_anchors(self) -> AnchorArrays | None: ...
+
+    @property
+    def exclusions(self) -> Exclusions: ...
+
     def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]: ...
 
     def shown_gaussians(self) -> GaussianArrays | None: ...

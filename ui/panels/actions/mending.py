@@ -8,8 +8,10 @@ from ui.panels.state import Dispatch, UiState
 
 
 def _mend_seam(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    """Ask about the seam nearest to the playhead; what is asked already begins."""
-    clips, frame = session.timeline.clips, session.timeline.frame_index
+    """Ask about the seam that is played around, else about the nearest one; what is asked already begins."""
+    timeline = session.timeline
+    clips, around = timeline.clips, timeline.around
+    frame = timeline.frame_index if around is None else (around[0] + around[1]) / 2
     page = session.mending.page
     if page is not None and page.state == "asking":
         dispatch(StartMend())

@@ -92,6 +92,7 @@ def _draw_scope(session: MakingNeeds, dispatch: Dispatch, ui: UiState, edit: Edi
         imgui.end_combo()
     else:
         ui.mark("edits.scope")
+        imgui.set_item_tooltip(reach_text(scope, timeline))
     if scope.stop is not None:
         frames = (scope.first, scope.stop - 1)
         found = whole_numbers(ui, "frames", "Frames", frames, low=0, high=timeline.last_frame)
@@ -99,7 +100,6 @@ def _draw_scope(session: MakingNeeds, dispatch: Dispatch, ui: UiState, edit: Edi
             first, last = (found[0], max(found)) if found[0] != frames[0] else (min(found), found[1])
             wanted = Scope(min(first, last), max(first, last) + 1, scope.is_reference_only)
             dispatch(ChangeEdit(structs.replace(edit, scope=wanted), ui.editing.gesture, "scope"))
-    text_wrapped_dim(reach_text(scope, timeline))
 
 
 def _draw_target(ui: UiState, target: Target) -> Target | None:

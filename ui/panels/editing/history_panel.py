@@ -48,14 +48,16 @@ class HistoryPanel:
                 clipper.include_item_by_index(present)
             while clipper.step():
                 for row in range(clipper.display_start, clipper.display_end):
-                    _draw_step(session, dispatch, ui, row, names[row], present)
+                    is_seen = _draw_step(session, dispatch, ui, row, names[row], present)
                     if row == present != self._seen:
-                        imgui.set_scroll_here_y(0.5)
                         self._seen = present
+                        if not is_seen:  # else what was clicked would move away from the pointer
+                            imgui.set_scroll_here_y(0.5)
         imgui.end_child()
 
 
-def _draw_step(session: HistoryNeeds, dispatch: Dispatch, ui: UiState, row: int, name: str, present: int) -> None:
+def _draw_step(session: HistoryNeeds, dispatch: Dispatch, ui: UiState, row: int, name: str, present: int) -> bool:
+    """Whether it is in sight."""
     imgui.push_id(row)
     if imgui.selectable("##step", row == present)[0] and row != present:
         dispatch(GoToStep(row - present))
@@ -63,7 +65,8 @@ def _draw_step(session: HistoryNeeds, dispatch: Dispatch, ui: UiState, row: int,
         draw_copy_entries(ui, "history.menu", lambda: session.command_texts.step(present - row))
         imgui.end_popup()
     low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-    if imgui.is_item_visible():
+    is_seen = imgui.is_item_visible()
+    if is_seen:
         ui.mark_rect(f"history.step{row}", Rect(low.x, low.y, high.x, high.y))
     imgui.same_line(4)
     color = theme.TEXT if row <= present else theme.TEXT_DIM
@@ -72,3 +75,4 @@ def _draw_step(session: HistoryNeeds, dispatch: Dispatch, ui: UiState, row: int,
     imgui.text(elided(text, imgui.get_content_region_avail().x))
     imgui.pop_style_color()
     imgui.pop_id()
+    return is_seen

@@ -130,6 +130,9 @@ def _draw_progress(progress: JobStatus | None, dispatch: Dispatch, ui: UiState) 
 
 
 def _draw_result(page: MendPage, record: MendRecord, dispatch: Dispatch, ui: UiState) -> None:
+    if page.compared is not None:  # out of the way of what is compared
+        _draw_buttons(page, record, dispatch, ui)
+        return
     if page.state == "reverted":
         _line(Icon.UNDO, theme.SKY, "Taken back: the clips are as they were before.")
     elif record.has_helped:
@@ -148,6 +151,10 @@ def _draw_result(page: MendPage, record: MendRecord, dispatch: Dispatch, ui: UiS
                 dispatch(TrainClip(int(worst)))
             ui.mark("mend.retrain")
     imgui.spacing()
+    _draw_buttons(page, record, dispatch, ui)
+
+
+def _draw_buttons(page: MendPage, record: MendRecord, dispatch: Dispatch, ui: UiState) -> None:
     width = (imgui.get_content_region_avail().x - 2 * imgui.get_style().item_spacing.x) / 3
     if page.state == "done" and record.has_helped:
         label = "Only now" if page.compared is not None else "A/B: before"

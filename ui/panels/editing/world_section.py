@@ -67,7 +67,7 @@ def draw_world(session: WorldNeeds, dispatch: Dispatch, ui: UiState) -> None:
         "##scale", world.meters_per_unit or 0.0, 0.0, 0.0, "%.6g m", imgui.InputTextFlags_.enter_returns_true
     )
     ui.mark("world.scale")
-    imgui.set_item_tooltip("Length of a unit of the scene; 0 where nobody knows. Exports are written in metres then.")
+    imgui.set_item_tooltip("Length of a unit of the scene, 0 if not known. With it, exports are in metres.")
     if is_entered and math.isfinite(typed):
         dispatch(SetScale(typed if typed > 0.0 else None))
     label_before("Length")

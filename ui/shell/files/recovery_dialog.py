@@ -78,9 +78,8 @@ class RecoveryDialog:
         self._chosen = (self._chosen + step) % len(found)
         answer = None
         for index, way in enumerate(found):
-            if self._draw_way(index, way):
+            if self._draw_way(index, way, ui):
                 answer = way.command
-            ui.mark(f"question.way{index}")
         imgui.spacing()
         imgui.separator()
         imgui.spacing()
@@ -94,11 +93,12 @@ class RecoveryDialog:
         ui.mark("question.no")
         return answer
 
-    def _draw_way(self, index: int, way: Way) -> bool:
+    def _draw_way(self, index: int, way: Way, ui: UiState) -> bool:
         """A row: title and what it means. True when it is taken by a double click."""
         start, width = imgui.get_cursor_pos(), imgui.get_content_region_avail().x
         flags = imgui.SelectableFlags_.allow_double_click | imgui.SelectableFlags_.no_auto_close_popups
         is_clicked = imgui.selectable(f"##way{index}", index == self._chosen, flags, ImVec2(width, ROW_HEIGHT))[0]
+        ui.mark(f"question.way{index}")
         end = imgui.get_cursor_pos()
         if is_clicked:
             self._chosen = index
