@@ -129,6 +129,12 @@ class ScriptedProject:
         return self._project.clips(self.n_frames)
 
     @property
+    def training_order(self) -> list[int]:
+        """Indices of all clips in the order in which they can be trained: the reference first. Raises what `capture`
+        raises."""
+        return self._project.training_order(len(self.clips))
+
+    @property
     def trained_clips(self) -> list[int]:
         """Indices of the clips that are finished. Raises what `capture` raises."""
         return [clip.clip_index for clip in self.clips if self._project.is_trained(clip.clip_index)]

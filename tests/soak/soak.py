@@ -46,9 +46,7 @@ from tests.soak.held import Growth, Held, growths, handle_names, held_now
 
 MAX_GROWTH = 0.05
 WAIT_S = 120.0
-ROUNDS_OF_A_SESSION = 6
 ROUNDS_OF_AN_EXPORT = 10
-SEEKS = 24
 ACTIONS = (
     Hide(),
     Delete(),
@@ -74,10 +72,22 @@ class Soak:
         extra: A trained project, which is copied and used beside the made ones.
         has_window: Whether a window is drawn, too.
         start: Starts a training.
+        rounds_of_a_session: After so many, session and window are closed and made anew.
+        n_seeks: Frames that each round goes to.
     """
 
-    def __init__(self, work: Path, *, extra: Path | None = None, has_window: bool, start: Launch = launch) -> None:
+    def __init__(
+        self,
+        work: Path,
+        *,
+        extra: Path | None = None,
+        has_window: bool,
+        start: Launch = launch,
+        rounds_of_a_session: int = 6,
+        n_seeks: int = 24,
+    ) -> None:
         self._work, self._has_window, self._start = work, has_window, start
+        self._rounds_of_a_session, self._n_seeks = rounds_of_a_session, n_seeks
         self._random = random.Random(1)
         self._projects = [
             train(
@@ -111,7 +121,7 @@ class Soak:
         """One round. What is held at its end, which is the same moment in each."""
         n = len(self.samples)
         project = self._projects[n % len(self._projects)]
-        if n and n % ROUNDS_OF_A_SESSION == 0:
+        if n and n % self._rounds_of_a_session == 0:
             self.close()
             self._session = self._open_session()
         self._open(project)
@@ -146,7 +156,7 @@ class Soak:
 
     def _scrub(self) -> None:
         session = self._session
-        for _ in range(SEEKS):
+        for _ in range(self._n_seeks):
             self._do(commands.SetFrame(self._random.randrange(session.timeline.n_frames)))
             self._draw(1)
             session.request_render(320, 240)
