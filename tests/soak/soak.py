@@ -45,7 +45,8 @@ from tests.app.lab.report.made_up import train
 from tests.soak.held import Growth, Held, growths, handle_names, held_now
 
 MAX_GROWTH = 0.05
-WAIT_S = 120.0
+WAIT_S = 600.0
+"""Only a hang takes longer."""
 ROUNDS_OF_AN_EXPORT = 10
 ACTIONS = (
     Hide(),
@@ -74,6 +75,7 @@ class Soak:
         start: Starts a training.
         rounds_of_a_session: After so many, session and window are closed and made anew.
         n_seeks: Frames that each round goes to.
+        is_preloading: See Session.
     """
 
     def __init__(
@@ -85,9 +87,11 @@ class Soak:
         start: Launch = launch,
         rounds_of_a_session: int = 6,
         n_seeks: int = 24,
+        is_preloading: bool = True,
     ) -> None:
         self._work, self._has_window, self._start = work, has_window, start
         self._rounds_of_a_session, self._n_seeks = rounds_of_a_session, n_seeks
+        self._is_preloading = is_preloading
         self._random = random.Random(1)
         self._projects = [
             train(
@@ -103,7 +107,11 @@ class Soak:
         self.samples: list[Held] = []
 
     def _open_session(self) -> Session:
-        session = Session(launch=self._start, settings=Settings(self._work / "settings.json"))
+        session = Session(
+            launch=self._start,
+            settings=Settings(self._work / "settings.json"),
+            is_preloading=self._is_preloading,
+        )
         if self._has_window:
             from ui.shell.window import StudioWindow
 
