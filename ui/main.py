@@ -43,6 +43,7 @@ def build_parser() -> PlainParser:
     )
     parser.add_argument("path", nargs="?", type=path_argument, help="capture or project folder to open")
     add_follow_links(parser)
+    parser.add_argument("--read-only", action="store_true", help="only look at the project; nothing in it is changed")
     parser.add_argument("--size", type=_parse_size, metavar="WxH", help="window size in pixels, for example 1440x900")
     parser.add_argument(
         "--ui-scale",
@@ -145,6 +146,7 @@ def _serve_window(options: argparse.Namespace) -> int:
     pyglet.options.shadow_window = False  # no hidden second context
     # Sizes are pixels of the screen, of which ui.style.ui_scale makes units; on macOS they are the system's points.
     pyglet.options.dpi_scaling = "stretch" if sys.platform == "darwin" else "real"
+    from app.project.project_choices import ProjectChoices
     from app.session.commands import OpenCapture
     from app.session.preferences import PreferencesFile
     from app.session.session import Session
@@ -163,7 +165,8 @@ def _serve_window(options: argparse.Namespace) -> int:
         raise
     try:
         if options.path is not None:
-            session.dispatch(OpenCapture(options.path, follow_links=options.follow_links))
+            choices = ProjectChoices(is_read_only=options.read_only)
+            session.dispatch(OpenCapture(options.path, follow_links=options.follow_links, choices=choices))
         window.run()
     finally:
         window.close()

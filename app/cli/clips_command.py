@@ -50,7 +50,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             document = with_reference(document, options.reference, n_frames)
         if document != project.document:
             if options.dry_run:
-                project.history = replace(project.history, present=document)  # for what is said of it, not kept
+                project.history = replace(project.history, present=document)  # so that what is said is of it
             else:
                 project.change(document, "cut clips otherwise")
         found = describe_clips(project, n_frames)

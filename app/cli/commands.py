@@ -53,6 +53,11 @@ COMMANDS = {
         "app.cli.eval_command",
         "The result was not written.",
     ),
+    "apply": Command(
+        "take what edits delete out of the clips for good",
+        "app.cli.apply_command",
+        "Edits and clips fit together, before or after.",
+    ),
     "mend": Command(
         "make a seam between two clips smaller, or a stretch that flickers, and measure it",
         "app.cli.mend_command",
@@ -94,7 +99,12 @@ COMMANDS = {
         "list what clips were before they were trained again, bring it back, make room on the disk",
         "app.cli.versions_command",
     ),
+    "exclude": Command("leave cameras and pictures out of training", "app.cli.exclude_command"),
+    "edit": Command(
+        "list and change the edits of a project, and take steps back", "app.cli.edit_command", "Nothing was changed."
+    ),
     "gate": Command("say what is static in a project and why, and overrule it", "app.cli.gate_command"),
+    "repair": Command("say what is left of a damaged project, and go on with it", "app.cli.repair_command"),
     "doctor": Command(
         "look at this machine: versions, memory, compiled kernels, OpenGL, disk", "app.cli.doctor_command"
     ),

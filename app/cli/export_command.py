@@ -12,6 +12,7 @@ from app.cli.arguments import EXIT_OK, parse_range, path_argument
 from app.cli.terminal.progress import ProgressLine, row_progress
 from app.evaluation.headless import TrainedProject, open_trained
 from app.export.export_progress import ExportProgress, ExportResult
+from app.export.picked_frames import PickedFrames, picked_frames
 from app.project.project import open_project
 from app.training.service import Launch
 from engine.errors import ProjectError
@@ -41,7 +42,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--out", type=path_argument, metavar="PATH", help="new or empty folder; of figures a file")
     frames = command.add_mutually_exclusive_group()
     frames.add_argument(
-        "--frames", metavar="A:B", help="frames A up to B, B not included, or one frame A (default: all trained)"
+        "--frames",
+        metavar="A:B",
+        help="frames A up to B, B not included, or one frame A; several of these with commas (default: all trained)",
     )
     frames.add_argument("--clip", type=int, metavar="N", help="frames of this clip")
     command.add_argument(
@@ -102,7 +105,7 @@ def _check_options(options: argparse.Namespace, kind: ModuleType) -> None:
             raise ProjectError(f"--{name.replace('_', '-')} does not apply to {what}.", hint="Leave it out.")
 
 
-def _frames(options: argparse.Namespace, opened: TrainedProject) -> range | None:
+def _frames(options: argparse.Namespace, opened: TrainedProject) -> range | PickedFrames | None:
     """The chosen frames; None for all that are trained. Raises ProjectError where there are no such frames."""
     if options.step < 1:
         raise ProjectError(f"--step is {options.step}.", hint="Write 1 for every frame, 2 for every second one.")
@@ -112,7 +115,7 @@ def _frames(options: argparse.Namespace, opened: TrainedProject) -> range | None
             raise ProjectError(f"There is no clip {options.clip}.", hint=hint)
         chosen = opened.clips[options.clip].frame_indices()
     elif options.frames is not None:
-        chosen = parse_range(options.frames, opened.capture.n_frames, option="--frames", what="frames")
+        return _frame_ranges(options, opened.capture.n_frames)
     elif options.step == 1:
         return None
     else:
@@ -124,6 +127,17 @@ def _frames(options: argparse.Namespace, opened: TrainedProject) -> range | None
                 hint="Say which frames: --frames A:B.",
             )
     return range(chosen.start, chosen.stop, options.step)
+
+
+def _frame_ranges(options: argparse.Namespace, n_frames: int) -> range | PickedFrames:
+    """One range, or several that rise. Raises ProjectError."""
+    spans: list[tuple[int, int]] = []
+    for part in options.frames.split(","):
+        chosen = parse_range(part, n_frames, option="--frames", what="frames")
+        if spans and chosen.start < spans[-1][1]:
+            raise ProjectError(f"--frames is '{options.frames}', where ranges do not follow each other.")
+        spans.append((chosen.start, chosen.stop))
+    return picked_frames(spans, options.step)
 
 
 def _document(options: argparse.Namespace, result: ExportResult, seconds: float) -> dict[str, Any]:

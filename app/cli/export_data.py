@@ -6,6 +6,8 @@ import argparse
 
 from app.evaluation.headless import TrainedProject
 from app.export.export_progress import ExportResult, Report
+from app.export.named_jobs import run_named_job
+from app.export.picked_frames import PickedFrames
 
 FORMATS = {
     "metrics-csv": "every figure that was measured, a row per picture",
@@ -28,13 +30,8 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     """There are no options beside those of all formats."""
 
 
-def export(opened: TrainedProject, options: argparse.Namespace, frames: range | None, report: Report) -> ExportResult:
+def export(
+    opened: TrainedProject, options: argparse.Namespace, frames: range | PickedFrames | None, report: Report
+) -> ExportResult:
     """Write a file of figures or a folder of cameras. Raises EngineError."""
-    from app.export import cameras_job, metrics_job
-
-    if options.format == "cameras-colmap":
-        return cameras_job.run(opened, cameras_job.CamerasJob(options.out, "colmap"), report)
-    if options.format == "cameras-transforms":
-        return cameras_job.run(opened, cameras_job.CamerasJob(options.out, "transforms"), report)
-    format_ = "json" if options.format == "metrics-json" else "csv"
-    return metrics_job.run(opened, metrics_job.MetricsJob(options.out, format_, frames), report)
+    return run_named_job(opened, report, options.format, options.out, frames=frames)

@@ -7,6 +7,8 @@ import argparse
 from app.evaluation.headless import TrainedProject
 from app.export.export_progress import ExportResult, Report
 from app.export.gaussian_files import WRITTEN_PARTS
+from app.export.named_jobs import run_named_job
+from app.export.picked_frames import PickedFrames
 
 _AXES = ("x", "y", "z")
 FORMATS = {
@@ -20,7 +22,7 @@ FORMATS = {
 """Names of `engine.export.formats.table.FORMATS` in a few words; that table is loaded once it is needed."""
 
 
-OPTIONS = ("part", "up", "down", "scale", "axes")
+OPTIONS = ("part", "up", "down", "scale", "axes", "scene_up")
 TAKES_EDITS = True
 
 
@@ -44,7 +46,19 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
     turn.add_argument("--down", choices=_AXES, help="turn the scene so that this axis points down")
     own.add_argument(
-        "--scale", type=float, default=1.0, metavar="S", help="units of the files per unit of the capture (default: 1)"
+        "--scene-up",
+        nargs=3,
+        type=float,
+        metavar=("X", "Y", "Z"),
+        help="which way is up in the capture, for --up and --down (default: as the project says, else what its cameras "
+        "agree on)",
+    )
+    own.add_argument(
+        "--scale",
+        type=float,
+        metavar="S",
+        help="units of the files per unit of the capture (default: metres where the project says how long a unit is, "
+        "else 1)",
     )
     own.add_argument(
         "--axes",
@@ -54,18 +68,20 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
 
 
-def export(opened: TrainedProject, options: argparse.Namespace, frames: range | None, report: Report) -> ExportResult:
+def export(
+    opened: TrainedProject, options: argparse.Namespace, frames: range | PickedFrames | None, report: Report
+) -> ExportResult:
     """Write the files. Raises ProjectError."""
-    from app.export.gaussians_job import GaussiansJob, run
-
-    job = GaussiansJob(
-        out=options.out,
-        format=options.format,
+    return run_named_job(
+        opened,
+        report,
+        options.format,
+        options.out,
         frames=frames,
         part=options.part,
         up=f"+{options.up}" if options.up else f"-{options.down}" if options.down else None,
         scale=options.scale,
         axes=options.axes,
         has_edits=not options.without_edits,
+        scene_up=None if options.scene_up is None else tuple(options.scene_up),
     )
-    return run(opened, job, report)

@@ -7,14 +7,17 @@ import sys
 
 from app.cli.terminal.progress import ProgressLine
 from app.evaluation.headless import TrainedProject
+from app.export.export_jobs import KINDS
 from app.export.export_progress import ExportResult, Report
+from app.export.named_jobs import named_job
+from app.export.picked_frames import PickedFrames
 
 NAME = "player"
 FORMATS: dict[str, str] = {}
 """None: the page has an option of its own, since it is a file and no folder."""
 
 
-OPTIONS = ("data_folder",)
+OPTIONS = ("data_folder", "one_file")
 TAKES_EDITS = True
 
 
@@ -26,21 +29,28 @@ def takes_frames(format_name: str) -> bool:
 def add_arguments(command: argparse.ArgumentParser) -> None:
     """Options of the player."""
     own = command.add_argument_group("player")
-    own.add_argument(
+    data = own.add_mutually_exclusive_group()
+    data.add_argument(
         "--data-folder",
         action="store_true",
         default=None,
         help="a page with a folder of clips beside it, which are loaded as they are needed (default: for large scenes)",
     )
+    data.add_argument("--one-file", action="store_true", help="everything in the page, however large that becomes")
 
 
-def export(opened: TrainedProject, options: argparse.Namespace, frames: range | None, report: Report) -> ExportResult:
+def export(
+    opened: TrainedProject, options: argparse.Namespace, frames: range | PickedFrames | None, report: Report
+) -> ExportResult:
     """Write the page; says before how large it becomes. Raises ProjectError."""
-    from app.export.player_job import PlayerJob, estimate, run
-
-    job = PlayerJob(
-        out=options.player, frames=frames, has_folder=options.data_folder, has_edits=not options.without_edits
+    kind, job = named_job(
+        NAME,
+        options.player,
+        frames=frames,
+        has_folder=False if options.one_file else options.data_folder,
+        has_edits=not options.without_edits,
     )
-    for said in estimate(opened, job).lines:
+    work = KINDS[kind].load()
+    for said in work.estimate(opened, job).lines:
         ProgressLine(sys.stderr, is_quiet=options.quiet).say(said)
-    return run(opened, job, report)
+    return work.run(opened, job, report)

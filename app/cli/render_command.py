@@ -130,6 +130,8 @@ def _job(options: argparse.Namespace, opened: TrainedProject) -> Any:
 
 
 def _camera(text: str, option: str, opened: TrainedProject) -> str:
+    if text in opened.capture.rig.names:  # one name, whatever is in it
+        return text
     chosen = parse_cameras(text, opened.capture)
     if len(chosen) != 1:
         raise ProjectError(f"{option} is '{text}'; one camera can be taken at a time.")

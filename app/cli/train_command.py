@@ -18,7 +18,7 @@ from app.cli.chosen_project import open_for_training, project_to_plan
 from app.cli.terminal.progress import ProgressLine
 from app.cli.terminal.training_lines import PlanLines, show_event, show_outcome, show_status
 from app.cli.training_settings import add_training_settings
-from app.evaluation.headless import train_clips, train_document
+from app.evaluation.headless import BAD_INPUT_KINDS, train_clips, train_document
 from app.plan.planning import clip_history, memory_text, plan_clip, plan_document, plan_text, totals
 from app.plan.speed import step_time
 from app.project.clip_catalog import ClipCatalog
@@ -27,9 +27,7 @@ from app.training.service import Launch, TrainingService
 from engine.errors import CaptureError, DiskError, ProjectError
 from engine.storage.json_files import json_text
 from engine.text import duration_text
-
-BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
-"""Failures of a worker that are the input's and not the program's."""
+from engine.training.config import parse_overrides
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -44,6 +42,19 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     )
     add_follow_links(command)
     add_training_settings(command)
+    command.add_argument(
+        "--again",
+        action="store_true",
+        help="train chosen clips also where they are trained or damaged; what they were becomes a version",
+    )
+    command.add_argument(
+        "--clip-set",
+        dest="own_assignments",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="a training setting that the chosen clips alone are to have; may be given several times",
+    )
     command.add_argument("--seed", type=int, help="fixes initial values and order of pictures (default: 0)")
     command.add_argument("--reference-clip", type=int, metavar="K", help="clip that others inherit from (default: 0)")
     command.add_argument(
@@ -89,6 +100,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             service,
             sorted(chosen, key=lambda clip_index: clip_index != first),
             on_begin=lambda clip_index: plans.begin(clips[clip_index]),
+            is_again=options.again,
+            own=parse_overrides(options.own_assignments) or None,
             on_status=lambda status: show_status(line, status),
             on_event=lambda event: show_event(line, event),
             on_outcome=lambda outcome: (show_outcome(line, outcome), plans.end(outcome)),

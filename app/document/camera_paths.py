@@ -37,19 +37,10 @@ class StoredPath(Struct, frozen=True, forbid_unknown_fields=True):
     keys: tuple[_StoredKey, ...]
 
 
-def stored_paths(paths: Sequence[CameraPath]) -> tuple[StoredPath, ...]:
-    """Camera paths as they are stored."""
-    return tuple(
-        StoredPath(
-            path.name,
-            path.is_closed,
-            tuple(
-                _StoredKey(key.frame, tuple(tuple(row) for row in key.world_to_camera.tolist()), key.fov_y_rad)
-                for key in path.keys
-            ),
-        )
-        for path in paths
-    )
+def stored_path(path: CameraPath) -> StoredPath:
+    """A camera path as it is stored."""
+    keys = (_StoredKey(key.frame, tuple(map(tuple, key.world_to_camera.tolist())), key.fov_y_rad) for key in path.keys)
+    return StoredPath(path.name, path.is_closed, tuple(keys))
 
 
 def to_path(stored: StoredPath) -> CameraPath:

@@ -10,7 +10,7 @@ from msgspec import structs, to_builtins
 
 from app.document.checked_text import checked_text
 from app.document.project_document import ProjectDocument
-from app.document.stored_document import check_edits
+from app.document.stored_document import check_picks
 from engine.editing.edit import EVERYWHERE, Action, Edit, Everything, Scope, Target
 from engine.errors import ProjectError
 from engine.storage.typed_json import EntryError, to_type
@@ -174,5 +174,5 @@ def _checked(edit: Edit) -> Edit:
         read = to_type(to_builtins(edit), Edit)
     except (EntryError, ValueError) as error:
         raise ProjectError(f"The edit makes no sense ({error}).") from error
-    check_edits((read,))
+    check_picks(read)
     return edit

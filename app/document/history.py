@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 
 from app.document.project_document import ProjectDocument
@@ -107,6 +107,13 @@ class DocumentHistory:
             case Placed(settings=settings):
                 return replace(self, present=replace(self.present, settings=settings))
 
+    def each(self, change: Callable[[ProjectDocument], ProjectDocument]) -> DocumentHistory:
+        """The history with every document changed alike."""
+        past, future = (
+            tuple(replace(step, document=change(step.document)) for step in steps) for steps in (self.past, self.future)
+        )
+        return DocumentHistory(change(self.present), past, future)
+
     def _undone(self) -> DocumentHistory:
         step = self.past[-1]
         back = Step(step.name, self.present)
@@ -131,3 +138,15 @@ def _closed(steps: tuple[Step, ...]) -> tuple[Step, ...]:
     if not steps or steps[-1].merge is None:
         return steps
     return (*steps[:-1], replace(steps[-1], merge=None))
+
+
+def coalesced(events: Sequence[Event]) -> list[Event]:
+    """The same with fewer events: of changes in a row that count as one step, only the last one."""
+    found: list[Event] = []
+    for event in events:
+        match found[-1:], event:
+            case [Changed(name=name, merge=merge)], Changed() if merge is not None and event.merge == merge:
+                found[-1] = replace(event, name=name)
+            case _:
+                found.append(event)
+    return found

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from engine.errors import ProjectError
-from engine.storage.files import disk_error
-from engine.storage.json_files import HAND_EDITED, ChecksumError, JsonError, read_checked_json, write_checked_json
+from engine.storage.files import atomic_path, disk_error
+from engine.storage.json_files import (
+    HAND_EDITED,
+    ChecksumError,
+    JsonError,
+    checked_text,
+    read_json_object,
+    without_checksum,
+)
 
 MAX_BYTES = 4 << 20
 """Of settings and of regions; both take some kilobytes."""
@@ -22,8 +30,14 @@ def read_kept(path: Path, what: str, *, hint: str, max_bytes: int = MAX_BYTES) -
     Raises:
         ProjectError: It cannot be read or is damaged.
     """
+    found = kept_object(path, what, hint=hint, max_bytes=max_bytes)
+    return None if found is None else found[0]
+
+
+def kept_object(path: Path, what: str, *, hint: str, max_bytes: int) -> tuple[dict[str, Any], str | None] | None:
+    """Likewise, with the checksum of the file; None for that where somebody has taken it out."""
     try:
-        return read_checked_json(path, max_bytes=max_bytes)
+        return without_checksum(read_json_object(path, max_bytes=max_bytes))
     except FileNotFoundError:
         return None
     except (OSError, JsonError) as error:
@@ -35,13 +49,41 @@ def read_kept(path: Path, what: str, *, hint: str, max_bytes: int = MAX_BYTES) -
         ) from error
 
 
-def write_kept(path: Path, content: dict[str, Any]) -> None:
+@dataclass(frozen=True, slots=True)
+class KeptText:
+    """What is to be written, and the checksum in it."""
+
+    data: bytes
+    checksum: str
+
+
+def kept_text(content: dict[str, Any], *, max_bytes: int = MAX_BYTES, is_for_people: bool = True) -> KeptText:
+    """A file of a project as it is written. max_bytes: What is read again. is_for_people: See `checked_text`.
+
+    Raises:
+        ProjectError: It would be too large, or holds what JSON cannot.
+    """
+    try:
+        text, checksum = checked_text(content, is_for_people=is_for_people)
+        data = text.encode("utf-8")
+    except ValueError as error:  # NaN, or half a Unicode character
+        raise ProjectError(f"That cannot be kept ({error}).") from error
+    if len(data) > max_bytes:
+        raise ProjectError(
+            f"The project would take {len(data) / 1e6:.0f} MB, at most {max_bytes / 1e6:.0f} are kept.",
+            hint="Delete some of what is not needed.",
+        )
+    return KeptText(data, checksum)
+
+
+def write_kept(path: Path, text: KeptText) -> None:
     """Write a file of a project, atomically and for good.
 
     Raises:
         DiskError: The disk refused.
     """
     try:
-        write_checked_json(path, content, makes_parents=False, is_durable=True)
+        with atomic_path(path, makes_parents=False, is_durable=True) as partial:
+            partial.write_bytes(text.data)
     except OSError as error:
         raise disk_error(error, what="The project", path=path) from error

@@ -10,13 +10,13 @@ from msgspec import Meta, Struct
 
 from app.document.project_settings import ProjectSettings
 from engine.camera.camera_path import CameraPath
+from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.editing.edit import Edit, Vector
 from engine.gate.regions import GateRegion
 
 MAX_TEXT_CHARACTERS = 200
 _Count = Annotated[int, Meta(ge=0, lt=2**31)]
 _Text = Annotated[str, Meta(max_length=MAX_TEXT_CHARACTERS)]
-_Share = Annotated[float, Meta(ge=-1.0, le=2.0)]
 
 
 class Marker(Struct, frozen=True, forbid_unknown_fields=True):
@@ -40,76 +40,6 @@ class Label(Struct, frozen=True, forbid_unknown_fields=True):
     text: _Text
 
 
-class ExcludedFrames(Struct, frozen=True, forbid_unknown_fields=True):
-    """Pictures that training never sees.
-
-    Attributes:
-        camera: Its name; None for all cameras.
-        first, stop: Frames [first, stop).
-
-    Raises:
-        ValueError: There is no frame in it.
-    """
-
-    camera: str | None
-    first: _Count
-    stop: _Count
-
-    def __post_init__(self) -> None:
-        if self.stop <= self.first:
-            raise ValueError(f"frames {self.first} to before {self.stop} are none")
-
-
-class Stroke(Struct, frozen=True, forbid_unknown_fields=True):
-    """One stroke of a brush over a picture.
-
-    Attributes:
-        points: x as a share of the picture's width, y as a share of its height; slightly outside is allowed.
-        radius: As a share of the picture's width.
-        is_erasing: Whether it takes away from what earlier strokes have covered.
-    """
-
-    points: Annotated[tuple[tuple[_Share, _Share], ...], Meta(min_length=1, max_length=100_000)]
-    radius: Annotated[float, Meta(gt=0.0, le=1.0)]
-    is_erasing: bool = False
-
-
-class PaintedMask(Struct, frozen=True, forbid_unknown_fields=True):
-    """A part of a camera's pictures that training does not look at.
-
-    Attributes:
-        camera: Its name.
-        first, stop: Frames [first, stop).
-        strokes: In the order in which they were painted.
-
-    Raises:
-        ValueError: There is no frame in it.
-    """
-
-    camera: str
-    first: _Count
-    stop: _Count
-    strokes: tuple[Stroke, ...]
-
-    def __post_init__(self) -> None:
-        if self.stop <= self.first:
-            raise ValueError(f"frames {self.first} to before {self.stop} are none")
-
-
-class Exclusions(Struct, frozen=True, forbid_unknown_fields=True):
-    """What training never sees, beside the cameras that are held out for measuring.
-
-    Attributes:
-        cameras: Names of cameras that are left out altogether.
-        frames: Pictures.
-        masks: Parts of pictures.
-    """
-
-    cameras: tuple[str, ...] = ()
-    frames: tuple[ExcludedFrames, ...] = ()
-    masks: tuple[PaintedMask, ...] = ()
-
-
 class World(Struct, frozen=True, forbid_unknown_fields=True):
     """How the scene lies in the world.
 
@@ -131,7 +61,7 @@ class World(Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"a scene unit of {self.meters_per_unit} m is out of range")
 
 
-NOTHING_EXCLUDED, AS_CAPTURED = Exclusions(), World()
+AS_CAPTURED = World()
 
 
 @dataclass(frozen=True, slots=True)

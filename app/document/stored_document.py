@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, replace
+import hashlib
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from msgspec import Struct, to_builtins
 
-from app.document.camera_paths import StoredPath, check_paths, stored_paths, to_path
-from app.document.project_document import Exclusions, Label, Marker, ProjectDocument, World
+from app.document.camera_paths import StoredPath, check_paths, stored_path, to_path
+from app.document.project_document import Label, Marker, ProjectDocument, World
 from app.document.project_settings import ProjectSettings, check_bounds
+from engine.capture.exclusions import Exclusions
 from engine.editing.edit import Edit, Picked
 from engine.editing.picks import unpack_rows
 from engine.errors import ProjectError
 from engine.gate.regions import parse_region
 from engine.storage.typed_json import EntryError, to_type
 from engine.training.retired_settings import without_retired
+
+_sound: set[bytes] = set()
+"""Digests of packed numbers that could be unpacked, of this process."""
 
 
 class _Stored(Struct, frozen=True, forbid_unknown_fields=True):
@@ -40,19 +45,85 @@ def plain_document(document: ProjectDocument) -> dict[str, Any]:
     """A document as lists, objects, numbers and texts.
 
     Raises:
-        ProjectError: It cannot be kept; see `check_paths`.
+        ProjectError: It cannot be kept, because `document_of` would refuse it.
     """
     check_paths(document.camera_paths)
-    return {
-        "settings": to_builtins(asdict(document.settings)),
-        "regions": [region.as_dict() for region in document.regions],
-        "camera_paths": to_builtins(stored_paths(document.camera_paths)),
-        "edits": to_builtins(document.edits),
-        "markers": to_builtins(document.markers),
-        "labels": to_builtins(document.labels),
-        "exclusions": to_builtins(document.exclusions),
-        "world": to_builtins(document.world),
-    }
+    check_numbers(document.edits)
+    return {name: plain_entry(name, getattr(document, name)) for name in ENTRIES}
+
+
+def plain_entry(name: str, value: Any) -> Any:
+    """One entry of a document as plain data. Raises ProjectError like `plain_document`."""
+    codec = CODECS[name]
+    return [codec.plain(item) for item in value] if codec.is_list else codec.plain(value)
+
+
+@dataclass(frozen=True, slots=True)
+class Codec:
+    """How one entry of a document, or each item of it, is stored.
+
+    Attributes:
+        is_list: Whether the entry is a list of items.
+        plain: An item as plain data, which `value` takes again. Raises ProjectError for one that cannot be kept.
+        value: The item that plain data holds. Raises EntryError or ProjectError.
+        key: Tells items apart while they change; None for those that only have their place.
+    """
+
+    is_list: bool
+    plain: Callable[[Any], Any]
+    value: Callable[[Any], Any]
+    key: Callable[[Any], Hashable] | None = None
+
+
+def _checked(kind: type[Any]) -> Callable[[Any], Any]:
+    """Values as plain data that has gone through their declaration, which they themselves need not have done."""
+
+    def plain(value: Any) -> Any:
+        try:
+            return to_builtins(to_type(to_builtins(value), kind))
+        except EntryError as error:
+            raise ProjectError(f"That cannot be kept ({error}).") from error
+
+    return plain
+
+
+def _struct(kind: type[Any], key: Callable[[Any], Hashable] | None = None, *, is_list: bool = True) -> Codec:
+    return Codec(is_list, _checked(kind), lambda data: to_type(data, kind), key)
+
+
+def _plain_settings(settings: ProjectSettings) -> dict[str, Any]:
+    plain = _checked(ProjectSettings)(asdict(settings))
+    return {**plain, "overrides": dict(sorted(plain["overrides"].items()))}
+
+
+def _to_settings(data: Any) -> ProjectSettings:
+    settings = to_type(data, ProjectSettings)
+    settings = replace(settings, overrides=without_retired(settings.overrides))
+    settings.config()
+    return settings
+
+
+def _to_edit(data: Any) -> Edit:
+    edit = to_type(data, Edit)
+    check_picks(edit)
+    return edit
+
+
+CODECS = {
+    "settings": Codec(False, _plain_settings, _to_settings),
+    "regions": Codec(True, lambda region: parse_region(region.as_dict()).as_dict(), parse_region),
+    "camera_paths": Codec(
+        True,
+        lambda path: _checked(StoredPath)(stored_path(path)),
+        lambda data: to_path(to_type(data, StoredPath)),
+        lambda path: path.name,
+    ),
+    "edits": Codec(True, _checked(Edit), _to_edit, lambda edit: edit.edit_id),
+    "markers": _struct(Marker),
+    "labels": _struct(Label, lambda label: (label.kind, label.name)),
+    "exclusions": _struct(Exclusions, is_list=False),
+    "world": _struct(World, is_list=False),
+}
 
 
 def document_of(content: Any) -> ProjectDocument:
@@ -68,7 +139,10 @@ def document_of(content: Any) -> ProjectDocument:
     check_bounds(settings.clip_bounds)
     paths = tuple(to_path(path) for path in stored.camera_paths)
     check_paths(paths)
-    document = ProjectDocument(
+    check_numbers(stored.edits)
+    for edit in stored.edits:
+        check_picks(edit)
+    return ProjectDocument(
         settings,
         tuple(parse_region(values) for values in stored.regions),
         paths,
@@ -78,26 +152,30 @@ def document_of(content: Any) -> ProjectDocument:
         stored.exclusions,
         stored.world,
     )
-    check_edits(document.edits)
-    return document
 
 
-def check_edits(edits: Sequence[Edit]) -> None:
-    """See that edits can be told apart, and that what they picked can be read.
+def check_numbers(edits: Sequence[Edit]) -> None:
+    """See that edits can be told apart.
 
     Raises:
         ProjectError: They cannot.
     """
-    ids = [edit.edit_id for edit in edits]
-    if len(set(ids)) != len(ids):
+    if len({edit.edit_id for edit in edits}) != len(edits):
         raise ProjectError("Two edits have the same number.")
-    for edit in edits:
-        if isinstance(edit.target, Picked):
-            try:
-                for rows in edit.target.sets:
-                    unpack_rows(rows.rows)
-            except ValueError as error:
-                raise ProjectError(f"Edit {edit.edit_id} cannot be read: {error}.") from error
 
 
-__all__ = ["ENTRIES", "EntryError", "check_edits", "document_of", "plain_document"]
+def check_picks(edit: Edit) -> None:
+    """See that what an edit picked can be read.
+
+    Raises:
+        ProjectError: It cannot.
+    """
+    if isinstance(edit.target, Picked):
+        try:
+            for picked in edit.target.sets:
+                digest = hashlib.blake2b(picked.rows, digest_size=16).digest()
+                if digest not in _sound:  # unpacking takes far longer, and a document is read again and again
+                    unpack_rows(picked.rows)
+                    _sound.add(digest)
+        except ValueError as error:
+            raise ProjectError(f"Edit {edit.edit_id} cannot be read: {error}.") from error

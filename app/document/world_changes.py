@@ -37,7 +37,7 @@ def set_up(document: ProjectDocument, direction: Sequence[float] | None) -> Proj
 
 
 def set_scale(document: ProjectDocument, meters_per_unit: float | None) -> ProjectDocument:
-    """Say how long a scene unit is. meters_per_unit: m; None where nobody knows.
+    """Say how long a scene unit is. meters_per_unit: m; None takes it back.
 
     Raises:
         ProjectError: The length is out of range.

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from app.background.kernels import use_threads
 from app.evaluation.headless import TrainedProject
 from app.evaluation.kept_figures import EVALUATIONS, KeptFigures
+from engine.capture.exclusions import exclusion_key
 from engine.parallel import n_cores
 
 if TYPE_CHECKING:
@@ -94,6 +95,7 @@ def evaluate_project(
     from engine.metrics.clips import seams, summary
     from engine.metrics.clips.summary import EvalRow
 
+    opened = opened.measured
     project, capture = opened.project, opened.capture
     chosen_cameras = list(range(len(capture.rig)) if cameras is None else cameras)
     scope = Scope(list(clip_indices), chosen_cameras, metrics, precision)
@@ -105,7 +107,7 @@ def evaluate_project(
         measuring = ClipMeasuring()
         for clip_index in [i for i in scope.clips if unknown[i]]:  # damaged ones are found before the work
             opened.load(clip_index)
-    n_rows = sum(opened.clips[i].n_frames for i in scope.clips) * len(scope.cameras)
+    n_rows = sum(len(_usable(opened, i, camera)) for i in scope.clips for camera in scope.cameras)
     n_done = n_rows - sum(len(frames) for todo in unknown.values() for frames, _ in todo.values())
     on_progress(n_done, n_rows, None)
     try:
@@ -171,6 +173,9 @@ def kept_figures(opened: TrainedProject, scope: Scope, clip_index: int, say: Cal
         "precision": scope.precision,
         "lpips": scope.metrics == "all" and lpips.why_missing() is None,
     }
+    first = clip.start if scope.before(clip_index) is None else clip.start - 1
+    excluded = exclusion_key(opened.project.document.exclusions, (first, clip.stop))
+    content |= {"excluded": excluded} if excluded else {}
     before = scope.before(clip_index)
     path = opened.project.folder / EVALUATIONS / f"{clip_index:04d}-{scope.metrics}-{scope.precision}.jsonl"
     return KeptFigures(path, content, None if before is None else _fingerprint(opened, before), say)
@@ -182,7 +187,7 @@ def is_measured(opened: TrainedProject, scope: Scope) -> bool:
     Raises:
         ProjectError: A clip is not trained or damaged.
     """
-    nothing = logger.debug
+    nothing, opened = logger.debug, opened.measured
     return not any(_unknown(opened, scope, i, kept_figures(opened, scope, i, nothing)) for i in scope.clips)
 
 
@@ -226,21 +231,27 @@ def _fingerprint(opened: TrainedProject, clip_index: int) -> str:
 
 
 def _unknown(opened: TrainedProject, scope: Scope, clip_index: int, kept: KeptFigures) -> Frames:
-    clip, names = opened.clips[clip_index], opened.capture.rig.names
+    names = opened.capture.rig.names
     found: Frames = {}
     for camera in scope.cameras:
         name = names[camera]
-        frames = [frame for frame in clip.frame_indices() if (name, frame) not in kept.rows]
-        later = [frame for frame in _later_frames(opened, scope, clip_index) if (name, frame) not in kept.pairs]
+        frames = [frame for frame in _usable(opened, clip_index, camera) if (name, frame) not in kept.rows]
+        later = [f for f in _later_frames(opened, scope, clip_index, camera) if (name, f) not in kept.pairs]
         if frames or later:
             found[camera] = frames, later
     return found
 
 
-def _later_frames(opened: TrainedProject, scope: Scope, clip_index: int) -> list[int]:
-    """Later frames of all pairs of a clip."""
-    clip = opened.clips[clip_index]
-    return [f for f in clip.frame_indices() if f > clip.start or scope.before(clip_index) is not None]
+def _usable(opened: TrainedProject, clip_index: int, camera: int) -> list[int]:
+    """Frames of a clip that are measured for a camera: those that are not excluded."""
+    return [f for f in opened.clips[clip_index].frame_indices() if opened.capture.is_usable(camera, f)]
+
+
+def _later_frames(opened: TrainedProject, scope: Scope, clip_index: int, camera: int) -> list[int]:
+    """Later frames of all pairs of a clip that are measured for a camera."""
+    start, usable = opened.clips[clip_index].start, _usable(opened, clip_index, camera)
+    first = start if scope.before(clip_index) is not None else start + 1
+    return [f for f in usable if f >= first and f > 0 and opened.capture.is_usable(camera, f - 1)]
 
 
 def _in_order(
@@ -250,11 +261,11 @@ def _in_order(
     holdout, names = set(opened.project.settings.holdout), opened.capture.rig.names
     rows, pairs = [], []
     for clip_index in scope.clips:
-        later = _later_frames(opened, scope, clip_index)
         for camera in scope.cameras:
             name, is_held_out = names[camera], names[camera] in holdout
             found = kept[clip_index]
-            frames = opened.clips[clip_index].frame_indices()
+            frames = _usable(opened, clip_index, camera)
+            later = _later_frames(opened, scope, clip_index, camera)
             rows += [replace(found.rows[name, frame], is_held_out=is_held_out) for frame in frames]
             pairs += [replace(found.pairs[name, frame], is_held_out=is_held_out) for frame in later]
     return rows, pairs
@@ -270,6 +281,7 @@ def boundary_maps(opened: TrainedProject, *, clip_index: int, camera_index: int)
     if clip_index < 1:
         raise ValueError(f"clip {clip_index} has no clip before it")
     use_threads(None)
+    opened = opened.measured
     before, after = opened.load(clip_index - 1), opened.load(clip_index)
     return _evaluation(opened).boundary_maps(before, after, camera_index)
 

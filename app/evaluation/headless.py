@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from app.project.clip_versions import read_finished, recovery_hint
 from app.project.opening import open_capture_of
@@ -14,6 +16,7 @@ from app.project.project import Project
 from app.status import TrainingStatus
 from app.training.messages import ClipTrained, Event, TrainingFailed, TrainingStopped, WorkerDied
 from app.training.service import TrainingService
+from app.training.train_queue import OwnSettings
 from engine.backends.table import backend_called
 from engine.camera.corrections import corrected
 from engine.camera.rig import CameraRig
@@ -27,6 +30,8 @@ if TYPE_CHECKING:
     from engine.metrics.clips.trained_clip import TrainedClip
 
 TRAIN_SCHEMA = 1
+BAD_INPUT_KINDS = ("CaptureError", "ProjectError")
+"""Failures of a worker that are the input's and not the program's."""
 POLL_EVERY_S = 0.05
 STOP_TIMEOUT_S = 60.0
 """A step that changes the phase can take some seconds, and so can writing; nothing is thrown away for impatience."""
@@ -63,6 +68,8 @@ def train_clips(
     on_event: Callable[[Event], None],
     on_outcome: Callable[[ClipOutcome], object],
     on_begin: Callable[[int], None] = lambda clip_index: None,
+    is_again: bool = False,
+    own: OwnSettings | None = None,
     sleep: Callable[[float], None] = time.sleep,
 ) -> list[ClipOutcome]:
     """Train clips one after another; a failure ends it. KeyboardInterrupt stops, keeps and is raised again.
@@ -71,7 +78,9 @@ def train_clips(
         service: Queue and worker of the project.
         clip_indices: In order.
         on_status, on_event, on_outcome: Told how it goes.
-        on_begin: Told the index of each clip before it is trained; not of those that are trained already.
+        on_begin: Told the index of each clip before it is trained; not of those that are left as they are.
+        is_again: Train also clips that are trained or damaged; what they were becomes a version.
+        own: Settings that these clips alone are to have; their trainings then begin afresh.
         sleep: Waits some seconds between looks.
     Raises:
         ProjectError: A clip cannot be trained, for instance because its reference is not.
@@ -80,13 +89,13 @@ def train_clips(
     outcomes: list[ClipOutcome] = []
     for clip_index in clip_indices:
         known = service.catalog[clip_index]
-        if known.state == "trained":
+        if known.state == "trained" and not is_again:
             outcome = ClipOutcome(clip_index, "skipped", known.step, known.held_out_psnr)
-        elif known.state == "damaged" or known.blocked_by is not None:
+        elif (known.state == "damaged" and not is_again) or known.blocked_by is not None:
             outcome = _left_alone(service, clip_index)
         else:
             on_begin(clip_index)
-            outcome = _train_clip(service, clip_index, on_status, on_event, sleep)
+            outcome = _train_clip(service, clip_index, own, on_status, on_event, sleep)
         outcomes.append(outcome)
         on_outcome(outcome)
         if outcome.state == "failed":
@@ -97,12 +106,13 @@ def train_clips(
 def _train_clip(
     service: TrainingService,
     clip_index: int,
+    own: OwnSettings | None,
     on_status: Callable[[TrainingStatus], None],
     on_event: Callable[[Event], None],
     sleep: Callable[[float], None],
 ) -> ClipOutcome:
     started_s = time.monotonic()
-    service.enqueue(clip_index)
+    service.enqueue(clip_index, own)
     ending: Event | None = None
     try:
         while service.worker is not None:
@@ -169,11 +179,22 @@ class TrainedProject:
     reference: ClipState | None
 
     @property
+    def measured(self) -> TrainedProject:
+        """The same with the capture as it is measured: without what the document excludes."""
+        return replace(self, capture=self.capture.without(self.project.document.exclusions))
+
+    @property
     def rig(self) -> CameraRig:
         """The cameras of the capture as the reference clip refined them; see engine.camera.corrections."""
         if self.reference is None:
             return self.capture.rig
         return corrected(self.capture.rig, self.reference.header.camera_names, self.reference.corrections)
+
+    @property
+    def up(self) -> np.ndarray:
+        """What is up in the scene: as the user has said, else what the cameras agree on. [3]"""
+        said = self.project.document.world.up
+        return self.capture.rig.up_direction() if said is None else np.array(said)
 
     @property
     def trained(self) -> list[int]:

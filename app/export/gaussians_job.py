@@ -39,10 +39,12 @@ class GaussiansJob:
         frames: Of the capture; None for all that are trained.
         part: What is written; "static" once as long as it stays the same, "moving" per frame, "split" both.
         up: Axis of the files that the scene's up is turned to, one of `engine.export.world.AXES`; None leaves it.
-        scale: Units of the files per scene unit.
+        scale: Units of the files per scene unit; None for metres where the user has said how long a scene unit is, else
+            1.
         axes: "ply" as they are; "rub" turned by 180 degrees about x, for programs of Niantic.
         has_edits: Whether the edits of the project are applied.
-        scene_up: Which way is up in the capture; None for what its cameras agree on. [3]
+        scene_up: Which way is up in the capture; None for what the user has said of the project, else for what its
+            cameras agree on. [3]
     """
 
     out: Path
@@ -50,7 +52,7 @@ class GaussiansJob:
     frames: range | PickedFrames | None = None
     part: WrittenPart = "all"
     up: str | None = None
-    scale: float = 1.0
+    scale: float | None = None
     axes: FileAxes = "ply"
     scene_up: tuple[float, float, float] | None = None
     has_edits: bool = True
@@ -124,7 +126,9 @@ def _world(opened: TrainedProject, job: GaussiansJob) -> World:
     """Where the scene lies in the files. Raises ProjectError where that cannot be."""
     if job.up is not None and job.up not in AXES:
         raise ProjectError(f"There is no axis '{job.up}'.", hint=f"Axes are {', '.join(AXES)}.")
-    if not _SCALES[0] <= job.scale <= _SCALES[1]:
-        raise ProjectError(f"The scale is {job.scale:g}.", hint=f"Give a number from {_SCALES[0]} to {_SCALES[1]:.0f}.")
-    scene_up = opened.capture.rig.up_direction() if job.scene_up is None else np.array(job.scene_up)
-    return world(scene_up, up=job.up, scale=job.scale, is_rub=job.axes == "rub")
+    said = opened.project.document.world.meters_per_unit
+    scale = job.scale if job.scale is not None else 1.0 if said is None else said
+    if not _SCALES[0] <= scale <= _SCALES[1]:
+        raise ProjectError(f"The scale is {scale:g}.", hint=f"Give a number from {_SCALES[0]} to {_SCALES[1]:.0f}.")
+    scene_up = opened.up if job.scene_up is None else np.array(job.scene_up)
+    return world(scene_up, up=job.up, scale=scale, is_rub=job.axes == "rub")

@@ -119,7 +119,7 @@ def _states(project: Project, clips: list[Clip], trained: list[int], stretch: St
             try:
                 states[index] = read_clip_state(project.clip_path(index))
             except ProjectError:
-                continue  # one that is damaged is no neighbour
+                continue  # a damaged one does not count as a neighbour
     base = project.inherited_index(indices[-1])
     fingerprint = None if base is None else read_clip_state(project.clip_path(base)).header.fingerprint
     for index in [one for one in states if states[one].header.reference_fingerprint not in (None, fingerprint)]:

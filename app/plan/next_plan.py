@@ -61,7 +61,7 @@ class NextPlan:
         if clip_index is None or service.worker is not None:
             return None
         clip = service.clips[clip_index]
-        basis = (repr(project.settings), service.catalog.revision)
+        basis = (f"{project.settings!r} {id(project.document.exclusions)}", service.catalog.revision)
         request = PlanRequest(clip, basis, can_measure, project, capture, service.catalog)
         newest, plan = self._plans.newest, None
         if newest is None or newest[0] != request:

@@ -49,6 +49,7 @@ def plan_clip(
         CaptureError, PreparationError: The capture does not fit the settings.
     """
     settings, config = project.settings, project.settings.config()
+    capture = capture.without(project.document.exclusions)
     base = project.inherited_index(clip.clip_index)
     if base is None and config.start == "previous" and clip.clip_index != settings.reference_clip:
         base, config = project.previous_index(clip.clip_index), config.going_on()
@@ -113,7 +114,8 @@ def plan_status(
         can_edit: Whether settings may still change.
     """
     settings, config = project.settings, project.settings.config()
-    n_cameras = len(capture.rig) - len(settings.holdout)
+    capture = capture.without(project.document.exclusions)
+    n_cameras = len(capture.training_cameras(capture.camera_indices(settings.holdout)))
     derived: dict[str, int] = {
         "static_steps": config.n_static_steps(n_cameras),
         "joint_steps": config.n_joint_steps(n_cameras * clip.n_frames),

@@ -144,7 +144,7 @@ class SequencePlan:
         Args:
             can_measure: Whether nothing else computes, so that the machine may be timed.
         """
-        basis = (repr(project.settings), service.catalog.revision)
+        basis = (f"{project.settings!r} {id(project.document.exclusions)}", service.catalog.revision)
         can_measure = can_measure and service.worker is None
         request = SequenceRequest(basis, can_measure, project, capture, service.clips, service.catalog)
         newest = self._worker.newest
@@ -240,7 +240,7 @@ def _kinds(request: SequenceRequest) -> Kinds:
 
 
 def _plans(request: SequenceRequest, timed: StepTime) -> dict[Kind, TrainingPlan]:
-    project, capture = request.project, request.capture
+    project, capture = request.project, request.capture.without(request.project.document.exclusions)
     config = project.settings.config()
     history = clip_history(project, len(request.clips))
     footage = footage_of(capture, capture.camera_indices(project.settings.holdout))

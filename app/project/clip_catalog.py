@@ -13,6 +13,7 @@ from pathlib import Path
 from app.project.header_cache import FoundHeader
 from app.project.metrics_file import read_metrics
 from app.project.project import Project
+from engine.capture.exclusions import exclusion_key
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.roles import REFERENCE_ROLES
 
@@ -38,7 +39,8 @@ class ClipRecord:
         revision: Names that state; empty when there is none.
         resume_step: The step that training this clip goes on from; None when it starts from the beginning.
         resume_n_steps: Steps of that training.
-        reason: Why it is stale or damaged, or what became of its checkpoint; empty otherwise.
+        reason: Why it is stale or damaged, what became of its checkpoint, or that it was trained with other pictures;
+            empty otherwise.
         blocked_by: A damaged clip without which this one cannot be trained.
         seconds: What it took when it was trained; None where not recorded.
         exposure_change: How far the cameras' exposure is from the reference clip's, a share; None where not known.
@@ -121,6 +123,11 @@ class ClipCatalog:
     def update(self, clip_index: int) -> None:
         """Read the files of one clip again; the others are judged anew by what was read before."""
         self._read(clip_index)
+        self._records = self._judged()
+        self.revision += 1
+
+    def judge_anew(self) -> None:
+        """The document has changed: judge all clips by what was read before."""
         self._records = self._judged()
         self.revision += 1
 
@@ -279,6 +286,7 @@ class ClipCatalog:
         figures["exposure_change"] = found.exposure_change
         if basis.reason:  # it cannot be shown without what it was trained on
             return ClipRecord("stale", header.step, header.n_steps, reason=basis.reason, **figures, **resume)
+        reason = reason or self._other_pictures(header)
         revision = f"trained-{header.fingerprint}"
         path = self._project.clip_path(index)
         return ClipRecord(
@@ -291,6 +299,13 @@ class ClipCatalog:
             **figures,
             **resume,
         )
+
+    def _other_pictures(self, header: ClipHeader) -> str:
+        """That what is excluded of its pictures has changed since; empty where it has not. Such a clip is good."""
+        frames = (header.start, header.start + header.n_frames)
+        if header.exclusions == exclusion_key(self._project.document.exclusions, frames):
+            return ""
+        return "What is excluded from training has changed since: it was trained with other pictures."
 
     def _lost_checkpoint(self, kept: ClipHeader | None) -> str:
         """Why the training cannot go on from a checkpoint; empty when it can. kept: None where it is damaged."""

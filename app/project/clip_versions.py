@@ -91,7 +91,7 @@ def _numbers(project: Project, clip_index: int) -> list[int]:
 def set_aside(project: Project, clip_index: int, *, unless: str = "") -> int | None:
     """Keep the finished clip and its curves as a version, under their names as well. See `forget_oldest`.
 
-    A damaged clip is no version; it is kept as well, see `put_damaged_aside`.
+    A damaged clip does not become a version; it is kept as well, see `put_damaged_aside`.
 
     Args:
         unless: Fingerprint of what comes in its place: an equal clip is not kept twice.

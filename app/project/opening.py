@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from app.background.jobs import JobContext
+from app.document.document_file import DamagedDocument
+from app.document.journal_file import JournalDamage
+from app.document.recovery import damaged_project, plain_history
 from app.project.clip_catalog import ClipCatalog
 from app.project.clip_names import finished_files
 from app.project.opening_answers import OpeningAnswers, window_scale
@@ -20,10 +23,32 @@ from app.project.project import (
     is_project,
     open_project,
     read_settings,
+    repair_project,
 )
+from app.project.project_choices import AS_USUAL, ProjectChoices
 from app.project.recents import RecentProject, project_name
 from engine.capture.capture import Capture, open_capture
 from engine.errors import CaptureError, ProjectError
+
+Note = tuple[str, str, str, str]
+
+
+class LostCapture(CaptureError):
+    """The capture of a project is not where it was. project: The project's folder."""
+
+    project: Path | None = None
+
+
+class OtherCapture(ProjectError):
+    """In the place of a project's capture lies another one.
+
+    Attributes:
+        project: The project's folder.
+        known: Where its capture was.
+    """
+
+    project: Path | None = None
+    known: Path = Path()
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +59,7 @@ class Opened:
         project: None where it is the one already open, or the user has to be asked.
         catalog: What lies on disk of its clips; None without a project.
         choices: The projects to choose from; empty where there is nothing to choose.
-        note: Kind, title, detail and hint of something that the user has to know, or None.
+        notes: Kind, title, detail and hint of what the user has to know.
         follow_links: Of a choice: whether the user allows the capture's files to lie outside of its folder.
         is_asking: There is no project yet, and the user is to see the capture before one is made.
     """
@@ -43,7 +68,7 @@ class Opened:
     project: Project | None = None
     catalog: ClipCatalog | None = None
     choices: tuple[RecentProject, ...] = ()
-    note: tuple[str, str, str, str] | None = None
+    notes: tuple[Note, ...] = ()
     follow_links: bool = False
     is_asking: bool = False
 
@@ -61,6 +86,7 @@ def open_for_window(
     is_asking: bool = False,
     answers: OpeningAnswers | None = None,
     known: Capture | None = None,
+    choices: ProjectChoices = AS_USUAL,
 ) -> Opened:
     """Open a capture folder or a project folder.
 
@@ -77,12 +103,15 @@ def open_for_window(
         is_asking: Only look at the capture where a project would have to be made.
         answers: What a new project begins with; None takes the scale and what the capture suggests.
         known: The capture where it was opened already.
+        choices: How a project is opened.
     Raises:
+        DamagedProject: Its document is damaged; says what is left.
+        LostCapture: The capture of a project is not where it was.
         CaptureError, ProjectError: It cannot be opened.
     """
     context.report(0.0, path.name)
     if is_project(path):
-        return _open_project(path, current, context, follow_links=follow_links)
+        return _open_project(path, current, context, follow_links=follow_links, choices=choices)
     capture = known or open_capture(path, scale=1.0 if scale is None else scale, follow_links=follow_links)
     if answers is not None:
         capture = capture.resized(answers.scale, answers.frames)
@@ -92,21 +121,32 @@ def open_for_window(
     there = capture if scale is None else None
     if project_dir is not None:
         if (project_dir / PROJECT_FILE).is_file():
-            return _open_project(project_dir, current, context, there, follow_links=follow_links)
-        return _make_project(project_dir, capture, answers, is_asking=is_asking)
+            return _open_project(project_dir, current, context, there, follow_links=follow_links, choices=choices)
+        return _make_project(project_dir, capture, answers, choices, is_asking=is_asking)
     found = projects_of(capture, recent)
+    if not found and not is_new_project:
+        for folder in _kept_dirs(capture):
+            _read_settings(folder, choices)  # one that is damaged is asked about, not passed over
     if is_new_project or not found:
-        return _make_project(new_project_dir(capture), capture, answers, is_asking=is_asking)
+        return _make_project(new_project_dir(capture), capture, answers, choices, is_asking=is_asking)
     if len(found) > 1:
         return Opened(capture, choices=tuple(found), follow_links=follow_links)
-    opened = _open_project(found[0].folder, current, context, there, follow_links=follow_links)
-    if opened.project is None or opened.catalog is None or opened.note is not None:
+    opened = _open_project(found[0].folder, current, context, there, follow_links=follow_links, choices=choices)
+    if opened.project is None or opened.catalog is None or opened.notes:
         return opened
     told = f"{opened.catalog.n_trained} of {len(opened.catalog)} clips trained - {opened.project.folder}"
-    return replace(opened, note=("info", "The project of this capture was opened", told, ""))
+    return replace(opened, notes=(("info", "The project of this capture was opened", told, ""),))
 
 
-def _make_project(folder: Path, capture: Capture, answers: OpeningAnswers | None, *, is_asking: bool) -> Opened:
+def _make_project(
+    folder: Path, capture: Capture, answers: OpeningAnswers | None, choices: ProjectChoices, *, is_asking: bool
+) -> Opened:
+    if choices.is_read_only:
+        raise ProjectError(
+            "There is no project of this capture to look at.",
+            hint="Open it for writing, which makes one.",
+            path=capture.path,
+        )
     if is_asking:
         return Opened(capture, follow_links=capture.follow_links, is_asking=True)
     settings = default_settings(capture)
@@ -123,11 +163,22 @@ def _open_project(
     capture: Capture | None = None,
     *,
     follow_links: bool = False,
+    choices: ProjectChoices = AS_USUAL,
 ) -> Opened:
-    stored = read_settings(folder)
+    notes: list[Note] = []
+    if choices.is_repaired:
+        aside = repair_project(folder)
+        notes.append(("info", "The project was repaired", f"What was damaged is kept in {aside}.", ""))
+    stored = _read_settings(folder, choices)
     settings = replace(stored, follow_links=stored.follow_links or follow_links)
+    if choices.capture is not None:
+        settings = replace(settings, capture=str(choices.capture.resolve()))
     if capture is None:
-        capture = open_capture_of(settings, folder)
+        try:
+            capture = open_capture_of(settings, folder)
+        except OtherCapture as error:
+            error.known = Path(stored.capture)
+            raise
     else:
         check_capture(capture, settings, folder)
         capture = (
@@ -135,34 +186,66 @@ def _open_project(
             if (capture.scale, capture.frames) == (settings.scale, settings.frames)
             else capture.resized(settings.scale, settings.frames)
         )
-    if current is not None and current.resolve() == folder.resolve():
+    is_again = current is not None and current.resolve() == folder.resolve()
+    if is_again and choices == AS_USUAL:
         return Opened(capture)
-    note = None
+    project = _opened(folder, choices, notes)
+    settings = replace(settings, capture=str(Path(capture.path).resolve()))
     try:
-        project = open_project(folder)
-        place = str(Path(capture.path).resolve())
-        settings = replace(settings, capture=place)
-        if settings != stored:  # it has moved since, or may follow links; workers open it as the project says
-            project.update(settings)
-    except ProjectError as error:  # most likely locked; looking at it does no harm
-        note = ("warn", "The project is open for reading only", str(error), "Training is off until it is closed there.")
-        project = open_project(folder, is_writable=False)
-    n_clips = len(project.clips(capture.n_frames))
+        if project.is_writable and settings != stored:
+            project.update(settings)  # it has moved, or may follow links; workers open it as the project says
+        n_clips = len(project.clips(capture.n_frames))
 
-    def report(n_read: int) -> None:
-        context.report(0.5 + 0.5 * n_read / n_clips, f"reading clip {n_read} of {n_clips}")
+        def report(n_read: int) -> None:
+            context.report(0.5 + 0.5 * n_read / n_clips, f"reading clip {n_read} of {n_clips}")
 
-    try:
-        return Opened(capture, project, ClipCatalog(project, n_clips, report), note=note)
+        return Opened(capture, project, ClipCatalog(project, n_clips, report), notes=tuple(notes))
     except BaseException:
         project.close()
         raise
 
 
+def _read_settings(folder: Path, choices: ProjectChoices) -> ProjectSettings:
+    if not choices.is_journal_used:
+        return plain_history(folder).present.settings
+    try:
+        return read_settings(folder)
+    except (JournalDamage, DamagedDocument) as error:
+        raise damaged_project(folder, error) from error
+
+
+def _opened(folder: Path, choices: ProjectChoices, notes: list[Note]) -> Project:
+    """The project, for writing where that is possible and wanted; what there is to say of it goes into `notes`."""
+    if not choices.is_journal_used:
+        notes.append(("warn", "The project is open for reading only", "What its journal holds is left out.", ""))
+        why = "It was opened without its damaged journal. Repair it to go on with it."
+        return open_project(folder, is_writable=False, is_journal_used=False, why_read_only=why)
+    if choices.is_read_only:
+        notes.append(("info", "The project is open for reading only", "", "Open it again to change something."))
+        why = "It was opened so. Open it again to change something."
+        return open_project(folder, is_writable=False, why_read_only=why)
+    try:
+        project = open_project(folder)
+    except ProjectError as error:  # most likely locked; looking at it does no harm
+        notes.append(("warn", "The project is open for reading only", str(error), "Nothing can be changed in it."))
+        return open_project(folder, is_writable=False, why_read_only=f"{error.message} {error.hint}".strip())
+    notes += _recovered(project)
+    return project
+
+
+def _recovered(project: Project) -> list[Note]:
+    """What a user has to know whose project was not closed the last time."""
+    n, found = project.store.n_replayed, project.store.notes
+    steps = f"{n} step{'s were' if n != 1 else ' was'} taken from the journal, up to: {project.history.undo_name}."
+    told = f"It was not closed the last time. {steps if project.history.undo_name else steps.partition(',')[0] + '.'}"
+    notes: list[Note] = [("info", "What was edited last was recovered", told, "")] if n else []
+    return notes + [("warn", "Something of the project is missing", note, "") for note in found]
+
+
 def projects_of(capture: Capture, recent: Sequence[RecentProject] = ()) -> list[RecentProject]:
     """Projects of a capture: those that the window keeps, and those of the recent ones that were made for it."""
     place = Path(capture.path).resolve()
-    kept = sorted(default_project_dir(capture).parent.glob(f"{default_project_dir(capture).name}*"))
+    kept = _kept_dirs(capture)
     folders = [entry.folder for entry in recent if entry.project and Path(entry.capture) == place]
     found = []
     for folder in dict.fromkeys(path.resolve() for path in [*folders, *kept]):
@@ -178,6 +261,12 @@ def projects_of(capture: Capture, recent: Sequence[RecentProject] = ()) -> list[
             opened = next((entry.opened for entry in recent if entry.folder == folder), "")
             found.append(RecentProject(str(folder), str(place), name, n_trained, n_clips, opened))
     return found
+
+
+def _kept_dirs(capture: Capture) -> list[Path]:
+    """Folders of projects of a capture that the window has made."""
+    usual = default_project_dir(capture)
+    return [folder for folder in sorted(usual.parent.glob(f"{usual.name}*")) if is_project(folder)]
 
 
 def new_project_dir(capture: Capture) -> Path:
@@ -199,13 +288,19 @@ def open_capture_of(settings: ProjectSettings, folder: Path) -> Capture:
         ProjectError: Another one lies in its place.
     """
     if not Path(settings.capture).is_dir():
-        raise CaptureError(
+        lost = LostCapture(
             "The capture of this project is no longer where it was.",
             hint=f"Put it back, or say where it is: clipgstream train NEW_PLACE --project {folder}",
             path=settings.capture,
         )
+        lost.project = folder
+        raise lost
     capture = open_capture(settings.capture, scale=settings.scale, follow_links=settings.follow_links)
-    check_capture(capture, settings, folder)
+    try:
+        check_capture(capture, settings, folder)
+    except ProjectError:
+        capture.close()
+        raise
     return capture if settings.frames is None else capture.resized(settings.scale, settings.frames)
 
 
@@ -216,8 +311,10 @@ def check_capture(capture: Capture, settings: ProjectSettings, folder: Path) -> 
         ProjectError: It is another one.
     """
     if capture.fingerprint != settings.fingerprint:
-        raise ProjectError(
+        other = OtherCapture(
             f"The capture in {capture.path} is not the one this project was made for.",
             hint="Put the original capture back, or make a new project.",
             path=folder,
         )
+        other.project, other.known = folder, Path(settings.capture)
+        raise other

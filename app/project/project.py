@@ -1,6 +1,9 @@
 """Project: the folder that keeps what was learned about one capture. Paths, settings and the lock; no training.
 
 project.json                 the document: settings, regions, camera paths, edits and so on, see ProjectDocument
+journal/00000000.jsonl       what has happened to the document since that step
+history.json                 the way back from the document of project.json
+project.backup.json          project.json before it was written last
 clips/0000.safetensors       finished clips
 clips/000030-000035.safetensors  one of frames 30 to 34, after a split or merge; see app.project.clip_names
 mends/0001.json              what was mended, with figures before and after
@@ -24,11 +27,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from app.document.document_file import PROJECT_FILE, write_document
+from app.document.document_file import BACKUP_FILE, PROJECT_FILE
 from app.document.document_store import DocumentStore
 from app.document.history import Changed, DocumentHistory, Event, Placed
+from app.document.history_file import HISTORY_FILE
 from app.document.project_document import ProjectDocument
 from app.document.project_settings import ProjectSettings
+from app.document.recovery import plain_history, recover
+from app.document.replay import JOURNAL_FOLDER
+from app.project.clip_exchange import finish_exchange
 from app.project.clip_names import clip_name, finished_files
 from app.project.header_cache import HeaderCache
 from app.project.interrupted import finish_interrupted
@@ -43,6 +50,7 @@ logger = logging.getLogger(__name__)
 
 LOCK_FILE = "lock"
 LOCK_FILES = (LOCK_FILE, f".{LOCK_FILE}")
+OPEN_ELSEWHERE = "Another program has it open for writing. Close it there first, then open it again."
 MIN_TRAINING_CAMERAS = 2
 DEFAULT_CLIP_LENGTH = 10
 
@@ -54,13 +62,25 @@ class Project:
         history: The document and the way back. The window sets it, and keeps it by itself a moment later.
         store: Where the document is kept.
         headers: Of its clips and checkpoints, read once for everybody who asks.
+
+    Args:
+        why_read_only: Without a lock, why, and what helps.
     """
 
-    def __init__(self, folder: Path, history: DocumentHistory, lock: ProcessLock | None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        history: DocumentHistory,
+        lock: ProcessLock | None,
+        *,
+        store: DocumentStore | None = None,
+        why_read_only: str = OPEN_ELSEWHERE,
+    ) -> None:
         self.folder = folder
-        self.history, self.store = history, DocumentStore(folder)
+        self.history, self.store = history, store or DocumentStore(folder)
         self.headers = HeaderCache()
         self._lock = lock
+        self._why_read_only = why_read_only
 
     @property
     def document(self) -> ProjectDocument:
@@ -180,11 +200,7 @@ class Project:
             ProjectError: It may not.
         """
         if not self.is_writable:
-            raise ProjectError(
-                "The project is open for reading only, because another program trains into it.",
-                hint="Close it there first, then open it again.",
-                path=self.folder,
-            )
+            raise ProjectError("The project is open for reading only.", hint=self._why_read_only, path=self.folder)
 
     def change(self, document: ProjectDocument, name: str) -> None:
         """Replace the document, on disk first, as a step of its history. name: See Changed.
@@ -227,15 +243,19 @@ class Project:
             os.replace(path, self.metrics_path(clip_index))
 
     def close(self) -> None:
-        """Release the lock. The object can still be read from."""
+        """Write what the journal holds into project.json, and release the lock. The object can still be read from."""
+        if self.is_writable:
+            self.store.compact()
         if self._lock is not None:
             self._lock.release()
 
     def remove_files(self) -> None:
         """Take back a project that has learned nothing: its own files and folders go, other things stay."""
-        for name in ("clips", "mends", "versions", "damaged", "checkpoints", "live", "prep", "metrics", "logs"):
+        folders = ("clips", "mends", "versions", "damaged", "checkpoints", "live", "prep", "metrics", "logs")
+        for name in (*folders, JOURNAL_FOLDER):
             shutil.rmtree(self.folder / name, ignore_errors=True)
-        (self.folder / PROJECT_FILE).unlink(missing_ok=True)
+        for name in (PROJECT_FILE, BACKUP_FILE, HISTORY_FILE):
+            (self.folder / name).unlink(missing_ok=True)
 
 
 # ---------------------------------------------------------------- opening
@@ -340,36 +360,65 @@ def create_project(folder: Path | str, settings: ProjectSettings) -> Project:
     try:
         if (folder / PROJECT_FILE).exists():  # made while this one looked
             raise ProjectError("There is a project already.", hint="Open it instead.", path=folder)
-        document = ProjectDocument(settings)
-        write_document(folder, document)
+        document, store = ProjectDocument(settings), DocumentStore(folder)
+        store.create(document)
     except ProjectError:
         lock.release()
         raise
-    return Project(folder, DocumentHistory(document), lock)
+    return Project(folder, DocumentHistory(document), lock, store=store)
 
 
-def open_project(folder: Path | str, *, is_writable: bool = True) -> Project:
+def open_project(
+    folder: Path | str, *, is_writable: bool = True, is_journal_used: bool = True, why_read_only: str = OPEN_ELSEWHERE
+) -> Project:
     """Open an existing project folder; for writing it is locked, and left-over snapshots are swept.
 
+    Args:
+        is_journal_used: False for the document of project.json as it is, where the journal is damaged; read-only.
+        why_read_only: See Project.
     Raises:
         ProjectError: The folder is not a project, is damaged, of a newer schema, or open for writing elsewhere.
     """
     folder = Path(folder)
-    history = DocumentStore(folder).read()
+    if not is_journal_used:
+        return Project(folder, plain_history(folder), None, why_read_only=why_read_only)
+    store = DocumentStore(folder)
     lock = None
-    if is_writable:
+    if is_writable and is_project(folder):  # what is not a project says so below
         lock = ProcessLock(folder / LOCK_FILE)
         lock.acquire()
-        try:
-            history = DocumentStore(folder).read()  # another program may have changed it until now
-        except ProjectError:
+    try:
+        history = store.read()
+    except ProjectError:
+        if lock is not None:
             lock.release()
-            raise
-    project = Project(folder, history, lock)
+        raise
+    project = Project(folder, history, lock, store=store, why_read_only=why_read_only)
     if is_writable:
+        try:
+            finish_exchange(folder)
+        except ProjectError:
+            project.close()
+            raise
         sweep(project)
         finish_interrupted(project)
     return project
+
+
+def repair_project(folder: Path | str) -> Path:
+    """Go on with the steps before the damage; see app.document.recovery.
+
+    Returns:
+        The folder with what was damaged.
+    Raises:
+        ProjectError: Nothing can be kept, or the project is open for writing elsewhere.
+    """
+    lock = ProcessLock(Path(folder) / LOCK_FILE)
+    lock.acquire()
+    try:
+        return recover(Path(folder))
+    finally:
+        lock.release()
 
 
 def sweep(project: Project) -> None:

@@ -95,6 +95,7 @@ class Figures:
     Attributes:
         clips: Of the project.
         n_cameras: Of the capture.
+        is_usable: Pictures that can be measured, because they are not excluded; None for all. [F, C] bool
         cells: By column of CELL_COLUMNS, NaN where not known. [F, C] float64
         has_row, has_pair: What was measured, whether or not there is a figure. [F, C] bool
         is_wanted: Frames of trained clips. [F] bool
@@ -105,6 +106,7 @@ class Figures:
 
     clips: Sequence[Clip]
     n_cameras: int
+    is_usable: np.ndarray | None = None
     cells: dict[str, np.ndarray] = field(init=False)
     has_row: np.ndarray = field(init=False)
     has_pair: np.ndarray = field(init=False)
@@ -112,12 +114,17 @@ class Figures:
     is_wanted_pair: np.ndarray = field(init=False)
     seams: list[SeamStatus] = field(init=False)
     revision: int = 0
+    _usable: np.ndarray = field(init=False)
+    _usable_pair: np.ndarray = field(init=False)
     _excess_static: np.ndarray = field(init=False)
     _change_static: np.ndarray = field(init=False)
     _stale_seams: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         shape = (self.clips[-1].stop if self.clips else 0, self.n_cameras)
+        usable = np.ones(shape, bool) if self.is_usable is None else self.is_usable
+        before = np.concatenate([np.zeros((1, self.n_cameras), bool), usable[:-1]])[: shape[0]]
+        self._usable, self._usable_pair = usable, usable & before
         self.cells = {column: np.full(shape, np.nan) for column in CELL_COLUMNS}
         self.has_row, self.has_pair = (np.zeros(shape, bool) for _ in range(2))
         self.is_wanted, self.is_wanted_pair = (np.zeros(shape[0], bool) for _ in range(2))
@@ -206,8 +213,8 @@ class Figures:
 
     @property
     def n_all(self) -> int:
-        """Pictures of trained clips."""
-        return int(self.is_wanted.sum()) * self.n_cameras
+        """Pictures of trained clips that can be measured."""
+        return int((self._usable & self.is_wanted[:, None]).sum())
 
     @property
     def n_done(self) -> int:
@@ -217,9 +224,9 @@ class Figures:
     @property
     def unknown_rows(self) -> np.ndarray:
         """Pictures that are not measured. [F, C] bool"""
-        return ~self.has_row & self.is_wanted[:, None]
+        return ~self.has_row & self.is_wanted[:, None] & self._usable
 
     @property
     def unknown_pairs(self) -> np.ndarray:
         """Pairs that are not measured, by the later frame. [F, C] bool"""
-        return ~self.has_pair & self.is_wanted_pair[:, None]
+        return ~self.has_pair & self.is_wanted_pair[:, None] & self._usable_pair

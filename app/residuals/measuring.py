@@ -69,7 +69,8 @@ class Measuring:
         self._end()
         self._opened, self._catalog = opened, catalog
         self._seen, self._revisions = None, ("",) * len(opened.clips)
-        self._figures = Figures(opened.clips, len(opened.rig))
+        usable = opened.project.document.exclusions.usable(opened.rig.names, opened.capture.n_frames)
+        self._figures = Figures(opened.clips, len(opened.rig), usable)
         self._look, self._messages = None, []
         self._take_catalog()
         self._remake()

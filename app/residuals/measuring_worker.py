@@ -215,6 +215,7 @@ def measure(job: MeasureJob, talk: Talking) -> None:
         cache_bytes=CAPTURE_CACHE_BYTES,
         follow_links=job.follow_links,
     )
+    capture = capture.without(project.document.exclusions)
     opened = open_trained(project, capture)
     from engine.metrics.clips.evaluate import Evaluation
 

@@ -11,9 +11,12 @@ from pathlib import Path
 from app.calibration.job import CalibrationRequest
 from app.export.export_choices import ExportChoices
 from app.project.opening_answers import OpeningAnswers
+from app.project.project_choices import AS_USUAL, ProjectChoices
 from app.session.clips.clip_commands import ClipCommand
 from app.session.editing.edit_commands import EditCommand, GoToStep
 from app.session.editing.selection_commands import SelectionCommand
+from app.session.exclusions.exclusion_commands import ExclusionCommand
+from app.session.files.file_commands import FileCommand
 from app.session.mending.mend_commands import MendCommand
 from app.session.path_commands import PathCommand
 from engine.capture.writers.capture_json import Corrections
@@ -35,6 +38,8 @@ class OpenCapture:
     """Report what it is, and ask what a project of it begins with, where there is none; or why it does not open."""
     answers: OpeningAnswers | None = None
     """What a new project begins with; None takes what suits."""
+    choices: ProjectChoices = AS_USUAL
+    """How its project is opened."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +47,7 @@ class OpenProject:
     """Open a project folder and the capture it names."""
 
     path: Path
+    choices: ProjectChoices = AS_USUAL
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,6 +233,16 @@ class MarkRegion:
 
 
 @dataclass(frozen=True, slots=True)
+class MarkBox:
+    """Mark a box along the axes of the scene as MarkRegion marks a sphere."""
+
+    treat: str
+    low: tuple[float, float, float]
+    """Scene units."""
+    high: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
 class RemoveRegion:
     """Forget the marked region at this position of the list."""
 
@@ -357,7 +373,7 @@ class StopCalibration:
     """End the calibration that runs; nothing is written."""
 
 
-MarkCommand = MarkRegion | RemoveRegion
+MarkCommand = MarkRegion | MarkBox | RemoveRegion
 """What changes the marked regions, and can be taken back."""
 
 SettingCommand = SetHoldout | SetClipLength | SetTrainSetting | SetPreset
@@ -459,9 +475,11 @@ ExportCommand = (
 Command = (
     OpenCapture
     | OpenProject
+    | FileCommand
     | TrainNextClip
     | QueueCommand
     | ClipCommand
+    | ExclusionCommand
     | MendCommand
     | PauseTraining
     | ResumeTraining

@@ -129,6 +129,10 @@ class LiveTraining:
                 hint="Stop the training first: what was learned is kept.",
             )
 
+    def is_finished(self, clip_index: int) -> bool:
+        """Whether a finished clip, or a damaged one, would be replaced by training this one."""
+        return self.service is not None and self.service.is_finished(clip_index)
+
     def state_of(self, clip_index: int) -> ShownState | None:
         """The state of a clip to look at."""
         return None if self.service is None else self.service.shown_state(clip_index)

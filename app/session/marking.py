@@ -7,11 +7,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from app.session.commands import MarkCommand, MarkRegion, RemoveRegion
+from app.session.commands import MarkBox, MarkCommand, MarkRegion, RemoveRegion
 from app.session.editing.kept_document import KeptDocument
 from app.status import ClipStatus, RegionsStatus
 from engine.errors import ProjectError
-from engine.gate.regions import GateRegion, sphere_region
+from engine.gate.regions import GateRegion, parse_region, sphere_region
 
 STARTED = ("preparing", "training", "paused", "stopped", "trained")
 """States of clips that have taken their regions already."""
@@ -79,6 +79,9 @@ class Marking:
         match command:
             case MarkRegion(treat=treat, center=center, radius=radius):
                 self._change(after_marking(self.regions, [sphere_region(treat, center, radius)]), "mark a region")
+            case MarkBox(treat=treat, low=low, high=high):
+                box = parse_region({"treat": treat, "box": [list(low), list(high)]})
+                self._change(after_marking(self.regions, [box]), "mark a region")
             case RemoveRegion(index=index):
                 self.remove(index)
 

@@ -25,7 +25,8 @@ def settings_question(opened: OpenedProject, catalog: ClipCatalog, clip_index: i
     if not 0 <= clip_index < len(opened.clips):
         raise ProjectError(f"There is no clip {clip_index}; clips are 0 to {len(opened.clips) - 1}.")
     config = project.settings.config()
-    n_cameras = len(opened.rig) - len(project.settings.holdout)
+    capture = opened.capture.without(project.document.exclusions)
+    n_cameras = len(capture.training_cameras(opened.holdout))
     settings = []
     for name in offered(project, clip_index):
         declared = SETTINGS[name]

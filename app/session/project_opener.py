@@ -24,6 +24,8 @@ class ProjectOpener:
         take: Called by `Jobs.poll` with what was opened.
         open_path: Opens a path on the thread; tests bring their own.
         refuse: Told the folder that does not open and why, where the user was to be asked about it.
+        ask: Told what does not open, and why. Whether the user is asked what to do, so that nothing else has to be
+            said.
     """
 
     def __init__(
@@ -35,10 +37,11 @@ class ProjectOpener:
         project_dir: Path | None = None,
         open_path: Callable[..., Opened] = open_for_window,
         refuse: Callable[[Path, EngineError], None] | None = None,
+        ask: Callable[[OpenCapture, Exception], bool] | None = None,
     ) -> None:
         self.project_dir = project_dir
         self._jobs, self._notices, self._take, self._open_path = jobs, notices, take, open_path
-        self._refuse = refuse
+        self._refuse, self._ask = refuse, ask
         self._refusals: list[Notice] = []
         self._newest: object | None = None
         """Stands for what was asked for last."""
@@ -59,7 +62,7 @@ class ProjectOpener:
             known: The capture where it was opened already.
         """
         path, recent, project_dir = Path(command.path), tuple(recent), self.project_dir
-        asked = command if isinstance(command, OpenCapture) else OpenCapture(path)
+        asked = command if isinstance(command, OpenCapture) else OpenCapture(path, choices=command.choices)
         self._newest = this = object()
 
         def work(context: JobContext) -> Opened:
@@ -75,6 +78,7 @@ class ProjectOpener:
                 is_asking=asked.is_asking,
                 answers=asked.answers,
                 known=known,
+                choices=asked.choices,
             )
 
         def take(opened: Opened) -> None:
@@ -87,6 +91,8 @@ class ProjectOpener:
                 opened.capture.close()
 
         def failed(error: Exception) -> None:
+            if self._ask is not None and this is self._newest and self._ask(asked, error):
+                return
             if asked.is_asking and self._refuse is not None and isinstance(error, CaptureError):
                 if this is self._newest:
                     self._refuse(path, error)

@@ -9,6 +9,7 @@ from app.project.clip_catalog import ClipCatalog
 from app.project.opening_answers import OpeningAnswers
 from app.project.recents import RecentProject
 from app.session.clips.clip_questions import ClipQuestion
+from app.session.files.file_questions import FileQuestion
 from engine.capture.writers.capture_json import Corrections
 
 
@@ -127,7 +128,7 @@ class OpeningPage:
     follow_links: bool
 
 
-Question = RetrainQuestion | SettingsQuestion | ProjectQuestion | CorrectionQuestion | ClipQuestion
+Question = RetrainQuestion | SettingsQuestion | ProjectQuestion | CorrectionQuestion | ClipQuestion | FileQuestion
 
 
 def retrain_question(catalog: ClipCatalog, clip_index: int) -> RetrainQuestion:

@@ -29,11 +29,13 @@ from app.playback.timeline import Timeline
 from app.playback.trails import Trails
 from app.playback.view_modes import CONTENTS, MODES, ShownAs
 from app.playback.views import Views
+from app.project.allowed_changes import check_change, is_other_cut
 from app.project.disk.use import DiskUse
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.opening_answers import answers_to_keep
 from app.project.project import Project, check_settings
+from app.project.project_choices import AS_USUAL
 from app.project.recents import project_name
 from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
@@ -48,13 +50,17 @@ from app.session.clip_versions import Versions
 from app.session.clips.clip_commands import ClipCommand, CompareVersion
 from app.session.clips.clip_work import ClipWork
 from app.session.clips.comparing import show_version
+from app.session.copying.command_texts import CommandTexts
 from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
 from app.session.editing.selecting import Selecting, SelectionStatus
 from app.session.editing.shown_to_select import ShownToSelect
+from app.session.exclusions.excluding import apply_exclusion
+from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.exporting import Exporting
+from app.session.files.project_files import ProjectFiles
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
 from app.session.marking import Marking
@@ -65,7 +71,7 @@ from app.session.project_opener import ProjectOpener
 from app.session.questions import ProjectQuestion, Question
 from app.session.queue_commands import QueueCommands
 from app.session.recent_projects import RecentProjects
-from app.session.setting_changes import changed_settings, is_other_cut
+from app.session.setting_changes import changed_settings
 from app.session.settings import Settings
 from app.session.synchronising import Synchronising
 from app.status import (
@@ -93,9 +99,10 @@ from app.training.service import Launch, ShownState
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.editing.selection.ranges import Spread
 from engine.editing.selection.seen_from import SeenFrom
-from engine.errors import EngineError, ProjectError
+from engine.errors import EngineError
 
 
 class Session:
@@ -116,7 +123,9 @@ class Session:
         mending: A seam, or a stretch with flicker, that is mended.
         exporting: What leaves the project for other programs: what is asked, and the queue.
         recent: What was opened lately.
+        files: Repairing, relocating and copying projects.
         doctor: What is wrong with the open capture, and what helps.
+        command_texts: What was done, or could be, as commands to copy.
         notices: What the user has to know.
 
     Args:
@@ -177,6 +186,7 @@ class Session:
         )
         self.selection = SelectionStatus()
         self.editing = Edits(self.document, self.selecting)
+        self.command_texts = CommandTexts(lambda: self.project, self.live_training.is_finished)
         self.edits: EditsStatus = self.editing.status()
         self.regions: RegionsStatus = self.marking.status([])
         self.paths: PathsStatus = self.camera_paths.status()
@@ -189,6 +199,10 @@ class Session:
             project_dir=project_dir,
             open_path=opener,
             refuse=self.opening.refuse,
+            ask=lambda asked, error: self.files.ask_about(asked, error),
+        )
+        self.files = ProjectFiles(
+            self._jobs, self.notices, ask=self._ask, open_project=self.dispatch, settle=self.document.settle
         )
         self.doctor = CaptureDoctor(self._jobs, self.notices, self.dispatch)
         self._attention = Attention()
@@ -245,6 +259,12 @@ class Session:
         return ShownAs(self.overlays.mode, self.overlays.content)
 
     @property
+    def exclusions(self) -> Exclusions:
+        """What of the open capture training never sees."""
+        content = self.document.content
+        return NOTHING_EXCLUDED if content is None else content.exclusions
+
+    @property
     def residual_status(self) -> ResidualStatus:
         """What is measured of every picture."""
         return self.residuals.status
@@ -278,9 +298,14 @@ class Session:
         match command:
             case commands.OpenCapture() | commands.OpenProject():
                 self.question = None
-                current = None if self.project is None else self.project.folder
+                current = None if self.project is None or not self.project.is_writable else self.project.folder
+                if command.choices != AS_USUAL:  # it may be the open one, in another way
+                    self.document.settle()
                 known = self._take_answers(command) if isinstance(command, commands.OpenCapture) else None
                 self.opener.open(command, current=current, recent=self.recent.entries, known=known)
+            case _ if isinstance(command, commands.FileCommand):
+                self.question = None
+                self.files.apply(command, self.project, is_training=live.is_busy)
             case commands.ForgetRecent(folder=folder):
                 self.recent.forget(Path(folder))
             case commands.CloseQuestion():
@@ -317,6 +342,9 @@ class Session:
             case _ if isinstance(command, ClipCommand):
                 self.question = None
                 self.question = self.clip_work.obey(command)
+            case _ if isinstance(command, ExclusionCommand):
+                n_frames = 0 if self.capture is None else self.capture.n_frames
+                apply_exclusion(command, self.document, self.rig.names, n_frames)
             case commands.PauseTraining():
                 live.pause()
             case commands.ResumeTraining():
@@ -393,6 +421,9 @@ class Session:
             case _:
                 raise TypeError(f"not a command: {command!r}")
 
+    def _ask(self, question: Question | None) -> None:
+        self.question = question
+
     def _ask_export(self) -> None:
         service = self.live_training.service
         catalog = () if service is None else service.catalog
@@ -425,22 +456,20 @@ class Session:
     def _check_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """See that nothing was learned with settings that change. Raises ProjectError."""
         opened = self.opened
-        if opened is None or before.settings == after.settings:
+        if opened is None:
             return
         if is_other_cut(before.settings, after.settings):
             self.live_training.check_idle()
-            check_settings(after.settings, opened.capture)
-            return
-        if opened.project.has_progress or self.live_training.is_busy:
-            raise ProjectError(
-                "What all clips share is fixed once training has begun.",
-                hint="What was learned with them would be worthless. Use another project folder for other values.",
-            )
+        check_change(opened.project, opened.capture, before, after, is_training=self.live_training.is_busy)
 
     def _follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
         """The document has changed: show what follows from it."""
         if before.settings != after.settings:
             self._follow_settings()
+        elif before.exclusions != after.exclusions and self.opened is not None:
+            if self.live_training.service is not None:
+                self.live_training.service.catalog.judge_anew()
+            self._open_residuals(self.opened)
         self._show_notes(after)
 
     def _show_notes(self, document: ProjectDocument) -> None:
@@ -504,8 +533,8 @@ class Session:
         self._keep_recent()
         for sentence in opened.capture.warnings:
             self.notices.add("warn", "The capture is odd but usable", sentence)
-        if found.note is not None:
-            self.notices.add(*found.note)
+        for note in found.notes:
+            self.notices.add(*note)
         if self._is_preloading:
             self.playback.build_first_cloud(self._jobs)
 
@@ -815,6 +844,7 @@ _TITLES: dict[type, str] = {
     commands.TrainClips: "The clips cannot be trained",
     commands.TrainAll: "The clips cannot be trained",
     commands.AskTrainSettings: "The clip cannot be trained",
+    **dict.fromkeys(get_args(ExclusionCommand), "That cannot be excluded"),
     **dict.fromkeys(get_args(MendCommand), "That cannot be mended"),
     **dict.fromkeys(get_args(ClipCommand), "That cannot be done with the clips"),
     commands.RestoreVersion: "The version cannot be brought back",
@@ -826,6 +856,7 @@ _TITLES: dict[type, str] = {
     commands.SynchroniseCameras: "The cameras cannot be synchronised",
     **dict.fromkeys(get_args(commands.SelectionCommand), "That cannot be selected"),
     commands.MarkRegion: "The region cannot be marked",
+    commands.MarkBox: "The region cannot be marked",
     commands.RemoveRegion: "The region cannot be removed",
     commands.Undo: "The last change cannot be taken back",
     commands.Redo: "The change cannot be made again",
@@ -833,4 +864,5 @@ _TITLES: dict[type, str] = {
     **dict.fromkeys(get_args(commands.EditCommand), "That cannot be edited"),
     **dict.fromkeys(get_args(commands.PathCommand), "That cannot be done with the camera path"),
     commands.CorrectCapture: "The capture cannot be corrected",
+    **dict.fromkeys(get_args(commands.FileCommand), "That cannot be done with the project"),
 }

@@ -28,11 +28,3 @@ def changed_settings(settings: ProjectSettings, command: SettingCommand, rig: Ca
         case SetPreset(name=name):
             overrides = preset(name)
     return replace(settings, overrides=replace(settings, overrides=overrides).config().difference())
-
-
-def is_other_cut(before: ProjectSettings, after: ProjectSettings) -> bool:
-    """Whether nothing differs but where clips begin and which is the reference: what may change at any time, because
-    clips that do not fit keep their files and are out of use or out of date."""
-    return (
-        before != after and replace(before, clip_bounds=after.clip_bounds, reference_clip=after.reference_clip) == after
-    )

@@ -39,6 +39,7 @@ def build_training(job: TrainJob, report: ReportProgress) -> Training:
             hint="Put the original capture back, or make a new project.",
             path=job.capture,
         )
+    capture = capture.without(project.document.exclusions)
     clips = project.clips(capture.n_frames)
     if not 0 <= job.clip_index < len(clips):
         raise ProjectError(f"There is no clip {job.clip_index}; the capture has {len(clips)}.", path=job.project)

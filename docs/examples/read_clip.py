@@ -161,7 +161,7 @@ def sigmoid(values):
 def read_frame(project, frame):
     """Gaussians of a frame of a project."""
     project = Path(project)
-    settings = json.loads((project / "project.json").read_text("utf-8"))
+    settings = json.loads((project / "project.json").read_text("utf-8"))["settings"]
     clip_index, frame_in_clip = divmod(frame, settings["clip_length"])
     header, arrays = read_clip(project / "clips" / f"{clip_index:04d}.safetensors")
     reference = {}  # a clip that inherits nothing needs none

@@ -17,6 +17,8 @@ import numpy as np
 
 from engine.camera.rig import CameraRig
 from engine.capture.camera_optics import CameraOptics
+from engine.capture.excluded_pixels import ExcludedPixels
+from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
 from engine.capture.folder_contents import MAX_LOOKED_AT, folder_contents
 from engine.capture.format_checks import raise_problems
 from engine.capture.format_result import Layout, Probe
@@ -81,6 +83,7 @@ class Capture:
             the scale.
         follow_links: Whether the user allowed its files to lie outside of the folder.
         first_frame: Where those frames begin in the whole capture. Everywhere else frames are counted from there.
+        exclusions: What of it training does not see; see `without`.
     """
 
     path: Path
@@ -97,6 +100,24 @@ class Capture:
     layout: Layout = field(repr=False)
     follow_links: bool = False
     first_frame: int = 0
+    exclusions: Exclusions = NOTHING_EXCLUDED
+    _excluded: ExcludedPixels | None = field(default=None, repr=False)
+
+    def without(self, exclusions: Exclusions) -> Capture:
+        """The same capture as training sees it: without what is excluded. Files and decoded frames are shared.
+
+        An excluded camera is none of the cameras that are trained on, and an excluded picture or pixel is not usable
+        (`is_usable`, `valid_in`); in its place `frame` shows that of another frame of the camera.
+
+        Args:
+            exclusions: In place of those it has. Frames are counted as everywhere.
+        """
+        if exclusions == self.exclusions:
+            return self
+        excluded = None
+        if exclusions != NOTHING_EXCLUDED:
+            excluded = ExcludedPixels(exclusions, self.rig.names, self.n_frames, self.picture_size)
+        return replace(self, exclusions=exclusions, _excluded=excluded)
 
     @property
     def frames(self) -> tuple[int, int] | None:
@@ -131,7 +152,23 @@ class Capture:
             IndexError: No such camera or frame.
         """
         self._check(camera_index, (frame_index,))
+        return self._filled(camera_index, frame_index, self._stored(camera_index, frame_index))
+
+    def _stored(self, camera_index: int, frame_index: int) -> np.ndarray:
         return next(iter(self.store.frames(camera_index, (self.first_frame + frame_index,))))
+
+    def _filled(self, camera_index: int, frame_index: int, picture: np.ndarray) -> np.ndarray:
+        """The picture without what is excluded of it. [H, W, 3] uint8, read-only where it is another one"""
+        if self._excluded is None or self._excluded.of(camera_index, frame_index) is None:
+            return picture
+        filled = picture.copy()
+        sources, left = self._excluded.fills(camera_index, frame_index)
+        for frame, pixels in sources:
+            filled[pixels] = self._stored(camera_index, frame)[pixels]
+        if left is not None:
+            filled[left] = 0
+        filled.flags.writeable = False
+        return filled
 
     def frames_of(self, camera_index: int, frame_indices: Sequence[int]) -> np.ndarray:
         """Several pictures of one camera, decoded in the order given; rising indices are cheap for video.
@@ -147,11 +184,36 @@ class Capture:
         frames = np.empty((len(frame_indices), height, width, 3), dtype=np.uint8)
         wanted = [self.first_frame + frame_index for frame_index in frame_indices]
         for row, frame in enumerate(self.store.frames(camera_index, wanted)):
-            frames[row] = frame
+            frames[row] = self._filled(camera_index, frame_indices[row], frame)
         return frames
 
+    def is_usable(self, camera_index: int, frame_index: int) -> bool:
+        """Whether anything of a picture is left to be trained on and measured.
+
+        Raises:
+            IndexError: No such camera or frame.
+        """
+        self._check(camera_index, (frame_index,))
+        is_excluded = None if self._excluded is None else self._excluded.of(camera_index, frame_index)
+        return is_excluded is None or not is_excluded.all()
+
+    def valid_in(self, camera_index: int, frame_index: int) -> np.ndarray | None:
+        """Pixels of one picture that count: those that the camera sees and that are not excluded.
+
+        Returns:
+            [H, W] bool, read-only; None where all count.
+        Raises:
+            IndexError: No such camera or frame.
+        """
+        self._check(camera_index, (frame_index,))
+        valid = self.store.valid(camera_index)
+        is_excluded = None if self._excluded is None else self._excluded.of(camera_index, frame_index)
+        if is_excluded is None:
+            return valid
+        return ~is_excluded if valid is None else valid & ~is_excluded
+
     def valid(self, camera_index: int) -> np.ndarray | None:
-        """Pixels that a camera sees, the same in all of its frames; the others are black.
+        """Pixels that a camera sees and that are not excluded in all of its frames; the others are black.
 
         Returns:
             [H, W] bool, read-only; None where it sees all.
@@ -159,7 +221,11 @@ class Capture:
             IndexError: No such camera.
         """
         self._check(camera_index, ())
-        return self.store.valid(camera_index)
+        valid = self.store.valid(camera_index)
+        is_excluded = None if self._excluded is None else self._excluded.always(camera_index)
+        if is_excluded is None:
+            return valid
+        return ~is_excluded if valid is None else valid & ~is_excluded
 
     def valid_of(self, camera_indices: Sequence[int]) -> np.ndarray | None:
         """`valid` of several cameras. [C, H, W] bool, or None where all of them see all."""
@@ -208,8 +274,14 @@ class Capture:
         return [self.rig.names.index(name) for name in names]
 
     def training_cameras(self, holdout: Collection[int]) -> list[int]:
-        """Rows of the rig that are trained on: all but the held-out ones, in order."""
-        return [camera for camera in range(len(self.rig)) if camera not in holdout]
+        """Rows of the rig that are trained on: all but the held-out ones and the excluded ones, in order."""
+        left_out = {*holdout, *self.excluded_cameras}
+        return [camera for camera in range(len(self.rig)) if camera not in left_out]
+
+    @property
+    def excluded_cameras(self) -> list[int]:
+        """Rows of the rig that are excluded altogether, in order."""
+        return [row for row, name in enumerate(self.rig.names) if name in self.exclusions.cameras]
 
     def close(self) -> None:
         """Let go of open files and cached frames. The capture can still be used; files are opened again."""

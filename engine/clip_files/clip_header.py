@@ -181,6 +181,7 @@ class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
         n_anchors: Rows of each anchor set, inherited ones too, by role.
         n_alive: Most moving anchors in one frame.
         fingerprint: Of the arrays: names what a source clip was trained against.
+        exclusions: What of its pictures was excluded from its training, see engine.capture.exclusions.exclusion_key.
         reference_fingerprint: Of the clip that this one inherits from.
         previous_fingerprint: Of the clip that this one goes on from.
         metrics: Of a finished clip; see `figures`.
@@ -207,6 +208,7 @@ class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
     n_anchors: dict[str, Count] = {}
     n_alive: Count | None = None
     coverage: Coverage | None = None
+    exclusions: str = ""
     reference_fingerprint: str | None = None
     previous_fingerprint: str | None = None
     metrics: ClipFigures | None = None

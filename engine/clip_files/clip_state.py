@@ -129,7 +129,9 @@ def write_clip_state(path: Path | str, state: ClipState, *, is_durable: bool = F
     write_arrays(path, state.arrays, {"header": header_text(state.header)}, what="The clip", is_durable=is_durable)
 
 
-def write_coded_arrays(path: Path | str, coded: dict[str, CodedArray], header: ClipHeader) -> None:
+def write_coded_arrays(
+    path: Path | str, coded: dict[str, CodedArray], header: ClipHeader, *, is_durable: bool = False
+) -> None:
     """Likewise, with every array in its compact form; `read_clip_state` gives the arrays that these decode to.
 
     Raises:
@@ -137,7 +139,24 @@ def write_coded_arrays(path: Path | str, coded: dict[str, CodedArray], header: C
     """
     specs = {name: array.spec for name, array in coded.items()}
     metadata = {"header": header_text(header), "coding": json.dumps(specs, separators=(",", ":"))}
-    write_arrays(path, {name: array.payload for name, array in coded.items()}, metadata, what="The clip")
+    payloads = {name: array.payload for name, array in coded.items()}
+    write_arrays(path, payloads, metadata, what="The clip", is_durable=is_durable)
+
+
+def read_coded_arrays(path: Path | str) -> dict[str, CodedArray] | None:
+    """The stored form of every array of a file that `read_clip_state` can read; None where it holds arrays as they are.
+
+    Raises:
+        ProjectError: The file is missing or damaged.
+    """
+    try:
+        payloads, metadata = read_arrays(path, _ENTRIES)
+        specs = parse_object(metadata["coding"]) if "coding" in metadata else None
+    except _DAMAGE as error:
+        raise DamagedClip(Path(path), reason_of(error)).error() from error
+    if specs is None:
+        return None
+    return {name: CodedArray(payloads[name], specs[name], np.zeros(1)) for name in payloads}
 
 
 def read_clip_state(path: Path | str, *, only: Collection[str] | None = None) -> ClipState:

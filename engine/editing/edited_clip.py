@@ -101,6 +101,11 @@ class EditedClip:
         index = np.concatenate([still.index, host_array(moving.index)])
         return EditedGaussians(gaussians, self.rows.named(index), len(still.index))
 
+    @property
+    def n_bytes_kept(self) -> int:
+        """Memory of what is kept between moments, beside the model."""
+        return sum(part.n_bytes for part in self._still.values()) + self._frames.n_bytes
+
     # ---------------------------------------------------------------- what stands still
 
     def _still_part(self, effects: Effects) -> StillPart:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import hashlib
 import math
 from bisect import bisect_right
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import msgspec
@@ -48,11 +49,16 @@ class Effects:
     @classmethod
     def of(cls, edits: tuple[Edit, ...]) -> Effects:
         """Of edits that hold at a moment."""
-        if not edits:
-            return NO_EFFECTS
-        effects = tuple(
+        return cls.made(
             Effect(edit.target, edit.action, edit.is_inverted, edit.scope.is_reference_only) for edit in edits
         )
+
+    @classmethod
+    def made(cls, effects: Iterable[Effect]) -> Effects:
+        """With the digest that belongs to them."""
+        effects = tuple(effects)
+        if not effects:
+            return NO_EFFECTS
         return cls(effects, hashlib.sha256(_ENCODER.encode(effects)).hexdigest()[:20])
 
 

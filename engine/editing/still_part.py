@@ -75,6 +75,13 @@ class StillPart:
         self.index = index if self._kept is None else index[host_array(self._kept)]
         self._unchanging: Tensor | None = None
 
+    @property
+    def n_bytes(self) -> int:
+        """Memory of it."""
+        tensors = [*self._shapes.tensors(), *(step.is_chosen for step in self._steps)]
+        tensors += [tensor for tensor in (self._kept, self._unchanging) if tensor is not None]
+        return sum(tensor.nbytes for tensor in tensors) + self.index.nbytes
+
     def at(self, clip_time: float) -> Gaussians:
         """What is left of it, at a time of the clip."""
         if self._has_light:

@@ -70,7 +70,7 @@ def parse_region(values: Any) -> GateRegion:
             center, radius = np.array(values["sphere"][0], dtype=np.float64).reshape(3), float(values["sphere"][1])
             if not (len(values["sphere"]) == 2 and radius > 0.0):
                 raise ValueError(f"radius {radius}")
-            low, high = center - radius, center + radius
+            low, high = _box_around(center, radius)
     except (TypeError, ValueError, LookupError, OverflowError) as error:
         raise ProjectError(f"{values!r:.200} is not a region of the gate ({error}).", hint=hint) from error
     if not (np.isfinite(low).all() and np.isfinite(high).all() and math.isfinite(radius)):
@@ -78,6 +78,17 @@ def parse_region(values: Any) -> GateRegion:
     x0, y0, z0 = low.tolist()
     x1, y1, z1 = high.tolist()
     return GateRegion(values["treat"], (x0, y0, z0), (x1, y1, z1), radius)
+
+
+def _box_around(center: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Corners whose middle gives the same corners again, so that what is written and read stays as it is."""
+    for _ in range(8):  # two are enough; rounding moves the middle by a bit
+        low, high = center - radius, center + radius
+        middle = 0.5 * (low + high)
+        if not (middle != center).any():
+            break
+        center = middle
+    return low, high
 
 
 def sphere_region(treat: str, center: Sequence[float], radius: float) -> GateRegion:

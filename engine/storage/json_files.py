@@ -181,9 +181,24 @@ def write_checked_json(
         OSError: The disk refused.
         ValueError: The document holds NaN.
     """
-    text = json.dumps(document | {CHECKSUM: _checksum(document)}, indent=2, allow_nan=False) + "\n"
+    text, _ = checked_text(document)
     with atomic_path(path, makes_parents=makes_parents, is_durable=is_durable) as partial:
         partial.write_text(text, encoding="utf-8")
+
+
+def checked_text(document: dict[str, Any], *, is_for_people: bool = True) -> tuple[str, str]:
+    """What `write_checked_json` writes, and the checksum in it.
+
+    Args:
+        is_for_people: Over many lines, which takes several times as long.
+
+    Raises:
+        ValueError: The document holds NaN.
+    """
+    checksum = checksum_of(document)
+    return json.dumps(
+        document | {CHECKSUM: checksum}, indent=2 if is_for_people else None, allow_nan=False
+    ) + "\n", checksum
 
 
 def read_checked_json(path: Path | str, *, max_bytes: int = MAX_JSON_BYTES) -> dict[str, Any]:
@@ -193,16 +208,24 @@ def read_checked_json(path: Path | str, *, max_bytes: int = MAX_JSON_BYTES) -> d
         OSError: See `read_json_object`.
         JsonError: See there. ChecksumError: The content is not that which the checksum was made for.
     """
-    document = read_json_object(path, max_bytes=max_bytes)
+    return without_checksum(read_json_object(path, max_bytes=max_bytes))[0]
+
+
+def without_checksum(document: dict[str, Any]) -> tuple[dict[str, Any], str | None]:
+    """A document without its checksum, and the checksum; None where it has none.
+
+    Raises:
+        ChecksumError: The content is not that which the checksum was made for.
+    """
     stated = document.pop(CHECKSUM, None)
-    if stated is not None and stated != _checksum(document):
+    if stated is not None and stated != checksum_of(document):
         raise ChecksumError("its content does not fit its checksum")
-    return document
+    return document, stated
 
 
 def checked_line(row: dict[str, Any]) -> str:
     """One line of a file of rows, with a checksum of its own: a bad byte costs that row and no other."""
-    return json.dumps(row | {CHECKSUM: _checksum(row)}) + "\n"
+    return json.dumps(row | {CHECKSUM: checksum_of(row)}) + "\n"
 
 
 def read_checked_lines(path: Path | str, *, max_bytes: int = MAX_JSON_BYTES) -> tuple[list[dict[str, Any]], int]:
@@ -226,15 +249,15 @@ def read_checked_lines(path: Path | str, *, max_bytes: int = MAX_JSON_BYTES) -> 
             continue
         stated = row.pop(CHECKSUM, None)
         is_checked |= stated is not None
-        if is_checked and stated != _checksum(row):
+        if is_checked and stated != checksum_of(row):
             n_damaged += 1
         else:
             rows.append(row)
     return rows, n_damaged
 
 
-def _checksum(document: dict[str, Any]) -> str:
-    """Of the values as a reader gets them: tuples are lists by then, and keys are text."""
+def checksum_of(document: dict[str, Any]) -> str:
+    """The checksum of values as a reader gets them: tuples are lists by then, and keys are text."""
     values = json.loads(json.dumps(document))
     canonical = json.dumps(values, sort_keys=True, separators=(",", ":"))
     return f"crc32:{zlib.crc32(canonical.encode()):08x}"

@@ -18,6 +18,7 @@ from engine.backends.backend import Backend
 from engine.camera.depth_range import near_plane
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.capture.exclusions import NOTHING_EXCLUDED, exclusion_key
 from engine.clip_files.anchor_record import AnchorRecord
 from engine.clip_files.array_names import CORRECTIONS, DECODER, GAINS, LOG_DRIFT
 from engine.clip_files.clip_header import SCHEMA, ClipHeader, Place
@@ -90,12 +91,12 @@ class ClipTraining:
         self.reference, self.previous, self.backend = reference, previous, backend
         self._base = method.base(reference, previous)
         self.regions = tuple(regions)
-        self.holdout = sorted(set(holdout))
-        self.camera_indices = capture.training_cameras(self.holdout)
+        self.holdout = sorted(set(holdout) - set(capture.excluded_cameras))
+        self.camera_indices = _training_cameras(capture, self.holdout, self._base)
         if len(self.camera_indices) < 2:
             raise PreparationError(
                 f"Only {len(self.camera_indices)} of {len(capture.rig)} cameras are left for training; two are needed.",
-                hint="Hold out fewer cameras.",
+                hint="Hold out fewer cameras, or exclude fewer.",
                 path=capture.path,
             )
         self.seed, self.prep_dir, self.report = seed, Path(prep_dir), report
@@ -130,6 +131,7 @@ class ClipTraining:
             report=report,
         )
         self._tiles: ActiveTiles | None = None
+        self._items: list[int] = []
         self._trained: ClipModel | None = None
         """The model before it took over the values that are stored."""
 
@@ -186,8 +188,8 @@ class ClipTraining:
             parameters, n_steps=n_steps, config=self.config, final_ratios=ratios, backend=self.backend
         )
         self._optimizer.steps_done = steps_in_phase
-        n_items = len(self.camera_indices) if name == "static" else len(self.pictures)
-        self._order = ShuffledOrder(n_items, seed=self.seed + index)
+        self._items = self._items_of(name)
+        self._order = ShuffledOrder(len(self._items), seed=self.seed + index)
         self._phase_index = index
         # a set may have become dynamic
         self._sight = Sight(self.model, self._cameras.first_views, reach=self._reach, reaches=reaches)
@@ -199,6 +201,20 @@ class ClipTraining:
             self._say("Nothing to learn", f"Nothing moves in this clip: no steps instead of {n_steps}")
             self.phases[index] = (name, steps_in_phase)
 
+    def _items_of(self, phase: str) -> list[int]:
+        """Numbers of what a phase draws: cameras, or pictures camera by camera; without what is excluded altogether."""
+        if phase == "static":
+            out = self.capture.excluded_cameras
+            return [row for row, camera in enumerate(self.camera_indices) if camera not in out]
+        n_frames = self.clip.n_frames
+        items = [item for item in range(len(self.pictures)) if self.pictures.is_usable(*divmod(item, n_frames))]
+        if not items:
+            raise PreparationError(
+                f"Every picture of clip {self.clip.clip_index} is excluded from training.",
+                hint="Take some of the exclusions back, or leave the clip untrained.",
+            )
+        return items
+
     def step(self) -> StepStats:
         """Draw a picture, render it, compare, update.
 
@@ -209,7 +225,7 @@ class ClipTraining:
         if index != self._phase_index:
             self._add_moving()
             self._start_phase(index, 0)
-        stage, item = self.phases[index][0], self._order.draw()
+        stage, item = self.phases[index][0], self._items[self._order.draw()]
         if stage == "static":
             camera_row, clip_time = item, 0.0
             truth = self.backgrounds.images[camera_row]
@@ -217,7 +233,7 @@ class ClipTraining:
         else:
             camera_row, frame = divmod(item, self.clip.n_frames)
             clip_time = frame / self.clip.clip_length
-            truth, is_counted = self.pictures.picture(camera_row, frame), self._valid.of(camera_row)
+            truth, is_counted = self.pictures.picture(camera_row, frame), self._counted(camera_row, frame)
         view = self._cameras.view(camera_row)
         active = self._active_picture(camera_row, view, clip_time)
         self._cameras.watch(active.gaussians)
@@ -269,6 +285,13 @@ class ClipTraining:
             is_clipped=self._optimizer.clips(gradient_norm),
         )
 
+    def _counted(self, camera_row: int, frame_in_clip: int) -> Tensor | None:
+        """Pixels of a picture that count: those of its camera, without what is excluded of it. None for all."""
+        if self.capture.exclusions == NOTHING_EXCLUDED:
+            return self._valid.of(camera_row)
+        valid = self.pictures.valid_in(camera_row, frame_in_clip)
+        return None if valid is None else self._tensor(valid)
+
     def _tensor(self, array: np.ndarray) -> Tensor:
         return torch.from_numpy(array).to(self.backend.device)
 
@@ -291,10 +314,12 @@ class ClipTraining:
         values = []
         for i, camera in enumerate(self.holdout[:n_pictures]):
             frame = self.clip.start + (i * self.clip.n_frames) // max(len(self.holdout[:n_pictures]), 1)
+            if not self.capture.is_usable(camera, frame):
+                continue
             clip_time = self.clip.clip_time(frame)
             image = render_model(self.model, self._views[camera], clip_time, reach=self._reach)
             shown = colors.in_camera(host_array(image), self.capture.rig, camera, clip_time)
-            values.append(psnr(shown, self.capture.frame(camera, frame) / 255.0, self.capture.valid(camera)))
+            values.append(psnr(shown, self.capture.frame(camera, frame) / 255.0, self.capture.valid_in(camera, frame)))
         return float(np.mean(values)) if values else float("nan")
 
     def state(self) -> ClipState:
@@ -332,6 +357,7 @@ class ClipTraining:
             decoder=decoder_shape(model.decoder),
             field=None if model.field is None else model.field.shape,
             fingerprint=fingerprint_of(arrays),
+            exclusions=exclusion_key(self.capture.exclusions, (self.clip.start, self.clip.stop)),
             reference_fingerprint=None if self.reference is None else self.reference.header.fingerprint,
             previous_fingerprint=None if self.previous is None else self.previous.header.fingerprint,
         )
@@ -480,6 +506,18 @@ class ClipTraining:
         self._optimizer.restore(kept.state.arrays, place.steps_in_phase)
         self._order.restore(place.order)
         self._generator.set_state(torch.tensor(place.generator, dtype=torch.uint8))
+
+
+def _training_cameras(capture: Capture, holdout: Sequence[int], base: ClipState | None) -> list[int]:
+    """Rows of the rig that a clip is trained with. One that goes on from another clip has that one's cameras: of one
+    that was excluded since, no picture is usable."""
+    cameras = capture.training_cameras(holdout)
+    if base is None or capture.exclusions == NOTHING_EXCLUDED:
+        return cameras
+    rows = {name: row for row, name in enumerate(capture.rig.names)}
+    of_base = [rows.get(name) for name in base.header.camera_names]
+    known = [row for row in of_base if row is not None and row not in holdout]
+    return known if len(known) == len(of_base) else cameras
 
 
 def _reasons_in(state: ClipState) -> dict[str, np.ndarray]:

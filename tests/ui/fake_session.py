@@ -33,11 +33,13 @@ from app.residuals.anchor_heat import AnchorHeat
 from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.session import commands, path_commands
 from app.session.calibration_page import CalibrationPage
+from app.session.copying.command_texts import CommandTexts
 from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edit_commands import EditCommand
 from app.session.editing.edits import changed, edits_status
 from app.session.editing.selecting import SelectionStatus
+from app.session.editing.selection import NOTHING_SELECTED, Selection
 from app.session.exporting import ExportPage
 from app.session.marking import after_marking
 from app.session.mending.mend_page import MendPage
@@ -66,6 +68,7 @@ from app.status import (
 )
 from engine.camera.rig import NO_CAMERAS, CameraRig
 from engine.capture.clip import Clip, split_clips
+from engine.capture.exclusions import NOTHING_EXCLUDED
 from engine.doctor.finding import Finding
 from engine.editing.selection.ranges import Spread, spread_of
 from engine.editing.selection.seen_from import SeenFrom
@@ -160,6 +163,17 @@ class FakeSynchronising:
 
 
 @dataclass
+class FakeSelecting:
+    """What the panels read of Selecting."""
+
+    selection: Selection = NOTHING_SELECTED
+
+    def mask(self, gaussians: GaussianArrays) -> np.ndarray:
+        """Nothing of it is selected."""
+        return np.zeros(len(gaussians), np.bool_)
+
+
+@dataclass
 class FakeMending:
     """What the window of mending reads."""
 
@@ -215,6 +229,7 @@ class FakeSession:
         self.queue = QueueStatus()
         self.usage = UsageStatus(window_mb=412.0, window_cores=0.1, n_cores=2)
         self.disk: DiskUse | None = None
+        self.exclusions = NOTHING_EXCLUDED
         self.versions: dict[int, tuple[VersionStatus, ...]] = {}
         self.curves: dict[int, tuple[list[tuple[int, float]], list[tuple[int, float]]]] = {}
         self.lines: tuple[LogLine, ...] = ()
@@ -245,7 +260,8 @@ class FakeSession:
             inherited_reasons=np.where(inherited_roles == 2, 2, 255).astype(np.uint8),
             own_reasons=np.full(300, 255, np.uint8),
         )
-        self.selection = SelectionStatus()
+        self.selection, self.selecting = SelectionStatus(), FakeSelecting()
+        self.command_texts = CommandTexts(lambda: None, lambda clip_index: False)
         self.regions = RegionsStatus(why_not="Open a capture first.")
         self.paths, self.history = PathsStatus(why_not="Open a capture first."), HistoryStatus()
         self.edits, self.content = (

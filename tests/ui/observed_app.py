@@ -49,6 +49,7 @@ def describe(studio: Any) -> dict[str, Any]:
         "mending": None if session.mending.page is None else session.mending.page.state,
         "regions": [region.as_dict() for region in session.regions.regions],
         "can_mark": session.regions.can_mark,
+        "n_keys": sum(len(path.keys) for path in session.paths.paths),
         "sphere": None if studio.frame.ui.regions.sphere is None else studio.frame.ui.regions.sphere.as_dict(),
         "is_help_open": studio.frame.ui.is_help_open,
         "shows": studio.frame.viewport.scene.shows,

@@ -10,11 +10,17 @@ from imgui_bundle import ImVec2, imgui
 
 from app.playback.orbit_view import OrbitView
 from app.session.commands import LookThrough
+from app.session.edit_status import EditsStatus
 from engine.camera.rig import CameraRig
 from engine.capture.clip import Clip
+from engine.text import one_line
 from ui.gl.image import ImageTexture
+from ui.panels.editing.labels import draw_label_field, with_label
+from ui.panels.excluding.excluded_drawing import ExcludedNeeds
+from ui.panels.excluding.menu import draw_exclusion_menu
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.thumbnails import ThumbnailNeeds, Thumbnails
+from ui.panels.timeline.stage import hatch
 from ui.panels.widgets import elided, pop_bold, push_bold, text_wrapped_dim
 from ui.style import theme
 from ui.style.numbers import format_count
@@ -22,7 +28,7 @@ from ui.style.theme import Icon
 
 ROW_HEIGHT = 50.0
 PICTURE_SIZE = (64.0, 40.0)
-HELD_OUT_WORDS = ("held out", "test")
+HELD_OUT_WORDS, EXCLUDED_WORDS = ("held out", "test"), ("excluded", "out")
 """The longest that there is room for."""
 
 
@@ -45,7 +51,7 @@ class CaptureFacts(Protocol):
     def fps(self) -> float: ...
 
 
-class CaptureNeeds(ThumbnailNeeds, Protocol):
+class CaptureNeeds(ThumbnailNeeds, ExcludedNeeds, Protocol):
     """What this panel reads."""
 
     @property
@@ -59,6 +65,9 @@ class CaptureNeeds(ThumbnailNeeds, Protocol):
 
     @property
     def holdout(self) -> tuple[int, ...]: ...
+
+    @property
+    def edits(self) -> EditsStatus: ...
 
 
 class CapturePanel:
@@ -127,6 +136,12 @@ class CapturePanel:
             low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
             if is_visible:
                 ui.mark(f"capture.camera{index}")
+            if imgui.begin_popup_context_item("camera menu"):
+                imgui.text_disabled(one_line(name))
+                draw_label_field(session, dispatch, ui, "camera", name)
+                imgui.separator()
+                draw_exclusion_menu(session, dispatch, ui, index, session.timeline.frame_index)
+                imgui.end_popup()
             if is_clicked:
                 dispatch(LookThrough(None if shown == index else index))
             if shown == index and shown != self._shown_camera:
@@ -135,7 +150,7 @@ class CapturePanel:
             if is_visible:
                 row = Rect(top_left.x, low.y, high.x, high.y)
                 if self._draw_row(session, ui, row, index, index in held_out, is_shown=shown == index):
-                    imgui.set_item_tooltip(name)
+                    imgui.set_item_tooltip(with_label(session, "camera", name, name))
             imgui.pop_id()
         if shown is None:
             self._shown_camera = None
@@ -154,20 +169,26 @@ class CapturePanel:
         x, room = box.x1 + 10, row.x1 - box.x1 - 14
         if is_shown:
             push_bold(ui, ui.fonts.body_size)
-        name = elided(rig.names[index], room)
+        title = with_label(session, "camera", rig.names[index], rig.names[index])
+        name = elided(title, room)
         draw.add_text(ImVec2(x, row.y0 + 6), theme.u32(theme.TEXT), name)
         if is_shown:
             pop_bold(ui)
         width, height = (int(v) for v in rig.image_sizes[index])
         size = f"{width} x {height}"
         size_width = imgui.calc_text_size(size).x
-        label = next((word for word in HELD_OUT_WORDS if imgui.calc_text_size(word).x + 14 <= room), "")
-        is_size_shown = not (is_held_out and size_width + imgui.calc_text_size(label).x + 22 > room)
+        is_excluded = rig.names[index] in session.exclusions.cameras
+        if is_excluded:
+            hatch(draw, box, theme.ON_PICTURE.yellow, 9.0)
+        is_marked, words = is_held_out or is_excluded, EXCLUDED_WORDS if is_excluded else HELD_OUT_WORDS
+        label = next((word for word in words if imgui.calc_text_size(word).x + 14 <= room), "")
+        is_size_shown = not (is_marked and size_width + imgui.calc_text_size(label).x + 22 > room)
         if is_size_shown:
             draw.add_text(ImVec2(x, row.y0 + 26), theme.u32(theme.TEXT_DIM), size)
-        if is_held_out and label:
+        if is_marked and label:
             left = row.x1 - 18 - imgui.calc_text_size(label).x if is_size_shown else x
             tag = Rect(left, row.y0 + 25, left + imgui.calc_text_size(label).x + 14, row.y0 + 44)
-            draw.add_rect(tag.low, tag.high, theme.u32(theme.HELD_OUT), 4)
-            draw.add_text(ImVec2(tag.x0 + 7, tag.y0 + 1), theme.u32(theme.HELD_OUT), label)
-        return name != rig.names[index]
+            color = theme.u32(theme.YELLOW if is_excluded else theme.HELD_OUT)
+            draw.add_rect(tag.low, tag.high, color, 4)
+            draw.add_text(ImVec2(tag.x0 + 7, tag.y0 + 1), color, label)
+        return name != title

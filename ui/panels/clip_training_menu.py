@@ -12,6 +12,7 @@ from app.session.commands import AskTrainSettings, RemoveFromQueue, TrainAll, Tr
 from app.status import ClipStatus, ProjectStatus, QueueStatus, TrainingStatus
 from engine.text import duration_text
 from ui.panels.clip_versions import VersionNeeds, draw_versions_menu
+from ui.panels.copying import draw_copy_menu
 from ui.panels.state import Dispatch, UiState
 from ui.style.numbers import format_count
 from ui.style.theme import Icon
@@ -89,6 +90,7 @@ def draw_clip_training(
     label = f"{Icon.GEAR}  Train with other settings ..."
     if _item(ui, "settings", label, is_enabled=can_train and has_reference):
         dispatch(AskTrainSettings(clip_index))
+    draw_copy_menu(ui, "clip menu.training", lambda: session.command_texts.training(clip_index))
     draw_versions_menu(session, dispatch, ui, clip_index)
 
 

@@ -10,6 +10,7 @@ from app.session.clips.clip_commands import CompareVersion
 from app.session.commands import RemoveVersion, RestoreVersion
 from app.status import VersionStatus
 from engine.text import size_text
+from ui.panels.copying import CopyNeeds, draw_copy_menu
 from ui.panels.state import Dispatch, UiState
 from ui.style.numbers import format_count
 from ui.style.theme import Icon
@@ -17,7 +18,7 @@ from ui.style.theme import Icon
 MAX_DIFFERENCES = 6
 
 
-class VersionNeeds(Protocol):
+class VersionNeeds(CopyNeeds, Protocol):
     """What the menu reads."""
 
     def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]: ...
@@ -61,6 +62,11 @@ def draw_versions_menu(session: VersionNeeds, dispatch: Dispatch, ui: UiState, c
                 dispatch(RestoreVersion(clip_index, version.number))
             ui.mark(f"clip menu.restore{version.number}")
             imgui.set_item_tooltip("What the clip is now becomes an earlier version")
+            draw_copy_menu(
+                ui,
+                "clip menu.version",
+                lambda version=version: session.command_texts.version(clip_index, version.number),
+            )
             if imgui.menu_item(f"{Icon.TRASH}  Remove it for good", "", False, True)[0]:
                 dispatch(RemoveVersion(clip_index, version.number))
             ui.mark(f"clip menu.remove{version.number}")

@@ -15,9 +15,14 @@ from app.status import version_number
 from ui.panels.actions.action import ActionNeeds
 from ui.panels.clip_versions import VersionNeeds
 from ui.panels.comparison import covered_share, is_held, kind_words, missing_words, other_label, shown_compare
+from ui.panels.editing.edit_grip import EditGrip
+from ui.panels.editing.edit_subject import subject_of
+from ui.panels.editing.handle_drawing import draw_edit_hint, draw_handles, draw_points
 from ui.panels.editing.select_drawing import draw_hint, draw_tool
 from ui.panels.editing.select_grip import DRAG as SELECT
 from ui.panels.editing.select_grip import SelectGrip
+from ui.panels.excluding.excluded_drawing import ExcludedDrawing
+from ui.panels.excluding.mask_grip import follow_brush
 from ui.panels.gizmo import draw_gizmo, gizmo_rect
 from ui.panels.heat_overlay import HeatNeeds, HeatOverlay
 from ui.panels.hud import Hud, HudNeeds
@@ -48,7 +53,9 @@ class PicturePane:
         self.scene, self.heat = scene, heat
         self.pointer = Pointer()
         self.keys = KeyGrip()
+        self.editing = EditGrip()
         self.selecting = SelectGrip()
+        self.excluded = ExcludedDrawing()
         self.hud = Hud()
         self._aimed_at = (0.0, 0.0)
         self._captured_frame: int | None = None
@@ -111,14 +118,20 @@ class PicturePane:
         free = self.heat.beside(area)
         legend_x = free.x1 - 12 if gizmo is None else min(free.x1 - 12, gizmo.x0 - 8)
         self.hud.draw(session, ui, free, self.scene, value=value, legend_x=legend_x)
-        if (ui.regions.is_active or ui.selecting.is_active) and is_active:
+        if is_active:
             top = panes.captured.y0 + 44 if panes.captured is not None else area.y0 + 12  # below what names the pane
-            free = Rect(area.x0 + 12, top, area.x1, area.y1)
-            if ui.regions.is_active:
-                draw_chosen_sphere(ui, imgui.get_window_draw_list(), free, self.scene.regions.counts)
-            else:
-                draw_hint(imgui.get_window_draw_list(), ui.selecting, free)
+            self._draw_hints(ui, Rect(area.x0 + 12, top, area.x1, area.y1))
         return is_used
+
+    def _draw_hints(self, ui: UiState, free: Rect) -> None:
+        """What the tool in use does."""
+        draw = imgui.get_window_draw_list()
+        if ui.editing.asking is not None or ui.editing.held is not None:
+            draw_edit_hint(draw, ui.editing, free)
+        elif ui.regions.is_active:
+            draw_chosen_sphere(ui, draw, free, self.scene.regions.counts)
+        elif ui.selecting.is_active:
+            draw_hint(draw, ui.selecting, free)
 
     # ---- picture ---------------------------------------------------------------------------------------------
 
@@ -138,8 +151,12 @@ class PicturePane:
         self.scene.selection.pixels_per_unit = density
         self.keys.follow(session, dispatch, ui, self.scene.path, self.pointer, view, pane, density)
         self._point_at_camera(session, ui, view, pane, density)
+        if is_active:
+            pick = lambda x, y: self._pick(session, pane, x, y)  # noqa: E731
+            self.editing.follow(session, dispatch, ui, self.pointer, view, pane, density, pick)
         self._select(session, dispatch, ui, view, pane, density)
         if is_active:
+            follow_brush(session, dispatch, ui, self.pointer, pane)
             self._aim(session, ui, view, pane, density)
             command = ui.regions.take_accepted()
             if command is not None:
@@ -150,11 +167,20 @@ class PicturePane:
         composed = self.scene.compose(session, view, shown)
         draw.add_image(imgui.ImTextureRef(composed.texture.glo), pane.low, pane.high)
         self.heat.draw(session, ui, pane)
+        self.excluded.draw(draw, session, ui, pane)
         if is_active or self.pointer.drag == SELECT:
             draw_tool(draw, ui.selecting, view, pane, density, np.asarray(session.view.up, np.float64))
+        subject = subject_of(session, ui)
+        if subject is not None and not ui.regions.is_active:
+            draw_handles(draw, subject, ui, view, pane, density)
+        draw_points(draw, ui.editing, view, pane, density)
         if self.pointer.is_moving:
             ui.redraw_within(MOVING_S)
-        elif imgui.is_item_hovered() and self.pointer.drag is None and not (tool.is_active or ui.selecting.is_active):
+        elif (
+            imgui.is_item_hovered()
+            and self.pointer.drag is None
+            and not (tool.is_active or ui.selecting.is_active or ui.masks.is_active)
+        ):
             camera, key = self.scene.marks.pointed_camera, self.scene.path.pointed_key
             if key is not None:
                 words = f"{key_words(session.paths, key)}\nDrag moves it, with Ctrl along the view"
@@ -205,7 +231,7 @@ class PicturePane:
 
     def _point_at_camera(self, session: PictureNeeds, ui: UiState, view: SceneView, pane: Rect, density: float) -> None:
         """The camera under the pointer stands out; one that was pressed is remembered for the click."""
-        is_choosing = ui.regions.is_active or ui.selecting.is_active
+        is_choosing = ui.regions.is_active or ui.selecting.is_active or ui.masks.is_active
         is_free = imgui.is_item_hovered() and not is_choosing and self.scene.path.pointed_key is None
         is_pressing = imgui.is_item_activated() and self.pointer.button == imgui.MouseButton_.left
         marks = self.scene.marks

@@ -139,7 +139,7 @@ class Pointer:
         if across == 0.0 and steps == 0.0:
             return
         gesture = ui.navigation.preset.turn(_modifiers())
-        if ui.selecting.is_active and io.key_ctrl and ui.selecting.kind in SIZED:
+        if io.key_ctrl and (ui.masks.is_active or (ui.selecting.is_active and ui.selecting.kind in SIZED)):
             return  # it is meant for the tool
         if tool.sphere is not None:
             if not io.key_ctrl:

@@ -21,15 +21,17 @@ from ui.panels.timeline.view_state import TimelineView
 from ui.panels.wishes import Wishes
 from ui.style.fonts import Fonts
 from ui.style.ui_scale import UiScale
+from ui.viewport.editing.edit_tool import EditTool
 from ui.viewport.editing.select_tool import SelectTool
+from ui.viewport.excluding.mask_tool import MaskTool
 from ui.viewport.path_tool import PathTool
 from ui.viewport.region_tool import RegionTool
 
 VIEWPORT, CAPTURE, TRAINING, REGIONS, TIMELINE = "Viewport", "Capture", "Training", "Regions", "Timeline"
-SELECTION = "Selection"
+SELECTION, EDITS, HISTORY = "Selection", "Edits", "History"
 RESIDUALS, LOG, DOCTOR = "Residuals", "Log", "Capture doctor"
 PATHS, EXPORTS = "Camera path", "Exports"
-PANELS = (CAPTURE, TRAINING, REGIONS, SELECTION, RESIDUALS, PATHS, TIMELINE, LOG, DOCTOR, EXPORTS)
+PANELS = (CAPTURE, TRAINING, REGIONS, SELECTION, EDITS, RESIDUALS, PATHS, HISTORY, TIMELINE, LOG, DOCTOR, EXPORTS)
 """Titles of the panels around the picture."""
 LAYOUT_WORDS = {"Standard": "as in the beginning", "Long capture": "with a tall timeline, for long captures"}
 LAYOUTS = tuple(LAYOUT_WORDS)
@@ -77,6 +79,8 @@ class UiState:
         rects: Where named items were drawn in the newest frame; tests and screenshots aim with these.
         regions: The region that is being chosen, and the one that stands out.
         selecting: The tool that selects, and its options.
+        editing: Which edit is chosen, and what is being done to it.
+        masks: The brush that paints what training does not see.
         paths: What is being done to the keys of the camera path.
         navigation: What mouse and keys do over a picture.
         curves: What the plots of the training panel show.
@@ -101,6 +105,8 @@ class UiState:
     rects: dict[str, Rect] = field(default_factory=dict)
     regions: RegionTool = field(default_factory=RegionTool)
     selecting: SelectTool = field(default_factory=SelectTool)
+    editing: EditTool = field(default_factory=EditTool)
+    masks: MaskTool = field(default_factory=MaskTool)
     paths: PathTool = field(default_factory=PathTool)
     navigation: Navigation = field(default_factory=Navigation)
     pointed_anchor: np.ndarray | None = None

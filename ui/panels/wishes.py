@@ -5,6 +5,7 @@ frame or in the next one.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass
@@ -14,6 +15,8 @@ class Wishes:
     Attributes:
         is_palette: Open the palette.
         preferences_page: Open the preferences at the page of this title; None for no wish, empty for the last one.
+        is_read_only: Ask for a project to look at only.
+        relocated_project: Ask where the capture of the project in this folder lies; None for no wish.
         is_calibration: Ask for a folder of plain videos to calibrate.
         is_fullscreen: Fill the screen, or go back to a window.
         layout: Name of the layout to show; None for no wish.
@@ -26,6 +29,8 @@ class Wishes:
     preferences_page: str | None = None
     is_fullscreen: bool = False
     is_calibration: bool = False
+    is_read_only: bool = False
+    relocated_project: Path | None = None
     layout: str | None = None
     is_layout_name: bool = False
     layout_removed: str | None = None

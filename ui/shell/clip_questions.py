@@ -10,8 +10,8 @@ from dataclasses import replace
 
 from imgui_bundle import ImVec2, imgui
 
-from app.session.clips.clip_commands import FreeSpace
-from app.session.clips.clip_questions import ClipQuestion, CutQuestion, DamagedQuestion, RoomQuestion
+from app.session.clips.clip_commands import ApplyDeletions, FreeSpace
+from app.session.clips.clip_questions import ClipQuestion, CutQuestion, DamagedQuestion, DeletionsQuestion, RoomQuestion
 from app.session.commands import CloseQuestion, Command, RestoreVersion, TrainClip
 from engine.text import duration_text, size_text
 from ui.panels.state import UiState
@@ -30,6 +30,8 @@ def clip_question_title(question: ClipQuestion) -> str:
             return "Make room on the disk?###question"
         case DamagedQuestion(clip_index=clip_index):
             return f"Clip {clip_index} is damaged###question"
+        case DeletionsQuestion():
+            return "Apply deletions permanently?###question"
 
 
 def draw_clip_question(question: ClipQuestion, ui: UiState, is_agreed: bool) -> Command | None:
@@ -49,6 +51,8 @@ def draw_clip_question(question: ClipQuestion, ui: UiState, is_agreed: bool) -> 
             again = ("again", "Train it again", TrainClip(question.clip_index, is_confirmed=True))
             back = () if question.version is None else (_bring_back(question.clip_index, question.version),)
             yes = (*back, again)
+        case DeletionsQuestion():
+            yes = (("yes", "Apply permanently", ApplyDeletions(is_confirmed=True)),)
     answer = _buttons(ui, yes, "Leave it as it is" if isinstance(question, DamagedQuestion) else "Cancel")
     return yes[0][2] if answer is None and is_agreed else answer
 
@@ -91,6 +95,8 @@ def clip_question_texts(question: ClipQuestion) -> list[str]:
             ]
         case DamagedQuestion():
             return _damage_texts(question)
+        case DeletionsQuestion():
+            return _deletions_texts(question)
 
 
 def _cut_texts(question: CutQuestion) -> list[str]:
@@ -106,6 +112,23 @@ def _cut_texts(question: CutQuestion) -> list[str]:
         texts.append(f"{them} out of date then, until trained again.")
     if question.seconds is not None:
         texts.append(f"Training what is not trained then takes about {duration_text(question.seconds)}.")
+    return texts
+
+
+def _deletions_texts(question: DeletionsQuestion) -> list[str]:
+    clips = "1 clip is" if question.n_clips == 1 else f"{question.n_clips} clips are"
+    texts = [
+        f"{clips} written again without {question.n_anchors:,} anchors. Nothing looks different then.",
+        "What they are now is kept as versions, which bring back what was deleted.",
+        "Edits stay in the stack as far as something is left for them: where they hide instead of deleting, delete in "
+        "some frames only, or some Gaussians of an anchor only.",
+    ]
+    if question.n_untrained:
+        n = question.n_untrained
+        them = "1 clip is" if n == 1 else f"{n} clips are"
+        texts.append(
+            f"{them} not trained: all edits that delete stay, and so do the anchors that such a clip would inherit."
+        )
     return texts
 
 

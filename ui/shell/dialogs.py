@@ -14,7 +14,8 @@ from typing import Any
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import portable_file_dialogs as native
 
-from app.session.commands import LookAtVideos, OpenCapture
+from app.project.project_choices import ProjectChoices
+from app.session.commands import LookAtVideos, OpenCapture, OpenProject
 from ui.panels.actions.action import BOOKMARKS, PLAY, TIME, WINDOW
 from ui.panels.actions.table import ACTIONS
 from ui.panels.gestures import mouse_help
@@ -23,12 +24,19 @@ from ui.panels.widgets import text_wrapped_dim
 from ui.style import theme
 
 _LINUX_HELPERS = ("zenity", "kdialog", "matedialog", "qarma")
-OPEN, CALIBRATE = "open", "calibrate"
+OPEN, CALIBRATE, READ_ONLY, RELOCATE = "open", "calibrate", "read only", "relocate"
 """What a folder is asked for."""
-_TITLES = {OPEN: "Open a capture or project folder", CALIBRATE: "Calibrate a folder of plain videos"}
+_TITLES = {
+    OPEN: "Open a capture or project folder",
+    CALIBRATE: "Calibrate a folder of plain videos",
+    READ_ONLY: "Open a project for reading only",
+    RELOCATE: "Where the capture of the project is by now",
+}
 _HINTS = {
     OPEN: "Folder with the cameras and their videos or pictures, or of a project",
     CALIBRATE: "Folder with one video, or one folder of pictures, per camera",
+    READ_ONLY: "Folder of a project, or of a capture that has one; nothing in it is changed",
+    RELOCATE: "Folder with the cameras and their videos or pictures",
 }
 _MAX_LISTED = 500
 NO_KEY = "no key"
@@ -75,17 +83,32 @@ class OpenFolderDialog:
         self._text = str(self._start)
         self._listed: tuple[str, list[str]] = ("", [])
         self._purpose = OPEN
+        self._project: Path | None = None
 
     @property
     def is_waiting(self) -> bool:
         """True while the desktop's dialog is up and has to be polled."""
         return self._native is not None
 
-    def open(self, start: Path | None = None, *, purpose: str = OPEN) -> None:
-        """Ask, for OPEN or CALIBRATE. A second call while a question is up does nothing."""
+    def open_wished(self, ui: UiState) -> None:
+        """Ask for what is wished, if anything is."""
+        wishes = ui.wishes
+        if wishes.relocated_project is not None:
+            self.open(purpose=RELOCATE, project=wishes.relocated_project)
+        elif wishes.is_read_only or wishes.is_calibration or ui.is_open_requested:
+            self.open(purpose=READ_ONLY if wishes.is_read_only else CALIBRATE if wishes.is_calibration else OPEN)
+        wishes.relocated_project = None
+        ui.is_open_requested = wishes.is_calibration = wishes.is_read_only = False
+
+    def open(self, start: Path | None = None, *, purpose: str = OPEN, project: Path | None = None) -> None:
+        """Ask, for one of the purposes above. A second call while a question is up does nothing.
+
+        Args:
+            project: The project whose capture is asked for.
+        """
         if self._native is not None:
             return
-        self._purpose = purpose
+        self._purpose, self._project = purpose, project
         if start is not None:
             self._start = start
             self._text = str(start)
@@ -114,7 +137,11 @@ class OpenFolderDialog:
     def _popup(self) -> str:
         return f"{_TITLES[self._purpose]}###folder"
 
-    def _answer(self, folder: Path) -> OpenCapture | LookAtVideos:
+    def _answer(self, folder: Path) -> OpenCapture | OpenProject | LookAtVideos:
+        if self._purpose == RELOCATE and self._project is not None:
+            return OpenProject(self._project, ProjectChoices(capture=folder))
+        if self._purpose == READ_ONLY:
+            return OpenCapture(folder, choices=ProjectChoices(is_read_only=True))
         return LookAtVideos(folder) if self._purpose == CALIBRATE else OpenCapture(folder, is_asking=True)
 
     def _poll_native(self, dispatch: Dispatch, ui: UiState) -> None:
@@ -149,7 +176,7 @@ class OpenFolderDialog:
             imgui.close_current_popup()
         imgui.same_line()
         imgui.begin_disabled(not is_folder)
-        is_clicked = imgui.button("Open" if self._purpose == OPEN else "Go on", ImVec2(120, 0))
+        is_clicked = imgui.button("Open" if self._purpose in (OPEN, READ_ONLY) else "Go on", ImVec2(120, 0))
         ui.mark("open.accept")
         imgui.end_disabled()
         if (is_clicked or is_entered) and folder is not None and is_folder:

@@ -17,12 +17,14 @@ from app.export.forms.table import FORMS
 from app.export.picked_frames import PickedFrames
 from app.session.commands import CloseQuestion, Command, StartExport
 from engine.text import one_line
+from ui.panels.copying import COMMAND, CopyNeeds, draw_copy_entries
 from ui.panels.exports import ExportingFacts
 from ui.panels.state import EXPORTS, Dispatch, UiState
 from ui.panels.widgets import elided, primary_button, segment, text_wrapped_dim
 from ui.shell.export_place import LABEL_WIDTH, REFRESH_S, ExportPlace, Suggests, draw_plan, label
 from ui.shell.modal import Modal
 from ui.style import theme
+from ui.style.theme import Icon
 
 TITLE = "Export###export"
 SIZE = (900.0, 740.0)
@@ -54,7 +56,7 @@ class ExportPageFacts(Protocol):
     def choices(self) -> ExportChoices: ...
 
 
-class HasExporting(Protocol):
+class HasExporting(CopyNeeds, Protocol):
     """A session with one."""
 
     @property
@@ -103,7 +105,7 @@ class ExportDialog:
             draw_plan(plan, ui)
         imgui.end_child()
         imgui.separator()
-        answer = self._draw_buttons(plan, ui, is_agreed=is_agreed)
+        answer = self._draw_buttons(session, page, plan, ui, is_agreed=is_agreed)
         if answer is None and (is_left or keys.is_closed):
             answer = CloseQuestion()
         if answer is not None:
@@ -200,12 +202,24 @@ class ExportDialog:
         if has_changed:
             self._choices = self._choices.changed(step=min(max(step, 1), 100_000))
 
-    def _draw_buttons(self, plan: ExportPlan | None, ui: UiState, *, is_agreed: bool) -> Command | None:
+    def _draw_buttons(
+        self, session: HasExporting, page: ExportPageFacts, plan: ExportPlan | None, ui: UiState, *, is_agreed: bool
+    ) -> Command | None:
+        is_possible = plan is not None and not plan.problems
+        imgui.begin_disabled(not is_possible)
+        if imgui.button(f"{Icon.COPY}  {COMMAND}", BUTTON):
+            imgui.open_popup("copy")
+        ui.mark("export.copy")
+        imgui.end_disabled()
+        if imgui.begin_popup("copy"):
+            self._is_box_open = True
+            draw_copy_entries(ui, "export", lambda: session.command_texts.export(page.context, self._choices))
+            imgui.end_popup()
+        imgui.same_line()
         imgui.set_cursor_pos_x(imgui.get_window_width() - 2 * BUTTON.x - 22)
         is_cancelled = imgui.button("Cancel", BUTTON)
         ui.mark("export.cancel")
         imgui.same_line()
-        is_possible = plan is not None and not plan.problems
         imgui.begin_disabled(not is_possible)
         is_clicked = primary_button("Export", BUTTON, ui)
         ui.mark("export.start")

@@ -24,6 +24,8 @@ from ui.panels.actions.table import ACTIONS, handle_keys
 from ui.panels.camera_path import PathPanelNeeds, draw_paths
 from ui.panels.capture import CaptureNeeds, CapturePanel
 from ui.panels.doctor.panel import DoctorNeeds, DoctorPanel
+from ui.panels.editing.edits_panel import EditsPanelNeeds, draw_edits
+from ui.panels.editing.history_panel import HistoryPanel
 from ui.panels.editing.mend_panel import HasMending, draw_mending
 from ui.panels.editing.select_panel import SelectionPanelNeeds, draw_selection
 from ui.panels.exports import draw_exports
@@ -38,7 +40,9 @@ from ui.panels.residuals.panel import ResidualsNeeds, ResidualsPanel
 from ui.panels.state import (
     CAPTURE,
     DOCTOR,
+    EDITS,
     EXPORTS,
+    HISTORY,
     LAYOUTS,
     LOG,
     PATHS,
@@ -57,7 +61,7 @@ from ui.panels.timeline.panel import draw_timeline
 from ui.panels.training import draw_training
 from ui.panels.viewport import ViewportNeeds, ViewportPanel
 from ui.shell.calibration_dialog import CalibrationDialog, HasCalibrating
-from ui.shell.dialogs import CALIBRATE, OPEN, OpenFolderDialog, draw_help
+from ui.shell.dialogs import OpenFolderDialog, draw_help
 from ui.shell.export_dialog import ExportDialog, HasExporting
 from ui.shell.imgui_backend import ImGuiBackend
 from ui.shell.layout import hold_sizes, is_laid_out, lay_out
@@ -99,6 +103,7 @@ class FrameNeeds(
     ViewportNeeds,
     CaptureNeeds,
     SelectionPanelNeeds,
+    EditsPanelNeeds,
     TimelineNeeds,
     MenuNeeds,
     PaletteNeeds,
@@ -213,12 +218,14 @@ class Frame:
             (TRAINING, draw_training, True),
             (REGIONS, draw_regions, True),
             (SELECTION, draw_selection, True),
+            (EDITS, draw_edits, True),
             (RESIDUALS, self.residuals.draw, True),
             (PATHS, draw_paths, True),
             (TIMELINE, draw_timeline, True),
             (LOG, self.log.draw, True),
             (DOCTOR, self.doctor.draw, True),
             (EXPORTS, draw_exports, True),
+            (HISTORY, HistoryPanel().draw, True),
             (VIEWPORT, self.viewport.draw, False),  # last: it shows what the others have just changed
         )
 
@@ -344,9 +351,7 @@ class Frame:
             if title == VIEWPORT or not ui.is_picture_only:
                 self._draw_panel(title, draw_panel, has_padding)
         hold_sizes(self._dock_ids)
-        if ui.is_open_requested or ui.wishes.is_calibration:
-            self.dialog.open(purpose=CALIBRATE if ui.wishes.is_calibration else OPEN)
-            ui.is_open_requested = ui.wishes.is_calibration = False
+        self.dialog.open_wished(ui)
         self._guard("Open dialog", lambda: self.dialog.draw(dispatch, ui))
         self._guard("Help", lambda: draw_help(ui))
         self._guard("Layouts", lambda: self.layouts.draw(ui))

@@ -12,7 +12,9 @@ from imgui_bundle import ImVec2, imgui
 from ui.panels.state import (
     CAPTURE,
     DOCTOR,
+    EDITS,
     EXPORTS,
+    HISTORY,
     LAYOUTS,
     LOG,
     PATHS,
@@ -30,6 +32,7 @@ SMALLEST = {
     TRAINING: SIDE,
     REGIONS: SIDE,
     SELECTION: SIDE,
+    EDITS: SIDE,
     RESIDUALS: SIDE,
     PATHS: (176.0, 0.0),
     TIMELINE: (0.0, 140.0),
@@ -69,11 +72,13 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
         (TRAINING, right),
         (REGIONS, right),
         (SELECTION, right),
+        (EDITS, right),
         (RESIDUALS, right),
         (TIMELINE, bottom),
         (LOG, bottom),
         (DOCTOR, bottom),
         (EXPORTS, bottom),
+        (HISTORY, bottom),
     ):
         internal.dock_builder_dock_window(title, node_id)
     node = internal.dock_builder_get_node(middle)  # it stays the central node: the one that gives way

@@ -5,6 +5,7 @@ A dialog is up as long as the session has the question. Enter says yes, Escape n
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -12,11 +13,17 @@ from imgui_bundle import ImVec2, imgui
 
 from app.session.clips.clip_questions import ClipQuestion
 from app.session.commands import CloseQuestion, Command, CorrectCapture, OpenCapture, OpenProject, TrainClip
+from app.session.files.file_commands import CancelSaveAs
+from app.session.files.file_questions import RecoveryQuestion, RelocationQuestion, SaveAsQuestion, SavingQuestion
 from app.session.questions import CorrectionQuestion, ProjectQuestion, Question, RetrainQuestion, SettingsQuestion
+from app.status import JobStatus
 from engine.text import duration_text
 from ui.panels.state import Dispatch, UiState
 from ui.panels.widgets import elided, primary_button, text_wrapped_dim
 from ui.shell.clip_questions import clip_question_title, draw_clip_question
+from ui.shell.files.recovery_dialog import RecoveryDialog
+from ui.shell.files.relocation_dialog import draw_relocation
+from ui.shell.files.save_as_dialog import SaveAsDialog, draw_saving
 from ui.shell.train_settings import SettingsDialog
 from ui.style import theme
 from ui.style.numbers import format_count
@@ -34,6 +41,9 @@ class QuestionNeeds(Protocol):
     @property
     def question(self) -> Question | None: ...
 
+    @property
+    def jobs(self) -> Sequence[JobStatus]: ...
+
 
 class QuestionDialogs:
     """Owns which row is chosen; the question itself is the session's."""
@@ -42,6 +52,7 @@ class QuestionDialogs:
         self._asked: Question | None = None
         self._chosen = 0
         self._settings = SettingsDialog()
+        self._recovery, self._saving = RecoveryDialog(), SaveAsDialog()
 
     def draw(self, session: QuestionNeeds, dispatch: Dispatch, ui: UiState) -> None:
         """Draw the dialog of the session's question, if there is one."""
@@ -52,6 +63,9 @@ class QuestionDialogs:
         title = _title(question)
         if is_new:
             self._chosen = 0
+            self._recovery.reset()
+            if isinstance(question, SaveAsQuestion):
+                self._saving.reset(question)
             imgui.open_popup(title)
         viewport = imgui.get_main_viewport()
         imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.always, ImVec2(0.5, 0.5))
@@ -61,7 +75,7 @@ class QuestionDialogs:
         is_open, is_kept = imgui.begin_popup_modal(title, True, flags)
         if not is_open:
             if not is_new:  # closed by its cross
-                dispatch(CloseQuestion())
+                dispatch(_closing(question))
             return
         imgui.push_text_wrap_pos(0.0)
         # the key that led to the question is still pressed in its first frame, and is not an answer to it
@@ -72,13 +86,21 @@ class QuestionDialogs:
             answer = self._draw_settings(question, ui, is_agreed)
         elif isinstance(question, CorrectionQuestion):
             answer = _draw_correction(question, ui, is_agreed)
+        elif isinstance(question, RecoveryQuestion):
+            answer = self._recovery.draw(question, ui, is_agreed)
+        elif isinstance(question, RelocationQuestion):
+            answer = draw_relocation(question, ui, is_agreed)
+        elif isinstance(question, SaveAsQuestion):
+            answer = self._saving.draw(question, ui, is_agreed)
+        elif isinstance(question, SavingQuestion):
+            answer = draw_saving(question, session.jobs, ui)
         elif isinstance(question, ClipQuestion):
             answer = draw_clip_question(question, ui, is_agreed)
         else:
             answer = self._draw_projects(question, ui, is_agreed)
         imgui.pop_text_wrap_pos()
         if answer is None and (not is_kept or (not is_new and imgui.is_key_pressed(imgui.Key.escape, False))):
-            answer = CloseQuestion()
+            answer = _closing(question)
         if answer is not None:
             imgui.close_current_popup()
         imgui.end_popup()
@@ -141,6 +163,11 @@ class QuestionDialogs:
         return is_taken
 
 
+def _closing(question: Question) -> Command:
+    """What Escape and the cross of a dialog mean."""
+    return CancelSaveAs() if isinstance(question, SavingQuestion) else CloseQuestion()
+
+
 def _title(question: Question) -> str:
     if isinstance(question, ClipQuestion):
         return clip_question_title(question)
@@ -150,6 +177,14 @@ def _title(question: Question) -> str:
         return f"Train clip {question.clip_index} again?###question"
     if isinstance(question, CorrectionQuestion):
         return "Correct the capture?###question"
+    if isinstance(question, RecoveryQuestion):
+        return "The project is damaged###question"
+    if isinstance(question, RelocationQuestion):
+        return "Where is the capture?###question"
+    if isinstance(question, SaveAsQuestion):
+        return "Save the project as###question"
+    if isinstance(question, SavingQuestion):
+        return "Saving the project###question"
     return "Several projects###question"
 
 

@@ -34,10 +34,19 @@ _PART_TIPS = {
     "split": "What stands still once, and what moves in a file per frame",
 }
 _UPS = (("", "As in the capture"), ("+y", "+y"), ("-y", "-y"), ("+z", "+z"), ("-z", "-z"))
-_UP_TIP = "Turns the scene so that what its cameras agree is up points along this axis"
+_UP_TIP = "Turns the scene so that what is up in it points along this axis"
 _SCALE_TIP = "Units of the files per unit of the capture"
+_METRES_TIP = "Metres where the panel Edits says how long a unit of the scene is; else as in the capture"
 _AXES = (("ply", "As in .ply files"), ("rub", "As Niantic's programs take them"))
-_SCALES = (("1", "1"), ("0.001", "0.001"), ("0.01", "0.01"), ("10", "10"), ("100", "100"), ("1000", "1000"))
+_SCALES = (
+    ("", "Metres, where the scale is known"),
+    ("1", "1"),
+    ("0.001", "0.001"),
+    ("0.01", "0.01"),
+    ("10", "10"),
+    ("100", "100"),
+    ("1000", "1000"),
+)
 
 
 def _options(context: ExportContext, choices: ExportChoices) -> tuple[Option, ...]:
@@ -46,7 +55,7 @@ def _options(context: ExportContext, choices: ExportChoices) -> tuple[Option, ..
         format_,
         Option("part", "Part", _PARTS, _PART_TIPS),
         Option("up", "Up axis", _UPS, {value: _UP_TIP for value, _ in _UPS[1:]}),
-        Option("scale", "Scale", _SCALES, {value: _SCALE_TIP for value, _ in _SCALES}),
+        Option("scale", "Scale", _SCALES, {value: _SCALE_TIP for value, _ in _SCALES[1:]} | {"": _METRES_TIP}),
     )
     return (*options, Option("axes", "Axes", _AXES)) if format_.chosen(choices) == "spz" else options
 
@@ -61,7 +70,7 @@ def _job(answers: Answers) -> Job:
         frames=answers.job_frames,
         part=answers.one_of(WRITTEN_PARTS, "part"),
         up=answers["up"] or None,
-        scale=float(answers["scale"]),
+        scale=float(answers["scale"]) if answers["scale"] else None,
         axes=answers.one_of(("ply", "rub"), "axes"),
         has_edits=answers.has_edits,
     )

@@ -173,7 +173,7 @@ def _view_of(
     if job.camera is not None:
         return camera_view(opened.rig, _camera(opened.capture, job.camera), job.size)
     assert job.turntable is not None
-    return turntable_view(opened.rig, job.turntable, n_pictures, size)
+    return turntable_view(opened.rig, opened.up, job.turntable, n_pictures, size)
 
 
 def _camera(capture: Capture, name: str) -> int:

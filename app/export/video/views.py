@@ -61,10 +61,12 @@ def path_view(path: CameraPath, size: tuple[int, int]) -> ViewOf:
     return view
 
 
-def turntable_view(rig: CameraRig, turntable: Turntable, n_pictures: int, size: tuple[int, int]) -> ViewOf:
+def turntable_view(
+    rig: CameraRig, up: np.ndarray, turntable: Turntable, n_pictures: int, size: tuple[int, int]
+) -> ViewOf:
     """A circle around what the cameras look at, beginning in front of the camera that the home view begins at, through
-    a lens like that camera's."""
-    focus, up = rig.focus_point(), rig.up_direction()
+    a lens like that camera's. up: What is up in the scene. [3]"""
+    focus = rig.focus_point()
     camera = home_camera(rig, focus, up)
     path = path_presets.turntable(
         focus,

@@ -10,7 +10,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta, to_builtins
 
-from app.document.kept_json import read_kept, write_kept
+from app.document.kept_json import kept_text, read_kept, write_kept
 from app.project.project import Project
 from engine.errors import ProjectError
 from engine.mending.figures import Attempt, StretchFigures
@@ -121,7 +121,7 @@ def write_record(path: Path, record: MendRecord) -> None:
         path.parent.mkdir(exist_ok=True)  # not the project itself, which may be gone
     except OSError as error:
         raise disk_error(error, what="The record of what was mended", path=path) from error
-    write_kept(path, {"schema": SCHEMA, **to_builtins(record, str_keys=True)})
+    write_kept(path, kept_text({"schema": SCHEMA, **to_builtins(record, str_keys=True)}))
 
 
 def read_record(path: Path) -> MendRecord | None:

@@ -66,7 +66,14 @@ class AskAboutDamage:
     clip_index: int
 
 
+@dataclass(frozen=True, slots=True)
+class ApplyDeletions:
+    """Write clips again without what the edits delete everywhere; the clips of before become versions. Asks first."""
+
+    is_confirmed: bool = False
+
+
 CutCommand = SplitClip | MergeClips | SetReferenceClip
 """What changes the document, and can be taken back."""
-ClipCommand = TrainStale | CompareVersion | CutCommand | AskFreeSpace | FreeSpace | AskAboutDamage
+ClipCommand = TrainStale | CompareVersion | CutCommand | AskFreeSpace | FreeSpace | AskAboutDamage | ApplyDeletions
 """What is done about clips beside training them."""

@@ -66,4 +66,19 @@ class DamagedQuestion:
     seconds: float | None
 
 
-ClipQuestion = CutQuestion | RoomQuestion | DamagedQuestion
+@dataclass(frozen=True, slots=True)
+class DeletionsQuestion:
+    """Are deletions to be applied permanently?
+
+    Attributes:
+        n_anchors: Anchors that go, counted in every clip that shows them.
+        n_clips: Clips that are written again.
+        n_untrained: Clips that are not trained; while there are some, edits that delete stay in the stack.
+    """
+
+    n_anchors: int
+    n_clips: int
+    n_untrained: int
+
+
+ClipQuestion = CutQuestion | RoomQuestion | DamagedQuestion | DeletionsQuestion

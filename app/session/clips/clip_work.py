@@ -15,6 +15,7 @@ from app.project.disk.use import DiskUse
 from app.project.opened_project import OpenedProject
 from app.project.project import Project
 from app.session.clips.clip_commands import (
+    ApplyDeletions,
     AskAboutDamage,
     AskFreeSpace,
     ClipCommand,
@@ -28,6 +29,7 @@ from app.session.clips.clip_commands import (
 from app.session.clips.clip_questions import ClipQuestion, CutQuestion, DamagedQuestion, RoomQuestion
 from app.session.clips.costs import expected_seconds
 from app.session.clips.disk_reader import DiskReader
+from app.session.clips.permanence import Permanence
 from app.session.editing.kept_document import KeptDocument
 from app.session.live_training import LiveTraining
 from app.session.notices import Notices
@@ -58,6 +60,7 @@ class ClipWork:
         ask: Callable[[ClipQuestion], None],
     ) -> None:
         self._jobs, self._notices, self._live, self._document, self._ask = jobs, notices, live, document, ask
+        self._permanence = Permanence(jobs, notices, document, ask)
         self._opened: OpenedProject | None = None
         self._disk = DiskReader()
         self._dependencies: dict[int, DependencyStatus] = {}
@@ -96,6 +99,8 @@ class ClipWork:
                 self._free(what, clip_index)
             case AskAboutDamage(clip_index=clip_index):
                 self._ask_about_damage(clip_index)
+            case ApplyDeletions():
+                self._permanence.obey(command, opened, service)
         return None
 
     def _cut(self, command: CutCommand, opened: OpenedProject, catalog: ClipCatalog) -> CutQuestion | None:

@@ -104,6 +104,7 @@ class SetLabel:
     kind: Literal["clip", "camera"]
     name: str
     text: str
+    gesture: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +134,7 @@ class SetScaleByLength:
 
 @dataclass(frozen=True, slots=True)
 class SetScale:
-    """Say how long a scene unit is, m; None where nobody knows."""
+    """Say how long a scene unit is, m; None takes it back."""
 
     meters_per_unit: float | None
 

@@ -54,7 +54,7 @@ class Edits:
         return EditsStatus(why_not=why_not) if content is None else edits_status(content, why_not)
 
     def apply(self, command: c.EditCommand) -> None:
-        """Carry out a command; one that changes nothing is no step of the history.
+        """Carry out a command; one that changes nothing does not become a step of the history.
 
         Raises:
             ProjectError: It cannot be done now, or makes no sense.
@@ -82,7 +82,8 @@ class Edits:
         Raises:
             ProjectError: A step cannot be taken; those before it were.
         """
-        for _ in range(abs(n_steps)):
+        history = self._document.checked().history
+        for _ in range(min(abs(n_steps), len(history.past if n_steps < 0 else history.future))):
             (self._document.undo if n_steps < 0 else self._document.redo)()
 
 
@@ -129,8 +130,9 @@ def changed(document: ProjectDocument, command: c.EditCommand) -> Change:
         case c.MoveMarker(frame_index=frame_index, to_frame=to_frame, gesture=gesture):
             merge = ("move marker", gesture) if gesture else None
             return Change(note_changes.move_marker(document, frame_index, to_frame), "move marker", merge)
-        case c.SetLabel(kind=kind, name=name, text=text):
-            return Change(note_changes.set_label(document, kind, name, text), f"label a {kind}")
+        case c.SetLabel(kind=kind, name=name, text=text, gesture=gesture):
+            merge = ("label", kind, name, gesture) if gesture else None
+            return Change(note_changes.set_label(document, kind, name, text), f"label a {kind}", merge)
         case c.SetUp(direction=direction):
             return Change(world_changes.set_up(document, direction), "set what is up")
         case c.SetUpByGround(points=points, toward=toward):

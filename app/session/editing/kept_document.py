@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 
@@ -14,10 +15,12 @@ from app.document.history import Changed, DocumentHistory, Event, Redone, Undone
 from app.document.project_document import ProjectDocument
 from app.project.project import Project
 from app.session.edit_status import HistoryStatus
-from engine.errors import EngineError, ProjectError
+from engine.errors import DiskError, EngineError, ProjectError
 
 logger = logging.getLogger(__name__)
 
+RETRY_S = 5.0
+"""How long after the disk has refused something it is asked again."""
 SETTLE_S = 2.0
 """A disk that takes longer than this to write a few lines is not waited for."""
 Guard = Callable[[ProjectDocument, ProjectDocument], None]
@@ -53,6 +56,7 @@ class KeptDocument:
         self._number = 0
         self._awaited: int | None = None
         self._problem = ""
+        self._retry_at_s: float | None = None
         self._lock = threading.Lock()
         self._pending: list[Event] = []
         self._told: tuple[DocumentHistory | None, HistoryStatus] = (None, HistoryStatus())
@@ -88,7 +92,7 @@ class KeptDocument:
         self._files.forget()
         self._project = None
         self._pending = []
-        self._awaited, self._problem = None, ""
+        self._awaited, self._problem, self._retry_at_s = None, "", None
 
     # ---------------------------------------------------------------- changes
 
@@ -166,16 +170,24 @@ class KeptDocument:
         with self._lock:  # those of later requests too: their own find nothing more to do
             events, self._pending = self._pending, []
             history = request.project.history
-        store.write(events, history)
+        try:
+            store.write(events, history)
+        except DiskError:
+            with self._lock:  # to be tried again
+                self._pending = [*events, *self._pending]
+            raise
         return history
 
     def take_error(self) -> Exception | None:
-        """The last failure, once. After one of writing, what the project holds is read again."""
+        """The last failure, once. What the disk refused is tried again after a while, and with the next change; where
+        something else has gone wrong while writing, what the project holds is read again."""
         found = self._files.take_error()
         if found is None or self._project is None or found[0].project is not self._project:
             return None
         request, error = found
-        if not request.is_reading:
+        if not request.is_reading and isinstance(error, DiskError):
+            self._retry_at_s = time.monotonic() + RETRY_S
+        elif not request.is_reading:
             with self._lock:
                 self._pending = []
             self._request(self._project, is_reading=True)
@@ -185,6 +197,9 @@ class KeptDocument:
 
     def poll(self) -> bool:
         """Take in what was read. Whether there was something."""
+        if self._project is not None and self._retry_at_s is not None and time.monotonic() >= self._retry_at_s:
+            self._retry_at_s = None
+            self._request(self._project, is_reading=False)
         newest = self._files.newest
         if self._project is None or newest is None or newest[0].number != self._awaited:
             return False

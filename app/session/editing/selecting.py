@@ -254,7 +254,7 @@ class Selecting:
     def finished(self) -> object:
         """Another value means that there is something new to see."""
         newest = [self._worker.newest_in(lane) for lane in (FIND, SPREAD, *self._share_lanes)]
-        return tuple(None if found is None else found[0] for found in newest)
+        return (self._revision, *(None if found is None else found[0] for found in newest))
 
     # ---------------------------------------------------------------- what is shown of it
 

@@ -20,7 +20,7 @@ class MendPage:
         state: "asking" before it begins, "running", "done", "reverted".
         clip_indices: Clips that may change.
         why_not: Why it cannot be mended; empty where it can.
-        estimate_s: What it is expected to take; None where nobody knows.
+        estimate_s: What it is expected to take; None where that is not known.
         record: What came of it; None before.
         number: Of the record in the project; None where nothing changed.
         compared: Clip whose earlier version stands beside it; None for none.

@@ -65,7 +65,7 @@ def build_moving_cloud(
     *,
     bounds_min: np.ndarray,
     bounds_max: np.ndarray,
-    is_valid: np.ndarray | None = None,
+    valid_in: Callable[[int], np.ndarray | None] = lambda frame_in_clip: None,
     max_points: int = 30_000,
     voxel_size: float | None = None,
     report: Report,
@@ -79,7 +79,7 @@ def build_moving_cloud(
         rig: Training cameras only, at mask size.
         gains: camera_colour = gain * scene_colour. [C, 3]
         bounds_min, bounds_max: Box to search, scene units. [3]
-        is_valid: Pixels that the cameras see; None for all. [C, H, W] bool
+        valid_in: Frame in clip to the pixels that count there; None for all. [C, H, W] bool
         max_points: The voxel grows until about no more than this many points remain over the clip.
         voxel_size: Voxel edge to use as it is, scene units; a source clip takes its reference's. None derives it.
         report: Gets one line per step with counts and the reason.
@@ -101,6 +101,7 @@ def build_moving_cloud(
 
     def carve_frame(frame_in_clip: int, grid: Grid) -> Arrays:
         frame_masks = masks[frame_in_clip]
+        is_valid = valid_in(frame_in_clip)
         voxels = carve(
             frame_masks, projections, grid, near=near, n_misses=n_misses, min_hits=min_hits, is_valid=is_valid
         )

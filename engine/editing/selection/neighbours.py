@@ -10,7 +10,7 @@ from numba import njit
 
 
 def grown(means: np.ndarray, selected: np.ndarray, distance: float) -> np.ndarray:
-    """What is selected, and every Gaussian whose centre is no farther than a distance from one of those.
+    """What is selected, and every Gaussian whose centre is within a distance of one of those.
 
     Args:
         means: Scene units. [N, 3]
@@ -42,7 +42,7 @@ def flooded(means: np.ndarray, colors: np.ndarray, seed: int, distance: float, c
         means: Scene units. [N, 3]
         colors: Display-encoded RGB in 0..1. [N, 3]
         seed: Row of the Gaussian.
-        distance: Neighbours are no farther apart than this, scene units.
+        distance: Neighbours are at most this far apart, scene units.
         color_tolerance: No channel of a colour differs by more than this from that of the seed.
     Returns:
         [N] bool
@@ -67,7 +67,7 @@ def flooded(means: np.ndarray, colors: np.ndarray, seed: int, distance: float, c
 
 def _points(means: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     points = np.ascontiguousarray(means, np.float64)
-    is_sound: np.ndarray = np.isfinite(points).all(axis=1)
+    is_sound = np.all(np.isfinite(points), axis=1, keepdims=True)[:, 0]
     return points, is_sound
 
 

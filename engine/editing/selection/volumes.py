@@ -38,7 +38,7 @@ def in_volume(
         beside = np.abs(offsets @ axes.T)
         if quats is not None and scales is not None:
             beside = beside - EXTENT_SIGMAS * _sigmas(quats, scales, axes[None])
-        is_in: np.ndarray = (beside <= np.asarray(volume.half_sizes)).all(axis=1)
+        is_in = np.all(beside <= np.asarray(volume.half_sizes), axis=1, keepdims=True)[:, 0]
     return is_in
 
 

@@ -116,12 +116,13 @@ class Evaluation:
             before: The clip that ends where this one starts; where the pair at the first frame is wanted.
             frames: Capture frame indices of the rows that are wanted.
             pairs: Of the pairs that are wanted, by the later frame. Frames that only pairs need are rendered too.
+                Pictures that are excluded from training are left out, with their pairs.
         """
         clip = trained.clip
         name, is_held_out = self.capture.rig.names[camera], camera in self.holdout
         last: _Shot | None = None
         for frame in clip.frame_indices():
-            if frame not in frames and frame not in pairs:
+            if (frame not in frames and frame not in pairs) or not self.capture.is_usable(camera, frame):
                 continue
             shot = self._shot(trained, camera, frame)
             if frame in frames:
@@ -129,15 +130,16 @@ class Evaluation:
                     shot.image,
                     shot.pixels,
                     shot.is_moving,
-                    is_valid=self.capture.valid(camera),
+                    is_valid=self.capture.valid_in(camera, frame),
                     metrics=self.metrics,
                     precision=self.precision,
                 )
                 yield EvalRow(clip.clip_index, frame, name, is_held_out, measured.figures, measured.missing)
-            if frame in pairs and frame == clip.start:
+            has_pair = frame in pairs and frame > 0 and self.capture.is_usable(camera, frame - 1)
+            if has_pair and frame == clip.start:
                 assert before is not None, "the pair at a boundary needs the clip before it"
                 yield self._boundary(clip, shot, before, camera)[0]
-            elif frame in pairs:
+            elif has_pair:
                 if last is None or last.frame_index != frame - 1:
                     last = self._shot(trained, camera, frame - 1)
                 yield _pair_row(self._maps(camera, shot, last), clip, frame, name, is_held_out, is_boundary=False)
@@ -176,7 +178,7 @@ class Evaluation:
     def _shot(self, trained: TrainedClip, camera: int, frame: int) -> _Shot:
         pixels = self.capture.frame(camera, frame)
         image = self._render(trained, camera, trained.clip.clip_time(frame))
-        return _Shot(frame, image, pixels, self._is_moving(camera, pixels))
+        return _Shot(frame, image, pixels, self._is_moving(camera, frame, pixels))
 
     def _render(self, trained: TrainedClip, camera: int, clip_time: float) -> np.ndarray:
         """Picture in the camera's colours, as it is compared: black where the camera sees nothing. [H, W, 3] float32"""
@@ -184,10 +186,12 @@ class Evaluation:
         valid = self.capture.valid(camera)
         return image if valid is None else np.where(valid[..., None], image, np.float32(0.0))
 
-    def _is_moving(self, camera: int, pixels: np.ndarray) -> np.ndarray:
+    def _is_moving(self, camera: int, frame: int, pixels: np.ndarray) -> np.ndarray:
         """Where a picture differs from the camera's background, whatever its exposure. [H, W] bool"""
         background, exposure = self._background(camera)
-        return motion_mask(exposure.applied_to(pixels[None])[0], background, is_valid=self.capture.valid(camera))
+        return motion_mask(
+            exposure.applied_to(pixels[None])[0], background, is_valid=self.capture.valid_in(camera, frame)
+        )
 
     def _background(self, camera: int) -> tuple[np.ndarray, Exposure]:
         """What a camera sees when nothing moves, in its mean exposure, and that exposure."""
@@ -201,7 +205,12 @@ class Evaluation:
 
     def _maps(self, camera: int, shot: _Shot, last: _Shot) -> SeamMaps:
         truth, last_truth = (s.pixels.astype(np.float32) / np.float32(255.0) for s in (shot, last))
-        is_moving, is_valid = shot.is_moving | last.is_moving, self.capture.valid(camera)
+        is_moving, is_valid = shot.is_moving | last.is_moving, self.capture.valid_in(camera, shot.frame_index)
+        is_last_valid = self.capture.valid_in(camera, last.frame_index)
+        if is_valid is not None and is_last_valid is not None:
+            is_valid = is_valid & is_last_valid
+        elif is_last_valid is not None:
+            is_valid = is_last_valid
         return seam_maps(shot.image, last.image, truth, last_truth, is_moving, is_valid)
 
 

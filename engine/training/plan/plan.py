@@ -193,15 +193,16 @@ def footage_of(capture: Capture, holdout: Sequence[int]) -> Footage:
     Raises:
         PreparationError: Cameras differ in size, or fewer than two are left for training.
     """
-    n_cameras = len(capture.rig) - len(set(holdout))
+    n_cameras = len(capture.training_cameras(holdout))
     if n_cameras < 2:
         raise PreparationError(
             f"Only {n_cameras} of {len(capture.rig)} cameras are left for training; two are needed.",
-            hint="Hold out fewer cameras.",
+            hint="Hold out fewer cameras, or exclude fewer.",
             path=capture.path,
         )
     width, height = capture.picture_size
-    return Footage(width, height, n_cameras, len(set(holdout)), capture.n_frames)
+    n_held_out = len(set(holdout) - set(capture.excluded_cameras))
+    return Footage(width, height, n_cameras, n_held_out, capture.n_frames)
 
 
 StepTime = Callable[[StepSizes, str], float | None]

@@ -19,6 +19,7 @@ from engine.backends.backend import Backend
 from engine.capture.came_along import came_along
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
+from engine.capture.exclusions import exclusion_key
 from engine.clip_files.clip_header import Coverage
 from engine.clip_files.clip_state import ClipState, fingerprint_of
 from engine.cloud.background.exposure import Exposure
@@ -256,6 +257,7 @@ class ClipPreparation:
         def named(state: ClipState | None) -> str | None:
             return None if state is None else state.header.fingerprint
 
+        excluded = exclusion_key(self._capture.exclusions, (0, self._capture.n_frames))
         return {
             "capture": self._capture.part_key,
             "size": [int(side) for side in self._cameras.rig.image_sizes[0]],
@@ -267,6 +269,7 @@ class ClipPreparation:
             "base": named(self._base),
             "previous": named(self._previous),
             "seed": self._seed,
+            **({"excluded": excluded} if excluded else {}),
         }
 
     def _keep_after(self, model: ClipModel, gains: nn.Parameter, backgrounds: Backgrounds) -> Keep:

@@ -19,6 +19,7 @@ import numpy as np
 from engine.camera.rig import CameraRig
 from engine.capture.came_along import came_along
 from engine.capture.capture import Capture
+from engine.capture.exclusions import NOTHING_EXCLUDED, exclusion_key
 from engine.capture.format_result import Layout
 from engine.capture.points import points_of
 from engine.cloud.background.background import estimate_background
@@ -275,9 +276,12 @@ def moving_pixels(
         background: [H, W, 3] uint8 or float 0..255
         camera_index, frame_index: Of the picture, in the numbering of the capture.
     """
-    found = motion_mask(picture, background, is_valid=capture.valid(camera_index))
+    found = motion_mask(picture, background, is_valid=capture.valid_in(camera_index, frame_index))
     masked = capture.moving_mask(camera_index, frame_index)
-    return found if masked is None else found | masked
+    if masked is None:
+        return found
+    valid = capture.valid_in(camera_index, frame_index) if capture.exclusions != NOTHING_EXCLUDED else None
+    return found | (masked if valid is None else masked & valid)
 
 
 def seen_still(backgrounds: Backgrounds, pictures: TrainingPictures, masks: np.ndarray) -> Backgrounds:
@@ -292,6 +296,10 @@ def seen_still(backgrounds: Backgrounds, pictures: TrainingPictures, masks: np.n
 
     def seen(row: int) -> tuple[np.ndarray, np.ndarray]:
         is_still = ~masks[:, row]
+        for frame in range(n_frames):
+            valid = pictures.valid_in(row, frame)
+            if valid is not None:
+                is_still[frame] &= valid
         sums = np.zeros(backgrounds.images[row].shape, np.int32)
         for frame in range(n_frames):
             sums += np.where(is_still[frame, ..., None], pictures.picture(row, frame), np.uint8(0))
@@ -359,7 +367,7 @@ def moving_cloud(
         gains,
         bounds_min=lower,
         bounds_max=upper,
-        is_valid=pictures.is_valid,
+        valid_in=pictures.valid_in_frame,
         max_points=config.max_moving_points,
         voxel_size=voxel_size,
         report=say,
@@ -370,12 +378,14 @@ def moving_cloud(
 def key_of_corrected(capture: Capture, camera_indices: Sequence[int], config: TrainConfig) -> dict:
     """What corrected backgrounds belong to, as `write_backgrounds` keeps it beside them."""
     rig = capture.rig.subset(list(camera_indices))
+    excluded = exclusion_key(capture.exclusions, (0, capture.n_frames))
     return came_along(capture.layout) | {
         "capture": capture.part_key,
         "cameras": list(rig.names),
         "size": [int(side) for side in rig.image_sizes[0]],
         "frames": config.background_frames,
         "is_corrected": True,
+        **({"excluded": excluded} if excluded else {}),
     }
 
 

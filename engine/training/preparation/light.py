@@ -74,10 +74,13 @@ def _frames_in(
     outside = [index for index in frames if index not in clip.frame_indices() and 0 <= index < capture.n_frames]
 
     def frames_of(row: int) -> list[np.ndarray]:
-        own = [pictures.picture(row, index - clip.start) for index in inside]
-        if not outside:
+        camera = pictures.camera_indices[row]
+        used = [index for index in inside if capture.is_usable(camera, index)]
+        own = [pictures.picture(row, index - clip.start) for index in used]
+        beside = [index for index in outside if capture.is_usable(camera, index)]
+        if not beside:
             return own
-        others = capture.frames_of(pictures.camera_indices[row], outside)
+        others = capture.frames_of(camera, beside)
         return [*own, *(others if exposures is None else exposures[row].applied_to(others))]
 
     return frames_of

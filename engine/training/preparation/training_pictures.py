@@ -47,6 +47,22 @@ class TrainingPictures:
         """Pixels that a camera sees; None where it sees all. [H, W] bool"""
         return self.capture.valid(self.camera_indices[camera_row])
 
+    def valid_in(self, camera_row: int, frame_in_clip: int) -> np.ndarray | None:
+        """Pixels of one picture that count; None for all. [H, W] bool"""
+        return self.capture.valid_in(self.camera_indices[camera_row], self.clip.start + frame_in_clip)
+
+    def valid_in_frame(self, frame_in_clip: int) -> np.ndarray | None:
+        """`valid_in` of all cameras in one frame; None where all count. [C, H, W] bool"""
+        found = [self.valid_in(row, frame_in_clip) for row in range(self.n_cameras)]
+        if all(valid is None for valid in found):
+            return None
+        width, height = self.capture.picture_size
+        return np.stack([np.ones((height, width), bool) if valid is None else valid for valid in found])
+
+    def is_usable(self, camera_row: int, frame_in_clip: int) -> bool:
+        """Whether anything of a picture is left to be trained on."""
+        return self.capture.is_usable(self.camera_indices[camera_row], self.clip.start + frame_in_clip)
+
     def picture(self, camera_row: int, frame_in_clip: int) -> np.ndarray:
         """One picture. [H, W, 3] uint8"""
         return self._pixels[camera_row][frame_in_clip]

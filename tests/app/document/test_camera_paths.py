@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.document.camera_paths import camera_path_named, check_paths, stored_paths, to_path
+from app.document.camera_paths import camera_path_named, check_paths, stored_path, to_path
 from engine.camera.camera_path import CameraPath
 from engine.camera.path_presets import fly_through, turntable
 from engine.errors import ProjectError
@@ -24,7 +24,7 @@ def same(one: CameraPath, other: CameraPath) -> bool:
 
 
 def test_what_is_stored_comes_back_to_the_last_digit():
-    read = [to_path(path) for path in stored_paths([TURN, FLIGHT, EMPTY])]
+    read = [to_path(path) for path in map(stored_path, [TURN, FLIGHT, EMPTY])]
     assert all(same(one, other) for one, other in zip(read, (TURN, FLIGHT, EMPTY), strict=True))
 
 

@@ -13,12 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.evaluation.headless import TrainedProject
+from app.document import world_changes
+from app.evaluation.headless import TrainedProject, open_trained
 from app.export import gaussian_sequence, gaussians_job, read_back
 from app.export.export_progress import ExportCancelled, ExportProgress
 from app.export.gaussian_files import GaussianFile, base_name, moment_files, static_file
 from app.export.gaussians_job import GaussiansJob, estimate, run
 from app.export.scene_frames import Part, SceneFrames
+from app.project.project import open_project
 from engine.errors import DiskError, ProjectError
 from engine.export.formats.table import FORMATS, Format
 from engine.export.splats import Splats
@@ -333,3 +335,17 @@ def test_a_part_without_gaussians_is_written_and_said(
         result = run(opened, GaussiansJob(tmp_path / name, name, range(2)), quiet)
         assert any("2 files hold no Gaussians" in line for line in result.lines)
         assert result.psnr_db == 100.0
+
+
+def test_up_and_scale_are_those_of_the_project_unless_others_are_asked_for(project, tmp_path):
+    writable = open_project(project)
+    said = world_changes.set_scale(world_changes.set_up(writable.document, (1.0, 0.0, 0.0)), 0.25)
+    writable.change(said, "set up and scale")
+    writable.close()
+    opened = open_trained(open_project(project, is_writable=False))
+    job = GaussiansJob(tmp_path / "out", frames=range(1), up="+z")
+    assert estimate(opened, job).lines == ("Coordinates: turned so that +z is up, 0.25 units per unit of the capture.",)
+    run(opened, job, quiet)
+    assert sidecar(tmp_path / "out")["up"] == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+    other = replace(job, out=tmp_path / "other", scale=2.0, scene_up=(0.0, 1.0, 0.0))
+    assert "2 units per unit" in estimate(opened, other).lines[0]

@@ -27,7 +27,7 @@ SETTINGS = ProjectSettings(capture="somewhere", fingerprint="abc", holdout=("0",
 def test_settings_come_back_as_they_were(tmp_path):
     create_project(tmp_path / "p", SETTINGS).close()
     assert read_settings(tmp_path / "p") == SETTINGS
-    assert sorted(child.name for child in (tmp_path / "p").iterdir()) == ["project.json"]
+    assert sorted(child.name for child in (tmp_path / "p").iterdir()) == ["journal", "project.json"]
 
 
 def test_settings_that_are_gone_are_dropped_when_an_old_project_is_read(tmp_path):
@@ -48,12 +48,15 @@ def test_a_failed_save_leaves_the_old_file(tmp_path, monkeypatch):
     def full(*_args, **_kwargs):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(os, "replace", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(ProjectError, match="No space left"):
         project.update(ProjectSettings(capture="other", fingerprint="x"))
+    project.close()
     assert (tmp_path / "p" / "project.json").read_bytes() == before
     assert not list((tmp_path / "p").glob(".partial-*"))
     assert project.settings == SETTINGS
+    monkeypatch.undo()
+    assert read_settings(tmp_path / "p") == SETTINGS
 
 
 @pytest.mark.parametrize(

@@ -282,7 +282,9 @@ def test_paths_come_back_when_the_project_is_opened_again(make_session):
     assert all(
         np.array_equal(a.world_to_camera, b.world_to_camera) for a, b in zip(again.paths.path.keys, keys, strict=True)
     )
-    assert again.history.undo == ""
+    assert again.history.undo == "close camera path"
+    again.dispatch(c.Undo())
+    assert not again.paths.path.is_closed
 
 
 def test_what_could_not_be_kept_is_not_shown_as_if_it_were(session, monkeypatch):
@@ -297,7 +299,7 @@ def test_what_could_not_be_kept_is_not_shown_as_if_it_were(session, monkeypatch)
     poll_until(session, lambda: len(session.notices) > 0 and session.paths.can_edit, what="a notice")
     assert "No space left" in session.notices[0].detail
     assert frames(session) == [0.0]
-    assert session.history.undo == "", "what was done before is not known to be on disk"
+    assert session.history.undo == "new camera path", "what was done before is on disk"
 
 
 def test_a_project_that_another_program_writes_to_is_left_alone(make_session):

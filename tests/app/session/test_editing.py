@@ -77,7 +77,7 @@ def test_the_stack_is_reordered_copied_renamed_and_thinned(session):
     n_steps = len(session.history.past)
     session.dispatch(MoveEdit(3, 0))
     session.dispatch(RenameEdit(4, "brighter "))
-    assert len(session.history.past) == n_steps, "what changes nothing is no step"
+    assert len(session.history.past) == n_steps, "what changes nothing does not become a step"
 
 
 def test_what_cannot_be_is_said_and_changes_nothing(session):

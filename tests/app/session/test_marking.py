@@ -99,7 +99,9 @@ def test_regions_come_back_when_the_project_is_opened_again(make_session):
     first.close()  # right away: nothing marked may be lost
     again = ready(make_session())
     assert again.regions.regions == (BALL,)
-    assert not again.history.undo
+    assert again.history.undo == "mark a region"
+    again.dispatch(c.Undo())
+    assert again.regions.regions == ()
 
 
 def test_removing_and_taking_back(make_session):
@@ -119,7 +121,8 @@ def test_removing_and_taking_back(make_session):
         session.dispatch(command)
         assert session.regions.regions == expected
         assert on_disk(session) == expected
-    assert not bool(session.history.undo)
+    session.dispatch(c.Undo())
+    assert session.regions.regions == ()
     assert len(session.notices) == 0
 
 
@@ -229,7 +232,8 @@ def test_another_capture_brings_its_own_regions(make_session, tmp_path, capture_
     session.dispatch(c.OpenProject(folder))
     poll_until(session, lambda: session.project.folder == folder and session.regions.can_mark, what="the other one")
     assert session.regions.regions == (OTHER,)
-    assert not bool(session.history.undo)
+    session.dispatch(c.Undo())
+    assert session.regions.regions == ()
     assert open_project(tmp_path / "p", is_writable=False).document.regions == (BALL,)
 
 

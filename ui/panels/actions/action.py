@@ -8,27 +8,29 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from app.playback.arrays import AnchorArrays
+from app.playback.arrays import AnchorArrays, GaussianArrays
 from app.playback.bookmarks import Bookmarks
 from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.playback.views import Views
-from app.session.edit_status import HistoryStatus, PathsStatus
+from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.selecting import SelectionStatus
 from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
 from engine.camera.rig import CameraRig
+from engine.capture.exclusions import Exclusions
+from ui.panels.copying import CopyNeeds
+from ui.panels.editing.edit_subject import Selects
 from ui.panels.editing.mend_panel import HasMending
 from ui.panels.regions import RegionsNeeds
 from ui.panels.state import Dispatch, UiState
-from ui.viewport.editing.select_tool import TOOLS
 
 TIME, PLAY, VIEW, COMPARE = "Time", "Play and timeline", "View", "Show and compare"
 MARK, PATH, TRAIN, WINDOW = "Mark regions", "Camera path", "Train", "Window"
-SELECT = "Select"
+SELECT, EDIT = "Select", "Edit"
 NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
-class ActionNeeds(RegionsNeeds, HasMending, Protocol):
+class ActionNeeds(CopyNeeds, RegionsNeeds, HasMending, Protocol):
     """What actions act on."""
 
     @property
@@ -64,8 +66,20 @@ class ActionNeeds(RegionsNeeds, HasMending, Protocol):
     @property
     def selection(self) -> SelectionStatus: ...
 
+    @property
+    def selecting(self) -> Selects: ...
+
+    @property
+    def edits(self) -> EditsStatus: ...
+
     def shown_anchors(self) -> AnchorArrays | None: ...
+
+    @property
+    def exclusions(self) -> Exclusions: ...
+
     def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]: ...
+
+    def shown_gaussians(self) -> GaussianArrays | None: ...
 
     def wanted_frame(self) -> WantedFrame | None: ...
 
@@ -85,7 +99,7 @@ class Action:
             Empty where it has none.
         needs_capture: Ignored until a capture is open.
         needs_choosing: Ignored unless a region is being chosen.
-        needs_tool: Ignored unless a tool that selects is in use: this one, or "any". Empty where that does not matter.
+        leaves_tool: Not ignored either while a tool that selects is in use, or an edit stands out.
         moves_keys: Not ignored either where a key of the camera path is chosen.
         repeats: Holding the key repeats the action.
         is_in_help: Shown on the help sheet; of a row of keys that do alike, one is enough there.
@@ -101,7 +115,7 @@ class Action:
     keys: tuple[str, ...] = ()
     needs_capture: bool = True
     needs_choosing: bool = False
-    needs_tool: str = ""
+    leaves_tool: bool = False
     moves_keys: bool = False
     repeats: bool = False
     is_on: Callable[[ActionNeeds], bool] | None = None
@@ -117,9 +131,8 @@ class Action:
         """Why it cannot be run now, as a sentence; empty when it can."""
         if self.needs_capture and session.capture is None:
             return "Open a capture or a project first."
-        if self.needs_tool and ui.selecting.kind not in ((self.needs_tool,) if self.needs_tool != "any" else TOOLS):
-            return "Only while a tool that selects is in use."
-        if self.needs_choosing and not ui.regions.is_active:
+        is_tool_used = ui.selecting.is_active or ui.editing.is_active
+        if self.needs_choosing and not (ui.regions.is_active or (self.leaves_tool and is_tool_used)):
             if not self.moves_keys:
                 return "Only while a region is being chosen."
             if session.paths.key is None:

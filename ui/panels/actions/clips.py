@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from app.session.clips.clip_commands import (
+    ApplyDeletions,
     AskFreeSpace,
     CompareVersion,
     MergeClips,
@@ -79,6 +80,10 @@ def _free_versions(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> Non
     dispatch(AskFreeSpace("versions"))
 
 
+def _apply_deletions(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(ApplyDeletions())
+
+
 ACTIONS = (
     Action(
         "clips.compare_version",
@@ -103,6 +108,13 @@ ACTIONS = (
         "Let the other clips inherit from this one",
         TRAIN,
         _make_reference,
+        lacks=_something_trains,
+    ),
+    Action(
+        "clips.apply_deletions",
+        "Apply deletions permanently: write clips without what edits delete",
+        TRAIN,
+        _apply_deletions,
         lacks=_something_trains,
     ),
     Action("clips.free", "Make room: delete earlier versions of clips", TRAIN, _free_versions),

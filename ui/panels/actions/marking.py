@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from app.session.commands import Redo, RemoveRegion, Undo
+from app.session.editing.edit_commands import RemoveEdit
 from app.session.path_commands import DeleteCameraKey
 from ui.panels.actions.action import MARK, Action, ActionNeeds, Run
 from ui.panels.actions.camera_path import nudge_key
+from ui.panels.editing.edit_subject import meant
+from ui.panels.editing.making import DELETE, make_edit
 from ui.panels.regions import begin_choosing
 from ui.panels.state import REGIONS, Dispatch, UiState
 from ui.viewport.region_tool import GROWTH
@@ -22,7 +25,13 @@ def _mark_chosen(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _leave_choosing(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    ui.regions.leave()
+    if ui.editing.held is not None:  # the drag of a handle is given back, and nothing else
+        return
+    if ui.editing.asking is None and (ui.selecting.is_active or ui.regions.is_active):
+        ui.selecting.leave()
+        ui.regions.leave()
+    else:
+        ui.editing.leave()
 
 
 def _grow_by(factor: float) -> Run:
@@ -48,12 +57,18 @@ def _next_region(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _remove_chosen(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    """The region that stands out; a camera key where none does."""
-    if ui.regions.highlighted is not None:
+    """The region that stands out; without one, what is selected or drawn; else the camera key or the edit that is
+    chosen."""
+    if ui.regions.highlighted is None and meant(session, ui)[1]:
+        if session.edits.can_edit:
+            make_edit(session, dispatch, ui, DELETE)
+    elif ui.regions.highlighted is not None:
         if session.regions.can_mark:
             dispatch(RemoveRegion(ui.regions.highlighted))
     elif session.paths.chosen_key is not None and session.paths.can_edit:
         dispatch(DeleteCameraKey(session.paths.chosen_key))
+    elif ui.editing.chosen is not None and session.edits.can_edit:
+        dispatch(RemoveEdit(ui.editing.chosen))
 
 
 def _undo(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
@@ -67,7 +82,7 @@ def _redo(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 
 def _cannot_remove(session: ActionNeeds) -> str:
-    if session.regions.can_mark or session.paths.can_edit:
+    if session.regions.can_mark or session.paths.can_edit or session.edits.can_edit:
         return ""
     return session.regions.why_not or "Regions cannot be removed now."
 
@@ -78,7 +93,15 @@ _STEERING: dict[str, Any] = _SIZING | {"moves_keys": True}
 ACTIONS = (
     Action("mark.choose", "Mark a sphere as static or moving; again to switch", MARK, _choose_region, keys=("M",)),
     Action("mark.accept", "Mark the chosen sphere", MARK, _mark_chosen, keys=("Enter",), needs_choosing=True),
-    Action("mark.leave", "Leave without marking", MARK, _leave_choosing, keys=("Escape",), needs_choosing=True),
+    Action(
+        "mark.leave",
+        "Leave the tool, without marking or selecting; then the chosen edit",
+        MARK,
+        _leave_choosing,
+        keys=("Escape",),
+        needs_choosing=True,
+        leaves_tool=True,
+    ),
     Action("mark.smaller", "Smaller sphere", MARK, _grow_by(1 / GROWTH), keys=("-",), **_SIZING),
     Action("mark.larger", "Larger sphere", MARK, _grow_by(GROWTH), keys=("+",), **_SIZING),
     Action(
@@ -113,7 +136,7 @@ ACTIONS = (
     Action("mark.highlight_next", "Highlight the next marked region", MARK, _next_region, keys=("N",)),
     Action(
         "mark.remove",
-        "Remove the highlighted region, or the chosen camera key",
+        "Delete what is selected or drawn, or what is highlighted or chosen",
         MARK,
         _remove_chosen,
         keys=("Delete",),
@@ -121,7 +144,7 @@ ACTIONS = (
     ),
     Action(
         "mark.undo",
-        "Undo: take back what was done last to regions or camera paths",
+        "Undo: take back what was done last",
         MARK,
         _undo,
         keys=("Ctrl+Z",),

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from ui.panels.actions.action import (
     BOOKMARKS,
     COMPARE,
+    EDIT,
     MARK,
     MODE,
     NAVIGATE,
@@ -27,13 +28,14 @@ from ui.panels.actions.table import ACTIONS
 
 MOST_ITEMS = 24
 """As many fit into the smallest window."""
-MENUS = ("File", "View", "Time", "Train", "Select", "Mark", "Camera", "Window")
+MENUS = ("File", "Edit", "View", "Time", "Train", "Select", "Mark", "Camera", "Window")
 """From left to right; others follow before the last."""
 _MENU_OF_GROUP = {
     TIME: "Time",
     VIEW: "View",
     COMPARE: "View",
     SELECT: "Select",
+    EDIT: "Edit",
     MARK: "Mark",
     PATH: "Camera",
     TRAIN: "Train",

@@ -8,13 +8,13 @@ from typing import Any
 from app.session.editing.selection_commands import (
     ClearSelection,
     GrowSelection,
-    InvertSelection,
     Reselect,
     SelectAll,
     SelectByAttribute,
     ShrinkSelection,
 )
 from ui.panels.actions.action import SELECT, Action, ActionNeeds, Run
+from ui.panels.editing.edit_subject import invert_selection
 from ui.panels.editing.select_panel import near_distance
 from ui.panels.state import SELECTION, Dispatch, UiState
 from ui.viewport.editing.select_tool import TOOL_WORDS, ToolKind
@@ -29,8 +29,8 @@ def _tool(kind: ToolKind) -> Run:
     return take
 
 
-def _leave(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    ui.selecting.leave()
+def _invert(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    invert_selection(dispatch, ui)
 
 
 def _send(make: Callable[[], Any]) -> Run:
@@ -51,13 +51,6 @@ def _by_distance(make: Callable[[float], Any]) -> Run:
 
 def _moving(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     dispatch(SelectByAttribute("motion", 1.0, 1.0, ui.selecting.how()))
-
-
-def _resize(steps: float) -> Run:
-    def resize(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-        ui.selecting.resize(steps)
-
-    return resize
 
 
 def _toggle(name: str) -> Run:
@@ -95,12 +88,9 @@ ACTIONS = (
         Action(f"select.{kind}", f"Select with the tool {TOOL_WORDS[kind]}", SELECT, _tool(kind), keys=(key,), **_ANY)
         for kind, key in _TOOL_KEYS.items()
     ),
-    Action("select.leave", "Leave the tool that selects", SELECT, _leave, keys=("Escape",), needs_tool="any"),
-    Action("select.smaller", "Smaller brush", SELECT, _resize(-1), keys=("[",), needs_tool="brush", repeats=True),
-    Action("select.larger", "Larger brush", SELECT, _resize(1), keys=("]",), needs_tool="brush", repeats=True),
     Action("select.all", "Select everything that is shown", SELECT, _send(SelectAll), keys=("Ctrl+A",), **_ANY),
     Action("select.none", "Select nothing", SELECT, _send(ClearSelection), keys=("Ctrl+Shift+A",), **_SOME),
-    Action("select.invert", "Select what is not selected", SELECT, _send(InvertSelection), keys=("Ctrl+I",), **_ANY),
+    Action("select.invert", "Select what is not selected", SELECT, _invert, keys=("Ctrl+I",), **_ANY),
     Action("select.before", "Back to the selection before", SELECT, _send(Reselect), keys=("Alt+Z",), lacks=_no_before),
     Action("select.grow", "Grow the selection", SELECT, _by_distance(GrowSelection), keys=("Ctrl+]",), **_SOME),
     Action("select.shrink", "Shrink the selection", SELECT, _by_distance(ShrinkSelection), keys=("Ctrl+[",), **_SOME),

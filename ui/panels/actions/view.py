@@ -14,7 +14,8 @@ from ui.panels.state import Dispatch, UiState
 
 def _camera_by(step: int) -> Run:
     def hop(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
-        if ui.selecting.kind == "brush":  # these keys change its size
+        if ui.selecting.kind == "brush":
+            ui.selecting.resize(step)
             return
         n_cameras = len(session.rig)
         shown = session.view.look_through
@@ -62,8 +63,22 @@ def _next_view(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 ACTIONS = (
     Action("view.home", "Frame the whole scene", VIEW, _home, keys=("F",)),
-    Action("view.previous_camera", "Look through the previous camera", VIEW, _camera_by(-1), keys=("[",), repeats=True),
-    Action("view.next_camera", "Look through the next camera", VIEW, _camera_by(1), keys=("]",), repeats=True),
+    Action(
+        "view.previous_camera",
+        "Look through the previous camera; with a brush, a smaller one",
+        VIEW,
+        _camera_by(-1),
+        keys=("[",),
+        repeats=True,
+    ),
+    Action(
+        "view.next_camera",
+        "Look through the next camera; with a brush, a larger one",
+        VIEW,
+        _camera_by(1),
+        keys=("]",),
+        repeats=True,
+    ),
     Action("view.one", "One view", VIEW, _show_views(1), is_on=_shows(1)),
     Action("view.two", "Two views side by side", VIEW, _show_views(2), is_on=_shows(2)),
     Action("view.four", "Four views", VIEW, _show_views(4), is_on=_shows(4)),

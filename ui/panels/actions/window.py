@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal
 
 from app.session.commands import SynchroniseCameras
+from app.session.files.file_commands import AskSaveAs
 from ui.panels.actions.action import WINDOW, Action, ActionNeeds, Run
 from ui.panels.state import LAYOUT_WORDS, LAYOUTS, PANELS, Dispatch, UiState
 from ui.style.palette import THEMES
@@ -38,6 +39,14 @@ def _help(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
 
 def _open(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
     ui.is_open_requested = True
+
+
+def _open_read_only(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    ui.wishes.is_read_only = True
+
+
+def _save_as(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(AskSaveAs())
 
 
 def _calibrate(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
@@ -114,6 +123,8 @@ _THEMES: dict[str, Any] = _ALWAYS | {"menu": "View/Theme"}
 
 ACTIONS = (
     Action("window.open", "Open a capture or project folder", WINDOW, _open, keys=("Ctrl+O",), **_FILE),
+    Action("window.open_read_only", "Open a project for reading only ...", WINDOW, _open_read_only, **_FILE),
+    Action("window.save_as", "Save the project as ...", WINDOW, _save_as, keys=("Ctrl+Shift+S",), menu="File"),
     Action("window.calibrate", "Calibrate plain videos ...", WINDOW, _calibrate, **_FILE),
     Action("window.synchronise", "Synchronise cameras ...", WINDOW, _synchronise, menu="File"),
     Action("window.palette", "Find an action by its name", WINDOW, _palette, keys=("Ctrl+K", "Ctrl+P"), **_ALWAYS),

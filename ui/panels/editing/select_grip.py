@@ -50,6 +50,7 @@ class SelectGrip:
         if pointer.drag == DRAG:
             if not tool.is_dragging:  # Escape has ended it
                 return
+            pointer.is_beyond_click()  # noted on the way: a lasso ends where it began
             tool.extend(x, y)
             ui.redraw_within(0.0)
             if imgui.is_item_deactivated():

@@ -20,6 +20,7 @@ from app.session.editing.selection_commands import (
 )
 from engine.editing.selection.ranges import Spread
 from engine.editing.selection.set_algebra import SELECT_MODES
+from ui.panels.editing.edit_subject import invert_selection
 from ui.panels.editing.select_attribute import draw_attribute
 from ui.panels.editing.select_volume import draw_volume_numbers
 from ui.panels.state import Dispatch, UiState
@@ -141,7 +142,7 @@ def _draw_changes(session: SelectionPanelNeeds, dispatch: Dispatch, ui: UiState)
             imgui.same_line(0, GAP)
         imgui.begin_disabled(not is_possible)
         if imgui.button(label, ImVec2(width, 0)):
-            dispatch(command())
+            invert_selection(dispatch, ui) if command is InvertSelection else dispatch(command())
         ui.mark(f"selection.{label.lower()}")
         imgui.end_disabled()
         imgui.set_item_tooltip(tooltip)

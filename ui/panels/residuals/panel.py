@@ -19,6 +19,8 @@ from engine.capture.clip import Clip
 from engine.text import duration_text
 from ui.gl import ImageTexture
 from ui.panels.color_bar import COLOR_BAR_SIZE, draw_color_bar
+from ui.panels.excluding.excluded_drawing import ExcludedNeeds, exclusion_of
+from ui.panels.excluding.menu import draw_exclusion_menu
 from ui.panels.residuals.matrix import Matrix
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.thumbnails import ThumbnailNeeds, Thumbnails
@@ -42,7 +44,7 @@ ROW_HEIGHT = 46.0
 PICTURE_SIZE = (58.0, 36.0)
 
 
-class ResidualsNeeds(ThumbnailNeeds, Protocol):
+class ResidualsNeeds(ThumbnailNeeds, ExcludedNeeds, Protocol):
     """What this panel reads."""
 
     @property
@@ -123,6 +125,7 @@ class ResidualsPanel:
         self._thumbnails = Thumbnails(make_texture)
         self._matrix = Matrix(make_texture)
         self._capture: object | None = None
+        self._menu_cell: tuple[int, int] | None = None
         self._worst_key: object = None
         self._worst: Sequence[tuple[float, int, int]] = ()
         self.column = "psnr"
@@ -194,6 +197,14 @@ class ResidualsPanel:
     def _draw_matrix(self, status: ResidualStatus, session: ResidualsNeeds, dispatch: Dispatch, ui: UiState) -> None:
         at = (session.timeline.frame_index, session.view.look_through)
         hovered, pressed = self._matrix.draw(status, self.column, session.rig, session.clips, at, ui)
+        imgui.open_popup_on_item_click("cell menu", imgui.PopupFlags_.mouse_button_right)
+        if hovered is not None and imgui.is_mouse_released(1):
+            self._menu_cell = hovered
+        if self._menu_cell is not None and imgui.begin_popup("cell menu"):
+            frame_index, camera_index = self._menu_cell
+            imgui.text_disabled(f"Frame {frame_index}")
+            draw_exclusion_menu(session, dispatch, ui, camera_index, frame_index)
+            imgui.end_popup()
         if pressed is not None and pressed != at:
             dispatch(SetFrame(pressed[0]))
             dispatch(LookThrough(pressed[1]))
@@ -204,6 +215,8 @@ class ResidualsPanel:
             is_known = found == found  # not a NaN
             value = found if is_known else None
             words = figure_text(found, self.column) if is_known else "not measured"
+            excluded = exclusion_of(session, camera_index, frame_index)
+            words = f"{words}\n{excluded}" if excluded else words
             held_out = " (held out)" if status.is_held_out[camera_index] else ""
             name = session.rig.names[camera_index]
             imgui.set_tooltip(f"{name}{held_out}, frame {frame_index}: {words}")

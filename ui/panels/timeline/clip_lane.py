@@ -6,6 +6,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app.status import ClipStatus
 from engine.capture.clip import Clip
+from ui.panels.editing.labels import with_label
 from ui.panels.state import Rect
 from ui.panels.timeline.clip_words import clip_title, state_note, state_words
 from ui.panels.timeline.columns import MIN_GROUP_WIDTH, STATES, group_size, largest_of_groups, runs_of
@@ -136,12 +137,12 @@ def _draw_words(draw: imgui.ImDrawList, band: Rect, session: TimelineNeeds, clip
         if imgui.calc_text_size(text).x + 4 <= band.width:
             draw.add_text(ImVec2(band.x0 + 3, band.y0 + 4), theme.u32(theme.TEXT), text)
         return
-    title = clip_title(clip.clip_index, session.reference_index)
+    plain = clip_title(clip.clip_index, session.reference_index)
+    titles = (with_label(session, "clip", str(clip.start), plain), plain, str(clip.clip_index))
     words = band_words(status, session.training, clip.clip_index, state_words(state))
     if status.held_out_psnr is not None:
         words = f"{words}, {status.held_out_psnr:.1f} dB"
-    if not _fits(title, band):
-        title = str(clip.clip_index)
+    title = next((title for title in titles if _fits(title, band)), titles[-1])
     line_two = f"{icon}  {words}" if icon else words
     if not _fits(line_two, band):
         line_two = icon or ""
@@ -172,11 +173,11 @@ def _draw_note(session: TimelineNeeds, frame_index: int) -> None:
     clip = session.timeline.clip_of(frame_index)
     status = None if clip is None else session.clip_states[clip.clip_index]
     note = "" if status is None else state_note(status)
-    if not note or clip is None or status is None:
+    if clip is None or status is None or not (note or session.edits.label("clip", str(clip.start))):
         return
     imgui.begin_tooltip()
     imgui.push_text_wrap_pos(NOTE_WIDTH)
-    title = clip_title(clip.clip_index, session.reference_index)
+    title = with_label(session, "clip", str(clip.start), clip_title(clip.clip_index, session.reference_index))
     imgui.text_unformatted(f"{title}: {state_words(status.state)}. {note}")
     imgui.pop_text_wrap_pos()
     imgui.end_tooltip()

@@ -9,6 +9,7 @@ from app.session.mending.mend_commands import AskMend
 from engine.capture.clip import Clip
 from ui.panels.clip_training_menu import draw_clip_training
 from ui.panels.clips.menu import draw_cutting
+from ui.panels.editing.labels import draw_label_field
 from ui.panels.state import Dispatch, UiState
 from ui.panels.timeline.clip_words import clip_title, state_words
 from ui.panels.timeline.needs import TimelineNeeds
@@ -39,6 +40,7 @@ def draw_clip_menu(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> 
     if clip is not None:
         state = session.clip_states[clip.clip_index].state
         imgui.text_disabled(f"{clip_title(clip.clip_index, session.reference_index)}: {state_words(state)}")
+        draw_label_field(session, dispatch, ui, "clip", str(clip.start))
         imgui.separator()
         draw_clip_training(session, dispatch, ui, clip.clip_index, is_by_key=is_by_key)
         imgui.separator()

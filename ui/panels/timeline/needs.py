@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from app.playback.timeline import Timeline
-from app.session.edit_status import PathsStatus
+from app.session.edit_status import EditsStatus, PathsStatus
 from app.status import ClipStatus, ResidualStatus, TrainingStatus
 from engine.capture.clip import Clip
 from ui.panels.clip_training_menu import ClipMenuNeeds
@@ -20,6 +20,9 @@ class TimelineNeeds(ClipMenuNeeds, Protocol):
 
     @property
     def timeline(self) -> Timeline: ...
+
+    @property
+    def edits(self) -> EditsStatus: ...
 
     @property
     def paths(self) -> PathsStatus: ...

@@ -1,0 +1,215 @@
+"""Applying deletions permanently: new versions of the clips, without the anchors that no frame shows any more.
+
+First the document learns the new numbers of what was picked, beside the old ones, so that it holds for clips of before
+and after. Then all clips are exchanged at once. At last the edits go that have nothing left to delete. Whenever the
+program is killed in between, edits and clips fit together. What was deleted comes back with the versions of the clips.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from msgspec.structs import replace as with_entries
+
+from app.applying.deletions import Deletions, Report, Rows, find_deletions, loaded, reference_of
+from app.document.project_document import ProjectDocument
+from app.project.clip_exchange import begin_exchange, exchange, give_up_exchange
+from app.project.clip_versions import forget_oldest, read_finished, set_aside
+from app.project.project import Project
+from engine.capture.clip import Clip
+from engine.clip_files.clip_header import ClipFigures, ClipHeader
+from engine.clip_files.clip_state import ClipState, read_clip_state
+from engine.clip_files.rewriting import rewrite_clip
+from engine.editing.edit import Delete, Edit
+from engine.errors import ProjectError
+
+NAME = "apply deletions permanently"
+"""Of the step in the history."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StagedClips:
+    """New clips that lie ready.
+
+    Attributes:
+        before: Edits of the document that they were made for.
+        during: Edits that hold for the clips of before and after.
+        after: Edits that are left once the clips are exchanged.
+        clip_indices: Of the clips that change.
+        n_anchors: Anchors that go, counted in every clip that shows them.
+    """
+
+    before: tuple[Edit, ...]
+    during: tuple[Edit, ...]
+    after: tuple[Edit, ...]
+    clip_indices: tuple[int, ...]
+    n_anchors: int
+
+    @property
+    def kept(self) -> tuple[Edit, ...]:
+        """Edits that delete and stay in the stack, because something is left for them to delete."""
+        return tuple(edit for edit in self.after if edit.is_on and isinstance(edit.action, Delete))
+
+    def text(self) -> str:
+        """What was done, and why something stays."""
+        clips = "1 clip was" if len(self.clip_indices) == 1 else f"{len(self.clip_indices)} clips were"
+        said = f"{clips} written again without {self.n_anchors:,} anchors."
+        if self.kept:
+            n = len(self.kept)
+            said += f" {n} {'edit that deletes stays' if n == 1 else 'edits that delete stay'} in the stack: "
+            said += "anchors that are seen in other frames, or of which only some Gaussians are deleted, cannot go."
+        return said
+
+
+def apply_permanently(
+    project: Project, clips: Sequence[Clip], report: Report = lambda n_done, n_all: None
+) -> StagedClips:
+    """Do all of it, without a window.
+
+    Args:
+        clips: All of the capture.
+        report: What it raises ends the work as long as nothing is exchanged.
+    Raises:
+        ProjectError: There is nothing to apply, the project is read-only, or a clip is damaged; nothing has changed.
+        DiskError: The disk refused.
+    """
+    project.check_writable()
+    staged = stage(project, find_deletions(project, clips, report), report)
+    project.change(replace(project.document, edits=staged.during), NAME)
+    exchange_staged(project, staged)
+    project.change(replace(project.document, edits=staged.after), NAME)
+    return staged
+
+
+def stage(project: Project, deletions: Deletions, report: Report = lambda n_done, n_all: None) -> StagedClips:
+    """Write the new clips beside the old ones. Nothing else changes yet.
+
+    Raises:
+        ProjectError: No anchor goes, a clip is another one than before, or damaged.
+        DiskError: The disk refused; nothing is left behind.
+    """
+    if not deletions.n_anchors:
+        raise ProjectError(
+            "No anchor is deleted as a whole in all frames of its clip, so that nothing can be applied permanently.",
+            hint="The edits stay in the stack and hold as before.",
+        )
+    folder = begin_exchange(project.folder)
+    try:
+        return _staged(project, folder, deletions, report)
+    except BaseException:
+        give_up_exchange(project.folder)
+        raise
+
+
+def exchange_staged(project: Project, staged: StagedClips) -> None:
+    """Put new clips that lie ready in the places of the old ones, which become versions.
+
+    Raises:
+        DiskError: The disk refused; see app.project.clip_exchange.
+    """
+    for clip_index in staged.clip_indices:
+        set_aside(project, clip_index)
+    exchange(project.folder, [project.clip_path(clip_index).name for clip_index in staged.clip_indices])
+    for clip_index in staged.clip_indices:
+        forget_oldest(project, clip_index)
+
+
+def edits_after(document: ProjectDocument, staged: StagedClips) -> ProjectDocument:
+    """A document without the edits that have nothing left to delete; what was changed meanwhile stays."""
+    done = {edit.edit_id for edit in staged.during} - {edit.edit_id for edit in staged.after}
+    return replace(document, edits=tuple(edit for edit in document.edits if edit.edit_id not in done))
+
+
+# ---------------------------------------------------------------- new clips
+
+
+def _staged(project: Project, folder: Path, deletions: Deletions, report: Report) -> StagedClips:
+    from engine.editing.permanent.renumbering import with_new_numbers
+
+    order = sorted(deletions.clips, key=lambda index: index != deletions.reference_index)  # the reference first
+    old_reference = reference_of(project, deletions.reference_index)
+    new_reference = old_reference
+    renumbered, fingerprints, changed = {}, {}, []
+    acted, left = set(), set()  # numbers of edits that have deleted something, and that still do
+    for n_done, clip_index in enumerate(order):
+        report(n_done, len(order))
+        state = read_finished(project, clip_index)
+        if state.header.fingerprint != deletions.clips[clip_index].fingerprint:
+            raise ProjectError(f"Clip {clip_index} has changed meanwhile.", hint="Look again at what can be applied.")
+        acted |= _deleting(state, old_reference, deletions.edits, acted)
+        new = _new_state(state, deletions, clip_index, fingerprints)
+        fingerprints[state.header.fingerprint] = new.header.fingerprint
+        if clip_index == deletions.reference_index:
+            new_reference = new
+        if new.header == state.header:
+            left |= _deleting(state, new_reference, deletions.edits, left)
+            continue
+        path = project.clip_path(clip_index)
+        rewrite_clip(path, folder / path.name, ClipState(new.arrays, _described(new, new_reference)))
+        changed.append(clip_index)
+        renumbered |= _renumbered(state, new, deletions.own(clip_index))
+        written = read_clip_state(folder / path.name)
+        left |= _deleting(written, new_reference, with_new_numbers(deletions.edits, renumbered), left)
+    report(len(order), len(order))
+    during = with_new_numbers(deletions.edits, renumbered)
+    done = set() if deletions.untrained else acted - left  # clips that come later may still need them
+    after = tuple(edit for edit in during if edit.edit_id not in done)
+    return StagedClips(deletions.edits, during, after, tuple(changed), deletions.n_anchors)
+
+
+def _new_state(state: ClipState, deletions: Deletions, clip_index: int, fingerprints: dict[str, str]) -> ClipState:
+    from engine.editing.permanent.smaller_clip import without_anchors
+
+    gone = {} if state.is_reference else deletions.gone_from_reference
+    new = without_anchors(state, deletions.own(clip_index), deletions.clips[clip_index].inherited, gone)
+    header = new.header
+    entries = {
+        name: fingerprints.get(before, before)
+        for name in ("reference_fingerprint", "previous_fingerprint")
+        if (before := getattr(header, name)) is not None
+    }
+    return ClipState(new.arrays, with_entries(header, **entries))
+
+
+def _described(state: ClipState, reference: ClipState | None) -> ClipHeader:
+    """The header of a clip that has lost anchors: how many are left, and no figures of the pictures of before."""
+    from engine.training.preparation.clip_field import n_alive
+
+    model = loaded(state, None if state.is_reference else reference).model
+    n_anchors = {role: len(model.anchor_set(role)) for role in model.roles()}
+    metrics = state.header.metrics
+    if metrics is not None:
+        metrics = with_entries(metrics, held_out_psnr=ClipFigures().held_out_psnr)
+    return with_entries(state.header, n_anchors=n_anchors, n_alive=n_alive(model), metrics=metrics)
+
+
+def _renumbered(before: ClipState, now: ClipState, gone: Rows) -> dict:
+    from engine.editing.permanent.renumbering import Renumbered
+
+    k, sets = now.header.decoder.gaussians_per_anchor, {}
+    for role, record in before.anchors.items():
+        if record.own is not None:
+            is_kept = ~gone.get(role, np.zeros(len(record.own), bool))
+            sets[before.header.fingerprint, role] = Renumbered(now.header.fingerprint, is_kept, k)
+    return sets
+
+
+def _deleting(state: ClipState, reference: ClipState | None, edits: tuple[Edit, ...], known: set[int]) -> set[int]:
+    """Numbers of the edits that delete something of a clip. known: Those that need not be looked at."""
+    from engine.editing.permanent.deleted_anchors import deletes_something
+
+    header = state.header
+    asked = [
+        edit
+        for edit in edits
+        if isinstance(edit.action, Delete)
+        and edit.edit_id not in known
+        and edit.scope.touches(header.start, header.start + header.n_frames)
+    ]
+    if not asked:
+        return set()
+    clip = loaded(state, None if state.is_reference else reference)
+    return {edit.edit_id for edit in asked if deletes_something(clip, edits, edit)}

@@ -1,0 +1,73 @@
+"""Scripts: everything that the window does to a project, for programs. See docs/scripting.md.
+
+    from app.scripting import Sphere, open_project
+
+    with open_project("my-project") as project:
+        project.train_clip(0, on_progress=lambda status: print(status.stage, status.progress))
+        project.apply_edit("delete", Sphere((0.4, 0.1, 2.0), 0.3), scope=Scope(first=12, stop=40))
+        project.render("turn.mp4", turntable=Turntable())
+        project.export("frames", format="spz")
+
+What cannot be done raises an EngineError that says why; nothing is half done. A script that trains needs the usual
+`if __name__ == "__main__":`, because trainings run in processes of their own.
+"""
+
+from app.document.project_document import ProjectDocument
+from app.export.picked_frames import PickedFrames
+from app.export.video.job import Turntable
+from app.scripting.functions import apply_edit, change, export, open_project, redo, render, train_clip, undo
+from app.scripting.scripted_project import ScriptedProject
+from engine.editing.edit import (
+    EVERYWHERE,
+    Box,
+    Delete,
+    Edit,
+    Everything,
+    Expose,
+    Hide,
+    Hold,
+    Picked,
+    PickedRows,
+    Recolor,
+    Scope,
+    Smooth,
+    Sphere,
+    Transform,
+)
+from engine.errors import CaptureError, DiskError, EngineError, PreparationError, ProjectError, TrainingError
+
+__all__ = [
+    "EVERYWHERE",
+    "Box",
+    "CaptureError",
+    "Delete",
+    "DiskError",
+    "Edit",
+    "EngineError",
+    "Everything",
+    "Expose",
+    "Hide",
+    "Hold",
+    "Picked",
+    "PickedFrames",
+    "PickedRows",
+    "PreparationError",
+    "ProjectDocument",
+    "ProjectError",
+    "Recolor",
+    "Scope",
+    "ScriptedProject",
+    "Smooth",
+    "Sphere",
+    "TrainingError",
+    "Transform",
+    "Turntable",
+    "apply_edit",
+    "change",
+    "export",
+    "open_project",
+    "redo",
+    "render",
+    "train_clip",
+    "undo",
+]

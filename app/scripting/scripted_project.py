@@ -1,0 +1,383 @@
+"""ScriptedProject: an open project as a program uses it. It holds nothing of its own but what is open: everything it
+does is done by the functions that the window and the command line use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from app.document.edit_changes import edit_with
+from app.document.history import Changed, DocumentHistory, Event, Redone, Undone
+from app.document.project_document import ProjectDocument
+from app.document.stored_document import document_of, plain_document
+from app.export.export_progress import ExportProgress, ExportResult
+from app.export.named_jobs import VIDEO_FORMATS, run_named_job
+from app.project.allowed_changes import check_change
+from app.project.clip_versions import restore_version
+from app.project.opening import open_capture_of
+from app.project.project import Project, open_project
+from app.scripting.actions import action_called
+from app.session.editing.edit_commands import (
+    AddEdit,
+    ChangeEdit,
+    EditCommand,
+    MoveEdit,
+    RemoveEdit,
+    RenameEdit,
+    ToggleEdit,
+)
+from app.session.editing.edits import changed
+from app.status import TrainingStatus
+from app.training.process import ProcessWorker
+from app.training.service import Launch
+from engine.capture.capture import Capture
+from engine.capture.clip import Clip
+from engine.editing.edit import EVERYWHERE, Action, Edit, Everything, Scope, Target
+from engine.errors import ProjectError
+from engine.kernels.cache import use_kernel_cache
+from engine.storage.typed_json import EntryError
+
+if TYPE_CHECKING:
+    from app.evaluation.headless import ClipOutcome, TrainedProject
+
+TellTraining = Callable[[TrainingStatus], None]
+TellExport = Callable[[ExportProgress], None]
+
+
+class ScriptedProject:
+    """An open project; made by `app.scripting.open_project`, and closed by `close` or at the end of a `with` block.
+
+    Args:
+        project: The open project.
+        launch: Starts a training; a process by default.
+    """
+
+    def __init__(self, project: Project, *, launch: Launch = ProcessWorker) -> None:
+        self._project, self._launch = project, launch
+        self._capture: Capture | None = None
+        self._is_closed = False
+
+    def __enter__(self) -> ScriptedProject:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the project, so that others can write to it. May be called twice."""
+        self._is_closed = True
+        if self._capture is not None:
+            self._capture.close()
+            self._capture = None
+        self._project.close()
+
+    # ---------------------------------------------------------------- what is open
+
+    @property
+    def folder(self) -> Path:
+        """Of the project."""
+        return self._project.folder
+
+    @property
+    def is_writable(self) -> bool:
+        """Whether it can be changed and trained."""
+        return self._project.is_writable
+
+    @property
+    def document(self) -> ProjectDocument:
+        """Everything that is decided about the project; an immutable value."""
+        return self._project.document
+
+    @property
+    def history(self) -> DocumentHistory:
+        """The document with the steps that can be taken back and done again."""
+        return self._project.history
+
+    @property
+    def edits(self) -> tuple[Edit, ...]:
+        """The stack of edits, bottom first."""
+        return self.document.edits
+
+    @property
+    def capture(self) -> Capture:
+        """The capture; opened when it is first asked for.
+
+        Raises:
+            CaptureError: It is gone or damaged.
+            ProjectError: Another one is in its place, or the project is closed.
+        """
+        self._check_open()
+        if self._capture is None:
+            self._capture = open_capture_of(self._project.settings, self.folder)
+        return self._capture
+
+    @property
+    def n_frames(self) -> int:
+        """Frames of the capture that the project works on. Raises what `capture` raises."""
+        return self.capture.n_frames
+
+    @property
+    def clips(self) -> list[Clip]:
+        """The clips in their order: their index and frames. Raises what `capture` raises."""
+        return self._project.clips(self.n_frames)
+
+    @property
+    def trained_clips(self) -> list[int]:
+        """Indices of the clips that are finished. Raises what `capture` raises."""
+        return [clip.clip_index for clip in self.clips if self._project.is_trained(clip.clip_index)]
+
+    def clip(self, clip_index: int) -> Clip:
+        """One of the clips.
+
+        Raises:
+            ProjectError: There is no such clip.
+        """
+        clips = self.clips
+        if not 0 <= clip_index < len(clips):
+            raise ProjectError(f"There is no clip {clip_index}; clips are 0 to {len(clips) - 1}.")
+        return clips[clip_index]
+
+    def scope_of_clip(self, clip_index: int) -> Scope:
+        """The frames of a clip, for an edit. Raises what `clip` raises."""
+        clip = self.clip(clip_index)
+        return Scope(clip.start, clip.stop)
+
+    # ---------------------------------------------------------------- the document
+
+    def change(self, document: ProjectDocument, name: str) -> None:
+        """Replace the document, as one step that can be taken back; on the disk when it returns.
+
+        Args:
+            document: What it is to be; made of `document` with dataclasses.replace or the functions of app.document.
+            name: What is done, as a word or two that can follow "Undo".
+        Raises:
+            ProjectError: The project is read-only, or such a change is not allowed.
+            DiskError: The disk refused; nothing has changed.
+        """
+        self._happen(Changed(name, document))
+
+    def put(self, entries: Mapping[str, Any]) -> None:
+        """Replace entries of the document by plain data, as project.json holds it.
+
+        Args:
+            entries: By name: "markers", "labels", "camera_paths" and so on.
+        Raises:
+            ProjectError: An entry is not known or makes no sense, or what `change` raises.
+        """
+        try:
+            document = document_of(plain_document(self.document) | dict(entries))
+        except EntryError as error:
+            raise ProjectError(f"The document makes no sense ({error}).") from error
+        self.change(document, f"change {', '.join(name.replace('_', ' ') for name in entries)}")
+
+    def undo(self) -> str:
+        """Take back the last step. Returns what that was; empty where there was none. Raises what `change` raises."""
+        name = self.history.undo_name
+        if name:
+            self._happen(Undone())
+        return name
+
+    def redo(self) -> str:
+        """Do again what was taken back last. Returns what that was; empty where there was nothing. Raises what
+        `change` raises."""
+        name = self.history.redo_name
+        if name:
+            self._happen(Redone())
+        return name
+
+    def _happen(self, event: Event) -> None:
+        self._check_open()
+        self._project.check_writable()
+        after = self.history.after(event).present
+        if after.settings != self.document.settings:  # the capture may be gone, which is nothing to an edit
+            check_change(self._project, self.capture, self.document, after)
+        self._project.happen(event)
+
+    # ---------------------------------------------------------------- edits
+
+    def apply_edit(
+        self,
+        action: Action | str,
+        target: Target | None = None,
+        *,
+        scope: Scope = EVERYWHERE,
+        is_inverted: bool = False,
+        name: str = "",
+        **values: Any,
+    ) -> Edit:
+        """Put an edit on top of the stack.
+
+        Args:
+            action: What it does: a value such as Delete() or Expose(0.5), or its name with the `values` of its entries,
+                such as "expose", stops=0.5. "isolate" hides everything but the target.
+            target: What it acts on, such as a Box, a Sphere or what `select` gives; None for everything.
+            scope: In which frames.
+            is_inverted: Whether it acts on everything but the target.
+            name: For people; an empty one is put into words where the edit is shown.
+        Returns:
+            The edit with its number.
+        Raises:
+            ProjectError: A value is out of range or not known, or what `change` raises.
+        """
+        chosen, inverts = action_called(action, values)
+        target = Everything() if target is None else target
+        self._carry_out(AddEdit(chosen, target, scope, is_inverted=is_inverted != inverts, name=name))
+        return self.edits[-1]
+
+    def replace_edit(self, edit: Edit) -> None:
+        """Put an edit in the place of the one with its number. Raises ProjectError."""
+        self._carry_out(ChangeEdit(edit))
+
+    def switch_edit(self, edit_id: int, *, is_on: bool) -> None:
+        """Let an edit count or not. Raises ProjectError."""
+        if edit_with(self.document, edit_id).is_on != is_on:
+            self._carry_out(ToggleEdit(edit_id))
+
+    def remove_edit(self, edit_id: int) -> None:
+        """Take an edit out of the stack. Raises ProjectError."""
+        self._carry_out(RemoveEdit(edit_id))
+
+    def move_edit(self, edit_id: int, position: int) -> None:
+        """Bring an edit to a position of the stack, counted from 0 at the bottom. Raises ProjectError."""
+        self._carry_out(MoveEdit(edit_id, position))
+
+    def rename_edit(self, edit_id: int, name: str) -> None:
+        """Give an edit another name. Raises ProjectError."""
+        self._carry_out(RenameEdit(edit_id, name))
+
+    def _carry_out(self, command: EditCommand) -> None:
+        """What the window does at the same command."""
+        change = changed(self.document, command)
+        self.change(change.document, change.name)
+
+    # ---------------------------------------------------------------- jobs
+
+    def train_clip(
+        self,
+        clip_index: int,
+        *,
+        on_progress: TellTraining | None = None,
+        is_again: bool = False,
+        settings: Mapping[str, int | float | str | bool] | None = None,
+    ) -> ClipOutcome:
+        """Train a clip in a process of its own, and wait for it. One that was stopped goes on where it was.
+
+        Args:
+            on_progress: Told some twenty times a second how far it is; what it raises stops the training, and what was
+                learned is kept.
+            is_again: Train it also when it is finished or damaged; what it was becomes a version.
+            settings: Training settings that it alone is to have.
+        Returns:
+            How it ended: "trained", or "skipped" where it was finished already.
+        Raises:
+            ProjectError: It cannot be trained, or another program trains into the project.
+            TrainingError: The training failed; what was learned is kept.
+        """
+        from app.scripting.training import train_one
+
+        self._check_open()
+        self._project.check_writable()
+        self.clip(clip_index)
+        return train_one(
+            self._project,
+            self.capture,
+            clip_index,
+            launch=self._launch,
+            on_progress=on_progress,
+            is_again=is_again,
+            own=settings,
+        )
+
+    def restore_version(self, clip_index: int, number: int) -> None:
+        """Bring back what a clip was before it was trained again; what it is now becomes a version.
+
+        Args:
+            number: Of the version, as `clipgstream versions` lists them.
+        Raises:
+            ProjectError: There is no such version, or it does not go with the reference clip as it is now.
+        """
+        self._check_open()
+        self.clip(clip_index)
+        restore_version(self._project, clip_index, number)
+
+    def render(
+        self,
+        out: Path | str,
+        *,
+        format: str | None = None,
+        frames: range | None = None,
+        on_progress: TellExport | None = None,
+        **options: Any,
+    ) -> ExportResult:
+        """Write a video, or a folder of pictures, from a camera, along a camera path or on a turntable.
+
+        Args:
+            out: A file, or a new folder for pictures.
+            format: "mp4", "webm", "png" or "exr"; None goes by the name.
+            frames: Of the capture; None for all that are trained.
+            on_progress: Told how far it is; what it raises ends the work, and then nothing is left.
+            options: Entries of app.export.video.job.VideoJob, such as camera="cam00" or turntable=Turntable(2).
+        Raises:
+            EngineError: It cannot be rendered; nothing is left.
+        """
+        from app.export.video.formats import format_of
+
+        format_name = format_of(Path(out)) if format is None else format
+        if format_name not in VIDEO_FORMATS:
+            raise ProjectError(f"'{format_name}' is not a format.", hint=f"Formats are {', '.join(VIDEO_FORMATS)}.")
+        if frames is not None:
+            if frames.step != 1 or not frames:
+                raise ProjectError("A video has frames without gaps, at least one.", hint="Give a range without step.")
+            options["frames"] = (frames.start, frames.stop)
+        return self._run_job(format_name, out, on_progress, options)
+
+    def export(
+        self,
+        out: Path | str,
+        *,
+        format: str = "ply",
+        on_progress: TellExport | None = None,
+        **options: Any,
+    ) -> ExportResult:
+        """Write what other programs read.
+
+        Args:
+            out: A new or empty folder; of a player and of figures a file.
+            format: One of app.export.named_jobs.JOB_FORMATS, such as "spz", "player" or "metrics-csv".
+            on_progress: Told how far it is; what it raises ends the work, and then nothing is left.
+            options: Entries of the format's job, such as frames=range(10).
+        Raises:
+            EngineError: It cannot be written; nothing is left.
+        """
+        return self._run_job(format, out, on_progress, options)
+
+    def _run_job(
+        self, format_name: str, out: Path | str, on_progress: TellExport | None, options: dict[str, Any]
+    ) -> ExportResult:
+        report = on_progress if on_progress is not None else _tell_nobody
+        return run_named_job(self.open_trained(), report, format_name, out, **options)
+
+    def open_trained(self) -> TrainedProject:
+        """The finished clips as they are now, for reading. Raises what `capture` raises."""
+        from app.evaluation.headless import open_trained
+
+        return open_trained(self._project, self.capture)
+
+    def _check_open(self) -> None:
+        if self._is_closed:
+            raise ProjectError("The project is closed.", hint="Open it again.", path=self.folder)
+
+
+def _tell_nobody(progress: ExportProgress) -> None:
+    pass
+
+
+def open_scripted(folder: Path | str, *, read_only: bool = False, launch: Launch = ProcessWorker) -> ScriptedProject:
+    """Open a project folder; see `app.scripting.open_project`."""
+    use_kernel_cache()  # before anything imports kernels
+    return ScriptedProject(open_project(Path(folder), is_writable=not read_only), launch=launch)

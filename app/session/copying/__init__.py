@@ -1,0 +1,1 @@
+"""What was done, or could be done, as commands to copy."""

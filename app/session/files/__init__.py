@@ -1,0 +1,1 @@
+"""The files of the open project: repairing and relocating them, saving them somewhere else."""

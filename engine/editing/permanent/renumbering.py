@@ -1,0 +1,61 @@
+"""Picks of clips that have lost anchors: the same Gaussians under the numbers that they have now."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from msgspec.structs import replace
+
+from engine.editing.edit import Edit, Picked, PickedRows
+from engine.editing.picks import pack_rows, unpack_rows
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Renumbered:
+    """An anchor set that has lost anchors.
+
+    Attributes:
+        origin: Fingerprint that its clip has now.
+        is_kept: Which of its anchors are left. [A] bool
+        k: Gaussians per anchor.
+    """
+
+    origin: str
+    is_kept: np.ndarray
+    k: int
+
+    def numbers(self, numbers: np.ndarray) -> np.ndarray:
+        """New numbers of those Gaussians that are left. [n] int64"""
+        anchors, among_k = np.divmod(numbers, self.k)
+        is_there = anchors < len(self.is_kept)
+        anchors, among_k = anchors[is_there], among_k[is_there]
+        places = np.cumsum(self.is_kept) - 1
+        is_left = self.is_kept[anchors]
+        return places[anchors[is_left]] * self.k + among_k[is_left]
+
+
+def with_new_numbers(edits: tuple[Edit, ...], sets: Mapping[tuple[str, str], Renumbered]) -> tuple[Edit, ...]:
+    """Edits that hold for clips as they are now, and as before where a version of a clip is brought back.
+
+    Args:
+        sets: By the origin that they had, and their role.
+    Raises:
+        ValueError: The numbers of picks are damaged.
+    """
+    return tuple(_renumbered(edit, sets) for edit in edits)
+
+
+def _renumbered(edit: Edit, sets: Mapping[tuple[str, str], Renumbered]) -> Edit:
+    if not isinstance(edit.target, Picked):
+        return edit
+    known = {(one.origin, one.role) for one in edit.target.sets}
+    added: list[PickedRows] = []
+    for one in edit.target.sets:
+        now = sets.get((one.origin, one.role))
+        if now is not None and (now.origin, one.role) not in known:
+            added.append(
+                PickedRows(one.clip_index, now.origin, one.role, pack_rows(now.numbers(unpack_rows(one.rows))))
+            )
+    return replace(edit, target=Picked((*edit.target.sets, *added))) if added else edit

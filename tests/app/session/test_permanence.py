@@ -1,0 +1,83 @@
+"""Deletions applied permanently from the window: asked first, done by jobs, taken back by versions and undo."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.project.clip_versions import list_versions
+from app.project.project import Project
+from app.session import commands as c
+from app.session.clips.clip_commands import ApplyDeletions
+from app.session.clips.clip_questions import DeletionsQuestion
+from app.session.editing.edit_commands import AddEdit
+from app.session.session import Session
+from engine.clip_files.clip_state import read_clip_state
+from engine.editing.edit import Delete, Expose, Picked, PickedRows
+from engine.editing.picks import pack_rows
+from tests.app.conftest import poll_until
+from tests.app.residuals.conftest import make_project
+
+
+@pytest.fixture
+def session(make_session, tmp_path: Path) -> Session:
+    made = make_session(is_open=False)
+    made.dispatch(c.OpenProject(make_project(tmp_path / "made")))
+    poll_until(made, lambda: made.opened is not None, what="the project")
+    return made
+
+
+def project_of(session: Session) -> Project:
+    assert session.opened is not None
+    return session.opened.project
+
+
+def picked(session: Session, numbers: np.ndarray) -> Picked:
+    header = read_clip_state(project_of(session).clip_path(0)).header
+    return Picked((PickedRows(0, header.fingerprint, "static", pack_rows(numbers)),))
+
+
+def n_static(session: Session) -> int:
+    found = read_clip_state(project_of(session).clip_path(0)).anchors["static"].own
+    return 0 if found is None else len(found)
+
+
+def test_it_is_asked_first_and_then_done(session: Session):
+    session.dispatch(AddEdit(Delete(), picked(session, np.arange(4))))
+    session.dispatch(AddEdit(Expose(1.0), picked(session, np.arange(3, 6))))
+    session.dispatch(ApplyDeletions())
+    poll_until(session, lambda: session.question is not None, what="the question")
+    assert session.question == DeletionsQuestion(n_anchors=8, n_clips=2, n_untrained=0)
+    before = n_static(session)
+    session.dispatch(ApplyDeletions(is_confirmed=True))
+    poll_until(session, lambda: len(session.edits.edits) == 1, what="the end")
+    assert [type(edit.action) for edit in session.edits.edits] == [Expose]
+    assert n_static(session) == before - 4
+    assert session.history.undo == "apply deletions permanently"
+    project = project_of(session)
+    assert [len(list_versions(project, index)) for index in (0, 1)] == [1, 1]
+    assert [session.clip_states[index].state for index in (0, 1)] == ["trained", "trained"]
+    session.dispatch(c.Undo())
+    assert [type(edit.action) for edit in session.edits.edits] == [Delete, Expose], "in one step"
+
+
+def test_what_cannot_be_applied_is_a_notice(session: Session):
+    session.dispatch(AddEdit(Expose(1.0), picked(session, np.arange(2))))
+    session.dispatch(ApplyDeletions())
+    poll_until(session, lambda: bool(len(session.notices)), what="the notice")
+    assert "no edit that is on deletes" in next(iter(session.notices)).detail
+    assert session.question is None
+
+
+def test_edits_that_change_meanwhile_stop_it(session: Session):
+    session.dispatch(AddEdit(Delete(), picked(session, np.arange(4))))
+    before = n_static(session)
+    session.dispatch(ApplyDeletions(is_confirmed=True))
+    session.dispatch(AddEdit(Expose(1.0), picked(session, np.arange(2))))
+    poll_until(session, lambda: bool(len(session.notices)), what="the notice")
+    assert "changed meanwhile" in next(iter(session.notices)).detail
+    assert n_static(session) == before
+    assert not (project_of(session).folder / "exchange").exists()
+    assert len(session.edits.edits) == 2

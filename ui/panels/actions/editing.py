@@ -1,0 +1,200 @@
+"""Actions that edit: what is done to what is selected or drawn, the stack, markers of up and scale, and the history."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from app.session.editing.edit_commands import DuplicateEdit, GoToStep, MoveEdit, RemoveEdit, SetUp, ToggleEdit
+from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, ScopeChoice
+from engine.editing.edit import Edit, Hide
+from ui.panels.actions.action import EDIT, Action, ActionNeeds, Run
+from ui.panels.editing.edit_subject import drawn_volume, invert_selection
+from ui.panels.editing.making import MAKINGS, Making, make_edit, mark_moving
+from ui.panels.editing.world_section import view_up
+from ui.panels.state import EDITS, HISTORY, Dispatch, UiState
+from ui.viewport.editing.edit_tool import Asking
+
+
+def _make(making: Making) -> Run:
+    def make(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        make_edit(session, dispatch, ui, making)
+
+    return make
+
+
+def _show_again(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """Switch off what was hidden last."""
+    for edit in reversed(session.edits.edits):
+        if edit.is_on and isinstance(edit.action, Hide):
+            dispatch(ToggleEdit(edit.edit_id))
+            return
+
+
+def _hold_in(choice: ScopeChoice) -> Run:
+    def hold(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        ui.editing.scope = choice
+
+    return hold
+
+
+def _next_scope(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    following = (SCOPE_CHOICES.index(ui.editing.scope) + 1) % len(SCOPE_CHOICES)
+    ui.editing.scope = SCOPE_CHOICES[following]
+    ui.wanted_panel = EDITS
+
+
+def _outside(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    if drawn_volume(ui) is not None:
+        invert_selection(dispatch, ui)
+
+
+def _choose_by(step: int) -> Run:
+    """To the next edit of the stack, up or down; to none beyond its ends."""
+
+    def choose(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        ids: list[int | None] = [None, *(edit.edit_id for edit in session.edits.edits)]
+        present = ids.index(ui.editing.chosen) if ui.editing.chosen in ids else 0
+        ui.editing.choose(ids[(present + step) % len(ids)])
+        ui.wanted_panel = EDITS
+
+    return choose
+
+
+def _of_chosen(make: Callable[[ActionNeeds, Edit], object]) -> Run:
+    """Send a command for the chosen edit, if there is one."""
+
+    def send(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        edit = session.edits.edit(ui.editing.chosen)
+        command = None if edit is None else make(session, edit)
+        if command is not None:
+            dispatch(command)  # type: ignore[arg-type]
+
+    return send
+
+
+def _moved_by(step: int) -> Callable[[ActionNeeds, Edit], MoveEdit | None]:
+    def moved(session: ActionNeeds, edit: Edit) -> MoveEdit | None:
+        position = session.edits.edits.index(edit) + step
+        return MoveEdit(edit.edit_id, position) if 0 <= position < len(session.edits.edits) else None
+
+    return moved
+
+
+def _up_of_view(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    dispatch(SetUp(view_up(session.view)))
+
+
+def _ask(asking: Asking) -> Run:
+    def ask(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        ui.editing.ask(None if ui.editing.asking == asking else asking)
+
+    return ask
+
+
+def _step_by(n_steps: int) -> Run:
+    def step(session: ActionNeeds, dispatch: Dispatch, ui: UiState) -> None:
+        dispatch(GoToStep(n_steps))
+        ui.wanted_panel = HISTORY
+
+    return step
+
+
+def _cannot_edit(session: ActionNeeds) -> str:
+    return "" if session.edits.can_edit else session.edits.why_not or "Nothing can be edited now."
+
+
+def _no_edits(session: ActionNeeds) -> str:
+    return _cannot_edit(session) or ("" if session.edits.edits else "There are no edits yet.")
+
+
+ACTIONS = (
+    *(
+        Action(f"edit.{making.name}", making.words, EDIT, _make(making), keys=making.keys, lacks=_cannot_edit)
+        for making in MAKINGS
+    ),
+    Action("edit.moving", "Set moving: mark what was drawn as moving", EDIT, mark_moving, lacks=_cannot_edit),
+    Action("edit.unhide", "Show again what was hidden last", EDIT, _show_again, keys=("Alt+H",), lacks=_no_edits),
+    Action("edit.outside", "Edit everything outside of what was drawn", EDIT, _outside, keys=("Shift+I",)),
+    Action("edit.next_scope", "Let new edits hold elsewhere: the next choice", EDIT, _next_scope, keys=("Shift+U",)),
+    *(
+        Action(
+            f"scope.{choice}",
+            f"New edits hold: {SCOPE_WORDS[choice]}",
+            EDIT,
+            _hold_in(choice),
+            menu="Edit/New edits hold",
+            is_in_help=False,
+        )
+        for choice in SCOPE_CHOICES
+    ),
+    Action("edit.above", "Choose the edit above", EDIT, _choose_by(1), keys=("Alt+Up",), lacks=_no_edits),
+    Action("edit.below", "Choose the edit below", EDIT, _choose_by(-1), keys=("Alt+Down",), lacks=_no_edits),
+    Action(
+        "edit.raise",
+        "Chosen edit one up: later",
+        EDIT,
+        _of_chosen(_moved_by(1)),
+        keys=("Alt+Shift+Up",),
+        lacks=_no_edits,
+    ),
+    Action(
+        "edit.lower",
+        "Chosen edit one down: earlier",
+        EDIT,
+        _of_chosen(_moved_by(-1)),
+        keys=("Alt+Shift+Down",),
+        lacks=_no_edits,
+    ),
+    Action(
+        "edit.toggle",
+        "Chosen edit on or off",
+        EDIT,
+        _of_chosen(lambda session, edit: ToggleEdit(edit.edit_id)),
+        keys=("Ctrl+H",),
+        lacks=_no_edits,
+    ),
+    Action(
+        "edit.duplicate",
+        "Duplicate the chosen edit",
+        EDIT,
+        _of_chosen(lambda session, edit: DuplicateEdit(edit.edit_id)),
+        keys=("Ctrl+D",),
+        lacks=_no_edits,
+    ),
+    Action(
+        "edit.remove",
+        "Remove the chosen edit",
+        EDIT,
+        _of_chosen(lambda session, edit: RemoveEdit(edit.edit_id)),
+        keys=("Shift+Delete",),
+        lacks=_no_edits,
+    ),
+    Action("world.up_of_view", "Up is as in this view", EDIT, _up_of_view, menu="Edit/World", lacks=_cannot_edit),
+    Action(
+        "world.ground", "Up by three points of the ground", EDIT, _ask("ground"), menu="Edit/World", lacks=_cannot_edit
+    ),
+    Action(
+        "world.length",
+        "Scale by two points of known length",
+        EDIT,
+        _ask("length"),
+        menu="Edit/World",
+        lacks=_cannot_edit,
+    ),
+    Action(
+        "history.first",
+        "Back to the first step of the history",
+        EDIT,
+        _step_by(-1_000_000),
+        menu="Edit/History",
+        lacks=lambda session: "" if session.history.undo else "There is nothing to take back.",
+    ),
+    Action(
+        "history.last",
+        "Forward to the last step of the history",
+        EDIT,
+        _step_by(1_000_000),
+        menu="Edit/History",
+        lacks=lambda session: "" if session.history.redo else "Nothing was taken back.",
+    ),
+)

@@ -1,0 +1,112 @@
+"""What is being worked on in the picture: the chosen edit, or the box or sphere that the user has drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from msgspec import structs
+
+from app.playback.arrays import GaussianArrays
+from app.session.edit_status import EditsStatus
+from app.session.editing.edit_commands import ChangeEdit
+from app.session.editing.selecting import SelectionStatus
+from app.session.editing.selection import Selection
+from app.session.editing.selection_commands import InvertSelection
+from engine.editing.edit import Box, Edit, Sphere, Transform, Vector
+from ui.panels.state import Dispatch, UiState
+from ui.viewport.editing.handles import Thing, middle_of
+
+
+class Selects(Protocol):
+    """Knows what is selected."""
+
+    @property
+    def selection(self) -> Selection: ...
+
+    def mask(self, gaussians: GaussianArrays) -> np.ndarray: ...
+
+
+class SubjectNeeds(Protocol):
+    """What this module reads of a session."""
+
+    @property
+    def edits(self) -> EditsStatus: ...
+
+    @property
+    def selection(self) -> SelectionStatus: ...
+
+    @property
+    def selecting(self) -> Selects: ...
+
+    def shown_gaussians(self) -> GaussianArrays | None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Subject:
+    """What has handles.
+
+    Attributes:
+        thing: A box, a sphere or a movement.
+        edit: The edit it belongs to; None of what the user has drawn to select.
+    """
+
+    thing: Thing
+    edit: Edit | None = None
+
+    def with_thing(self, thing: Thing, gesture: int, verb: str) -> ChangeEdit | None:
+        """The command that gives the edit another one; None without an edit."""
+        if self.edit is None:
+            return None
+        part = {"action": thing} if isinstance(thing, Transform) else {"target": thing}
+        return ChangeEdit(structs.replace(self.edit, **part), gesture, verb)
+
+
+def drawn_volume(ui: UiState) -> Box | Sphere | None:
+    """The box or sphere that the user has drawn to select, while that tool is in use."""
+    tool = ui.selecting
+    return tool.volume if tool.kind in ("box", "sphere") and not tool.is_dragging else None
+
+
+def invert_selection(dispatch: Dispatch, ui: UiState) -> None:
+    """Select what is not selected; of a box or sphere that was drawn, everything outside of it is meant then."""
+    dispatch(InvertSelection())
+    if drawn_volume(ui) is not None:
+        ui.editing.is_outside = not ui.editing.is_outside
+
+
+def subject_of(session: SubjectNeeds, ui: UiState) -> Subject | None:
+    """What has handles now: what was drawn, else what belongs to the chosen edit."""
+    volume = drawn_volume(ui)
+    if volume is not None:
+        return Subject(volume)
+    edit = session.edits.edit(ui.editing.chosen)
+    thing = ui.editing.shown_thing(edit)
+    return None if thing is None else Subject(thing, edit)
+
+
+def meant(session: SubjectNeeds, ui: UiState) -> tuple[Box | Sphere | None, str]:
+    """What a new edit would act on: the box or sphere that was drawn, with its words; None stands for what is selected.
+    No words where there is neither."""
+    volume = drawn_volume(ui)
+    if volume is not None:
+        return volume, "the box" if isinstance(volume, Box) else "the sphere"
+    return None, "the selection" if session.selection.n_gaussians else ""
+
+
+def pivot_of(session: SubjectNeeds, volume: Box | Sphere | None) -> Vector:
+    """Where a movement turns about: the middle of what it moves, as it is shown. Scene units"""
+    if volume is not None:
+        return _vector(middle_of(volume))
+    gaussians = session.shown_gaussians()
+    if gaussians is None or gaussians.rows is None or not session.selection.n_gaussians:
+        return (0.0, 0.0, 0.0)
+    means = gaussians.means[session.selecting.mask(gaussians)]
+    means = means[np.isfinite(means).all(axis=1)]
+    return _vector(np.median(means, axis=0)) if len(means) else (0.0, 0.0, 0.0)
+
+
+def _vector(values: np.ndarray) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

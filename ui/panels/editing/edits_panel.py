@@ -1,0 +1,156 @@
+"""The panel of edits: making new ones, the stack with the last one on top, the chosen one in numbers, and the world."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from imgui_bundle import ImVec2, imgui
+
+from app.document.edit_words import edit_title, scope_text, target_text
+from app.playback.orbit_view import OrbitView
+from app.session.edit_status import HistoryStatus
+from app.session.editing.edit_commands import DuplicateEdit, MoveEdit, RemoveEdit, ToggleEdit
+from engine.editing.edit import Edit
+from engine.text import one_line
+from ui.panels.copying import CopyNeeds, draw_copy_entries
+from ui.panels.editing.details import draw_details
+from ui.panels.editing.making import MakingNeeds, draw_making
+from ui.panels.editing.world_section import draw_world
+from ui.panels.history_buttons import draw_history
+from ui.panels.state import Dispatch, UiState
+from ui.panels.widgets import elided, text_warning, text_wrapped_dim
+from ui.style import theme
+from ui.style.theme import Icon
+
+ROW_HEIGHT, BUTTON_WIDTH = 42.0, 30.0
+LEAST_ROWS, MOST_ROWS = 1.2, 6.2
+PAYLOAD = "edit"
+
+
+class EditsPanelNeeds(MakingNeeds, CopyNeeds, Protocol):
+    """What this panel reads."""
+
+    @property
+    def capture(self) -> object | None: ...
+
+    @property
+    def history(self) -> HistoryStatus: ...
+
+    @property
+    def view(self) -> OrbitView: ...
+
+
+def draw_edits(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """Everything that is edited without training."""
+    if session.capture is None:
+        text_wrapped_dim("What you hide, crop, move or recolour is listed here when a capture is open.")
+        return
+    ui.editing.follow(session.edits.edits)
+    if session.edits.why_not:
+        text_warning(session.edits.why_not)
+    draw_making(session, dispatch, ui)
+    imgui.separator()
+    _draw_stack(session, dispatch, ui)
+    imgui.begin_disabled(not session.edits.can_edit)
+    edit = session.edits.edit(ui.editing.chosen)
+    if edit is not None:
+        imgui.separator()
+        imgui.push_id(edit.edit_id)
+        draw_details(session, dispatch, ui, edit)
+        imgui.pop_id()
+    imgui.end_disabled()
+    imgui.separator()
+    draw_history(session.history, dispatch, ui, "edits")
+    draw_world(session, dispatch, ui)
+
+
+def _draw_stack(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """One row per edit, the last one on top: it acts on what the others have left."""
+    edits = session.edits.edits
+    if not edits:
+        text_wrapped_dim("Nothing is edited: everything is shown as it was trained.")
+        return
+    n_on = sum(edit.is_on for edit in edits)
+    imgui.text(f"{len(edits)} edit{'' if len(edits) == 1 else 's'}")
+    if n_on < len(edits):
+        imgui.same_line()
+        imgui.text_disabled(f"{len(edits) - n_on} off")
+    n_rows = min(max(len(edits) + 0.2, LEAST_ROWS), MOST_ROWS)
+    if imgui.begin_child("stack", ImVec2(0, n_rows * (ROW_HEIGHT + imgui.get_style().item_spacing.y))):
+        clipper = imgui.ListClipper()
+        clipper.begin(len(edits), ROW_HEIGHT + imgui.get_style().item_spacing.y)
+        while clipper.step():
+            for row in range(clipper.display_start, clipper.display_end):
+                position = len(edits) - 1 - row
+                imgui.push_id(edits[position].edit_id)
+                _draw_row(session, dispatch, ui, edits[position], position)
+                imgui.pop_id()
+    imgui.end_child()
+
+
+def _draw_row(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: Edit, position: int) -> None:
+    is_chosen = ui.editing.chosen == edit.edit_id
+    flags = imgui.SelectableFlags_.allow_overlap
+    if imgui.selectable("##edit", is_chosen, flags, ImVec2(0, ROW_HEIGHT))[0]:
+        ui.editing.choose(None if is_chosen else edit.edit_id)
+    ui.mark(f"edits.row{edit.edit_id}")
+    _drag_row(session, dispatch, edit, position)
+    if imgui.begin_popup_context_item("menu"):
+        _draw_menu(session, dispatch, ui, edit, position)
+        imgui.end_popup()
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    draw = imgui.get_window_draw_list()
+    x, room = low.x + BUTTON_WIDTH + 6, high.x - low.x - 2 * BUTTON_WIDTH - 14
+    color = theme.TEXT if edit.is_on else theme.TEXT_DIM
+    title = one_line(edit_title(edit))
+    shown = elided(title, room)
+    draw.add_text(ImVec2(x, low.y + 3), theme.u32(color), shown)
+    words = scope_text(edit.scope, session.timeline.clips)
+    if edit.name:
+        words = f"{target_text(edit.target, is_inverted=edit.is_inverted)}, {words}"
+    words = words if edit.is_on else f"off, {words}"
+    draw.add_text(ImVec2(x, low.y + 22), theme.u32(theme.TEXT_DIM), elided(words, room))
+    imgui.set_cursor_screen_pos(ImVec2(low.x + 2, low.y + 8))
+    imgui.begin_disabled(not session.edits.can_edit)
+    if imgui.button(f"{Icon.EYE if edit.is_on else ' – '}##on", ImVec2(BUTTON_WIDTH, 26)):
+        dispatch(ToggleEdit(edit.edit_id))
+    ui.mark(f"edits.on{edit.edit_id}")
+    imgui.set_item_tooltip("Switch off" if edit.is_on else "Switch on")
+    imgui.set_cursor_screen_pos(ImVec2(high.x - BUTTON_WIDTH - 2, low.y + 8))
+    if imgui.button(f"{Icon.TRASH}##remove", ImVec2(BUTTON_WIDTH, 26)):
+        dispatch(RemoveEdit(edit.edit_id))
+    ui.mark(f"edits.remove{edit.edit_id}")
+    imgui.set_item_tooltip("Remove this edit: what it did is undone, what others did stays")
+    imgui.end_disabled()
+    imgui.set_cursor_screen_pos(ImVec2(low.x, high.y + imgui.get_style().item_spacing.y))
+    imgui.dummy(ImVec2(0, 0))
+
+
+def _drag_row(session: EditsPanelNeeds, dispatch: Dispatch, edit: Edit, position: int) -> None:
+    """A row that is dragged onto another one takes its place."""
+    if not session.edits.can_edit:
+        return
+    if imgui.begin_drag_drop_source(imgui.DragDropFlags_.source_no_preview_tooltip):
+        imgui.set_drag_drop_payload_py_id(PAYLOAD, edit.edit_id)
+        imgui.end_drag_drop_source()
+    if imgui.begin_drag_drop_target():
+        payload = imgui.accept_drag_drop_payload_py_id(PAYLOAD)
+        if payload is not None and payload.data_id != edit.edit_id:
+            dispatch(MoveEdit(payload.data_id, position))
+        imgui.end_drag_drop_target()
+
+
+def _draw_menu(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: Edit, position: int) -> None:
+    can_edit, n_edits = session.edits.can_edit, len(session.edits.edits)
+    for label, command, is_possible in (
+        ("Switch off" if edit.is_on else "Switch on", ToggleEdit(edit.edit_id), True),
+        ("Duplicate", DuplicateEdit(edit.edit_id), True),
+        ("Later: one up", MoveEdit(edit.edit_id, position + 1), position + 1 < n_edits),
+        ("Earlier: one down", MoveEdit(edit.edit_id, position - 1), position > 0),
+        ("Remove", RemoveEdit(edit.edit_id), True),
+    ):
+        if imgui.menu_item(label, "", False, can_edit and is_possible)[0]:
+            dispatch(command)
+        ui.mark(f"edits.menu {label.split(':')[0].lower()}")
+    imgui.separator()
+    draw_copy_entries(ui, "edits.menu", lambda: session.command_texts.edit(edit.edit_id))

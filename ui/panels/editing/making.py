@@ -1,0 +1,193 @@
+"""New edits: buttons and keys for what can be done to what is selected or drawn, and where in time it is to hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from imgui_bundle import ImVec2, imgui
+
+from app.playback.timeline import Timeline
+from app.session.commands import MarkBox, MarkRegion
+from app.session.editing.edit_commands import AddEdit
+from app.session.editing.scope_choice import SCOPE_CHOICES, SCOPE_WORDS, chosen_scope, reach_text
+from app.session.editing.selection_commands import ClearSelection
+from engine.editing.edit import (
+    Action,
+    Box,
+    Delete,
+    Everything,
+    Expose,
+    Hide,
+    Hold,
+    Recolor,
+    Smooth,
+    Sphere,
+    Target,
+    Transform,
+)
+from ui.panels.editing.edit_subject import SubjectNeeds, invert_selection, meant, pivot_of
+from ui.panels.state import EDITS, Dispatch, UiState
+from ui.panels.widgets import segment, text_wrapped_dim
+from ui.viewport.editing.handles import axes_of, middle_of
+
+FIRST_STOPS, FIRST_OPACITY, FIRST_SIGMA_FRAMES = 0.5, 0.5, 2.0
+"""What new edits begin with."""
+
+
+class MakingNeeds(SubjectNeeds, Protocol):
+    """What this module reads of a session."""
+
+    @property
+    def timeline(self) -> Timeline: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Making:
+    """One kind of edit that can be made.
+
+    Attributes:
+        name: In ids of actions and names of buttons.
+        label: On the button.
+        words: What it does, for menus and tooltips.
+        action: Made where it is wanted; None has no use of its own for the frame and the pivot.
+        keys: See ui.panels.actions.action.Action.
+        is_inverted: Whether it acts on everything else.
+        is_for_everything: Whether it makes sense where nothing is selected: it then acts on everything.
+    """
+
+    name: str
+    label: str
+    words: str
+    action: Callable[[MakingNeeds, Box | Sphere | None], Action]
+    keys: tuple[str, ...] = ()
+    is_inverted: bool = False
+    is_for_everything: bool = False
+
+
+DELETE = Making("delete", "Delete", "Delete what is selected", lambda session, volume: Delete())
+MAKINGS = (
+    Making("hide", "Hide", "Hide what is selected", lambda session, volume: Hide(), ("H",)),
+    Making(
+        "isolate",
+        "Isolate",
+        "Isolate: hide everything but what is selected",
+        lambda session, volume: Hide(),
+        ("Shift+H",),
+        is_inverted=True,
+    ),
+    DELETE,
+    Making(
+        "move",
+        "Move",
+        "Move, rotate and scale what is selected",
+        lambda session, volume: Transform(pivot=pivot_of(session, volume)),
+        ("Alt+G",),
+    ),
+    Making(
+        "recolor", "Recolour", "Recolour what is selected", lambda session, volume: Recolor(), is_for_everything=True
+    ),
+    Making(
+        "expose",
+        "Exposure",
+        "Change the exposure of what is selected",
+        lambda session, volume: Expose(FIRST_STOPS),
+        is_for_everything=True,
+    ),
+    Making(
+        "opacity",
+        "Opacity",
+        "Change the opacity of what is selected",
+        lambda session, volume: Recolor(opacity=FIRST_OPACITY),
+    ),
+    Making(
+        "hold",
+        "Set static",
+        "Set static: what is selected stands still, as at this frame",
+        lambda session, volume: Hold(session.timeline.frame_index),
+    ),
+    Making(
+        "smooth",
+        "Smooth",
+        "Smooth what is selected over time",
+        lambda session, volume: Smooth(FIRST_SIGMA_FRAMES),
+        is_for_everything=True,
+    ),
+)
+PER_ROW = 3
+
+
+def make_edit(session: MakingNeeds, dispatch: Dispatch, ui: UiState, making: Making) -> None:
+    """Put an edit on the stack and show it; the session says why where nothing is selected."""
+    volume, words = meant(session, ui)
+    target: Target | None = volume
+    if not words and making.is_for_everything:
+        target = Everything()
+    is_outside = volume is not None and ui.editing.is_outside
+    before = {edit.edit_id for edit in session.edits.edits}
+    scope = chosen_scope(ui.editing.scope, session.timeline)
+    dispatch(AddEdit(making.action(session, volume), target, scope, making.is_inverted != is_outside))
+    ui.wanted_panel = EDITS
+    added = [edit.edit_id for edit in session.edits.edits if edit.edit_id not in before]
+    if added:
+        ui.editing.choose(added[-1])
+        if volume is not None:  # its handles are those of the edit now
+            ui.selecting.leave()
+            ui.editing.is_outside = False
+            dispatch(ClearSelection())
+
+
+def mark_moving(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """Let everything in what was drawn move: a region of the gate, in clips whose training starts from now on."""
+    volume, _ = meant(session, ui)
+    if isinstance(volume, Sphere):
+        dispatch(MarkRegion("dynamic", volume.center, volume.radius))
+    elif volume is not None:
+        reach = abs(axes_of(volume)) @ volume.half_sizes
+        low, high = middle_of(volume) - reach, middle_of(volume) + reach
+        dispatch(MarkBox("dynamic", (low[0], low[1], low[2]), (high[0], high[1], high[2])))
+
+
+def draw_making(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """What new edits act on, where they are to hold, and a button for each kind."""
+    volume, words = meant(session, ui)
+    if words:
+        is_outside = volume is not None and ui.editing.is_outside
+        imgui.text(f"Acts on {'all but ' if is_outside else ''}{words}")
+        if session.selection.words and volume is None:
+            text_wrapped_dim(session.selection.words)
+    else:
+        text_wrapped_dim("Select Gaussians, or draw a box or a sphere; colours and light can be changed everywhere.")
+    if volume is not None:
+        if imgui.checkbox("Everything outside of it", ui.editing.is_outside)[0]:
+            invert_selection(dispatch, ui)
+        ui.mark("edits.outside")
+    imgui.text_disabled("New edits hold")
+    width = (imgui.get_content_region_avail().x - 2 * imgui.get_style().item_spacing.x) / PER_ROW
+    for place, choice in enumerate(SCOPE_CHOICES):
+        if place % PER_ROW:
+            imgui.same_line()
+        if segment(SCOPE_WORDS[choice], ui.editing.scope == choice, width):
+            ui.editing.scope = choice
+        ui.mark(f"edits.scope {choice}")
+    text_wrapped_dim(reach_text(chosen_scope(ui.editing.scope, session.timeline), session.timeline))
+    imgui.begin_disabled(not session.edits.can_edit)
+    for place, making in enumerate(MAKINGS):
+        if place % PER_ROW:
+            imgui.same_line()
+        imgui.begin_disabled(not (words or making.is_for_everything))
+        label = "Crop" if making.name == "isolate" and volume is not None else making.label
+        if imgui.button(f"{label}##{making.name}", ImVec2(width, 0)):
+            make_edit(session, dispatch, ui, making)
+        ui.mark(f"edits.make {making.name}")
+        imgui.end_disabled()
+        key = f" ({making.keys[0]})" if making.keys else ""
+        imgui.set_item_tooltip(f"{making.words}{key}")
+    imgui.begin_disabled(volume is None)
+    if imgui.button("Set moving", ImVec2(width, 0)):
+        mark_moving(session, dispatch, ui)
+    ui.mark("edits.make moving")
+    imgui.end_disabled()
+    imgui.set_item_tooltip("Marks what was drawn as moving; clips take it up when they are trained")
+    imgui.end_disabled()

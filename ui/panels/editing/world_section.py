@@ -1,0 +1,91 @@
+"""How the scene lies in the world: what is up, and how long a unit of the scene is."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+from imgui_bundle import imgui
+
+from app.playback.orbit_view import OrbitView
+from app.playback.scene_axes import UP_AXES
+from app.session.edit_status import EditsStatus
+from app.session.editing.edit_commands import SetScale, SetUp
+from engine.editing.edit import Vector
+from ui.panels.editing.fields import label_before
+from ui.panels.state import Dispatch, UiState
+from ui.panels.widgets import text_wrapped_dim
+
+SCALES = (1e-9, 1e9)
+
+
+class WorldNeeds(Protocol):
+    """What this section reads of a session."""
+
+    @property
+    def edits(self) -> EditsStatus: ...
+
+    @property
+    def view(self) -> OrbitView: ...
+
+
+def view_up(view: OrbitView) -> Vector:
+    """What is up in the picture of a view."""
+    x, y, z = (float(value) for value in -view.pose().rotation[1])
+    return x, y, z
+
+
+def draw_world(session: WorldNeeds, dispatch: Dispatch, ui: UiState) -> None:
+    """Folded away until it is wanted."""
+    if not imgui.collapsing_header("World: up and scale"):
+        ui.mark("edits.world")
+        return
+    ui.mark("edits.world")
+    imgui.begin_disabled(not session.edits.can_edit)
+    world, tool = session.edits.world, ui.editing
+    label_before("Up is")
+    if imgui.begin_combo("##up", _up_words(world.up)):
+        for name, axis in UP_AXES.items():
+            words = "as the cameras suggest" if axis is None else f"{name} of the scene"
+            if imgui.selectable(words, world.up == axis)[0] and world.up != axis:
+                dispatch(SetUp(axis))
+            ui.mark(f"world.up {name}")
+        imgui.end_combo()
+    else:
+        ui.mark("world.up")
+    if imgui.button("As in this view"):
+        dispatch(SetUp(view_up(session.view)))
+    ui.mark("world.view")
+    imgui.set_item_tooltip("What is up in the picture becomes up")
+    imgui.same_line()
+    if imgui.button("Three points of the ground"):
+        tool.ask(None if tool.asking == "ground" else "ground")
+    ui.mark("world.ground")
+    imgui.set_item_tooltip("Click three points of the ground in the picture")
+    label_before("1 unit is")
+    is_entered, typed = imgui.input_double(
+        "##scale", world.meters_per_unit or 0.0, 0.0, 0.0, "%.6g m", imgui.InputTextFlags_.enter_returns_true
+    )
+    ui.mark("world.scale")
+    imgui.set_item_tooltip("Length of a unit of the scene, 0 if not known. With it, exports are in metres.")
+    if is_entered and math.isfinite(typed):
+        dispatch(SetScale(typed if typed > 0.0 else None))
+    label_before("Length")
+    _, length_m = imgui.input_double("##length", tool.length_m, 0.0, 0.0, "%.6g m")
+    ui.mark("world.length")
+    if math.isfinite(length_m) and SCALES[0] <= length_m <= SCALES[1]:
+        tool.length_m = length_m
+    if imgui.button("Two points of that length"):
+        tool.ask(None if tool.asking == "length" else "length")
+    ui.mark("world.points")
+    imgui.set_item_tooltip("Click two points in the picture that are known to be so far apart")
+    imgui.end_disabled()
+    if world.meters_per_unit is not None:
+        text_wrapped_dim(f"Exports are written in metres: {world.meters_per_unit:.6g} m per unit of the scene.")
+
+
+def _up_words(up: Vector | None) -> str:
+    if up is None:
+        return "as the cameras suggest"
+    name = next((name for name, axis in UP_AXES.items() if axis == up), "")
+    return f"{name} of the scene" if name else ", ".join(f"{value:.3f}" for value in up)
