@@ -28,9 +28,7 @@ def trained(folder: Path) -> Project:
     source = {"role": "source", "reference_fingerprint": "clip-0"}
     for name, base in (("old", "clip-0"), ("other", "gone"), ("new", "clip-0")):
         set_aside(project, 1)
-        write_header(
-            project.clip_path(1), clip_header(1, fingerprint=name, role="source", reference_fingerprint=base)
-        )
+        write_header(project.clip_path(1), clip_header(1, fingerprint=name, role="source", reference_fingerprint=base))
     write_header(project.clip_path(2), clip_header(2, **source))
     return project
 
