@@ -40,7 +40,7 @@ def mend(job: MendJob, report: ReportProgress) -> MendResult:
     warm_up_reporting(lambda progress: report(Progress(progress.stage, 0.0, progress.message)))
     project = open_project(job.project, is_writable=False)
     opened = open_trained(project)
-    settings, capture = project.settings, opened.capture
+    settings, capture = project.settings, opened.capture.without(project.document.exclusions)
     stretch = job.request.stretch(opened.clips)
     reference = _checked_reference(project, opened.reference)
     states = _states(project, opened.clips, opened.trained, stretch)
