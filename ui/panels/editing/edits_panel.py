@@ -49,7 +49,8 @@ def draw_edits(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> Non
     ui.editing.follow(session.edits.edits)
     if session.edits.why_not:
         text_warning(session.edits.why_not)
-    draw_making(session, dispatch, ui)
+    if imgui.collapsing_header("New edit", imgui.TreeNodeFlags_.default_open):
+        draw_making(session, dispatch, ui)
     imgui.separator()
     _draw_stack(session, dispatch, ui)
     imgui.begin_disabled(not session.edits.can_edit)
@@ -87,17 +88,13 @@ def _draw_stack(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> No
                 _draw_row(session, dispatch, ui, edits[position], position)
                 imgui.pop_id()
     imgui.end_child()
-    if any(edit.is_on and isinstance(edit.action, Delete) for edit in edits):
-        _draw_permanence(session, dispatch, ui)
-
-
-def _draw_permanence(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    imgui.begin_disabled(not session.edits.can_edit)
-    if imgui.button("Apply deletions permanently..."):
+    is_deleting = any(edit.is_on and isinstance(edit.action, Delete) for edit in edits)
+    imgui.begin_disabled(not (session.edits.can_edit and is_deleting))
+    if imgui.button("Apply permanently ..."):
         dispatch(ApplyDeletions())
-    ui.mark("edits.permanent")
-    imgui.set_item_tooltip("Writes clips without what is deleted in all of their frames; asks first")
+    ui.mark("edits.apply")
     imgui.end_disabled()
+    imgui.set_item_tooltip("Writes clips again without what is deleted everywhere, once you have confirmed it")
 
 
 def _draw_row(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: Edit, position: int) -> None:
