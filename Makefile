@@ -12,7 +12,7 @@ PYTEST := $(BIN)/python -m pytest --numprocesses=$(WORKERS) --dist=loadfile --no
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run check test coverage lint types fmt bench faults docs screenshots golden clean
+.PHONY: help setup run check test coverage lint types fmt bench faults soak docs screenshots golden clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z]*\):.*## /  make \1	/p' Makefile | expand -t 16
@@ -53,10 +53,13 @@ bench: setup ## measure the figures of the README, print them as tables, draw ou
 	@$(BIN)/python -m tests.benchmarks.bench_window $(SAMPLE)
 	@$(BIN)/python -m tests.benchmarks.bench_selecting $(SAMPLE)
 
-faults: setup ## damage files and captures, contend for locks, kill trainings, fill disks: the figures of the README
+faults: setup ## damage files and captures, contend for locks, kill trainings and editing, fill disks: the figures of the README
 	@for script in $$(grep -l "^if __name__" tests/faults/*.py); do \
 		$(BIN)/python -m $$(echo $${script%.py} | tr / .) || exit 1; \
 	done
+
+soak: setup ## one hour of use by a program: does the window hold more and more memory or handles? MINUTES=60
+	@$(BIN)/python -m tests.soak.soak --minutes $(or $(MINUTES),60) $(if $(PROJECT),--project "$(PROJECT)")
 
 docs: setup ## fill the generated parts of the documents: keys, commands, settings, tree
 	@$(BIN)/python -m tests.documents write

@@ -19,6 +19,7 @@ from engine.editing.edit import (
     Expose,
     Hide,
     Hold,
+    Picked,
     Quat,
     Recolor,
     Scope,
@@ -39,6 +40,7 @@ ACTION_OPTIONS = (
     *("recolour", "saturation", "gains", "opacity", "exposure", "hold", "smooth"),
 )
 """Of which one or more say what an edit does."""
+_TARGET_OPTIONS = ("everything", "box", "turned_box", "sphere", "target", "where", "at", "inverted")
 
 
 class _Given(Struct):
@@ -70,6 +72,13 @@ def _add_targets(group: argparse._ArgumentGroup) -> None:
     )
     one.add_argument("--sphere", nargs=4, type=float, metavar=("X", "Y", "Z", "R"), help="a sphere: centre and radius")
     one.add_argument("--target", metavar="JSON", help="as --json prints it; - reads standard input")
+    group.add_argument(
+        "--where",
+        metavar="TEXT",
+        help="only Gaussians with these attributes, as 'opacity<0.05 and motion=static'; opacity, size, clip, birth, "
+        "motion",
+    )
+    group.add_argument("--at", type=int, metavar="FRAME", help="frame in which --where looks (default: 0)")
     group.add_argument("--inverted", action="store_true", help="everything but that")
 
 
@@ -122,7 +131,7 @@ def has_action(options: argparse.Namespace) -> bool:
 
 def has_target(options: argparse.Namespace) -> bool:
     """Whether something was said of what an edit acts on."""
-    return any(_is_given(options, name) for name in ("everything", "box", "turned_box", "sphere", "target", "inverted"))
+    return any(_is_given(options, name) for name in _TARGET_OPTIONS)
 
 
 def has_scope(options: argparse.Namespace) -> bool:
@@ -135,14 +144,27 @@ def _is_given(options: argparse.Namespace, name: str) -> bool:
     return value is not None and value is not False
 
 
-def chosen_target(options: argparse.Namespace, read_text: Callable[[str], str]) -> Target:
+def chosen_target(options: argparse.Namespace, project: ScriptedProject, read_text: Callable[[str], str]) -> Target:
     """What the edit acts on.
 
     Args:
+        project: Where Gaussians are looked for, if their attributes are given.
         read_text: Gives the text of an argument, from standard input where that is "-".
     Raises:
         ProjectError: It cannot be.
     """
+    target = _shape(options, read_text)
+    if options.where is None:
+        if options.at is not None:
+            raise ProjectError("--at is given without --where.", hint="Leave it out.")
+        return target
+    if isinstance(target, Picked):
+        raise ProjectError("--where goes with a box, a sphere or everything.", hint="Leave --target out.")
+    volume = None if isinstance(target, Everything) else target
+    return project.select(options.where, frame_index=options.at or 0, volume=volume)
+
+
+def _shape(options: argparse.Namespace, read_text: Callable[[str], str]) -> Target:
     if options.box is not None:
         a, b = options.box[:3], options.box[3:]
         center = _vector((x + y) / 2 for x, y in zip(a, b, strict=True))

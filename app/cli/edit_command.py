@@ -30,7 +30,7 @@ from engine.text import one_line
 
 EDIT_SCHEMA = 1
 MAX_STDIN_CHARACTERS = 1 << 28
-_OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "put", "undo", "redo")
+_OF_STACK = ("on", "off", "remove", "rename", "move_to", "replace", "put", "undo", "redo", "apply_permanently")
 
 
 def add_arguments(command: argparse.ArgumentParser) -> None:
@@ -56,6 +56,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         metavar="JSON",
         help=f"entries of the document, which take the place of what is there: {', '.join(ENTRIES)}; - reads them "
         "from standard input",
+    )
+    one.add_argument(
+        "--apply-permanently",
+        action="store_true",
+        default=None,
+        help="take what is deleted out of the clips for good; what they were becomes versions",
     )
     stack.add_argument("--history", action="store_true", help="list the steps as well")
     command.add_argument("--json", action="store_true", help="print everything as JSON")
@@ -96,7 +102,7 @@ def _check_options(options: argparse.Namespace, chosen: str) -> None:
 
 
 def _add(options: argparse.Namespace, project: ScriptedProject) -> None:
-    target = chosen_target(options, _text)
+    target = chosen_target(options, project, _text)
     action, inverts = chosen_action(options, target)
     scope = chosen_scope(options, project)
     project.apply_edit(action, target, scope=scope, is_inverted=options.inverted != inverts, name=options.name or "")
@@ -120,6 +126,8 @@ def _change(options: argparse.Namespace, project: ScriptedProject) -> None:
         project.replace_edit(_replaced(options, project))
     elif options.put is not None:
         _put(options.put, project)
+    elif options.apply_permanently:
+        project.apply_permanently()
     else:
         _take_steps(options, project)
 
@@ -138,7 +146,7 @@ def _take_steps(options: argparse.Namespace, project: ScriptedProject) -> None:
 def _replaced(options: argparse.Namespace, project: ScriptedProject) -> Edit:
     edit = edit_with(project.document, options.replace)
     if has_target(options):
-        edit = structs.replace(edit, target=chosen_target(options, _text), is_inverted=options.inverted)
+        edit = structs.replace(edit, target=chosen_target(options, project, _text), is_inverted=options.inverted)
     if has_action(options):
         action, inverts = chosen_action(options, edit.target)
         edit = structs.replace(edit, action=action, is_inverted=edit.is_inverted != inverts)

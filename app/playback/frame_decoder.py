@@ -255,42 +255,12 @@ class FrameDecoder:
     # ---------------------------------------------------------------- on the thread
 
     def _compute(self, request: FrameRequest) -> ShownFrame:
-        from engine.model.host_array import host_array
-
         known = self._cache.get(request.key)
         if known is not None:  # it was asked for and planned
             return known
         loaded = self._load(request)
-        clip_time = request.clip.clip_time(request.frame_index)
-        content = request.shown_as.content
-        edited = loaded.parts.part(content).decode(clip_time, request.effects)
-        source = PictureSource(
-            request.clip_index,
-            request.frame_index,
-            request.revision,
-            loaded.step,
-            loaded.model.field is None,
-            shown_as=ShownAs(content=content),
-        )
-        if request.effects:
-            view = loaded.model.anchors().chosen(*loaded.parts.has_left(edited, content))
-        else:
-            view = loaded.model.anchors(clip_time)
-        anchors = _anchor_arrays(view, request.key, loaded.anchors.spacing, source)
-        values = [np.ascontiguousarray(host_array(tensor)) for tensor in edited.gaussians.tensors()]
-        has_changes = request.shown_as.mode == "changed"
-        arrays = GaussianArrays(
-            *values,
-            key=request.key,
-            near_plane=loaded.near_plane,
-            source=source,
-            n_still=edited.n_still,
-            still_key=(request.model_key, content, request.effects.digest),
-            births=loaded.parts.births(edited.rows),
-            changes=loaded.parts.changes(edited.gaussians, edited.rows) if has_changes else None,
-            rows=edited.rows,
-        )
-        shown = ShownFrame(arrays, anchors)
+        shown = decode_frame(loaded, request)
+        arrays, anchors = shown.gaussians, shown.anchors
         if self.worker.is_still_wanted:
             n_bytes = arrays.n_bytes + anchors.inherited_positions.nbytes + anchors.own_positions.nbytes
             self._frame_bytes = n_bytes
@@ -316,6 +286,42 @@ class FrameDecoder:
         # replaced as a whole, so that the other thread never sees it half changed
         self._models = OrderedDict([*kept[-(MAX_MODELS - 1) :], (identity, loaded)])
         return loaded
+
+
+def decode_frame(loaded: LoadedClip, request: FrameRequest) -> ShownFrame:
+    """What is drawn of a frame of a clip in memory, with the edits of the request."""
+    from engine.model.host_array import host_array
+
+    clip_time = request.clip.clip_time(request.frame_index)
+    content = request.shown_as.content
+    edited = loaded.parts.part(content).decode(clip_time, request.effects)
+    source = PictureSource(
+        request.clip_index,
+        request.frame_index,
+        request.revision,
+        loaded.step,
+        loaded.model.field is None,
+        shown_as=ShownAs(content=content),
+    )
+    if request.effects:
+        view = loaded.model.anchors().chosen(*loaded.parts.has_left(edited, content))
+    else:
+        view = loaded.model.anchors(clip_time)
+    anchors = _anchor_arrays(view, request.key, loaded.anchors.spacing, source)
+    values = [np.ascontiguousarray(host_array(tensor)) for tensor in edited.gaussians.tensors()]
+    has_changes = request.shown_as.mode == "changed"
+    arrays = GaussianArrays(
+        *values,
+        key=request.key,
+        near_plane=loaded.near_plane,
+        source=source,
+        n_still=edited.n_still,
+        still_key=(request.model_key, content, request.effects.digest),
+        births=loaded.parts.births(edited.rows),
+        changes=loaded.parts.changes(edited.gaussians, edited.rows) if has_changes else None,
+        rows=edited.rows,
+    )
+    return ShownFrame(arrays, anchors)
 
 
 def _anchor_arrays(view: AnchorView, key: Hashable, spacing: float, source: PictureSource = UNKNOWN) -> AnchorArrays:

@@ -35,13 +35,15 @@ from app.training.process import ProcessWorker
 from app.training.service import Launch
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
-from engine.editing.edit import EVERYWHERE, Action, Edit, Everything, Scope, Target
+from engine.editing.edit import EVERYWHERE, Action, Box, Edit, Everything, Picked, Scope, Sphere, Target
 from engine.errors import ProjectError
 from engine.kernels.cache import use_kernel_cache
 from engine.storage.typed_json import EntryError
 
 if TYPE_CHECKING:
     from app.evaluation.headless import ClipOutcome, TrainedProject
+    from app.mending.mend_project import MendOutcome
+    from engine.progress import ReportProgress
 
 TellTraining = Callable[[TrainingStatus], None]
 TellExport = Callable[[ExportProgress], None]
@@ -125,6 +127,12 @@ class ScriptedProject:
     def clips(self) -> list[Clip]:
         """The clips in their order: their index and frames. Raises what `capture` raises."""
         return self._project.clips(self.n_frames)
+
+    @property
+    def training_order(self) -> list[int]:
+        """Indices of all clips in the order in which they can be trained: the reference first. Raises what `capture`
+        raises."""
+        return self._project.training_order(len(self.clips))
 
     @property
     def trained_clips(self) -> list[int]:
@@ -255,7 +263,80 @@ class ScriptedProject:
         change = changed(self.document, command)
         self.change(change.document, change.name)
 
+    def select(
+        self,
+        where: str = "",
+        *,
+        frame_index: int = 0,
+        volume: Box | Sphere | None = None,
+        is_inverted: bool = False,
+    ) -> Picked:
+        """Pick Gaussians of a frame, as edits have left them: a target for an edit, in all frames.
+
+        Args:
+            where: Conditions joined by "and" that all have to hold, such as "opacity<0.05 and motion=static".
+                Attributes are opacity, size (scene units), clip (of birth), birth and motion.
+            volume: Only what lies in it.
+            is_inverted: Pick everything else.
+        Raises:
+            ProjectError: The frame is not trained, a condition makes no sense, or nothing is picked.
+        """
+        from app.scripting.selecting import select
+
+        self._check_open()
+        opened = self.open_trained()
+        return select(opened, self.edits, frame_index, volume=volume, where=where, is_inverted=is_inverted)
+
+    def apply_permanently(self, on_progress: Callable[[int, int], None] | None = None) -> tuple[int, ...]:
+        """Take what is deleted out of the clips for good; what clips were becomes versions.
+
+        Args:
+            on_progress: Told how many clips are done, of how many.
+        Returns:
+            Indices of the clips that have changed.
+        Raises:
+            ProjectError: There is nothing to apply, the project is read-only, or a clip is damaged; nothing has
+                changed.
+            DiskError: The disk refused.
+        """
+        from app.applying.applying import apply_permanently
+
+        self._check_open()
+        tell = (lambda n_done, n_all: None) if on_progress is None else on_progress
+        return tuple(apply_permanently(self._project, self.clips, tell).clip_indices)
+
     # ---------------------------------------------------------------- jobs
+
+    def mend(
+        self,
+        *,
+        boundary: int | None = None,
+        frames: range | None = None,
+        method: str = "auto",
+        on_progress: ReportProgress | None = None,
+    ) -> MendOutcome:
+        """Make the flicker at a boundary, or in a stretch of frames, smaller; what clips were becomes versions.
+
+        Args:
+            boundary: The clip that begins at the boundary; None for frames.
+            frames: Of the capture, without gaps; None for a boundary.
+            method: "auto" or one of engine.mending.figures.METHODS.
+            on_progress: Told how far it is.
+        Returns:
+            What came of it, with figures before and after; `record.has_helped` says whether anything was kept.
+        Raises:
+            ProjectError: It cannot be mended; all clips are as they were.
+        """
+        from app.mending.mend_project import mend_project
+        from app.mending.request import MendRequest
+
+        self._check_open()
+        if (boundary is None) == (frames is None) or (frames is not None and frames.step != 1):
+            raise ProjectError("Name what is to be mended: a boundary, or frames without gaps.")
+        span = None if frames is None else (frames.start, frames.stop)
+        request = MendRequest(after=boundary, frames=span, method=method)
+        tell = (lambda progress: None) if on_progress is None else on_progress
+        return mend_project(self._project, request, report=tell)
 
     def train_clip(
         self,

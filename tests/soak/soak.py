@@ -45,10 +45,9 @@ from tests.app.lab.report.made_up import train
 from tests.soak.held import Growth, Held, growths, handle_names, held_now
 
 MAX_GROWTH = 0.05
-WAIT_S = 120.0
-ROUNDS_OF_A_SESSION = 6
+WAIT_S = 600.0
+"""Only a hang takes longer."""
 ROUNDS_OF_AN_EXPORT = 10
-SEEKS = 24
 ACTIONS = (
     Hide(),
     Delete(),
@@ -74,10 +73,25 @@ class Soak:
         extra: A trained project, which is copied and used beside the made ones.
         has_window: Whether a window is drawn, too.
         start: Starts a training.
+        rounds_of_a_session: After so many, session and window are closed and made anew.
+        n_seeks: Frames that each round goes to.
+        is_preloading: See Session.
     """
 
-    def __init__(self, work: Path, *, extra: Path | None = None, has_window: bool, start: Launch = launch) -> None:
+    def __init__(
+        self,
+        work: Path,
+        *,
+        extra: Path | None = None,
+        has_window: bool,
+        start: Launch = launch,
+        rounds_of_a_session: int = 6,
+        n_seeks: int = 24,
+        is_preloading: bool = True,
+    ) -> None:
         self._work, self._has_window, self._start = work, has_window, start
+        self._rounds_of_a_session, self._n_seeks = rounds_of_a_session, n_seeks
+        self._is_preloading = is_preloading
         self._random = random.Random(1)
         self._projects = [
             train(
@@ -93,7 +107,11 @@ class Soak:
         self.samples: list[Held] = []
 
     def _open_session(self) -> Session:
-        session = Session(launch=self._start, settings=Settings(self._work / "settings.json"))
+        session = Session(
+            launch=self._start,
+            settings=Settings(self._work / "settings.json"),
+            is_preloading=self._is_preloading,
+        )
         if self._has_window:
             from ui.shell.window import StudioWindow
 
@@ -111,7 +129,7 @@ class Soak:
         """One round. What is held at its end, which is the same moment in each."""
         n = len(self.samples)
         project = self._projects[n % len(self._projects)]
-        if n and n % ROUNDS_OF_A_SESSION == 0:
+        if n and n % self._rounds_of_a_session == 0:
             self.close()
             self._session = self._open_session()
         self._open(project)
@@ -146,7 +164,7 @@ class Soak:
 
     def _scrub(self) -> None:
         session = self._session
-        for _ in range(SEEKS):
+        for _ in range(self._n_seeks):
             self._do(commands.SetFrame(self._random.randrange(session.timeline.n_frames)))
             self._draw(1)
             session.request_render(320, 240)

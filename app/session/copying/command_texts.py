@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.command_text.command_text import CommandText
-from app.command_text.job_command import export_command, training_command, version_command
+from app.command_text.job_command import export_command, mend_command, training_command, version_command
 from app.command_text.step_command import edit_command, step_command
 from app.document.edit_changes import edit_with
 from app.export.export_choices import ExportChoices, ExportContext
 from app.export.forms.table import answers_to
+from app.mending.request import MendRequest
 from app.project.project import Project
 from engine.errors import ProjectError
 
@@ -57,6 +58,10 @@ class CommandTexts:
     def version(self, clip_index: int, number: int) -> CommandText:
         """What brings back an earlier version of a clip. Raises ProjectError where nothing is open."""
         return version_command(self._project().folder, clip_index, number)
+
+    def mend(self, request: MendRequest, method: str) -> CommandText:
+        """What mends a boundary or a stretch of frames. Raises ProjectError where nothing is open."""
+        return mend_command(self._project().folder, after=request.after, frames=request.frames, method=method)
 
     def export(self, context: ExportContext, choices: ExportChoices) -> CommandText:
         """What exports what was chosen in the dialog. Raises ProjectError where nothing is open."""

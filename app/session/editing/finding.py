@@ -8,12 +8,16 @@ import numpy as np
 
 from app.playback.arrays import GaussianArrays
 from app.session.editing.attributes import AnchorValues, values_of
+from app.session.editing.selection import Selection, whole_anchors
 from app.session.editing.selection_commands import (
     Brush,
+    ClearSelection,
     GrowSelection,
+    How,
     InvertSelection,
     Lasso,
     Rectangle,
+    Reselect,
     SelectAll,
     SelectAnchor,
     SelectByAttribute,
@@ -28,6 +32,7 @@ from engine.editing.selection.in_picture import under_mask
 from engine.editing.selection.neighbours import flooded, grown, shrunk
 from engine.editing.selection.projected import project_gaussians
 from engine.editing.selection.ranges import in_range
+from engine.editing.selection.set_algebra import combined
 from engine.editing.selection.shapes import brush_mask, lasso_mask, rectangle_mask
 from engine.editing.selection.visibility import seen_rows
 from engine.editing.selection.volumes import in_volume
@@ -85,6 +90,33 @@ def found_by(command: SelectionCommand, ground: Ground) -> np.ndarray:
             return np.ones(len(means), np.bool_)
         case _:
             raise TypeError(f"{type(command).__name__} finds nothing")
+
+
+def selection_after(selection: Selection, command: SelectionCommand, ground: Ground, found: np.ndarray) -> Selection:
+    """What is selected once a command has found something.
+
+    Args:
+        selection: What was selected.
+        ground: What the command acted on, with rows.
+        found: See `found_by`. [N] bool
+    """
+    rows = ground.gaussians.rows
+    assert rows is not None  # nothing can be selected without
+    how, keeps_others = _how(command)
+    if how.is_whole_anchors:
+        found = whole_anchors(rows, found, ground.gaussians_per_anchor)
+    return selection.with_mask(rows, combined(ground.selected, found, how.mode), keeps_others=keeps_others)
+
+
+def _how(command: SelectionCommand) -> tuple[How, bool]:
+    """What becomes of the selection, and whether what does not exist in the frame stays in it."""
+    match command:
+        case GrowSelection() | ShrinkSelection():
+            return How(), True
+        case InvertSelection() | SelectAll() | ClearSelection() | Reselect():
+            return How(), False
+        case _:
+            return command.how, command.how.mode in ("add", "subtract")
 
 
 def shape_mask(shape: Shape, size: tuple[int, int]) -> np.ndarray:

@@ -16,26 +16,22 @@ import numpy as np
 from app.background.latest import LatestWorker, nothing
 from app.playback.arrays import GaussianArrays
 from app.session.editing.attributes import ATTRIBUTES, AnchorValues, values_of
-from app.session.editing.finding import Ground, found_by
-from app.session.editing.selection import NOTHING_SELECTED, Selection, selection_words, whole_anchors
+from app.session.editing.finding import Ground, found_by, selection_after
+from app.session.editing.selection import NOTHING_SELECTED, Selection, selection_words
 from app.session.editing.selection_commands import (
     ClearSelection,
-    GrowSelection,
-    How,
     InvertSelection,
     Reselect,
     SelectAll,
     SelectAnchor,
     SelectByAttribute,
     SelectionCommand,
-    ShrinkSelection,
 )
 from app.session.editing.selection_status import SelectionStatus
 from engine.editing.gaussian_rows import GaussianRows
 from engine.editing.selection.projected import project_gaussians
 from engine.editing.selection.ranges import Spread, spread_of
 from engine.editing.selection.seen_from import SeenFrom
-from engine.editing.selection.set_algebra import combined
 from engine.editing.selection.share import selected_share
 from engine.errors import ProjectError
 
@@ -195,14 +191,7 @@ class Selecting:
             self._take(self._before)
 
     def _take_found(self, work: _Find, found: np.ndarray) -> None:
-        ground, rows = work.ground, work.ground.gaussians.rows
-        assert rows is not None  # looked at in `apply`
-        how, keeps_others = _how(work.command)
-        if how.is_whole_anchors:
-            found = whole_anchors(rows, found, ground.gaussians_per_anchor)
-        self._take(
-            self.selection.with_mask(rows, combined(ground.selected, found, how.mode), keeps_others=keeps_others)
-        )
+        self._take(selection_after(self.selection, work.command, work.ground, found))
 
     def _take(self, selection: Selection) -> None:
         if selection != self.selection:
@@ -309,17 +298,6 @@ class Selecting:
     def _residuals_of(self, attribute: str) -> AnchorValues | None:
         column = ATTRIBUTES[attribute].column
         return self._shown.anchor_values(column) if column else None
-
-
-def _how(command: SelectionCommand) -> tuple[How, bool]:
-    """What becomes of the selection, and whether what does not exist in the frame stays in it."""
-    match command:
-        case GrowSelection() | ShrinkSelection():
-            return How(), True
-        case InvertSelection() | SelectAll() | ClearSelection() | Reselect():
-            return How(), False
-        case _:
-            return command.how, command.how.mode in ("add", "subtract")
 
 
 def _prepare() -> None:

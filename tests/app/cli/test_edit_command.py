@@ -115,6 +115,35 @@ def test_the_frames_of_a_clip_are_those_of_the_capture(run, tmp_path):
     assert (code, err) == (2, "clipgstream: There is no clip 2; clips are 0 to 1.\n")
 
 
+def test_gaussians_are_picked_by_their_attributes(run, tmp_path):
+    project = make_trained(tmp_path)
+    code, out, _ = run("edit", project, "--delete", "--where", "clip=1", "--at", 4, "--inverted", "--clip", 1)
+    assert (code, "all but 12 Gaussians of clip 1, frames 3-5" in out) == (0, True), out
+    for arguments, message in (
+        (("--where", "opacity<0"), "Nothing is selected in frame 0"),
+        (("--where", "x<0"), "There is no attribute 'x'"),
+        (("--at", 3), "--at is given without --where"),
+        (("--where", "opacity>0", "--target", '{"type": "picked", "sets": []}'), "--where goes with a box"),
+    ):
+        code, _, err = run("edit", project, "--delete", *arguments)
+        assert (code, message in err) == (2, True), err
+    code, _, err = run("edit", project, "--apply-permanently", "--hide")
+    assert (code, "--apply-permanently is given with what an edit does" in err) == (2, True)
+
+
+def test_steps_are_taken_back_by_another_program_run(run, folder):
+    for name in ("a", "b", "c"):
+        run("edit", folder, "--hide", "--name", name)
+    assert run("edit", folder, "--undo", 2)[0] == 0
+    assert [edit.name for edit in edits(folder)] == ["a"]
+    assert run("edit", folder, "--redo")[0] == 0
+    assert [edit.name for edit in edits(folder)] == ["a", "b"]
+    out = run("edit", folder, "--history")[1]
+    assert out.splitlines()[-4:] == ["Steps: 2", "  a", "  b", "  c (taken back)"]
+    code, _, err = run("edit", folder, "--redo", 2)
+    assert (code, "2 steps cannot be done again: there are 1" in err) == (2, True)
+
+
 def test_the_stack_is_changed_and_steps_are_taken_back(run, folder):
     for name in ("a", "b", "c"):
         assert run("edit", folder, "--delete", *BALL, "--name", name)[0] == 0

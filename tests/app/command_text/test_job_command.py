@@ -13,7 +13,7 @@ import pytest
 from app.cli import export_command, render_command, train_command
 from app.cli.cli import build_parser
 from app.command_text.job_command import export_command as as_command
-from app.command_text.job_command import training_command
+from app.command_text.job_command import mend_command, training_command, version_command
 from app.document.project_settings import ProjectSettings
 from app.export.cameras_job import CamerasJob
 from app.export.export_jobs import KINDS
@@ -24,6 +24,7 @@ from app.export.picked_frames import PickedFrames
 from app.export.player_job import PlayerJob
 from app.export.video.formats import FORMATS as VIDEO_FORMATS
 from app.export.video.job import Turntable, VideoJob
+from app.mending.request import MendRequest
 from app.scripting import scripted_project
 from engine.errors import ProjectError
 from engine.export.formats.table import FORMATS as GAUSSIAN_FORMATS
@@ -130,6 +131,31 @@ def test_a_training():
     assert parse_overrides(options.own_assignments) == own
     assert command.statement == f"project.train_clip(3, is_again=True, settings={own!r})"
     assert train_command is not None
+
+
+def test_a_mending():
+    for command, expected, statement in (
+        (mend_command(Path("/p"), after=2), MendRequest(after=2), "project.mend(boundary=2)"),
+        (
+            mend_command(Path("/p"), frames=(3, 9), method="fade"),
+            MendRequest(frames=(3, 9), method="fade"),
+            "project.mend(frames=range(3, 9), method='fade')",
+        ),
+    ):
+        options = build_parser(["mend"]).parse_args(shlex.split(command.shell(is_windows=False))[1:])
+        assert (options.project, options.method) == (Path("/p"), expected.method)
+        assert (options.boundary, options.frames) == (
+            None if expected.after is None else f"{expected.after - 1}:{expected.after}",
+            None if expected.frames is None else "{}:{}".format(*expected.frames),
+        )
+        assert command.statement == statement
+
+
+def test_a_version():
+    command = version_command(Path("/p"), 3, 12)
+    options = build_parser(["versions"]).parse_args(shlex.split(command.shell(is_windows=False))[1:])
+    assert (options.project, options.clip, options.restore) == (Path("/p"), 3, 12)
+    assert command.statement == "project.restore_version(3, 12)"
 
 
 def test_the_table_of_names_is_complete():

@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 import clipgstream
+from app.document.edit_words import n_picked
 from app.document.note_changes import put_marker
 from app.project.project import Project, create_project, default_settings, open_project
 from app.scripting.scripted_project import ScriptedProject, open_scripted
@@ -18,7 +19,7 @@ from engine.capture.capture import open_capture
 from engine.editing.edit import Delete, Expose, Hide, Scope, Sphere
 from engine.errors import CaptureError, ProjectError, TrainingError
 from tests.app.conftest import inline
-from tests.app.fakes import N_STEPS, make_crashing, make_fake
+from tests.app.fakes import N_ANCHORS, N_STEPS, make_crashing, make_fake
 from tests.app.residuals.conftest import make_project
 
 BALL = Sphere((0.0, 0.0, 0.0), 1.0)
@@ -240,3 +241,54 @@ def _crashing(job, project):
     from app.training.process import ProcessWorker
 
     return ProcessWorker(job, project, make_crashing)
+
+
+def test_gaussians_are_picked_by_place_and_attribute(trained):
+    with opened(trained) as project:
+        everything = project.select()
+        n_all = n_picked(everything)
+        ball = project.select(volume=Sphere((0.0, 0.0, 0.0), 0.5))
+        rest = project.select(volume=Sphere((0.0, 0.0, 0.0), 0.5), is_inverted=True)
+        assert 0 < n_picked(ball) < n_all
+        assert n_picked(ball) + n_picked(rest) == n_all
+        assert n_picked(project.select("opacity>=0 and motion=static")) == n_all
+        assert n_picked(project.select("clip=1", frame_index=4)) == N_ANCHORS
+        assert project.select("birth=born, clip>0", frame_index=4) == project.select("clip=1", frame_index=4)
+        edit = project.apply_edit("delete", ball)
+        assert project.select() == rest  # as edits have left them
+        project.switch_edit(edit.edit_id, is_on=False)
+        for where, frame_index, message in (
+            ("opacity<0", 0, "Nothing is selected in frame 0"),
+            ("opacity", 0, "The condition 'opacity' makes no sense. Write opacity<0.05; attributes are opacity, size"),
+            ("error>3", 0, "There is no attribute 'error' to select by"),
+            ("size=large", 0, "'large' is not a value of size. Write a number."),
+            ("motion=fast", 0, "Write a number or one of static, moving."),
+            ("size>nan", 0, "not a value of size"),
+            ("", 9, "There is no frame 9; the capture has frames 0 to 5."),
+        ):
+            with pytest.raises(ProjectError) as error:
+                project.select(where, frame_index=frame_index)
+            assert message in str(error.value)
+
+
+def test_what_is_deleted_goes_for_good(trained):
+    with opened(trained) as project:
+        with pytest.raises(ProjectError):
+            project.apply_permanently()
+        project.apply_edit("delete", Sphere((0.0, 0.0, 0.0), 0.5))
+        assert project.apply_permanently() == (0, 1)
+        n_left = n_picked(project.select())
+        assert project.edits == ()
+        project.restore_version(0, 1)
+        assert n_picked(project.select()) > n_left
+        with pytest.raises(ProjectError, match="no version 9"):
+            project.restore_version(0, 9)
+
+
+def test_what_cannot_be_mended(trained):
+    with opened(trained) as project:
+        for arguments in ({}, {"boundary": 1, "frames": range(3)}, {"frames": range(0, 6, 2)}):
+            with pytest.raises(ProjectError, match="Name what is to be mended"):
+                project.mend(**arguments)
+        with pytest.raises(ProjectError):
+            project.mend(boundary=7)

@@ -18,7 +18,6 @@ from app.session.editing.selection_status import SelectionStatus
 from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from engine.capture.exclusions import Exclusions
-from ui.panels.copying import CopyNeeds
 from ui.panels.editing.edit_subject import Selects
 from ui.panels.editing.mend_panel import HasMending
 from ui.panels.regions import RegionsNeeds
@@ -30,7 +29,7 @@ SELECT, EDIT = "Select", "Edit"
 NAVIGATE, BOOKMARKS, MODE = "Navigate", "Bookmarks", "View mode"
 
 
-class ActionNeeds(CopyNeeds, RegionsNeeds, HasMending, Protocol):
+class ActionNeeds(RegionsNeeds, HasMending, Protocol):
     """What actions act on."""
 
     @property

@@ -9,6 +9,7 @@ from ui.panels.actions.action import EDIT, TRAIN, Action, ActionNeeds, Run
 from ui.panels.copying import copy_command, copy_python
 from ui.panels.state import Dispatch, UiState
 
+MENU = "Edit/Copy as command"
 _WAYS = (("command", "command", copy_command), ("python", "Python", copy_python))
 
 
@@ -34,11 +35,13 @@ def _no_step(session: ActionNeeds) -> str:
 
 ACTIONS = (
     *(
-        Action(f"edit.copy_{id_}", f"Copy last step as {words}", EDIT, _copy(way, _last_step), lacks=_no_step)
+        Action(
+            f"edit.copy_{id_}", f"Copy last step as {words}", EDIT, _copy(way, _last_step), menu=MENU, lacks=_no_step
+        )
         for id_, words, way in _WAYS
     ),
     *(
-        Action(f"train.copy_{id_}", f"Copy training of this clip as {words}", TRAIN, _copy(way, _training))
+        Action(f"train.copy_{id_}", f"Copy training of this clip as {words}", TRAIN, _copy(way, _training), menu=MENU)
         for id_, words, way in _WAYS
     ),
 )

@@ -47,6 +47,7 @@ _MENU_OF_TOPIC = {
     "content": "View/Draw only",
     "heat": "View/Residuals",
     "mend": "Train/Mend",
+    "live": "Train/Live view",
     "mode": "View/Mode",
     "navigation": "View/Navigate/Mouse",
     "play": "Time/Play",

@@ -118,7 +118,12 @@ def _draw_row(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: E
     if edit.name:
         words = f"{target_text(edit.target, is_inverted=edit.is_inverted)}, {words}"
     words = words if edit.is_on else f"off, {words}"
-    draw.add_text(ImVec2(x, low.y + 22), theme.u32(theme.TEXT_DIM), elided(words, room))
+    lost = next((one for one in session.edits.lost if one.edit_id == edit.edit_id), None)
+    if lost is not None:
+        words = f"{Icon.WARNING}  {'all' if lost.is_all else 'some'} of what was picked is gone, {words}"
+    draw.add_text(
+        ImVec2(x, low.y + 22), theme.u32(theme.TEXT_DIM if lost is None else theme.ORANGE), elided(words, room)
+    )
     imgui.set_cursor_screen_pos(ImVec2(low.x + 2, low.y + 8))
     imgui.begin_disabled(not session.edits.can_edit)
     if imgui.button(f"{Icon.EYE if edit.is_on else ' – '}##on", ImVec2(BUTTON_WIDTH, 26)):

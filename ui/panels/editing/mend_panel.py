@@ -17,6 +17,7 @@ from app.session.mending.mend_page import MendPage
 from app.status import JobStatus
 from engine.mending.figures import METHODS, StretchFigures
 from engine.text import duration_text
+from ui.panels.copying import CopyNeeds, draw_copy_entries
 from ui.panels.state import Dispatch, Rect, UiState
 from ui.panels.widgets import primary_button, text_warning, text_wrapped, text_wrapped_dim
 from ui.style import theme
@@ -44,7 +45,7 @@ class MendingNeeds(Protocol):
     def progress(self) -> JobStatus | None: ...
 
 
-class HasMending(Protocol):
+class HasMending(CopyNeeds, Protocol):
     """A session with one."""
 
     @property
@@ -66,7 +67,7 @@ def draw_mending(session: HasMending, dispatch: Dispatch, ui: UiState) -> None:
     is_visible, is_kept = imgui.begin(TITLE, True, flags)
     ui.mark_rect("mend", _window_rect())
     if is_visible:
-        _draw_page(page, session.mending.progress, dispatch, ui)
+        _draw_page(session, page, dispatch, ui)
     imgui.end()
     if not is_kept:
         dispatch(CloseMend())
@@ -77,7 +78,7 @@ def _window_rect() -> Rect:
     return Rect(low.x, low.y, low.x + size.x, low.y + size.y)
 
 
-def _draw_page(page: MendPage, progress: JobStatus | None, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_page(session: HasMending, page: MendPage, dispatch: Dispatch, ui: UiState) -> None:
     clips = " and ".join(str(index) for index in page.clip_indices)
     text_wrapped(
         f"{page.words[0].upper()}{page.words[1:]}, {'clip' if len(page.clip_indices) == 1 else 'clips'} {clips}"
@@ -85,14 +86,14 @@ def _draw_page(page: MendPage, progress: JobStatus | None, dispatch: Dispatch, u
     if page.failure:
         text_warning(f"{page.failure} {page.hint}".strip())
     if page.state == "running":
-        _draw_progress(progress, dispatch, ui)
+        _draw_progress(session.mending.progress, dispatch, ui)
     elif page.record is None:
-        _draw_choice(page, dispatch, ui)
+        _draw_choice(session, page, dispatch, ui)
     else:
         _draw_result(page, page.record, dispatch, ui)
 
 
-def _draw_choice(page: MendPage, dispatch: Dispatch, ui: UiState) -> None:
+def _draw_choice(session: HasMending, page: MendPage, dispatch: Dispatch, ui: UiState) -> None:
     if page.why_not:
         text_warning(page.why_not)
     else:
@@ -109,6 +110,9 @@ def _draw_choice(page: MendPage, dispatch: Dispatch, ui: UiState) -> None:
         else:
             is_clicked = imgui.button(f"{METHOD_WORDS[method]} only", ImVec2(-1, 0))
         ui.mark(f"mend.{method}")
+        if imgui.begin_popup_context_item(f"copy {method}"):
+            draw_copy_entries(ui, "mend", lambda method=method: session.command_texts.mend(page.request, method))
+            imgui.end_popup()
         imgui.set_item_tooltip(AUTO_HINT if method == "auto" else f"Only this: {METHODS[method]}")
         if is_clicked:
             dispatch(StartMend(method))
