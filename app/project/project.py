@@ -214,7 +214,7 @@ class Project:
     def happen(self, event: Event) -> None:
         """Let something happen to the document, on disk first. Raises what `change` raises.
 
-        Not while a KeptDocument still has something to keep: events are kept in the order in which they are handed over.
+        Not while a KeptDocument still has something to keep: events are kept in the order in which they arrive.
         """
         self.check_writable()
         history = self.history.after(event)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -101,15 +101,16 @@ def disk_use(project: Project, n_clips: int) -> DiskUse:
     return DiskUse(tuple(ClipUse(*row) for row in rows), n_unused_bytes, n_unused, preparation, other)
 
 
-def _owner(place: tuple[str, ...], names: dict[str, int]) -> tuple[str, int | None]:
+def _owner(place: Sequence[str], names: dict[str, int]) -> tuple[str, int | None]:
     """Which part of which clip a file is, if of any. place: Names of folders and of the file inside the project."""
-    top, name = place[0], place[-1].partition(".")[0]
+    top, last = place[0], place[len(place) - 1]
+    name = last.partition(".")[0]
     if top == "prep" and name.startswith("clip-"):  # pieces of a preparation are kept by the index of the clip
         number = name.removeprefix("clip-").partition("-")[0]
         return "checkpoints", int(number) if number.isdecimal() else None
     if top == "versions" and len(place) > 2:
         return "versions", names.get(place[1])
-    if top == "checkpoints" or (top == "metrics" and place[-1].endswith(".unfinished.jsonl")):
+    if top == "checkpoints" or (top == "metrics" and last.endswith(".unfinished.jsonl")):
         return "checkpoints", names.get(name)
     return "clips", names.get(name) if top in ("clips", "metrics") else None
 

@@ -51,7 +51,7 @@ def test_a_damaged_file_is_put_aside_whatever_takes_its_place(tmp_path: Path) ->
     for content in (b"damaged once", b"damaged twice"):
         project.clip_path(1).unlink()  # files are replaced, never written in place
         project.clip_path(1).write_bytes(content)
-        assert set_aside(project, 1) is None, "it is no version"
+        assert set_aside(project, 1) is None, "it became a version"
     found = {path.name: path.read_bytes() for path in (project.folder / DAMAGED).iterdir()}
     assert found == {"0001-1.safetensors": b"damaged once", "0001-2.safetensors": b"damaged twice"}
     restore_version(project, 1, 1)
