@@ -51,8 +51,9 @@ bench: setup ## measure the figures of the README, print them as tables, draw ou
 	@$(BIN)/python -m tests.benchmarks.bench_quality $(SAMPLE)
 	@$(BIN)/clipgstream bench --full --out out
 	@$(BIN)/python -m tests.benchmarks.bench_window $(SAMPLE)
+	@$(BIN)/python -m tests.benchmarks.bench_selecting $(SAMPLE)
 
-faults: setup ## damage files and captures, contend for locks, kill trainings, fill disks: the figures of the README
+faults: setup ## damage files and captures, contend for locks, kill trainings and editing, fill disks: the figures of the README
 	@for script in $$(grep -l "^if __name__" tests/faults/*.py); do \
 		$(BIN)/python -m $$(echo $${script%.py} | tr / .) || exit 1; \
 	done

@@ -142,7 +142,8 @@ class SceneFrames:
             use_threads(self._n_threads)
             loaded = self.opened.load(clip.clip_index)
             header = self.opened.header(clip.clip_index)
-            self._named = named_sets(loaded.model, header, self.opened.project.settings.reference_clip)
+            reference = self.opened.reference
+            self._named = named_sets(loaded.model, header, 0 if reference is None else reference.header.clip_index)
             self._loaded, self._parts = replace(loaded, model=with_features(loaded.model, self._features)), {}
         return self._loaded
 

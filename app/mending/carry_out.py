@@ -8,6 +8,7 @@ from pathlib import Path
 from app.background.kernels import use_threads, warm_up_reporting
 from app.evaluation.headless import open_trained
 from app.mending.request import MendJob, MendResult
+from app.project.clip_versions import read_finished
 from app.project.mends.record import MendedClip, MendRecord, now_text
 from app.project.project import Project, open_project
 from app.training.build import clip_training
@@ -39,7 +40,7 @@ def mend(job: MendJob, report: ReportProgress) -> MendResult:
     warm_up_reporting(lambda progress: report(Progress(progress.stage, 0.0, progress.message)))
     project = open_project(job.project, is_writable=False)
     opened = open_trained(project)
-    settings, capture = project.settings, opened.capture
+    settings, capture = project.settings, opened.capture.without(project.document.exclusions)
     stretch = job.request.stretch(opened.clips)
     reference = _checked_reference(project, opened.reference)
     states = _states(project, opened.clips, opened.trained, stretch)
@@ -114,10 +115,10 @@ def _states(project: Project, clips: list[Clip], trained: list[int], stretch: St
         if index in indices:
             if index not in trained:
                 raise ProjectError(f"Clip {index} is not trained.", hint="Train it before it is mended.")
-            states[index] = read_clip_state(project.clip_path(index))
+            states[index] = read_finished(project, index)
         elif index in trained and 0 <= index < len(clips):
             try:
-                states[index] = read_clip_state(project.clip_path(index))
+                states[index] = read_finished(project, index)
             except ProjectError:
                 continue  # a damaged one does not count as a neighbour
     base = project.inherited_index(indices[-1])

@@ -13,6 +13,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from app.project.project import Project
 from engine.clip_files.clip_header import ClipHeader
 from engine.clip_files.clip_state import ClipState, read_clip_state
@@ -161,15 +163,18 @@ def recovery_hint(project: Project, clip_index: int) -> str:
 
 
 def read_finished(project: Project, clip_index: int) -> ClipState:
-    """A finished clip.
+    """A finished clip. Its header says which clip it is now, also where clips before it were split or merged since.
 
     Raises:
         ProjectError: It is damaged; says which version of it could come back.
     """
     try:
-        return read_clip_state(project.clip_path(clip_index))
+        state = read_clip_state(project.clip_path(clip_index))
     except ProjectError as error:
         raise ProjectError(error.message, hint=recovery_hint(project, clip_index), path=error.path) from error
+    if state.header.clip_index == clip_index:
+        return state
+    return ClipState(state.arrays, replace(state.header, clip_index=clip_index))
 
 
 def _is_whole(path: Path) -> bool:

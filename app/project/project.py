@@ -212,7 +212,10 @@ class Project:
         self.happen(Changed(name, document))
 
     def happen(self, event: Event) -> None:
-        """Let something happen to the document, on disk first. Raises what `change` raises."""
+        """Let something happen to the document, on disk first. Raises what `change` raises.
+
+        Not while a KeptDocument still has something to keep: events are kept in the order in which they arrive.
+        """
         self.check_writable()
         history = self.history.after(event)
         self.store.write([event], history)

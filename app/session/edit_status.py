@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from app.document.project_document import AS_CAPTURED, World
 from engine.camera.camera_path import CameraKey, CameraPath
 from engine.editing.edit import Edit
+from engine.editing.lost_picks import LostPicks
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +35,7 @@ class EditsStatus:
         edits: The stack, bottom first.
         labels: The user's own names of clips and cameras, by kind and name; see app.document.project_document.Label.
         world: Up and scale.
+        lost: Which of them have lost what was picked, because a clip was trained anew.
         can_edit: Whether anything can be changed now.
         why_not: The reason if not, and what to do.
     """
@@ -41,6 +43,7 @@ class EditsStatus:
     edits: tuple[Edit, ...] = ()
     labels: Mapping[tuple[str, str], str] = field(default_factory=dict)
     world: World = AS_CAPTURED
+    lost: tuple[LostPicks, ...] = ()
     can_edit: bool = False
     why_not: str = ""
 

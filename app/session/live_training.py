@@ -226,7 +226,7 @@ class LiveTraining:
         running = None if self.service is None else self.service.running_clip
         events = [] if self.service is None else self.service.poll()
         for event in events:
-            tell(event, self._notices)
+            tell(event, self._notices, running)
             if isinstance(event, SnapshotWritten):
                 self._unread = event
             elif isinstance(event, ENDINGS):

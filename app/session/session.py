@@ -55,7 +55,9 @@ from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
-from app.session.editing.selecting import Selecting, SelectionStatus
+from app.session.editing.lost_edits import LostEdits
+from app.session.editing.selecting import Selecting
+from app.session.editing.selection_status import SelectionStatus
 from app.session.editing.shown_to_select import ShownToSelect
 from app.session.exclusions.excluding import apply_exclusion
 from app.session.exclusions.exclusion_commands import ExclusionCommand
@@ -182,10 +184,10 @@ class Session:
         self.mending = Mending(self.live_training, lambda: self.overlays)
         self.marking, self.camera_paths = Marking(self.document), CameraPaths(self.document)
         self.selecting = Selecting(
-            ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self.overlays.content)
+            ShownToSelect(self.playback, self.residuals, lambda: self.timeline, lambda: self._shown_as)
         )
         self.selection = SelectionStatus()
-        self.editing = Edits(self.document, self.selecting)
+        self.editing = Edits(self.document, self.selecting, LostEdits(lambda: self.live_training.service))
         self.command_texts = CommandTexts(lambda: self.project, self.live_training.is_finished)
         self.edits: EditsStatus = self.editing.status()
         self.regions: RegionsStatus = self.marking.status([])

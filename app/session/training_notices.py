@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from app.session.notices import Notices
 from app.training.messages import ClipTrained, Event, TrainingFailed, TrainingStopped, WarningRaised, WorkerDied
 
 
-def tell(event: Event, notices: Notices) -> None:
+def tell(event: Event, notices: Notices, clip_index: int | None = None) -> None:
     """Add a notice if the user should know of this; most events show in the status alone."""
     match event:
-        case ClipTrained(path=path, held_out_psnr=psnr):
+        case ClipTrained(held_out_psnr=psnr):
             figure = "" if psnr is None else f"Held-out PSNR {psnr:.1f} dB."
-            notices.add("info", f"Clip {int(Path(path).stem)} is trained", figure)
+            notices.add("info", "A clip is trained" if clip_index is None else f"Clip {clip_index} is trained", figure)
         case TrainingStopped(path=path, step=step):
             detail = f"What was learned in {step} steps is kept." if path else "Nothing was learned yet."
             notices.add("info", "Training stopped", detail)

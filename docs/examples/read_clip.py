@@ -158,19 +158,32 @@ def sigmoid(values):
     return 1 / (1 + np.exp(-values))
 
 
+def clip_of(settings, frame=0, clip_index=None):
+    """Index, name of the file and first frame of the clip that holds a frame, or that has an index."""
+    length, bounds = settings["clip_length"], settings.get("clip_bounds")
+    if bounds is None:  # every clip has as many frames
+        clip_index = frame // length if clip_index is None else clip_index
+        return clip_index, f"{clip_index:04d}", clip_index * length
+    if clip_index is None:
+        clip_index = max(i for i, start in enumerate(bounds[:-1]) if start <= frame)
+    start, stop = bounds[clip_index], bounds[clip_index + 1]
+    is_regular = start % length == 0 and stop == min(start + length, bounds[-1])
+    return clip_index, f"{start // length:04d}" if is_regular else f"{start:06d}-{stop:06d}", start
+
+
 def read_frame(project, frame):
     """Gaussians of a frame of a project."""
     project = Path(project)
     settings = json.loads((project / "project.json").read_text("utf-8"))["settings"]
-    clip_index, frame_in_clip = divmod(frame, settings["clip_length"])
-    header, arrays = read_clip(project / "clips" / f"{clip_index:04d}.safetensors")
+    clip_index, name, start = clip_of(settings, frame=frame)
+    header, arrays = read_clip(project / "clips" / f"{name}.safetensors")
     reference = {}  # a clip that inherits nothing needs none
     if header["role"] == "source":
-        path = project / "clips" / f"{settings.get('reference_clip', 0):04d}.safetensors"
-        base, reference = read_clip(path)
+        _, name, _ = clip_of(settings, clip_index=settings.get("reference_clip", 0))
+        base, reference = read_clip(project / "clips" / f"{name}.safetensors")
         if base["fingerprint"] != header["reference_fingerprint"]:
             sys.exit(f"Clip {clip_index} was trained on another reference clip; train it again.")
-    return decode(header, arrays, reference, frame_in_clip)
+    return decode(header, arrays, reference, frame - start)
 
 
 if __name__ == "__main__":

@@ -70,10 +70,32 @@ def encode_array(array: np.ndarray, codec: str, **options: Any) -> CodedArray:
     little = np.ascontiguousarray(array.astype(array.dtype.newbyteorder("<"), copy=False)).reshape(array.shape)
     if little.dtype.str not in _DTYPES:
         raise CodingError(f"arrays of {array.dtype} cannot be stored")
-    raw, extra, bounds = _CODECS[codec][0](little, **options)
+    return _coded(little, codec, *_CODECS[codec][0](little, **options))
+
+
+def encode_on_grid_of(array: np.ndarray, other: CodedArray) -> CodedArray:
+    """Pack an array whose values lie where those of a coded array may lie, such as some of its rows, exactly.
+
+    Args:
+        other: Of `steps` with two axes, or of `lattice`; sound.
+    Raises:
+        CodingError: They do not lie there, or the other array has no grid.
+    """
+    codec, spec = other.spec["codec"], other.spec
+    if codec not in _ON_GRID or len(spec["shape"]) != 2 or array.shape[1:] != tuple(spec["shape"][1:]):
+        raise CodingError(f"{codec} has no grid for an array of shape {array.shape}")
+    before = lzma.decompress(other.payload.tobytes(), format=lzma.FORMAT_RAW, filters=_FILTERS)
+    raw = _ON_GRID[codec](array, before, spec)
+    coded = _coded(array, codec, raw, {key: spec[key] for key in ("bits",) if key in spec}, np.zeros(1))
+    if decode_array(coded.payload, coded.spec).tobytes() != array.tobytes():
+        raise CodingError(f"values lie beside the grid of {codec}")
+    return CodedArray(coded.payload, coded.spec | {"max_error": spec["max_error"]}, other.bounds)
+
+
+def _coded(array: np.ndarray, codec: str, raw: bytes, extra: dict[str, Any], bounds: np.ndarray) -> CodedArray:
     spec = {
         "codec": codec,
-        "dtype": little.dtype.str,
+        "dtype": array.dtype.str,
         "shape": list(array.shape),
         "n_bytes": len(raw),
         "crc32": zlib.crc32(raw),
@@ -230,6 +252,15 @@ def _grouped(array: np.ndarray) -> np.ndarray:
     return array.reshape(_group_shape(array.shape))
 
 
+def _steps_on_grid(array: np.ndarray, before: bytes, spec: dict[str, Any]) -> bytes:
+    n_channels, code_dtype = array.shape[1], _code_dtype(int(spec["bits"]))
+    sizes = np.frombuffer(before[: 16 * n_channels], "<f8").reshape(n_channels, 2)
+    codes = np.round(array.astype(np.float64) / np.where(sizes[:, 0] == 0, 1.0, sizes[:, 0])) - sizes[:, 1]
+    if not ((codes >= 0) & (codes <= np.iinfo(code_dtype).max)).all():
+        raise CodingError("values lie outside of the grid")
+    return before[: 16 * n_channels] + _planes(np.ascontiguousarray(codes.T.astype(code_dtype)))
+
+
 # ---------------------------------------------------------------- lattice
 
 
@@ -249,10 +280,23 @@ def _pack_lattice(array: np.ndarray, *, spacing: float) -> Packed:
     off = np.abs(origin + steps * spacing - positions).max(initial=0.0)
     if off > bound:
         raise CodingError(f"positions lie up to {off:.3g} beside a lattice of spacing {spacing:.6g}")
+    raw = np.array([*origin, spacing], "<f8").tobytes() + _folded_steps(steps)
+    return raw, {}, np.full(1, 1.5 * bound)
+
+
+def _lattice_on_grid(array: np.ndarray, before: bytes, spec: dict[str, Any]) -> bytes:
+    n_axes = array.shape[1]
+    numbers = np.frombuffer(before[: 8 * (n_axes + 1)], "<f8")
+    steps = np.round((array.astype(np.float64) - numbers[:n_axes]) / numbers[n_axes])
+    if not (np.abs(steps) < 2**30).all():
+        raise CodingError("the positions are too far apart")
+    return numbers.tobytes() + _folded_steps(steps)
+
+
+def _folded_steps(steps: np.ndarray) -> bytes:
     deltas = np.diff(steps, axis=0, prepend=0.0).astype(np.int64)
     folded = np.where(deltas < 0, -2 * deltas - 1, 2 * deltas).astype("<u4")  # small numbers for both signs
-    raw = np.array([*origin, spacing], "<f8").tobytes() + _planes(np.ascontiguousarray(folded.T))
-    return raw, {}, np.full(1, 1.5 * bound)
+    return _planes(np.ascontiguousarray(folded.T))
 
 
 def _fitted_spacing(offsets: np.ndarray, spacing: float) -> float:
@@ -306,4 +350,8 @@ _CODECS: dict[str, tuple[Callable[..., Packed], Callable[..., np.ndarray]]] = {
     "bits": (_pack_bits, _unpack_bits),
     "steps": (_pack_steps, _unpack_steps),
     "lattice": (_pack_lattice, _unpack_lattice),
+}
+_ON_GRID: dict[str, Callable[[np.ndarray, bytes, dict[str, Any]], bytes]] = {
+    "steps": _steps_on_grid,
+    "lattice": _lattice_on_grid,
 }

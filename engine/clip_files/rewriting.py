@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from engine.clip_files.clip_state import ClipState, read_coded_arrays, write_clip_state, write_coded_arrays
-from engine.clip_files.coding import CodedArray, CodingError, decode_array, encode_array
-
-_EXACT_HERE = ("half", "bits")
-"""Codecs that give rows back as they were, whichever other rows there are."""
+from engine.clip_files.coding import CodedArray, CodingError, decode_array, encode_array, encode_on_grid_of
 
 
 def rewrite_clip(source: Path, target: Path, state: ClipState) -> None:
@@ -33,21 +29,18 @@ def rewrite_clip(source: Path, target: Path, state: ClipState) -> None:
 
 
 def _coded(array: np.ndarray, before: CodedArray | None) -> CodedArray:
-    if before is not None and _is_same(decode_array(before.payload, before.spec), array):
+    """As before where nothing has changed, otherwise exactly and in as few bytes as that takes."""
+    if before is None:
+        return encode_array(array, "bits" if array.dtype == bool else "exact")
+    if _is_same(decode_array(before.payload, before.spec), array):
         return before
-    codec = "bits" if before is None and array.dtype == bool else _codec_of(before)
-    if codec in _EXACT_HERE:
-        try:
-            coded = encode_array(array, codec)
-        except CodingError:
-            coded = None
-        if coded is not None and _is_same(decode_array(coded.payload, coded.spec), array):
-            return coded
-    return encode_array(array, "exact")
-
-
-def _codec_of(coded: CodedArray | None) -> Any:
-    return None if coded is None else coded.spec.get("codec")
+    try:
+        if before.spec["codec"] not in ("half", "bits"):
+            return encode_on_grid_of(array, before)
+        coded = encode_array(array, before.spec["codec"])
+    except CodingError:
+        return encode_array(array, "exact")
+    return coded if _is_same(decode_array(coded.payload, coded.spec), array) else encode_array(array, "exact")
 
 
 def _is_same(one: np.ndarray, other: np.ndarray) -> bool:

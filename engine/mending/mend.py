@@ -78,7 +78,7 @@ class Mending:
         report: Told how far it is; what it raises ends the work.
 
     Raises:
-        ProjectError: A clip of the stretch is missing, or none of them may change.
+        ProjectError: A clip of the stretch is missing, or none of them may change, or cameras are not the capture's.
     """
 
     def __init__(
@@ -105,8 +105,13 @@ class Mending:
             )
         self._capture, self._stretch, self._clips, self._reference = capture, stretch, list(clips), reference
         self._states, self._make, self._report = dict(states), make_training, report
-        self._cameras = capture.training_cameras(holdout)
-        self._measuring = StretchMeasuring(capture, stretch, self._cameras, holdout, threads)
+        if unknown := set(reference.header.camera_names) - set(capture.rig.names):
+            raise ProjectError(f"The capture has no camera {sorted(unknown)[0]}, which clips were trained with.")
+        rows = {name: row for row, name in enumerate(capture.rig.names)}
+        self._cameras = [rows[name] for name in reference.header.camera_names]
+        seen = [camera for camera in self._cameras if camera not in capture.excluded_cameras]
+        held_out = [camera for camera in holdout if camera not in capture.excluded_cameras]
+        self._measuring = StretchMeasuring(capture, stretch, seen, held_out, threads)
         self._kept: dict[int, CompactClip] = {}
         self._shown = {index: self._trained(index, state) for index, state in states.items()}
         self._share = 0.0

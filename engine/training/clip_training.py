@@ -435,7 +435,9 @@ class ClipTraining:
                 parameter.requires_grad = False
         self.phases, self.steps_done = [("source", n_steps)], 0
         self._start_phase(0, 0)
-        self._order = ShuffledOrder(len(items), self.seed, items)
+        usable = set(self._items)
+        self._items = [item for item in items if item in usable] or self._items
+        self._order = ShuffledOrder(len(self._items), seed=self.seed)
 
     def write_checkpoint(self, path: Path | str) -> None:
         """State, optimiser, order of pictures and random state: enough to go on exactly."""

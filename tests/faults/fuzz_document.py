@@ -179,4 +179,4 @@ def _gone_on(store: Any, history: Any) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(fuzz_main("fuzz_document", __doc__ or "", run_case))
+    sys.exit(fuzz_main("fuzz_document", __doc__ or "", run_case, n_cases=2000))

@@ -243,14 +243,14 @@ def _status(key: str) -> int:
     return 0
 
 
-def fuzz_main(name: str, description: str, run_case: RunCase) -> int:
+def fuzz_main(name: str, description: str, run_case: RunCase, *, n_cases: int = 1000) -> int:
     """The command line of a script that damages things: prints each fault, what was damaged, and one line of results.
 
     Returns:
         The exit code: 1 when there was a fault.
     """
     parser = argparse.ArgumentParser(description=description.partition("\n")[0])
-    parser.add_argument("--cases", type=int, default=1000)
+    parser.add_argument("--cases", type=int, default=n_cases)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="index of the first case")
     options = parser.parse_args()

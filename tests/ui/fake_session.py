@@ -38,8 +38,8 @@ from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edit_commands import EditCommand
 from app.session.editing.edits import changed, edits_status
-from app.session.editing.selecting import SelectionStatus
 from app.session.editing.selection import NOTHING_SELECTED, Selection
+from app.session.editing.selection_status import SelectionStatus
 from app.session.exporting import ExportPage
 from app.session.marking import after_marking
 from app.session.mending.mend_page import MendPage

@@ -110,7 +110,7 @@ def in_rect(at: np.ndarray, rect: Rect) -> tuple[np.ndarray, np.ndarray]:
     """Whether points lie in a rectangle, and how far from its border."""
     off = np.stack([at[:, 0] - rect.x0, rect.x1 - at[:, 0], at[:, 1] - rect.y0, rect.y1 - at[:, 1]], axis=1)
     with np.errstate(invalid="ignore"):
-        return (off > 0.0).all(axis=1), np.abs(off).min(axis=1)
+        return np.asarray((off > 0.0).all(axis=1)), np.abs(off).min(axis=1)
 
 
 def yellow(pilot: Pilot, rect: Rect) -> int:
@@ -276,3 +276,22 @@ def test_all_none_invert_and_the_one_before_by_keyboard(window: Pilot) -> None:
     assert chosen(window).all()
     window.key(key.Y)
     assert tool(window).kind == "flood"
+
+
+def test_of_two_views_each_selects_in_its_own_picture(window: Pilot) -> None:
+    window.session.dispatch(c.ShowViews(2))
+    window.draw(6)
+    views = window.session.views
+    views.activate(1)
+    window.session.view.orbit(140.0, 30.0)
+    views.activate(0)
+    window.draw(4)
+    window.key(key.R)
+    area = window.rects["viewport.view1"]
+    x, y = area.center
+    rect = Rect(x - 0.2 * area.width, y - 0.3 * area.height, x + 0.15 * area.width, y + 0.1 * area.height)
+    window.drag((rect.x0, rect.y0), (rect.x1, rect.y1))
+    assert views.active_index == 1
+    window.draw(2)
+    at = pixels(window)
+    assert_chosen(window, *in_rect(at, rect), at)

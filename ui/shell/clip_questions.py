@@ -15,7 +15,7 @@ from app.session.clips.clip_questions import ClipQuestion, CutQuestion, DamagedQ
 from app.session.commands import CloseQuestion, Command, RestoreVersion, TrainClip
 from engine.text import duration_text, size_text
 from ui.panels.state import UiState
-from ui.panels.widgets import primary_button
+from ui.panels.widgets import primary_button, text_wrapped
 from ui.style.theme import Icon
 
 BUTTON_HEIGHT = 34.0
@@ -37,7 +37,7 @@ def clip_question_title(question: ClipQuestion) -> str:
 def draw_clip_question(question: ClipQuestion, ui: UiState, is_agreed: bool) -> Command | None:
     """Words and buttons. is_agreed: Enter was pressed."""
     for text in clip_question_texts(question):
-        imgui.text_wrapped(text.replace("%", "%%"))
+        text_wrapped(text)
         imgui.spacing()
     match question:
         case CutQuestion():

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from app.session.editing.selecting import SelectionStatus
+from app.session.editing.selection_status import SelectionStatus
 from app.session.notices import Notices
 from app.status import JobStatus, ProjectStatus, QueueStatus, TrainingStatus, UsageStatus
 from engine.text import duration_text

@@ -103,13 +103,14 @@ def disk_use(project: Project, n_clips: int) -> DiskUse:
 
 def _owner(place: tuple[str, ...], names: dict[str, int]) -> tuple[str, int | None]:
     """Which part of which clip a file is, if of any. place: Names of folders and of the file inside the project."""
-    top, name = place[0], place[-1].partition(".")[0]
+    top, last = place[0], place[len(place) - 1]
+    name = last.partition(".")[0]
     if top == "prep" and name.startswith("clip-"):  # pieces of a preparation are kept by the index of the clip
         number = name.removeprefix("clip-").partition("-")[0]
         return "checkpoints", int(number) if number.isdecimal() else None
     if top == "versions" and len(place) > 2:
         return "versions", names.get(place[1])
-    if top == "checkpoints" or (top == "metrics" and place[-1].endswith(".unfinished.jsonl")):
+    if top == "checkpoints" or (top == "metrics" and last.endswith(".unfinished.jsonl")):
         return "checkpoints", names.get(name)
     return "clips", names.get(name) if top in ("clips", "metrics") else None
 

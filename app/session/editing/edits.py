@@ -12,6 +12,7 @@ from app.document.project_document import ProjectDocument
 from app.session.edit_status import EditsStatus
 from app.session.editing import edit_commands as c
 from app.session.editing.kept_document import KeptDocument
+from app.session.editing.lost_edits import LostEdits
 from app.session.editing.selection import NOTHING_SELECTED, Selection
 from engine.editing.edit import Delete, Hide
 from engine.errors import ProjectError
@@ -43,15 +44,18 @@ class Edits:
     Args:
         document: Holds and keeps them.
         selecting: What is selected becomes the target of edits.
+        lost: Knows which edits have lost what was picked.
     """
 
-    def __init__(self, document: KeptDocument, selecting: Selects) -> None:
-        self._document, self._selecting = document, selecting
+    def __init__(self, document: KeptDocument, selecting: Selects, lost: LostEdits) -> None:
+        self._document, self._selecting, self._lost = document, selecting, lost
 
     def status(self) -> EditsStatus:
         """Everything as one value."""
         content, why_not = self._document.content, self._document.why_not()
-        return EditsStatus(why_not=why_not) if content is None else edits_status(content, why_not)
+        if content is None:
+            return EditsStatus(why_not=why_not)
+        return replace(edits_status(content, why_not), lost=self._lost.of(content.edits))
 
     def apply(self, command: c.EditCommand) -> None:
         """Carry out a command; one that changes nothing does not become a step of the history.
@@ -90,7 +94,7 @@ class Edits:
 def edits_status(document: ProjectDocument, why_not: str = "") -> EditsStatus:
     """What a window shows of a document. why_not: Why nothing can be changed now; empty when it can."""
     labels = {(label.kind, label.name): label.text for label in document.labels}
-    return EditsStatus(document.edits, labels, document.world, not why_not, why_not)
+    return EditsStatus(document.edits, labels, document.world, can_edit=not why_not, why_not=why_not)
 
 
 def changed(document: ProjectDocument, command: c.EditCommand) -> Change:

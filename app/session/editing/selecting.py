@@ -27,6 +27,7 @@ from app.session.editing.selection_commands import (
     SelectByAttribute,
     SelectionCommand,
 )
+from app.session.editing.selection_status import SelectionStatus
 from engine.editing.gaussian_rows import GaussianRows
 from engine.editing.selection.projected import project_gaussians
 from engine.editing.selection.ranges import Spread, spread_of
@@ -36,28 +37,6 @@ from engine.errors import ProjectError
 
 FIND, SPREAD, SHARE = "find", "spread", "share"
 """Lanes of the thread."""
-
-
-@dataclass(frozen=True, slots=True)
-class SelectionStatus:
-    """What the window shows of the selection.
-
-    Attributes:
-        words: "1,240 Gaussians, 96 anchors, 3 clips"; empty where nothing is selected.
-        n_gaussians, n_shown: Selected ones, and those of them that exist in the shown frame.
-        is_busy: Whether something is being looked for.
-        has_before: Whether there is a selection to go back to.
-        can_select: Whether there are Gaussians to select.
-        revision: Differs whenever the selection does.
-    """
-
-    words: str = ""
-    n_gaussians: int = 0
-    n_shown: int = 0
-    is_busy: bool = False
-    has_before: bool = False
-    can_select: bool = False
-    revision: int = 0
 
 
 class Shown(Protocol):

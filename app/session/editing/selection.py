@@ -64,11 +64,12 @@ class Selection:
         """
         parts = dict(self.parts) if keeps_others else {}
         for place, row_set in enumerate(rows.sets):
-            is_here = rows.set_index == place
-            kept = parts.get(row_set, _NONE)
-            if len(kept):
-                kept = kept[~np.isin(kept, rows.number[is_here])]
-            parts[row_set] = np.union1d(kept, rows.number[is_here & mask]).astype(np.int64)
+            is_here, kept = rows.set_index == place, parts.get(row_set, _NONE)
+            here = rows.number[is_here]
+            table = np.zeros(max(int(kept.max(initial=-1)), int(here.max(initial=-1))) + 1, np.bool_)
+            table[kept] = True
+            table[here] = mask[is_here]
+            parts[row_set] = np.flatnonzero(table)
         return Selection(tuple((row_set, numbers) for row_set, numbers in parts.items() if len(numbers)))
 
     def target(self) -> Picked:

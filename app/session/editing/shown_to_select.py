@@ -9,7 +9,7 @@ import numpy as np
 from app.playback.arrays import GaussianArrays
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
-from app.playback.view_modes import ShownAs
+from app.playback.view_modes import ShownAs, decoded_as
 from app.residuals.residuals import Residuals
 from app.session.editing.attributes import AnchorValues
 
@@ -19,18 +19,22 @@ class ShownToSelect:
 
     Args:
         timeline: Of the session, now.
-        content: Which part of clips is shown, see app.playback.view_modes.CONTENTS.
+        shown_as: In which mode and which part of clips.
     """
 
     def __init__(
-        self, playback: Playback, residuals: Residuals, timeline: Callable[[], Timeline], content: Callable[[], str]
+        self,
+        playback: Playback,
+        residuals: Residuals,
+        timeline: Callable[[], Timeline],
+        shown_as: Callable[[], ShownAs],
     ) -> None:
-        self._playback, self._residuals, self._timeline, self._content = playback, residuals, timeline, content
+        self._playback, self._residuals, self._timeline, self._shown_as = playback, residuals, timeline, shown_as
         self._per_anchor = 1
 
     def selectable(self) -> GaussianArrays | None:
         """Gaussians of the shown frame in their own colours; None where nothing is trained."""
-        shown = self._playback.frame(self._timeline(), ShownAs(content=self._content()))
+        shown = self._playback.frame(self._timeline(), decoded_as(self._shown_as()))
         return None if shown is None else shown.gaussians
 
     def anchor_values(self, column: str) -> AnchorValues | None:
@@ -38,7 +42,7 @@ class ShownToSelect:
         if column:
             heat = self._residuals.anchor_heat(self._timeline(), column)
             return None if heat is None or heat.is_stale or heat.note else AnchorValues(heat.positions, heat.values)
-        shown = self._playback.frame(self._timeline(), ShownAs(content=self._content()))
+        shown = self._playback.frame(self._timeline(), decoded_as(self._shown_as()))
         if shown is None:
             return None
         positions = np.concatenate([shown.anchors.inherited_positions, shown.anchors.own_positions])

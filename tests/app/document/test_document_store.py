@@ -18,6 +18,12 @@ from engine.errors import DiskError, ProjectError
 from tests.app.document.documents import EMPTY, as_bytes, random_events
 
 
+@pytest.fixture(autouse=True)
+def fast_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test here waits until the disk has flushed thousands of lines."""
+    monkeypatch.setattr(os, "fsync", lambda handle: None)
+
+
 def marked(history: DocumentHistory, frame: int, merge: object = None) -> Changed:
     """A small change."""
     document = replace(history.present, markers=(*history.present.markers, Marker(frame, "x"))[-3:])

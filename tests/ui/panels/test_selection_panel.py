@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 from pyglet.window import key
 
 from app.playback.arrays import AnchorArrays
-from app.session.editing.selecting import SelectionStatus
 from app.session.editing.selection_commands import (
     ClearSelection,
     GrowSelection,
@@ -22,6 +22,7 @@ from app.session.editing.selection_commands import (
     SelectVolume,
     ShrinkSelection,
 )
+from app.session.editing.selection_status import SelectionStatus
 from engine.editing.edit import Box, Sphere
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import CTRL, SHIFT, Pilot
@@ -46,6 +47,11 @@ def panel(open_pilot: Callable[..., Pilot], monkeypatch: pytest.MonkeyPatch) -> 
     return pilot
 
 
+def about(value: float, *, abs: float | None = None) -> Any:
+    """Equal to numbers near it, in the place of one."""
+    return pytest.approx(value, abs=abs)
+
+
 def tool(pilot: Pilot) -> SelectTool:
     return pilot.studio.frame.ui.selecting
 
@@ -56,8 +62,8 @@ def test_every_button_sends_its_command(panel: Pilot) -> None:
         ("none", ClearSelection()),
         ("invert", InvertSelection()),
         ("before", Reselect()),
-        ("grow", GrowSelection(pytest.approx(0.3))),
-        ("shrink", ShrinkSelection(pytest.approx(0.3))),
+        ("grow", GrowSelection(about(0.3))),
+        ("shrink", ShrinkSelection(about(0.3))),
     ):
         panel.click(f"selection.{name}")
         assert panel.session.commands[-1] == command
@@ -69,8 +75,8 @@ def test_the_same_by_keys(panel: Pilot) -> None:
         (key.A, (CTRL, SHIFT), ClearSelection()),
         (key.I, (CTRL,), InvertSelection()),
         (key.Z, (key.LALT,), Reselect()),
-        (key.BRACKETRIGHT, (CTRL,), GrowSelection(pytest.approx(0.3))),
-        (key.BRACKETLEFT, (CTRL,), ShrinkSelection(pytest.approx(0.3))),
+        (key.BRACKETRIGHT, (CTRL,), GrowSelection(about(0.3))),
+        (key.BRACKETLEFT, (CTRL,), ShrinkSelection(about(0.3))),
     ):
         panel.key(symbol, modifiers=modifiers)
         assert panel.session.commands[-1] == command
@@ -97,9 +103,7 @@ def test_a_range_by_its_handles_and_by_numbers(panel: Pilot) -> None:
     panel.click("selection.add")
     panel.click("selection.by_range")
     (command,) = panel.sent(SelectByAttribute)
-    assert command == SelectByAttribute(
-        "opacity", pytest.approx(0.25, abs=0.02), pytest.approx(0.75, abs=0.02), How("add")
-    )
+    assert command == SelectByAttribute("opacity", about(0.25, abs=0.02), about(0.75, abs=0.02), How("add"))
     panel.click("selection.low")
     panel.key(key.A, modifiers=(CTRL,))
     panel.type("0.5")
@@ -145,7 +149,9 @@ def test_a_box_and_a_sphere_by_numbers(panel: Pilot) -> None:
     panel.key(key.A, modifiers=(CTRL,))
     panel.type("-4")  # a radius below nothing is held
     panel.key(key.ENTER)
-    assert tool(panel).volume.radius > 0.0
+    held = tool(panel).volume
+    assert isinstance(held, Sphere)
+    assert held.radius > 0.0
     panel.click("selection.new_box")
     panel.click("selection.by_volume")
     assert isinstance(panel.sent(SelectVolume)[-1].volume, Box)

@@ -14,7 +14,7 @@ from app.playback.orbit_view import OrbitView
 from app.playback.timeline import Timeline
 from app.playback.views import Views
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
-from app.session.editing.selecting import SelectionStatus
+from app.session.editing.selection_status import SelectionStatus
 from app.status import Overlays, QueueStatus, TrainingStatus, VersionStatus, WantedFrame
 from engine.camera.rig import CameraRig
 from engine.capture.exclusions import Exclusions

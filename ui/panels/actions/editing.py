@@ -107,6 +107,8 @@ def _no_edits(session: ActionNeeds) -> str:
     return _cannot_edit(session) or ("" if session.edits.edits else "There are no edits yet.")
 
 
+STACK = "Edit/Stack"
+
 ACTIONS = (
     *(
         Action(f"edit.{making.name}", making.words, EDIT, _make(making), keys=making.keys, lacks=_cannot_edit)
@@ -127,14 +129,17 @@ ACTIONS = (
         )
         for choice in SCOPE_CHOICES
     ),
-    Action("edit.above", "Choose the edit above", EDIT, _choose_by(1), keys=("Alt+Up",), lacks=_no_edits),
-    Action("edit.below", "Choose the edit below", EDIT, _choose_by(-1), keys=("Alt+Down",), lacks=_no_edits),
+    Action("edit.above", "Choose the edit above", EDIT, _choose_by(1), keys=("Alt+Up",), menu=STACK, lacks=_no_edits),
+    Action(
+        "edit.below", "Choose the edit below", EDIT, _choose_by(-1), keys=("Alt+Down",), menu=STACK, lacks=_no_edits
+    ),
     Action(
         "edit.raise",
         "Chosen edit one up: later",
         EDIT,
         _of_chosen(_moved_by(1)),
         keys=("Alt+Shift+Up",),
+        menu=STACK,
         lacks=_no_edits,
     ),
     Action(
@@ -143,6 +148,7 @@ ACTIONS = (
         EDIT,
         _of_chosen(_moved_by(-1)),
         keys=("Alt+Shift+Down",),
+        menu=STACK,
         lacks=_no_edits,
     ),
     Action(
@@ -151,6 +157,7 @@ ACTIONS = (
         EDIT,
         _of_chosen(lambda session, edit: ToggleEdit(edit.edit_id)),
         keys=("Ctrl+H",),
+        menu=STACK,
         lacks=_no_edits,
     ),
     Action(
@@ -159,6 +166,7 @@ ACTIONS = (
         EDIT,
         _of_chosen(lambda session, edit: DuplicateEdit(edit.edit_id)),
         keys=("Ctrl+D",),
+        menu=STACK,
         lacks=_no_edits,
     ),
     Action(
@@ -167,6 +175,7 @@ ACTIONS = (
         EDIT,
         _of_chosen(lambda session, edit: RemoveEdit(edit.edit_id)),
         keys=("Shift+Delete",),
+        menu=STACK,
         lacks=_no_edits,
     ),
     Action("world.up_of_view", "Up is as in this view", EDIT, _up_of_view, menu="Edit/World", lacks=_cannot_edit),

@@ -82,7 +82,7 @@ ACTIONS = (
         "Paint over what training does not see of this camera",
         TRAIN,
         _paint("all"),
-        keys=("Alt+B",),
+        keys=("Alt+N",),
         lacks=_no_camera,
         menu="Train/Exclude",
     ),

@@ -11,9 +11,9 @@ from msgspec import structs
 from app.playback.arrays import GaussianArrays
 from app.session.edit_status import EditsStatus
 from app.session.editing.edit_commands import ChangeEdit
-from app.session.editing.selecting import SelectionStatus
 from app.session.editing.selection import Selection
 from app.session.editing.selection_commands import InvertSelection
+from app.session.editing.selection_status import SelectionStatus
 from engine.editing.edit import Box, Edit, Sphere, Transform, Vector
 from ui.panels.state import Dispatch, UiState
 from ui.viewport.editing.handles import Thing, middle_of

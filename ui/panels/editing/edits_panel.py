@@ -8,9 +8,10 @@ from imgui_bundle import ImVec2, imgui
 
 from app.document.edit_words import edit_title, scope_text, target_text
 from app.playback.orbit_view import OrbitView
+from app.session.clips.clip_commands import ApplyDeletions
 from app.session.edit_status import HistoryStatus
 from app.session.editing.edit_commands import DuplicateEdit, MoveEdit, RemoveEdit, ToggleEdit
-from engine.editing.edit import Edit
+from engine.editing.edit import Delete, Edit
 from engine.text import one_line
 from ui.panels.copying import CopyNeeds, draw_copy_entries
 from ui.panels.editing.details import draw_details
@@ -48,7 +49,8 @@ def draw_edits(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> Non
     ui.editing.follow(session.edits.edits)
     if session.edits.why_not:
         text_warning(session.edits.why_not)
-    draw_making(session, dispatch, ui)
+    if imgui.collapsing_header("New edit", imgui.TreeNodeFlags_.default_open):
+        draw_making(session, dispatch, ui)
     imgui.separator()
     _draw_stack(session, dispatch, ui)
     imgui.begin_disabled(not session.edits.can_edit)
@@ -86,6 +88,13 @@ def _draw_stack(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> No
                 _draw_row(session, dispatch, ui, edits[position], position)
                 imgui.pop_id()
     imgui.end_child()
+    is_deleting = any(edit.is_on and isinstance(edit.action, Delete) for edit in edits)
+    imgui.begin_disabled(not (session.edits.can_edit and is_deleting))
+    if imgui.button("Apply permanently ..."):
+        dispatch(ApplyDeletions())
+    ui.mark("edits.apply")
+    imgui.end_disabled()
+    imgui.set_item_tooltip("Writes clips again without what is deleted everywhere, once you have confirmed it")
 
 
 def _draw_row(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: Edit, position: int) -> None:
@@ -109,7 +118,12 @@ def _draw_row(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: E
     if edit.name:
         words = f"{target_text(edit.target, is_inverted=edit.is_inverted)}, {words}"
     words = words if edit.is_on else f"off, {words}"
-    draw.add_text(ImVec2(x, low.y + 22), theme.u32(theme.TEXT_DIM), elided(words, room))
+    lost = next((one for one in session.edits.lost if one.edit_id == edit.edit_id), None)
+    if lost is not None:
+        words = f"{Icon.WARNING}  {'all' if lost.is_all else 'some'} of what was picked is gone, {words}"
+    draw.add_text(
+        ImVec2(x, low.y + 22), theme.u32(theme.TEXT_DIM if lost is None else theme.ORANGE), elided(words, room)
+    )
     imgui.set_cursor_screen_pos(ImVec2(low.x + 2, low.y + 8))
     imgui.begin_disabled(not session.edits.can_edit)
     if imgui.button(f"{Icon.EYE if edit.is_on else ' – '}##on", ImVec2(BUTTON_WIDTH, 26)):

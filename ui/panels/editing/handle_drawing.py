@@ -40,7 +40,7 @@ def draw_handles(
     for handle in reversed(handles_of(thing)):
         is_pointed = handle == (tool.held or tool.pointed)
         if handle.kind == "ring":
-            _draw_ring(draw, ring_of(thing, handle, lens), handle, lens, pane, is_pointed=is_pointed)
+            _draw_ring(draw, ui, ring_of(thing, handle, lens), handle, lens, pane, is_pointed=is_pointed)
             continue
         at = _on_screen(place_of(thing, handle, lens), lens, pane)
         if at is None:
@@ -79,11 +79,20 @@ def draw_points(draw: imgui.ImDrawList, tool: EditTool, view: SceneView, pane: R
 
 
 def _draw_ring(
-    draw: imgui.ImDrawList, ring: np.ndarray, handle: Handle, lens: Lens, pane: Rect, *, is_pointed: bool
+    draw: imgui.ImDrawList,
+    ui: UiState,
+    ring: np.ndarray,
+    handle: Handle,
+    lens: Lens,
+    pane: Rect,
+    *,
+    is_pointed: bool,
 ) -> None:
     pixels, is_seen = lens.pixels(ring)
     if not is_seen.all():
         return
+    x, y = pixels[len(pixels) // 8] / lens.pixels_per_unit + [pane.x0, pane.y0]  # between two other rings
+    ui.mark_rect(f"handle.{handle.name}", Rect(x - 1, y - 1, x + 1, y + 1))
     color = ON_PICTURE.playhead if is_pointed else theme.faded(COLORS[handle.axis], 0.9)
     for shade, width in ((theme.faded(theme.VOID, 0.6), LINE + RIM), (color, LINE + is_pointed)):
         draw.path_clear()

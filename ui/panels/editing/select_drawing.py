@@ -18,6 +18,8 @@ from ui.viewport.scene import SceneView
 
 N_SEGMENTS = 48
 WIDTH, RIM_WIDTH = 1.6, 3.6
+GIZMO_ROOM = 110.0
+"""What the axes in the upper right corner take."""
 LEAST_SHARE = 0.02
 """Of the distance of what is drawn: lines nearer to the eye than this are cut off."""
 
@@ -51,7 +53,7 @@ def draw_hint(draw: imgui.ImDrawList, tool: SelectTool, area: Rect) -> None:
     mode = tool.held_mode if tool.is_dragging else tool.mode
     x = chip(draw, area.x0, area.y0, f"{TOOL_WORDS[tool.kind]}: {MODE_WORDS[mode].lower()}", color=ON_PICTURE.yellow)
     keys = f"{TOOL_HINTS[tool.kind]}   Shift adds   Ctrl subtracts   Esc leaves"
-    if imgui.calc_text_size(keys).x + 26 < area.x1 - x:
+    if imgui.calc_text_size(keys).x + 26 < area.x1 - x - GIZMO_ROOM:
         chip(draw, x + 4, area.y0, keys, color=ON_PICTURE.text_dim)
 
 

@@ -26,6 +26,9 @@ Pick = Callable[[float, float], np.ndarray | None]
 class SelectGrip:
     """Leads the tool in one picture."""
 
+    def __init__(self) -> None:
+        self._has_drag = False  # there may be other pictures
+
     def follow(
         self,
         session: ActionNeeds,
@@ -56,11 +59,13 @@ class SelectGrip:
             if imgui.is_item_deactivated():
                 self._finish(session, dispatch, tool, pointer, view, pane, density, pick, spacing)
             return
-        if not tool.is_active or (pointer.drag is None and tool.is_dragging):
+        if self._has_drag and tool.is_dragging:  # somebody has taken the pointer away
             tool.points, tool.surface = [], None
+        self._has_drag = False
         is_pressed = imgui.is_item_activated() and pointer.button == imgui.MouseButton_.left
         if tool.is_active and is_pressed and pointer.drag in ("view", "nothing") and pane.contains(x, y):
             pointer.take_press(DRAG)
+            self._has_drag = True
             tool.begin(*pointer.pressed_at, _mode(tool), pick(*pointer.pressed_at) if _needs_surface(tool) else None)
 
     def _finish(

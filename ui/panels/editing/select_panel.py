@@ -9,7 +9,6 @@ from imgui_bundle import ImVec2, imgui
 
 from app.playback.arrays import AnchorArrays
 from app.playback.orbit_view import OrbitView
-from app.session.editing.selecting import SelectionStatus
 from app.session.editing.selection_commands import (
     ClearSelection,
     GrowSelection,
@@ -18,6 +17,7 @@ from app.session.editing.selection_commands import (
     SelectAll,
     ShrinkSelection,
 )
+from app.session.editing.selection_status import SelectionStatus
 from engine.editing.selection.ranges import Spread
 from engine.editing.selection.set_algebra import SELECT_MODES
 from ui.panels.editing.edit_subject import invert_selection
@@ -67,7 +67,7 @@ def draw_selection(session: SelectionPanelNeeds, dispatch: Dispatch, ui: UiState
         text_wrapped_dim("What you select in the picture is counted here when a capture is open.")
         return
     if not status.can_select:
-        text_wrapped_dim("There are no Gaussians to select in this frame: it is not trained, or anchors are shown.")
+        text_wrapped_dim("There are no Gaussians to select in this frame: it is not trained.")
     _draw_counts(status, ui)
     imgui.begin_disabled(not status.can_select)
     imgui.separator_text("Tool")

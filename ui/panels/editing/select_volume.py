@@ -75,4 +75,4 @@ def _input_vector(label: str, vector: Vector, ui: UiState) -> Vector:
 
 
 def _room() -> float:
-    return -imgui.calc_text_size("Half sizes ").x
+    return -imgui.calc_text_size("Half sizes    ").x

@@ -59,7 +59,7 @@ class ExcludedDrawing:
         self._lines = np.zeros((0, 4))
 
     def draw(self, draw: imgui.ImDrawList, session: ExcludedNeeds, ui: UiState, pane: Rect) -> None:
-        """Over one picture, clipped by the caller; nothing over a view that is no camera's."""
+        """Over one picture, clipped by the caller; nothing over a free view."""
         camera = session.view.look_through
         if camera is None or camera >= len(session.rig.names):
             return

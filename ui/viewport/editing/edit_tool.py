@@ -37,7 +37,6 @@ class EditTool:
         points: Those that were given, scene units, [3] each.
         length_m: Known length between two points, m.
         renamed: The name that is being written; None while it is that of the edit.
-        is_applying: Is it being asked whether the edits are to be applied permanently?
     """
 
     chosen: int | None = None
@@ -54,7 +53,6 @@ class EditTool:
     points: list[np.ndarray] = field(default_factory=list)
     length_m: float = 1.0
     renamed: str | None = None
-    is_applying: bool = False
     _pressed_s: float = -1e9
 
     def follow(self, edits: tuple[Edit, ...]) -> None:

@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 
 from app.playback.arrays import GaussianArrays
-from app.session.editing.selecting import SelectionStatus
+from app.session.editing.selection_status import SelectionStatus
 from engine.editing.selection.seen_from import SeenFrom
 from ui.gl import PointRenderer, Target
 from ui.gl.shaders import load_program

@@ -1,0 +1,184 @@
+"""Mending through the session: asked, run, compared, kept or taken back. What it computes is made up here."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import torch  # noqa: F401  playback loads it on a thread; half loaded it would meet the seeds of the next test
+
+from app.background.jobs import JobCancelled, JobContext
+from app.mending.mend_project import MendOutcome
+from app.mending.request import MendRequest
+from app.project.mends.in_place import put_in_place
+from app.project.mends.record import MendedClip, MendRecord
+from app.project.project import Project
+from app.session import commands as c
+from app.session.mending import mending
+from app.session.mending.mend_commands import AskMend, CloseMend, CompareMended, RevertMend, StartMend, StopMend
+from app.session.mending.mend_page import MendPage
+from app.session.session import Session
+from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
+from engine.errors import ProjectError
+from engine.mending.figures import StretchFigures
+from tests.app.conftest import poll_until
+
+Make = Callable[..., Session]
+BEFORE = StretchFigures(excess=0.4, worst=0.5, elsewhere=0.2, psnr={"0": 30.0, "1": 29.0})
+AFTER = StretchFigures(excess=0.1, worst=0.2, elsewhere=0.2, psnr={"0": 30.0, "1": 29.5})
+
+
+def made_up(project: Project, request: MendRequest) -> Callable[[JobContext], MendOutcome]:
+    """Clip 1 with another number in it."""
+
+    def work(context: JobContext) -> MendOutcome:
+        context.report(0.5, "Fading")
+        state = read_clip_state(project.clip_path(1))
+        changed = ClipState(state.arrays | {"value": np.array([7.0], np.float32)}, state.header).stamped()
+        draft = project.folder / "draft.safetensors"
+        write_clip_state(draft, changed)
+        clip = MendedClip(1, state.header.fingerprint, changed.header.fingerprint)
+        record = MendRecord("the seam at frame 3", 2, 4, (clip,), BEFORE, AFTER, (), "It jumps.", "", 1.0)
+        return MendOutcome(record, put_in_place(project, record, {1: draft}))
+
+    return work
+
+
+@pytest.fixture
+def session(make_session: Make, monkeypatch: pytest.MonkeyPatch) -> Session:
+    """Two clips of three frames, both trained."""
+    monkeypatch.setattr(mending, "mend_work", made_up)
+    made = make_session()
+    made.dispatch(c.SetClipLength(3))
+    made.dispatch(c.TrainAll())
+    poll_until(made, lambda: [clip.state for clip in made.clip_states] == ["trained", "trained"], what="the training")
+    return made
+
+
+def page_of(session: Session) -> MendPage:
+    assert session.mending.page is not None
+    return session.mending.page
+
+
+def mend(session: Session) -> MendPage:
+    session.dispatch(AskMend(after=1))
+    session.dispatch(StartMend())
+    poll_until(session, lambda: page_of(session).state != "running", what="the end of the mending")
+    return page_of(session)
+
+
+def fingerprint(session: Session, clip_index: int = 1) -> str:
+    assert session.project is not None
+    return read_clip_state(session.project.clip_path(clip_index)).header.fingerprint
+
+
+def test_a_seam_is_asked_about_before_anything_happens(session: Session) -> None:
+    before = fingerprint(session)
+    session.dispatch(AskMend(after=1))
+    page = page_of(session)
+    assert (page.state, page.words, page.frame, page.clip_indices) == ("asking", "the seam at frame 3", 3, (0, 1))
+    assert not page.why_not
+    session.dispatch(CloseMend())
+    assert session.mending.page is None
+    assert fingerprint(session) == before
+
+
+def test_a_mended_clip_is_shown_compared_and_taken_back(session: Session) -> None:
+    before = fingerprint(session)
+    page = mend(session)
+    assert (page.state, page.number, page.record.has_helped if page.record else None) == ("done", 1, True)
+    after = fingerprint(session)
+    assert after != before
+    assert session.live_training.service is not None
+    assert session.live_training.service.catalog[1].revision == f"trained-{after}", "it is shown at once"
+    session.timeline.seek(0)
+    session.dispatch(CompareMended())
+    assert (session.overlays.compare, session.overlays.compare_with) == ("side", "version 1")
+    assert session.timeline.frame_index == 3, "the clip that changed is looked at"
+    session.dispatch(CompareMended())
+    assert session.overlays.compare == "off"
+    session.dispatch(CompareMended())
+    session.dispatch(RevertMend())
+    poll_until(session, lambda: page_of(session).state == "reverted", what="the way back")
+    assert session.overlays.compare == "off"
+    assert fingerprint(session) == before
+    assert session.live_training.service.catalog[1].revision == f"trained-{before}"
+    session.dispatch(RevertMend())  # once is enough
+    assert page_of(session).state == "reverted"
+
+
+def test_what_cannot_be_mended_says_why(session: Session, make_session: Make) -> None:
+    session.dispatch(AskMend(after=2))
+    assert "no boundary before clip 2" in list(session.notices)[-1].detail
+    session.dispatch(AskMend(frames=(0, 3)))
+    assert "reference clip" in page_of(session).why_not
+    session.dispatch(StartMend())
+    assert page_of(session).state == "asking"
+    other = make_session(name="untrained")
+    other.dispatch(c.SetClipLength(3))
+    other.dispatch(AskMend(after=1))
+    assert page_of(other).why_not == "Clip 0 is not trained, or out of date. Train it first."
+
+
+def test_without_a_capture_there_is_nothing_to_mend(make_session: Make) -> None:
+    session = make_session(is_open=False)
+    for command in (AskMend(after=1), StartMend(), RevertMend(), CompareMended()):
+        session.dispatch(command)
+    assert {notice.title for notice in session.notices} == {"That cannot be mended"}
+    session.dispatch(CloseMend())
+    assert session.mending.page is None
+
+
+def test_a_failure_is_told_in_its_place(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(project: Project, request: MendRequest) -> Callable[[JobContext], MendOutcome]:
+        def work(context: JobContext) -> MendOutcome:
+            raise ProjectError("The disk is full.", hint="Make room.")
+
+        return work
+
+    monkeypatch.setattr(mending, "mend_work", failing)
+    before = fingerprint(session)
+    page = mend(session)
+    assert (page.state, page.failure, page.hint) == ("asking", "The disk is full.", "Make room.")
+    assert fingerprint(session) == before
+
+
+def test_stopping_leaves_the_clips_as_they_were(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    has_ended = threading.Event()
+
+    def endless(project: Project, request: MendRequest) -> Callable[[JobContext], MendOutcome]:
+        def work(context: JobContext) -> MendOutcome:
+            try:
+                while True:
+                    context.report(0.5, "Fading")
+                    has_ended.wait(0.001)
+            except JobCancelled:
+                has_ended.set()
+                raise
+
+        return work
+
+    monkeypatch.setattr(mending, "mend_work", endless)
+    before = fingerprint(session)
+    session.dispatch(AskMend(after=1))
+    session.dispatch(StartMend())
+    assert page_of(session).state == "running"
+    session.dispatch(AskMend(after=1))  # one at a time
+    assert page_of(session).state == "running"
+    session.dispatch(StopMend())
+    assert page_of(session).state == "asking"
+    assert has_ended.wait(30.0)
+    poll_until(session, lambda: session.mending.progress is None)
+    assert fingerprint(session) == before
+
+
+def test_nothing_is_mended_while_a_clip_trains(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    session.dispatch(AskMend(after=1))
+    monkeypatch.setattr(type(session.live_training), "is_busy", property(lambda live: True))
+    session.dispatch(StartMend())
+    assert (page_of(session).state, page_of(session).why_not) == (
+        "asking",
+        "A clip trains at the moment. Mend when it has ended.",
+    )
