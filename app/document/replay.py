@@ -19,7 +19,6 @@ from app.document.journal_file import JournalDamage, JournalFile, Row, read_jour
 from app.document.plain_patch import PatchError
 from app.document.project_document import ProjectDocument
 from engine.errors import ProjectError
-from engine.storage.json_files import HAND_EDITED
 
 JOURNAL_FOLDER = "journal"
 _SUFFIX = ".jsonl"
@@ -74,15 +73,14 @@ def replayed(folder: Path) -> Replayed:
             raise found.damage
 
 
-def replayed_from(folder: Path, stored: StoredDocument, *, is_journal_used: bool = True) -> Replayed:
+def replayed_from(folder: Path, stored: StoredDocument) -> Replayed:
     """Likewise, up to the first damage, from a document at some step. Raises nothing."""
     replay = _Replay(folder, stored)
     damage = None
-    if is_journal_used:
-        try:
-            replay.run()
-        except ProjectError as error:
-            damage = error
+    try:
+        replay.run()
+    except ProjectError as error:
+        damage = error
     return Replayed(
         replay.history,
         replay.step,
@@ -167,9 +165,9 @@ class _Replay:
         assert last is not None
         if last.is_left:
             raise JournalDamage(f"A file of the journal is missing, after step {self.step}.", path=last.path)
-        if self.step < self.stored.step:
+        if last.stop < self.stored.step:
             raise JournalDamage(
-                f"The journal ends with step {self.step}, before step {self.stored.step} of the project file.",
+                f"The journal ends with step {last.stop}, before step {self.stored.step} of the project file.",
                 path=last.path,
             )
         if not last.is_whole:
@@ -191,9 +189,7 @@ class _Replay:
             raise self._damage("It was edited by hand while the journal held steps that it does not have")
 
     def _damage(self, what: str) -> JournalDamage:
-        return JournalDamage(
-            f"The project file does not fit its journal. {what}.", hint=HAND_EDITED, path=self.folder / PROJECT_FILE
-        )
+        return JournalDamage(f"The project file does not fit its journal. {what}.", path=self.folder / PROJECT_FILE)
 
     def _play(self, file: JournalFile) -> None:
         for number, row in enumerate(file.rows, start=2):

@@ -208,12 +208,14 @@ def kill_windows(work: Path, n_kills: int, rng: random.Random, tally: Tally) -> 
             if desk.state["n_keys"] != n_before:
                 tally.faults.append(f"window {number}: {desk.state['n_keys']} keys at the start, not {n_before}")
             desk.key("Home" if number == 0 else "End")
-            ends_s = time.monotonic() + rng.uniform(0.5, 4.0)
-            while time.monotonic() < ends_s:
+            gives_up_s, ends_s = time.monotonic() + START_S, None
+            while time.monotonic() < (gives_up_s if ends_s is None else ends_s):
                 desk.key("c")
                 time.sleep(rng.uniform(0.1, 0.3))
                 desk.key("Right" if number % 2 == 0 else "Left")
                 time.sleep(rng.uniform(0.05, 0.1))
+                if ends_s is None and desk.state["n_keys"] > n_before:
+                    ends_s = time.monotonic() + rng.uniform(0.0, 3.0)
             desk.program.kill()
             desk.program.wait()
             n_seen = desk.state["n_keys"]

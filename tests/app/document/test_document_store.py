@@ -233,6 +233,10 @@ def test_a_missing_file_of_the_journal_is_noticed(tmp_path: Path) -> None:
     journal_path(tmp_path / "p", 1).unlink()
     with pytest.raises(ProjectError, match="missing"):
         DocumentStore(tmp_path / "p").read()
+    older = journal_path(tmp_path / "p", 0)
+    older.write_bytes(older.read_bytes()[: read_journal(older)[0].ends[0]])
+    with pytest.raises(ProjectError, match="ends with step 0, before step 1"):
+        DocumentStore(tmp_path / "p").read()
     shutil.rmtree(tmp_path / "q" / "journal")
     store = DocumentStore(tmp_path / "q")
     assert store.read().present.markers == (Marker(1, "x"),)
