@@ -51,6 +51,7 @@ bench: setup ## measure the figures of the README, print them as tables, draw ou
 	@$(BIN)/python -m tests.benchmarks.bench_quality $(SAMPLE)
 	@$(BIN)/clipgstream bench --full --out out
 	@$(BIN)/python -m tests.benchmarks.bench_window $(SAMPLE)
+	@$(BIN)/python -m tests.benchmarks.bench_mending out/mending
 	@$(BIN)/python -m tests.benchmarks.bench_selecting $(SAMPLE)
 
 faults: setup ## damage files and captures, contend for locks, kill trainings and editing, fill disks: the figures of the README

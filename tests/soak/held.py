@@ -89,15 +89,16 @@ class Growth:
         return f"{self.name:<10} {self.first:10.1f} -> {self.last:10.1f}  {100 * self.share:+6.2f} %"
 
 
-def growths(samples: Sequence[Held], *, warm_up: int) -> list[Growth]:
-    """How far each number has grown, of medians of a third of the samples at either end.
+def growths(samples: Sequence[Held], *, warm_up: int, period: int = 1) -> list[Growth]:
+    """How far each number has grown, of medians of up to a third of the samples at either end.
 
     Args:
         samples: In the order of time, at equal moments of each round.
         warm_up: So many of the first ones do not count: caches fill, code is loaded.
+        period: After so many rounds the same is done again; whole periods are compared.
     """
     rows = [astuple(sample) for sample in samples[warm_up:]]
-    n = max(len(rows) // 3, 1)
+    n = max(len(rows) // 3 // period * period, 1)
     return [
         Growth(
             field.name,

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import math
 import os
 import random
 import shutil
@@ -117,6 +118,11 @@ class Soak:
 
             self._studio = StudioWindow(session, width=1280, height=800)
         return session
+
+    @property
+    def period(self) -> int:
+        """After so many rounds the same projects come in the same moments of a session."""
+        return math.lcm(len(self._projects), self._rounds_of_a_session)
 
     def close(self) -> None:
         """End everything."""
@@ -257,7 +263,7 @@ class Soak:
 
 def report(soak: Soak, *, warm_up: int) -> list[Growth]:
     """Print how far everything has grown; returns what has grown too far."""
-    found = growths(soak.samples, warm_up=warm_up)
+    found = growths(soak.samples, warm_up=warm_up, period=soak.period)
     for growth in found:
         print(f"  {growth.text()}", flush=True)
     return [growth for growth in found if growth.name in COMPARED and growth.share > MAX_GROWTH]

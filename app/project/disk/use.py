@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -101,7 +101,7 @@ def disk_use(project: Project, n_clips: int) -> DiskUse:
     return DiskUse(tuple(ClipUse(*row) for row in rows), n_unused_bytes, n_unused, preparation, other)
 
 
-def _owner(place: tuple[str, ...], names: dict[str, int]) -> tuple[str, int | None]:
+def _owner(place: Sequence[str], names: dict[str, int]) -> tuple[str, int | None]:
     """Which part of which clip a file is, if of any. place: Names of folders and of the file inside the project."""
     top, last = place[0], place[len(place) - 1]
     name = last.partition(".")[0]

@@ -70,6 +70,7 @@ def test_what_an_edit_does(run, folder, arguments, action, is_inverted):
 def test_a_turn_about_an_axis(run, folder):
     assert run("edit", folder, "--rotate", 0, 3, 0, 90)[0] == 0
     (edit,) = edits(folder)
+    assert isinstance(edit.action, Transform)
     assert edit.action.quat == pytest.approx((math.sqrt(0.5), 0, math.sqrt(0.5), 0))
     assert (edit.target, edit.action.pivot) == (Everything(), (0, 0, 0))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from hypothesis import strategies as st
 
 from engine.editing.edit import (
@@ -54,7 +55,7 @@ def _unit(numbers: tuple[float, float, float, float]) -> tuple[float, ...]:
 
 
 _QUATS = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: math.hypot(*q) > 1e-3).map(_unit)
-_ROWS = st.lists(st.integers(0, 100_000), min_size=1, max_size=30).map(pack_rows)
+_ROWS = st.lists(st.integers(0, 100_000), min_size=1, max_size=30).map(lambda rows: pack_rows(np.array(rows)))
 _TARGETS: Any = st.one_of(
     st.just(Everything()),
     st.builds(Sphere, _VECTORS, _POSITIVE),

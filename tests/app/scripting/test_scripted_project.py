@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -113,16 +114,18 @@ def replace_scope(edit):
 
 def test_what_cannot_be_an_edit(trained):
     with opened(trained) as project:
-        for arguments, values, message in (
+        flat: Any = (1.0, 2.0)
+        wrong: Any = (
             (("explode",), {}, "no edit 'explode'. Edits are hide"),
             (("expose",), {}, "no stops"),
             (("expose",), {"stops": 99.0}, "99.0 stops is out of range"),
             (("expose",), {"stops": "much"}, "not a number"),
             (("hide",), {"stops": 1.0}, "not known"),
             ((Delete(),), {"stops": 1.0}, "Delete is given with 'stops' beside it"),
-            ((Delete(), Sphere((1.0, 2.0), 1.0)), {}, "makes no sense"),
+            ((Delete(), Sphere(flat, 1.0)), {}, "makes no sense"),
             ((Delete(), 3), {}, "makes no sense"),
-        ):
+        )
+        for arguments, values, message in wrong:
             with pytest.raises(ProjectError, match=message):
                 project.apply_edit(*arguments, **values)
         with pytest.raises(ProjectError, match="no edit 7"):
@@ -287,7 +290,8 @@ def test_what_is_deleted_goes_for_good(trained):
 
 def test_what_cannot_be_mended(trained):
     with opened(trained) as project:
-        for arguments in ({}, {"boundary": 1, "frames": range(3)}, {"frames": range(0, 6, 2)}):
+        wrong: Any = ({}, {"boundary": 1, "frames": range(3)}, {"frames": range(0, 6, 2)})
+        for arguments in wrong:
             with pytest.raises(ProjectError, match="Name what is to be mended"):
                 project.mend(**arguments)
         with pytest.raises(ProjectError):

@@ -13,7 +13,6 @@ from hypothesis.extra import numpy as st_numpy
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state, write_coded_arrays
 from engine.clip_files.coding import CodingError, decode_array, encode_array, encode_on_grid_of
 from engine.clip_files.rewriting import rewrite_clip
-from tests.app.fakes import anchor_arrays
 from tests.clip_headers import make_header
 
 FLOATS = st.floats(-1e6, 1e6, width=32, allow_nan=False)
@@ -56,7 +55,10 @@ def test_what_lies_beside_the_grid_is_refused():
 
 @pytest.mark.parametrize("is_coded", [False, True])
 def test_a_file_is_written_in_the_form_that_it_had(tmp_path: Path, is_coded: bool):
-    arrays = anchor_arrays("static") | {"decoder.first.color": np.ones((4, 4), np.float32)}
+    rows = np.linspace(0, 1, 18, dtype=np.float32).reshape(6, 3)
+    arrays = {f"sets.static.{name}": rows for name in ("positions", "color_logits", "log_offset_scales")}
+    arrays |= {"sets.static.features": np.tile(rows, 4), "sets.static.log_base_scales": rows - 2.0}
+    arrays |= {"decoder.first.color": np.ones((4, 4), np.float32)}
     header = make_header()
     if is_coded:
         codecs = {"positions": ("steps", {"bits": 8}), "features": ("half", {})}

@@ -98,7 +98,7 @@ def _draw_stack(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState) -> No
 
 
 def _draw_row(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: Edit, position: int) -> None:
-    is_chosen = ui.editing.chosen == edit.edit_id
+    is_chosen, start = ui.editing.chosen == edit.edit_id, imgui.get_cursor_screen_pos()
     flags = imgui.SelectableFlags_.allow_overlap
     if imgui.selectable("##edit", is_chosen, flags, ImVec2(0, ROW_HEIGHT))[0]:
         ui.editing.choose(None if is_chosen else edit.edit_id)
@@ -136,7 +136,7 @@ def _draw_row(session: EditsPanelNeeds, dispatch: Dispatch, ui: UiState, edit: E
     ui.mark(f"edits.remove{edit.edit_id}")
     imgui.set_item_tooltip("Remove this edit: what it did is undone, what others did stays")
     imgui.end_disabled()
-    imgui.set_cursor_screen_pos(ImVec2(low.x, high.y + imgui.get_style().item_spacing.y))
+    imgui.set_cursor_screen_pos(ImVec2(start.x, start.y + ROW_HEIGHT))
     imgui.dummy(ImVec2(0, 0))
 
 
