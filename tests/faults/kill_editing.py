@@ -207,7 +207,7 @@ def kill_windows(work: Path, n_kills: int, rng: random.Random, tally: Tally) -> 
             desk.focus()
             if desk.state["n_keys"] != n_before:
                 tally.faults.append(f"window {number}: {desk.state['n_keys']} keys at the start, not {n_before}")
-            desk.key("Home" if number == 0 else "End")
+            desk.key("Home" if number % 2 == 0 else "End")
             gives_up_s, ends_s = time.monotonic() + START_S, None
             while time.monotonic() < (gives_up_s if ends_s is None else ends_s):
                 desk.key("c")
