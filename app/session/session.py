@@ -8,37 +8,26 @@ what was opened before. What is open is one immutable value that each of them is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
-
-import numpy as np
 
 from app.background.jobs import Jobs
-from app.background.log_reader import LogLine, LogView
+from app.background.log_reader import LogView
 from app.background.usage import UsageMeter
 from app.document.project_document import ProjectDocument
-from app.playback.arrays import AnchorArrays, GaussianArrays, Picture, PointArrays
 from app.playback.bookmarks import Bookmarks
-from app.playback.coverage import Coverage
 from app.playback.markers import Markers
-from app.playback.orbit_view import OrbitView
 from app.playback.playback import Playback
 from app.playback.timeline import Timeline
-from app.playback.trails import Trails
-from app.playback.view_modes import CONTENTS, MODES, ShownAs
 from app.playback.views import Views
 from app.project.allowed_changes import check_change, is_other_cut
-from app.project.disk.use import DiskUse
 from app.project.opened_project import OpenedProject, opened_project
 from app.project.opening import Opened, open_for_window
 from app.project.opening_answers import answers_to_keep
 from app.project.project import Project, check_settings
 from app.project.project_choices import AS_USUAL
 from app.project.recents import project_name
-from app.residuals.anchor_heat import AnchorHeat
-from app.residuals.heat_map import HEAT_KINDS, HeatMap
 from app.residuals.residuals import Residuals
 from app.session import commands
 from app.session.attention import Attention
@@ -50,8 +39,8 @@ from app.session.clip_versions import Versions
 from app.session.clips.clip_commands import ClipCommand, CompareVersion
 from app.session.clips.clip_work import ClipWork
 from app.session.clips.comparing import show_version
+from app.session.command_titles import SETTING_NAMES, TITLES
 from app.session.copying.command_texts import CommandTexts
-from app.session.doctor_status import DoctorStatus
 from app.session.edit_status import EditsStatus, HistoryStatus, PathsStatus
 from app.session.editing.edits import Edits
 from app.session.editing.kept_document import KeptDocument
@@ -65,6 +54,7 @@ from app.session.exporting import Exporting
 from app.session.files.project_files import ProjectFiles
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
+from app.session.looking import LookCommand, look
 from app.session.marking import Marking
 from app.session.mending.mend_commands import MendCommand
 from app.session.mending.mending import Mending
@@ -73,41 +63,27 @@ from app.session.project_opener import ProjectOpener
 from app.session.questions import ProjectQuestion, Question
 from app.session.queue_commands import QueueCommands
 from app.session.recent_projects import RecentProjects
+from app.session.session_face import SessionFace
 from app.session.setting_changes import changed_settings
 from app.session.settings import Settings
 from app.session.synchronising import Synchronising
 from app.status import (
-    CAPTURED,
-    COMPARE_MODES,
-    OVERLAY_NAMES,
     ClipStatus,
-    DependencyStatus,
-    JobStatus,
-    Overlays,
     PlanStatus,
     ProjectStatus,
     QueueStatus,
     RegionsStatus,
-    ResidualStatus,
     TrainingStatus,
     UsageStatus,
-    VersionStatus,
-    WantedFrame,
-    version_number,
 )
 from app.training.messages import ENDINGS, TrainJob
 from app.training.process import ProcessWorker, Worker
-from app.training.service import Launch, ShownState
-from engine.camera.rig import NO_CAMERAS, CameraRig
+from app.training.service import Launch
 from engine.capture.capture import Capture
-from engine.capture.clip import Clip
-from engine.capture.exclusions import NOTHING_EXCLUDED, Exclusions
-from engine.editing.selection.ranges import Spread
-from engine.editing.selection.seen_from import SeenFrom
 from engine.errors import EngineError
 
 
-class Session:
+class Session(SessionFace):
     """Everything the program knows while it runs.
 
     Attributes:
@@ -214,73 +190,6 @@ class Session:
             self.live_training.start()
             self.playback.start()
 
-    # ---------------------------------------------------------------- what is open
-
-    @property
-    def capture(self) -> Capture | None:
-        """The open capture."""
-        return None if self.opened is None else self.opened.capture
-
-    @property
-    def project(self) -> Project | None:
-        """Its project."""
-        return None if self.opened is None else self.opened.project
-
-    @property
-    def rig(self) -> CameraRig:
-        """Cameras of the open capture; without one, none."""
-        return NO_CAMERAS if self.opened is None else self.opened.rig
-
-    @property
-    def clips(self) -> tuple[Clip, ...]:
-        """Clips of the open capture."""
-        return () if self.opened is None else self.opened.clips
-
-    @property
-    def holdout(self) -> tuple[int, ...]:
-        """Camera indices that training never sees."""
-        return () if self.opened is None else self.opened.holdout
-
-    @property
-    def reference_index(self) -> int:
-        """The clip that the others inherit from."""
-        return 0 if self.opened is None else self.opened.reference_index
-
-    @property
-    def view(self) -> OrbitView:
-        """From where the current view looks."""
-        return self.views.current.view
-
-    @property
-    def overlays(self) -> Overlays:
-        """What the current view shows."""
-        return self.views.current.overlays
-
-    @property
-    def _shown_as(self) -> ShownAs:
-        return ShownAs(self.overlays.mode, self.overlays.content)
-
-    @property
-    def exclusions(self) -> Exclusions:
-        """What of the open capture training never sees."""
-        content = self.document.content
-        return NOTHING_EXCLUDED if content is None else content.exclusions
-
-    @property
-    def residual_status(self) -> ResidualStatus:
-        """What is measured of every picture."""
-        return self.residuals.status
-
-    @property
-    def doctor_status(self) -> DoctorStatus:
-        """What the capture doctor found, or how far it is."""
-        return self.doctor.status
-
-    @property
-    def jobs(self) -> list[JobStatus]:
-        """Short jobs that run."""
-        return self._jobs.statuses
-
     # ---------------------------------------------------------------- commands
 
     def dispatch(self, command: commands.Command) -> None:
@@ -292,7 +201,7 @@ class Session:
         try:
             self._obey(command)
         except EngineError as error:
-            self.notices.add_error(_TITLES.get(type(command), "That did not work"), error)
+            self.notices.add_error(TITLES.get(type(command), "That did not work"), error)
         self._refresh()
 
     def _obey(self, command: commands.Command) -> None:
@@ -353,52 +262,10 @@ class Session:
                 live.resume()
             case commands.StopTraining():
                 live.stop()
-            case commands.SetFrame(frame_index=frame_index):
-                self.timeline.seek(frame_index)
-            case commands.TogglePlay():
-                self.timeline.toggle_play()
-            case commands.FollowTraining(is_on=is_on):
-                self.timeline.hold()
-                self.timeline.is_following = is_on
-            case commands.LookThrough(camera_index=camera_index):
-                self.view.look(camera_index)
-            case commands.SetCompare(mode=mode):
-                if mode not in COMPARE_MODES:
-                    raise ValueError(f"compare is one of {', '.join(COMPARE_MODES)}, not {mode!r}")
-                self.overlays.compare = mode
-            case commands.ToggleOverlay(name=name):
-                if name not in OVERLAY_NAMES:
-                    raise ValueError(f"overlays are {', '.join(OVERLAY_NAMES)}, not {name!r}")
-                setattr(self.overlays, name, not getattr(self.overlays, name))
-            case commands.ShowHeat(kind=kind):
-                if kind and kind not in HEAT_KINDS:
-                    raise ValueError(f"heat maps are {', '.join(HEAT_KINDS)}, not {kind!r}")
-                self.overlays.heat = kind
+            case _ if isinstance(command, LookCommand):
+                look(command, self.timeline, self.views, self.playback)
             case commands.SetHoldout() | commands.SetClipLength() | commands.SetTrainSetting() | commands.SetPreset():
                 self._change_settings(command)
-            case commands.SetCompareWith(other=other):
-                if other != CAPTURED and other not in MODES and version_number(other) is None:
-                    known = f"{CAPTURED}, {', '.join(MODES)} and versions"
-                    raise ValueError(f"pictures to compare with are {known}, not {other!r}")
-                self.overlays.compare_with = other
-            case commands.SetMode(mode=mode):
-                if mode not in MODES:
-                    raise ValueError(f"modes are {', '.join(MODES)}, not {mode!r}")
-                self.overlays.mode = mode
-            case commands.SetContent(content=content):
-                if content not in CONTENTS:
-                    raise ValueError(f"parts of a clip are {', '.join(CONTENTS)}, not {content!r}")
-                self.overlays.content = content
-            case commands.SetFrameMemory(megabytes=megabytes):
-                self.playback.decoder.keep_megabytes(megabytes)
-            case commands.HomeView():
-                self.view.home()
-            case commands.ShowViews(n=n):
-                self.views.show(n)
-                self.playback.favour(self.views.active_index)
-            case commands.ActivateView(index=index):
-                self.views.activate(index)
-                self.playback.favour(self.views.active_index)
             case commands.DismissNotice(index=index):
                 self.notices.dismiss(index)
             case commands.ExamineCapture():
@@ -448,7 +315,7 @@ class Session:
             )
             return
         check_settings(changed, opened.capture)
-        name = _SETTING_NAMES.get(type(command), "change settings")
+        name = SETTING_NAMES.get(type(command), "change settings")
         self.document.change(replace(opened.project.document, settings=changed), name)
 
     def _take_question(self, question: Question) -> None:
@@ -666,6 +533,14 @@ class Session:
                 name, opened.project.folder, n_trained, len(opened.clips), opened.project.is_writable
             )
 
+    def lead_view(self) -> bool:
+        """Let the view go along the camera path, where that is wanted, after the playhead has moved. Whether anything
+        changed."""
+        has_changed = self.camera_paths.lead(self.views, self.timeline)
+        if has_changed:
+            self.paths = self.camera_paths.status()
+        return has_changed
+
     def wake_by(self, wake: Callable[[], None]) -> None:
         """Call this, on some thread, when a frame or picture that was asked for is there; it must not block."""
         self.playback.renderer.on_picture = self.playback.decoder.on_frame = self.selecting.on_found = wake
@@ -697,174 +572,8 @@ class Session:
         if self.capture is not None:
             self.capture.close()
 
-    # ---------------------------------------------------------------- trainings and their files
-
-    def clip_curves(self, clip_index: int) -> tuple[Sequence[tuple[int, float]], Sequence[tuple[int, float]]] | None:
-        """(step, value) of a clip's loss and of its held-out PSNR in dB; None until they were read."""
-        curves = self.live_training.curves(clip_index)
-        return None if curves is None else (curves.loss, curves.psnr)
-
-    def clip_versions(self, clip_index: int) -> tuple[VersionStatus, ...]:
-        """What a clip was before it was trained again, newest first; none until that was read."""
-        return self.versions.statuses(clip_index)
-
-    def clip_dependencies(self, clip_index: int) -> DependencyStatus:
-        """What a clip depends on, and what depends on it."""
-        return self.clip_work.dependencies(clip_index)
-
-    def disk_use(self) -> DiskUse | None:
-        """What the project takes on the disk; None until that was looked up."""
-        return self.clip_work.disk_use()
-
-    def version_state(self, clip_index: int, version: int) -> ShownState | None:
-        """An earlier version of a clip as a file to show; None until it was read, and where it cannot be shown."""
-        return self.versions.state(clip_index, version)
-
-    def log_lines(self) -> Sequence[LogLine]:
-        """What the program said, and the training of the clip that trains or is looked at; in the order of time."""
-        clip, project = self.timeline.clip, self.project
-        trains = self.training.state not in ("idle", "failed")
-        clip_index = self.training.clip_index if trains or clip is None else clip.clip_index
-        if project is None or clip_index is None:
-            return self.log.lines(None, None)
-        return self.log.lines(clip_index, project.log_path(clip_index))
-
-    # ---------------------------------------------------------------- pictures and arrays
-
-    def lead_view(self) -> bool:
-        """Let the view go along the camera path, where that is wanted, after the playhead has moved. Whether anything
-        changed."""
-        has_changed = self.camera_paths.lead(self.views, self.timeline)
-        if has_changed:
-            self.paths = self.camera_paths.status()
-        return has_changed
-
-    def wanted_frame(self) -> WantedFrame | None:
-        """What ought to be on screen; None without a capture. What is there says itself what it is."""
-        return self.playback.wanted(self.timeline, self.view, self._shown_as, view_id=self.views.current_index)
-
-    def shown_gaussians(self) -> GaussianArrays | None:
-        """Gaussians of the shown frame; the newest ones there are until those are decoded; None where nothing is
-        trained."""
-        shown = self.playback.frame(self.timeline, self._shown_as)
-        return None if shown is None else shown.gaussians
-
-    def selected(self, gaussians: GaussianArrays) -> np.ndarray:
-        """Which Gaussians of a frame are selected. [N] bool"""
-        return self.selecting.mask(gaussians)
-
-    def selected_share(self, gaussians: GaussianArrays, view: SeenFrom) -> np.ndarray | None:
-        """Where selected Gaussians are seen; see Selecting.share."""
-        return self.selecting.share(gaussians, view, self.views.current_index)
-
-    def attribute_spread(self, attribute: str) -> Spread | None:
-        """How an attribute is spread over the shown frame; see Selecting.spread."""
-        return self.selecting.spread(attribute)
-
-    def shown_anchors(self) -> AnchorArrays | None:
-        """Anchors that exist at the shown frame; those of the newest frame there is until it was decoded."""
-        shown = self.playback.frame(self.timeline, self._shown_as)
-        return None if shown is None else shown.anchors
-
-    def shown_coverage(self) -> Coverage | None:
-        """What inherited anchors cover; see Playback.coverage."""
-        return self.playback.coverage(self.timeline)
-
-    def shown_trails(self) -> Trails | None:
-        """The ways of what moves; see Playback.trails."""
-        return self.playback.trails(self.timeline)
-
-    def shown_points(self) -> PointArrays | None:
-        """A cloud for frames that are not trained; see Playback.cloud."""
-        return self.playback.cloud(self.view)
-
-    def request_render(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
-        """The rasterizer's picture of the frame and view; see Playback.render."""
-        view_id = self.views.current_index
-        return self.playback.render(
-            self.timeline, self.view, width, height, full_size=full_size, shown_as=self._shown_as, view_id=view_id
-        )
-
-    def request_other(self, width: int, height: int, *, full_size: tuple[int, int] | None = None) -> Picture | None:
-        """The rasterizer's picture that the rendered one is compared with; None where that is a captured one."""
-        other, state_of = self.overlays.compare_with, None
-        version = version_number(other)
-        if version is not None:
-            other, state_of = self.overlays.mode, lambda clip_index: self.version_state(clip_index, version)
-        if other not in MODES:
-            return None
-        shown_as = ShownAs(other, self.overlays.content)
-        view_id = ("other", self.views.current_index)
-        return self.playback.render(
-            self.timeline,
-            self.view,
-            width,
-            height,
-            full_size=full_size,
-            shown_as=shown_as,
-            view_id=view_id,
-            state_of=state_of,
-        )
-
-    def cached_frames(self) -> list[tuple[int, int]]:
-        """Frames that can be shown at once: first and stop of each run, in order."""
-        return self.playback.cached_frames()
-
-    def ground_truth(self, camera_index: int, frame_index: int, max_width: int) -> Picture | None:
-        """The captured picture, at most `max_width` pixels wide; None until it was decoded."""
-        return self.playback.captured_picture(camera_index, frame_index, max_width)
-
-    def compared_picture(self, camera_index: int, max_width: int) -> Picture | None:
-        """What a camera took at the playhead, to be set beside the render; see Playback.compared_picture."""
-        return self.playback.compared_picture(self.timeline, camera_index, max_width)
-
-    def anchor_heat(self, column: str) -> AnchorHeat | None:
-        """The residual of each anchor at the playhead; see Residuals.anchor_heat."""
-        return self.residuals.anchor_heat(self.timeline, column)
-
-    def heat(self, kind: str) -> HeatMap | None:
-        """The residual heat map of the playhead and the camera looked through; see Residuals.heat."""
-        camera_index = self.view.look_through
-        return None if camera_index is None else self.residuals.heat(self.timeline, camera_index, kind)
-
 
 def _n_steps(command: commands.Undo | commands.Redo | commands.GoToStep) -> int:
     if isinstance(command, commands.GoToStep):
         return command.n_steps
     return -1 if isinstance(command, commands.Undo) else 1
-
-
-_SETTING_NAMES: dict[type, str] = {
-    commands.SetHoldout: "choose held-out cameras",
-    commands.SetClipLength: "change the clip length",
-    commands.SetTrainSetting: "change a setting",
-    commands.SetPreset: "take a preset",
-}
-_TITLES: dict[type, str] = {
-    commands.TrainClip: "The clip cannot be trained",
-    commands.TrainNextClip: "The clip cannot be trained",
-    commands.TrainClips: "The clips cannot be trained",
-    commands.TrainAll: "The clips cannot be trained",
-    commands.AskTrainSettings: "The clip cannot be trained",
-    **dict.fromkeys(get_args(ExclusionCommand), "That cannot be excluded"),
-    **dict.fromkeys(get_args(MendCommand), "That cannot be mended"),
-    **dict.fromkeys(get_args(ClipCommand), "That cannot be done with the clips"),
-    commands.RestoreVersion: "The version cannot be brought back",
-    commands.RemoveVersion: "The version cannot be removed",
-    commands.SetHoldout: "These cameras cannot be held out",
-    commands.SetClipLength: "The clip length cannot be changed",
-    commands.SetTrainSetting: "The setting cannot be changed",
-    commands.SetPreset: "The preset cannot be taken",
-    commands.SynchroniseCameras: "The cameras cannot be synchronised",
-    **dict.fromkeys(get_args(commands.SelectionCommand), "That cannot be selected"),
-    commands.MarkRegion: "The region cannot be marked",
-    commands.MarkBox: "The region cannot be marked",
-    commands.RemoveRegion: "The region cannot be removed",
-    commands.Undo: "The last change cannot be taken back",
-    commands.Redo: "The change cannot be made again",
-    commands.GoToStep: "That step of the history cannot be reached",
-    **dict.fromkeys(get_args(commands.EditCommand), "That cannot be edited"),
-    **dict.fromkeys(get_args(commands.PathCommand), "That cannot be done with the camera path"),
-    commands.CorrectCapture: "The capture cannot be corrected",
-    **dict.fromkeys(get_args(commands.FileCommand), "That cannot be done with the project"),
-}

@@ -1,0 +1,47 @@
+"""What is said of commands: what could not be done, and what a change of settings is called in the history."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+from app.session import commands
+from app.session.clips.clip_commands import ClipCommand
+from app.session.exclusions.exclusion_commands import ExclusionCommand
+from app.session.mending.mend_commands import MendCommand
+
+SETTING_NAMES: dict[type, str] = {
+    commands.SetHoldout: "choose held-out cameras",
+    commands.SetClipLength: "change the clip length",
+    commands.SetTrainSetting: "change a setting",
+    commands.SetPreset: "take a preset",
+}
+"""Steps of the history."""
+TITLES: dict[type, str] = {
+    commands.TrainClip: "The clip cannot be trained",
+    commands.TrainNextClip: "The clip cannot be trained",
+    commands.TrainClips: "The clips cannot be trained",
+    commands.TrainAll: "The clips cannot be trained",
+    commands.AskTrainSettings: "The clip cannot be trained",
+    **dict.fromkeys(get_args(ExclusionCommand), "That cannot be excluded"),
+    **dict.fromkeys(get_args(MendCommand), "That cannot be mended"),
+    **dict.fromkeys(get_args(ClipCommand), "That cannot be done with the clips"),
+    commands.RestoreVersion: "The version cannot be brought back",
+    commands.RemoveVersion: "The version cannot be removed",
+    commands.SetHoldout: "These cameras cannot be held out",
+    commands.SetClipLength: "The clip length cannot be changed",
+    commands.SetTrainSetting: "The setting cannot be changed",
+    commands.SetPreset: "The preset cannot be taken",
+    commands.SynchroniseCameras: "The cameras cannot be synchronised",
+    **dict.fromkeys(get_args(commands.SelectionCommand), "That cannot be selected"),
+    commands.MarkRegion: "The region cannot be marked",
+    commands.MarkBox: "The region cannot be marked",
+    commands.RemoveRegion: "The region cannot be removed",
+    commands.Undo: "The last change cannot be taken back",
+    commands.Redo: "The change cannot be made again",
+    commands.GoToStep: "That step of the history cannot be reached",
+    **dict.fromkeys(get_args(commands.EditCommand), "That cannot be edited"),
+    **dict.fromkeys(get_args(commands.PathCommand), "That cannot be done with the camera path"),
+    commands.CorrectCapture: "The capture cannot be corrected",
+    **dict.fromkeys(get_args(commands.FileCommand), "That cannot be done with the project"),
+}
+"""Titles of notices, where a command was refused."""
