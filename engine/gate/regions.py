@@ -83,12 +83,8 @@ def parse_region(values: Any) -> GateRegion:
 def _box_around(center: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
     """Corners whose middle gives the same corners again, so that what is written and read stays as it is."""
     for _ in range(8):  # two are enough; rounding moves the middle by a bit
-        low, high = center - radius, center + radius
-        middle = 0.5 * (low + high)
-        if not (middle != center).any():
-            break
-        center = middle
-    return low, high
+        center = 0.5 * ((center - radius) + (center + radius))
+    return center - radius, center + radius
 
 
 def sphere_region(treat: str, center: Sequence[float], radius: float) -> GateRegion:

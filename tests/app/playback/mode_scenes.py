@@ -74,7 +74,7 @@ def view() -> OrbitView:
 def request(shown: ShownFrame, mode: str, *, view_: OrbitView | None = None) -> RenderRequest:
     """What draws it in a mode."""
     look = Look.of(view() if view_ is None else view_, *SIZE, shown_as=ShownAs(mode))
-    return RenderRequest((1, "path", 1, "a state", ShownAs(), 4), look, shown)
+    return RenderRequest((1, "path", 1, "a state", "", ShownAs(), 4), look, shown)
 
 
 def pinhole(made: OrbitView) -> PinholeView:

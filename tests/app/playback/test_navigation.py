@@ -353,7 +353,7 @@ def drawn(view: OrbitView, gaussians: GaussianArrays, mode: str = "color") -> Pi
     """The rasterizer's picture, 64 x 48."""
     anchors = AnchorArrays(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), key="none")
     look = Look.of(view, 64, 48, shown_as=ShownAs(mode))
-    return render(RenderRequest((0, "", 0, "", look.shown_as, 0), look, ShownFrame(gaussians, anchors)))
+    return render(RenderRequest((0, "", 0, "", "", look.shown_as, 0), look, ShownFrame(gaussians, anchors)))
 
 
 def true_orthographic(view: OrbitView, points: np.ndarray, width: int, height: int) -> np.ndarray:

@@ -73,7 +73,7 @@ def test_the_rasterizer_s_picture_is_that_of_a_true_orthographic_camera(view: Or
     arrays = made_up(view)
     anchors = AnchorArrays(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32), key="none")
     look = Look.of(view, WIDTH, HEIGHT)
-    image = render(RenderRequest((0, "", 0, "", look.shown_as, 0), look, ShownFrame(arrays, anchors))).image
+    image = render(RenderRequest((0, "", 0, "", "", look.shown_as, 0), look, ShownFrame(arrays, anchors))).image
     assert psnr(image / 255.0, from_infinitely_far(view, arrays)) > 55.0
 
 
