@@ -10,7 +10,7 @@ from app.background.jobs import Job, JobContext, Jobs
 from app.mending.mend_project import MendOutcome, mend_work
 from app.mending.request import MendRequest
 from app.playback.timeline import Timeline
-from app.project.mends.in_place import take_back, version_before
+from app.project.mends.in_place import as_cut_now, take_back, version_before
 from app.project.opened_project import OpenedProject
 from app.session.clips.clip_commands import CompareVersion
 from app.session.clips.comparing import show_version
@@ -159,7 +159,7 @@ class Mending:
         if page.compared is not None:
             self._end_comparing()
             return
-        clips, here = page.record.clips, timeline.clip
+        clips, here = as_cut_now(opened.project, page.record).clips, timeline.clip
         chosen = next((one for one in clips if here is not None and one.clip_index == here.clip_index), clips[0])
         version = version_before(opened.project, chosen)
         if version is None:
@@ -178,7 +178,7 @@ class Mending:
         if page is None or page.state != "done" or page.record is None or not page.record.has_helped:
             return
         self._end_comparing()
-        record, project = page.record, opened.project
+        record, project = as_cut_now(opened.project, page.record), opened.project
 
         def done(_: None) -> None:
             for clip in record.clips:
