@@ -329,6 +329,8 @@ class Session(SessionFace):
             return
         if is_other_cut(before.settings, after.settings):
             self.live_training.check_idle()
+            self.clip_work.check_idle()
+            self.mending.check_idle()
         check_change(opened.project, opened.capture, before, after, is_training=self.live_training.is_busy)
 
     def _follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:

@@ -47,12 +47,15 @@ class Mending:
         self._live, self._overlays = live, overlays
         self._jobs = Jobs()
         self._job: Job | None = None
+        self._stopped: tuple[int, ...] = ()
         self._opened: OpenedProject | None = None
 
     def open(self, opened: OpenedProject) -> None:
         """Take up a project, or the same one with other settings."""
         if self._opened is None or self._opened.generation != opened.generation:
             self._close_page()
+        elif self._opened.clips != opened.clips and self.page is not None and self.page.state == "asking":
+            self._close_page()  # what it asks about is numbered otherwise now
         self._opened = opened
 
     @property
@@ -65,6 +68,15 @@ class Mending:
     def is_busy(self) -> bool:
         """Whether something is being mended."""
         return self.page is not None and self.page.state == "running"
+
+    def check_idle(self) -> None:
+        """See that nothing is mended, so that clips may be cut otherwise.
+
+        Raises:
+            ProjectError: Something is.
+        """
+        if self.is_busy:
+            raise ProjectError("Clips are being mended as they are now.", hint="Wait for it, or stop it first.")
 
     def apply(self, command: MendCommand, timeline: Timeline) -> None:
         """Carry out a command.
@@ -189,14 +201,19 @@ class Mending:
         self._start(lambda context: take_back(project, record), done)
 
     def _note_change(self, clip_index: int) -> None:
-        if self._live.service is not None:
+        if self._live.service is not None and clip_index < len(self._live.service.catalog):
             self._live.service.catalog.update(clip_index)
 
     # ---------------------------------------------------------------- the page and its job
 
     def poll(self) -> bool:
         """Take in what was finished. Whether anything was."""
-        return self._jobs.poll()
+        has_ended = self._jobs.poll()
+        if has_ended and self._stopped:  # it may have been too late
+            for clip_index in self._stopped:
+                self._note_change(clip_index)
+            self._stopped = ()
+        return has_ended
 
     @property
     def finished(self) -> tuple[object, ...]:
@@ -220,7 +237,7 @@ class Mending:
     def _cancel(self) -> None:
         if self._job is not None:
             self._job.context.cancel()
-            self._job = None
+            self._job, self._stopped = None, self.page.clip_indices if self.page is not None else ()
 
     def _close_page(self) -> None:
         if self.page is None:

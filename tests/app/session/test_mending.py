@@ -16,6 +16,7 @@ from app.project.mends.in_place import put_in_place
 from app.project.mends.record import MendedClip, MendRecord
 from app.project.project import Project
 from app.session import commands as c
+from app.session.clips.clip_commands import SplitClip
 from app.session.mending import mending
 from app.session.mending.mend_commands import AskMend, CloseMend, CompareMended, RevertMend, StartMend, StopMend
 from app.session.mending.mend_page import MendPage
@@ -172,6 +173,55 @@ def test_stopping_leaves_the_clips_as_they_were(session: Session, monkeypatch: p
     assert has_ended.wait(30.0)
     poll_until(session, lambda: session.mending.progress is None)
     assert fingerprint(session) == before
+
+
+def test_stopping_too_late_shows_what_was_put_in_place(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    may_go_on = threading.Event()
+
+    def slow(project: Project, request: MendRequest) -> Callable[[JobContext], MendOutcome]:
+        mended = made_up(project, request)
+
+        def work(context: JobContext) -> MendOutcome:
+            outcome = mended(context)
+            may_go_on.wait(30.0)
+            return outcome
+
+        return work
+
+    monkeypatch.setattr(mending, "mend_work", slow)
+    before = fingerprint(session)
+    session.dispatch(AskMend(after=1))
+    session.dispatch(StartMend())
+    poll_until(session, lambda: fingerprint(session) != before, what="the mended clip")
+    session.dispatch(StopMend())
+    may_go_on.set()
+    service = session.live_training.service
+    assert service is not None
+    revision = f"trained-{fingerprint(session)}"
+    poll_until(session, lambda: service.catalog[1].revision == revision, what="the clip as it is now")
+
+
+def test_clips_are_not_cut_while_they_are_mended(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    may_go_on = threading.Event()
+
+    def slow(project: Project, request: MendRequest) -> Callable[[JobContext], MendOutcome]:
+        def work(context: JobContext) -> MendOutcome:
+            may_go_on.wait(30.0)
+            raise JobCancelled
+
+        return work
+
+    monkeypatch.setattr(mending, "mend_work", slow)
+    session.dispatch(AskMend(after=1))
+    session.dispatch(StartMend())
+    session.dispatch(SplitClip(1, is_confirmed=True))
+    assert len(session.clips) == 2
+    assert "being mended" in list(session.notices)[-1].detail
+    session.dispatch(StopMend())
+    may_go_on.set()
+    session.dispatch(SplitClip(1, is_confirmed=True))
+    assert len(session.clips) == 3
+    assert session.mending.page is None, "boundaries have other numbers now"
 
 
 def test_nothing_is_mended_while_a_clip_trains(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
