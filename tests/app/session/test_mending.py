@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from app.project.mends.record import MendedClip, MendRecord
 from app.project.project import Project
 from app.session import commands as c
 from app.session.clips.clip_commands import SplitClip
+from app.session.files.file_commands import SaveProjectAs
 from app.session.mending import mending
 from app.session.mending.mend_commands import AskMend, CloseMend, CompareMended, RevertMend, StartMend, StopMend
 from app.session.mending.mend_page import MendPage
@@ -201,7 +203,9 @@ def test_stopping_too_late_shows_what_was_put_in_place(session: Session, monkeyp
     poll_until(session, lambda: service.catalog[1].revision == revision, what="the clip as it is now")
 
 
-def test_clips_are_not_cut_while_they_are_mended(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_clips_are_not_cut_or_copied_while_they_are_mended(
+    session: Session, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     may_go_on = threading.Event()
 
     def slow(project: Project, request: MendRequest) -> Callable[[JobContext], MendOutcome]:
@@ -216,6 +220,8 @@ def test_clips_are_not_cut_while_they_are_mended(session: Session, monkeypatch: 
     session.dispatch(StartMend())
     session.dispatch(SplitClip(1, is_confirmed=True))
     assert len(session.clips) == 2
+    assert "being mended" in list(session.notices)[-1].detail
+    session.dispatch(SaveProjectAs(tmp_path / "copy"))
     assert "being mended" in list(session.notices)[-1].detail
     session.dispatch(StopMend())
     may_go_on.set()
