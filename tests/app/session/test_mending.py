@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch  # noqa: F401  playback loads it on a thread; half loaded it would meet the seeds of the next test
+from msgspec.structs import replace as with_entries
 
 from app.background.jobs import JobCancelled, JobContext
 from app.mending.mend_project import MendOutcome
@@ -18,12 +18,15 @@ from app.project.mends.record import MendedClip, MendRecord
 from app.project.project import Project
 from app.session import commands as c
 from app.session.clips.clip_commands import SplitClip
+from app.session.editing.edit_commands import AddEdit
 from app.session.files.file_commands import SaveProjectAs
 from app.session.mending import mending
 from app.session.mending.mend_commands import AskMend, CloseMend, CompareMended, RevertMend, StartMend, StopMend
 from app.session.mending.mend_page import MendPage
 from app.session.session import Session
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
+from engine.editing.edit import Hide, Picked, PickedRows
+from engine.editing.picks import pack_rows
 from engine.errors import ProjectError
 from engine.mending.figures import StretchFigures
 from tests.app.conftest import poll_until
@@ -39,7 +42,8 @@ def made_up(project: Project, request: MendRequest) -> Callable[[JobContext], Me
     def work(context: JobContext) -> MendOutcome:
         context.report(0.5, "Fading")
         state = read_clip_state(project.clip_path(1))
-        changed = ClipState(state.arrays | {"value": np.array([7.0], np.float32)}, state.header).stamped()
+        arrays = state.arrays | {"value": np.array([7.0], np.float32)}
+        changed = ClipState(arrays, with_entries(state.header, rows_of=state.header.origin)).stamped()
         draft = project.folder / "draft.safetensors"
         write_clip_state(draft, changed)
         clip = MendedClip(1, state.header.fingerprint, changed.header.fingerprint)
@@ -110,6 +114,19 @@ def test_a_mended_clip_is_shown_compared_and_taken_back(session: Session) -> Non
     assert session.live_training.service.catalog[1].revision == f"trained-{before}"
     session.dispatch(RevertMend())  # once is enough
     assert page_of(session).state == "reverted"
+
+
+def test_what_was_picked_in_a_clip_is_not_lost_by_mending_it(session: Session) -> None:
+    picked = Picked((PickedRows(1, fingerprint(session), "residual", pack_rows(np.arange(2))),))
+    session.dispatch(AddEdit(Hide(), picked))
+    before = fingerprint(session)
+    mend(session)
+    assert fingerprint(session) != before
+    session.poll()
+    assert (len(session.edits.edits), session.edits.lost) == (1, ())
+    session.dispatch(RevertMend())
+    poll_until(session, lambda: page_of(session).state == "reverted", what="the way back")
+    assert session.edits.lost == ()
 
 
 def test_what_cannot_be_mended_says_why(session: Session, make_session: Make) -> None:
