@@ -84,8 +84,9 @@ def _fixed_seeds() -> None:
     """Every test starts from the same state of every random generator, whichever tests ran before it."""
     random.seed(SEED)
     np.random.seed(SEED)  # noqa: NPY002 - libraries we call may still draw from the global generator
-    torch = sys.modules.get("torch")  # not imported here: tests that need no torch stay fast without it
-    if torch is not None:
+    if "torch" in sys.modules:  # not imported otherwise: tests that need no torch stay fast without it
+        import torch  # waits for a thread that an earlier test has left importing it; half loaded, both would fail
+
         torch.manual_seed(SEED)
         torch.set_num_threads(TORCH_THREADS)
 

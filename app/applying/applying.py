@@ -193,7 +193,7 @@ def _renumbered(before: ClipState, now: ClipState, gone: Rows) -> dict:
     for role, record in before.anchors.items():
         if record.own is not None:
             is_kept = ~gone.get(role, np.zeros(len(record.own), bool))
-            sets[before.header.fingerprint, role] = Renumbered(now.header.fingerprint, is_kept, k)
+            sets[before.header.origin, role] = Renumbered(now.header.origin, is_kept, k)
     return sets
 
 

@@ -12,7 +12,7 @@ from app.cli.terminal.progress import ProgressLine
 from app.mending.mend_project import MendOutcome, mend_project
 from app.mending.request import MendRequest
 from app.project.clip_versions import list_versions
-from app.project.mends.in_place import take_back
+from app.project.mends.in_place import as_cut_now, take_back
 from app.project.mends.record import kept_record, record_numbers
 from app.project.opening import open_capture_of
 from app.project.project import Project, open_project
@@ -89,6 +89,7 @@ def _revert(project: Project, options: argparse.Namespace) -> int:
     record = kept_record(project, numbers[-1]) if numbers else None
     if record is None:
         raise ProjectError("Nothing was mended in this project.", path=project.folder)
+    record = as_cut_now(project, record)
     take_back(project, record)
     if options.json:
         clips = [clip.clip_index for clip in record.clips]

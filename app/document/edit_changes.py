@@ -106,16 +106,6 @@ def toggle_edit(document: ProjectDocument, edit_id: int, is_on: bool | None = No
     return change_edit(document, structs.replace(edit, is_on=not edit.is_on if is_on is None else is_on))
 
 
-def invert_edit(document: ProjectDocument, edit_id: int) -> ProjectDocument:
-    """Let an edit act on everything but what it acts on.
-
-    Raises:
-        ProjectError: There is no such edit.
-    """
-    edit = edit_with(document, edit_id)
-    return change_edit(document, structs.replace(edit, is_inverted=not edit.is_inverted))
-
-
 def rename_edit(document: ProjectDocument, edit_id: int, name: str) -> ProjectDocument:
     """Give an edit another name; an empty one is put into words where the edit is shown.
 
@@ -123,20 +113,6 @@ def rename_edit(document: ProjectDocument, edit_id: int, name: str) -> ProjectDo
         ProjectError: There is no such edit, or the name is too long.
     """
     return change_edit(document, structs.replace(edit_with(document, edit_id), name=name.strip()))
-
-
-def set_scope(document: ProjectDocument, edit_id: int, scope: Scope) -> ProjectDocument:
-    """Let an edit hold in other frames.
-
-    Raises:
-        ProjectError: There is no such edit.
-    """
-    return change_edit(document, structs.replace(edit_with(document, edit_id), scope=scope))
-
-
-def clear_edits(document: ProjectDocument) -> ProjectDocument:
-    """Take all edits out of the stack."""
-    return _with(document, ())
 
 
 # ---------------------------------------------------------------- pieces

@@ -68,11 +68,6 @@ def set_label(document: ProjectDocument, kind: LabelKind, name: str, text: str) 
     return replace(document, labels=tuple(sorted(labels, key=lambda one: (one.kind, one.name))))
 
 
-def label_of(document: ProjectDocument, kind: LabelKind, name: str) -> str:
-    """The user's own name for a clip or a camera; empty without one. name: See Label."""
-    return next((label.text for label in document.labels if (label.kind, label.name) == (kind, name)), "")
-
-
 def _marker_at(document: ProjectDocument, frame_index: int) -> Marker:
     for marker in document.markers:
         if marker.frame_index == frame_index:

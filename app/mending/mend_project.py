@@ -92,6 +92,7 @@ def mend_project(
             if outcome.record is None:
                 raise ProjectError(outcome.message, hint=outcome.hint)
             number = None
+            alive()
             if outcome.record.has_helped:
                 paths = {index: Path(path) for index, path in outcome.drafts.items()}
                 number = put_in_place(project, outcome.record, paths)

@@ -7,6 +7,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from msgspec.structs import replace
 
 from app.playback.view_modes import ALL
 from engine.capture.clip import Clip
@@ -69,7 +70,8 @@ class ClipParts:
 
         self._model, self._clip, self._state, self._reference = model, clip, state, reference
         reference_index = 0 if reference is None else reference.header.clip_index
-        self.named = named_sets(model, state.header, reference_index)
+        header = replace(state.header, clip_index=clip.clip_index)  # others were split or merged since, perhaps
+        self.named = named_sets(model, header, reference_index)
         self._parts: dict[str, EditedClip] = {}
         self._base: Gaussians | None = None
         self._base_rows: dict[str, np.ndarray] = {}

@@ -45,6 +45,7 @@ class ClipRecord:
         seconds: What it took when it was trained; None where not recorded.
         exposure_change: How far the cameras' exposure is from the reference clip's, a share; None where not known.
         n_anchors: Inherited ones, and those of the clip itself; zeros where the file does not say.
+        origin: By which edits name the anchors of a trained clip, see ClipHeader.origin; empty of others.
     """
 
     state: str = "untrained"
@@ -60,6 +61,7 @@ class ClipRecord:
     seconds: float | None = None
     exposure_change: float | None = None
     n_anchors: tuple[int, int] = (0, 0)
+    origin: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,6 +298,7 @@ class ClipCatalog:
             file=path,
             revision=revision,
             reason=reason,
+            origin=header.origin,
             **figures,
             **resume,
         )

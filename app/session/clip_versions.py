@@ -31,9 +31,11 @@ MAX_KEPT = 64
 
 @dataclass(frozen=True, slots=True)
 class VersionsRequest:
-    """Versions of a clip as they are now: the folder's time and the catalog's revision tell whether they were read."""
+    """Versions of a clip as they are now: the folder's time and the catalog's revision tell whether they were read. The
+    name is that of its files: clips that were cut otherwise have other ones under the same index."""
 
     clip_index: int
+    name: str
     generation: int
     stamp: tuple[int, int]
     project: Project = field(compare=False)
@@ -90,8 +92,9 @@ class Versions:
             changed_ns = os.stat(clip_versions.versions_dir(opened.project, clip_index)).st_mtime_ns
         except OSError:
             return FoundVersions()
+        name = opened.project.clip_name(clip_index)
         stamp = (changed_ns, service.catalog.revision)
-        request = VersionsRequest(clip_index, opened.generation, stamp, opened.project)
+        request = VersionsRequest(clip_index, name, opened.generation, stamp, opened.project)
         newest = self.worker.newest
         if newest is not None and newest[0] not in self._kept:
             self._kept[newest[0]] = newest[1]
@@ -172,7 +175,7 @@ class Versions:
 
 
 def _same_clip(one: VersionsRequest, other: VersionsRequest) -> bool:
-    return (one.clip_index, one.generation) == (other.clip_index, other.generation)
+    return (one.name, one.generation) == (other.name, other.generation)
 
 
 def _stale_text(n: int) -> str:

@@ -89,7 +89,7 @@ class Exporting:
         self._namer: LatestWorker[_Wish, str] = LatestWorker("export name", _name)
         self._opened: OpenedProject | None = None
         self._n_asked = 0
-        self._settle: Callable[[], None] = nothing
+        self._settle: Callable[[], object] = nothing
         self._read: tuple[object, TrainedProject] | None = None  # belongs to the planner's thread
         self._settled = 0  # likewise: number of the page
         self._revision = 0
@@ -118,7 +118,7 @@ class Exporting:
         trained: tuple[int, ...],
         paths: tuple[str, ...] = (),
         *,
-        settle: Callable[[], None] = nothing,
+        settle: Callable[[], object] = nothing,
     ) -> None:
         """Open the dialog.
 

@@ -51,6 +51,7 @@ from app.session.editing.shown_to_select import ShownToSelect
 from app.session.exclusions.excluding import apply_exclusion
 from app.session.exclusions.exclusion_commands import ExclusionCommand
 from app.session.exporting import Exporting
+from app.session.files.file_commands import SaveProjectAs
 from app.session.files.project_files import ProjectFiles
 from app.session.following import follow_training
 from app.session.live_training import LiveTraining
@@ -216,6 +217,9 @@ class Session(SessionFace):
                 self.opener.open(command, current=current, recent=self.recent.entries, known=known)
             case _ if isinstance(command, commands.FileCommand):
                 self.question = None
+                if isinstance(command, SaveProjectAs):  # what is written meanwhile would be half of it
+                    self.clip_work.check_idle()
+                    self.mending.check_idle()
                 self.files.apply(command, self.project, is_training=live.is_busy)
             case commands.ForgetRecent(folder=folder):
                 self.recent.forget(Path(folder))
@@ -329,6 +333,8 @@ class Session(SessionFace):
             return
         if is_other_cut(before.settings, after.settings):
             self.live_training.check_idle()
+            self.clip_work.check_idle()
+            self.mending.check_idle()
         check_change(opened.project, opened.capture, before, after, is_training=self.live_training.is_busy)
 
     def _follow_change(self, before: ProjectDocument, after: ProjectDocument) -> None:
@@ -554,6 +560,8 @@ class Session(SessionFace):
         self.selecting.close()
         self.live_training.close()
         self._keep_recent()
+        self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)
+        self.mending.close()  # both may write into the project, whose lock goes now
         if self.project is not None:
             self.project.close()
         self.recent.close()
@@ -563,11 +571,9 @@ class Session(SessionFace):
         self.exporting.close()
         self.residuals.close()
         self.doctor.close()
-        self._jobs.close(timeout_s=6.0 if self.live_training.is_ending else 1.0)
         self.playback.close()
         self.versions.close()
         self.clip_work.close()
-        self.mending.close()
         self.log.close()
         if self.capture is not None:
             self.capture.close()

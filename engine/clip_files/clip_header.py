@@ -181,6 +181,8 @@ class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
         n_anchors: Rows of each anchor set, inherited ones too, by role.
         n_alive: Most moving anchors in one frame.
         fingerprint: Of the arrays: names what a source clip was trained against.
+        rows_of: Fingerprint of the clip that this one was before it was mended, where it has the same anchors in the
+            same rows still; see `origin`.
         exclusions: What of its pictures was excluded from its training, see engine.capture.exclusions.exclusion_key.
         reference_fingerprint: Of the clip that this one inherits from.
         previous_fingerprint: Of the clip that this one goes on from.
@@ -208,6 +210,7 @@ class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
     n_anchors: dict[str, Count] = {}
     n_alive: Count | None = None
     coverage: Coverage | None = None
+    rows_of: str = ""
     exclusions: str = ""
     reference_fingerprint: str | None = None
     previous_fingerprint: str | None = None
@@ -222,6 +225,11 @@ class ClipHeader(Struct, frozen=True, kw_only=True, omit_defaults=True):
     def figures(self) -> ClipFigures:
         """Of a finished clip; all of them missing elsewhere."""
         return self.metrics or ClipFigures()
+
+    @property
+    def origin(self) -> str:
+        """Fingerprint by which edits name the clip's own anchors: what was picked holds for a mended clip, too."""
+        return self.rows_of or self.fingerprint
 
 
 class NewerSchema(ValueError):

@@ -40,7 +40,7 @@ def named_sets(model: ClipModel, header: ClipHeader, reference_index: int) -> di
     named = {}
     for role in model.roles():
         is_own = inherits_from is None or model.anchor_set(role).is_trainable
-        origin = header.fingerprint if inherits_from is None or is_own else inherits_from
+        origin = header.origin if inherits_from is None or is_own else inherits_from
         row_set = RowSet(origin, header.clip_index if is_own else reference_index, role)
         named[role] = NamedSet(row_set, not is_own or inherits_from is None)
     return named

@@ -8,7 +8,7 @@ them; clips themselves stay as they were trained.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated
 
 from msgspec import Meta, Struct
 
@@ -220,7 +220,6 @@ class Smooth(Struct, frozen=True, forbid_unknown_fields=True, tag="smooth"):
 
 
 Action = Hide | Delete | Transform | Recolor | Expose | Hold | Smooth
-ActionName = Literal["hide", "delete", "transform", "recolor", "expose", "hold", "smooth"]
 
 # ---------------------------------------------------------------- the edit
 

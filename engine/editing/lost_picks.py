@@ -23,13 +23,13 @@ class LostPicks:
     is_all: bool
 
 
-def lost_picks(edits: tuple[Edit, ...], fingerprints: Mapping[int, str]) -> tuple[LostPicks, ...]:
+def lost_picks(edits: tuple[Edit, ...], origins: Mapping[int, str]) -> tuple[LostPicks, ...]:
     """Edits with picks that match no clip as it is now.
 
     Args:
-        fingerprints: Of the finished clips, by index.
+        origins: Of the finished clips, by index; see ClipHeader.origin.
     """
-    known, found = set(fingerprints.values()), []
+    known, found = set(origins.values()), []
     for edit in edits:
         if not isinstance(edit.target, Picked):
             continue

@@ -81,9 +81,10 @@ def _of_pair(
     truths = [capture.frame(camera, at).astype(np.float32) / np.float32(255.0) for at in (frame - 1, frame)]
     truth_change = change_of(truths[1], truths[0])
     is_still = stands_still(truth_change)
-    valid = capture.valid(camera)
-    if valid is not None:
-        is_still &= valid
+    for at in (frame - 1, frame):
+        valid = capture.valid_in(camera, at)
+        if valid is not None:
+            is_still &= valid
     if not is_still.any():
         return 0.0, 0.0, 0.0
     pictures = [_pictures(one, capture, camera, at) for one, at in zip(shown, (frame - 1, frame), strict=True)]

@@ -108,9 +108,11 @@ def _n_steps(wanted: int) -> int:
 
 
 def _measured_anew(clip: CompactClip, state: ClipState) -> CompactClip:
-    """With the header of the clip as it was: its settings and steps are those of its training. Figures are gone."""
+    """With the header of the clip as it was: its settings and steps are those of its training, its anchors lie in the
+    same rows. Figures are gone."""
     figures = with_entries(state.header.figures, held_out_psnr=None)
-    header = with_entries(state.header, fingerprint=clip.state.header.fingerprint, schema=clip.state.header.schema)
+    now = clip.state.header
+    header = with_entries(state.header, fingerprint=now.fingerprint, schema=now.schema, rows_of=state.header.origin)
     return CompactClip(ClipState(clip.state.arrays, with_entries(header, metrics=figures)), clip.coded)
 
 

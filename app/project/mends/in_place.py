@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
+from msgspec.structs import replace as with_entries
+
 from app.project.clip_versions import forget_oldest, list_versions, remove_version, restore_version, set_aside, why_not
 from app.project.mends.record import (
     UNFINISHED,
@@ -87,12 +89,32 @@ def take_back(project: Project, record: MendRecord) -> None:
     reason = why_not_back(project, record)
     if reason:
         raise ProjectError(reason, hint="The versions in the clip's menu say what can come back.")
+    record = as_cut_now(project, record)
+    unfinished = records_dir(project) / UNFINISHED
+    write_record(unfinished, record)  # killed in between, it is taken back to the end when the project is opened
     _take_back(project, record)
+    with suppress(OSError):
+        unfinished.unlink(missing_ok=True)
+
+
+def as_cut_now(project: Project, record: MendRecord) -> MendRecord:
+    """The record with the indices that its clips have now: splitting or merging clips before them gives them others.
+
+    A clip that is not what mending has made of it keeps the index that it had.
+    """
+
+    def now(clip: MendedClip) -> MendedClip:
+        if _fingerprint(project, clip.clip_index) == clip.after:
+            return clip
+        indices = (index for index, _ in project.finished_clips() if _fingerprint(project, index) == clip.after)
+        return with_entries(clip, clip_index=next(indices, clip.clip_index))
+
+    return with_entries(record, clips=tuple(map(now, record.clips)))
 
 
 def why_not_back(project: Project, record: MendRecord) -> str:
     """Why what was mended cannot be taken back; empty where it can."""
-    for clip in record.clips:
+    for clip in as_cut_now(project, record).clips:
         if _fingerprint(project, clip.clip_index) != clip.after:
             return f"Clip {clip.clip_index} was trained or brought back since it was mended."
         if version_before(project, clip) is None:
@@ -119,14 +141,14 @@ def recover(project: Project) -> None:
 
 
 def _take_back(project: Project, record: MendRecord) -> None:
-    """As far as there is something to take back."""
+    """As far as there is something to take back. A clip that was trained meanwhile stays."""
     for clip in record.clips:
-        number = version_before(project, clip)
+        number, now = version_before(project, clip), _fingerprint(project, clip.clip_index)
         if number is None:
             continue
-        if _fingerprint(project, clip.clip_index) == clip.before:  # it was set aside, and no more
+        if now == clip.before:  # it was set aside, and no more
             remove_version(project, clip.clip_index, number)
-        else:
+        elif now in (clip.after, None):
             restore_version(project, clip.clip_index, number)
 
 

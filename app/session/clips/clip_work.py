@@ -76,6 +76,10 @@ class ClipWork:
         self._dependencies_of = self._looked_for_damage = (0, 0)
         self._disk.note_change()
 
+    def check_idle(self) -> None:
+        """See that no clip is written again, so that clips may be cut otherwise. Raises ProjectError."""
+        self._permanence.check_idle()
+
     # ---------------------------------------------------------------- commands
 
     def obey(self, command: ClipCommand) -> ClipQuestion | None:

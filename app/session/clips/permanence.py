@@ -67,6 +67,17 @@ class Permanence:
 
         self._jobs.start("Writing clips without what is deleted", work, staged, self._failed)
 
+    def check_idle(self) -> None:
+        """See that nothing is applied at the moment.
+
+        Raises:
+            ProjectError: Something is.
+        """
+        if self._is_busy:
+            raise ProjectError(
+                "Deletions are being applied to the clips as they are now.", hint="Wait until that is done."
+            )
+
     def _found(self, deletions: Deletions) -> None:
         self._is_busy = False
         n_clips = sum(1 for clip in deletions.clips.values() if clip.n_anchors)
@@ -89,7 +100,8 @@ class Permanence:
             step = (NAME, self._n_done)
             if staged.during != staged.before:
                 self._document.change(replace(content, edits=staged.during), NAME, merge=step)
-                self._document.settle()  # it has to be on disk before the clips are others
+                if not self._document.settle():  # it has to be on disk before the clips are others
+                    raise ProjectError("What was edited could not be kept yet.", hint="Apply them again in a moment.")
         except EngineError as error:
             give_up_exchange(project.folder)
             self._failed(error)

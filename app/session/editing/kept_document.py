@@ -54,6 +54,7 @@ class KeptDocument:
         self._files: LatestWorker[DocumentRequest, DocumentHistory] = LatestWorker("document", self._keep_or_read)
         self._project: Project | None = None
         self._number = 0
+        self._last: DocumentRequest | None = None
         self._awaited: int | None = None
         self._problem = ""
         self._retry_at_s: float | None = None
@@ -90,8 +91,9 @@ class KeptDocument:
         """Let go of the project once everything is kept."""
         self._settle_for_good()
         self._files.forget()
-        self._project = None
-        self._pending = []
+        with self._lock:  # what the disk still works on belongs to nobody any more
+            self._project = None
+            self._pending, self._last = [], None
         self._awaited, self._problem, self._retry_at_s = None, "", None
 
     # ---------------------------------------------------------------- changes
@@ -161,20 +163,24 @@ class KeptDocument:
         self._number += 1
         if is_reading:
             self._awaited = self._number
-        self._files.request(DocumentRequest(self._number, is_reading, project, project.history))
+        self._last = DocumentRequest(self._number, is_reading, project, project.history)
+        self._files.request(self._last)
 
     def _keep_or_read(self, request: DocumentRequest) -> DocumentHistory:
         store = request.project.store
         if request.is_reading:
             return store.read()
         with self._lock:  # those of later requests too: their own find nothing more to do
+            if self._project is not request.project:  # the disk was slow; these are events of another project
+                return request.history
             events, self._pending = self._pending, []
             history = request.project.history
         try:
             store.write(events, history)
         except DiskError:
             with self._lock:  # to be tried again
-                self._pending = [*events, *self._pending]
+                if self._project is request.project:
+                    self._pending = [*events, *self._pending]
             raise
         return history
 
@@ -208,9 +214,12 @@ class KeptDocument:
         self._on_change(before, self._project.document)
         return True
 
-    def settle(self) -> None:
-        """Wait until what was changed is on disk; longer than a moment only where the disk is at fault."""
-        self._files.wait_idle(SETTLE_S)
+    def settle(self) -> bool:
+        """Wait until what was changed is on disk; longer than a moment only where the disk is at fault. Whether it is
+        there."""
+        is_idle = self._files.wait_idle(SETTLE_S)
+        last = self._last
+        return is_idle and not self._pending and not (last is not None and self._files.has_failed(last))
 
     def close(self) -> None:
         """Keep what was changed, end the thread."""

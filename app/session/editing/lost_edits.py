@@ -8,15 +8,13 @@ from app.training.service import TrainingService
 from engine.editing.edit import Edit
 from engine.editing.lost_picks import LostPicks, lost_picks
 
-_TRAINED = "trained-"
-"""How revisions of finished clips begin; their fingerprint follows."""
-
 
 class LostEdits:
     """For one thread. service: Gives the training of the open project, None without one."""
 
     def __init__(self, service: Callable[[], TrainingService | None]) -> None:
         self._service = service
+        self._edits: tuple[Edit, ...] = ()
         self._known: tuple[object, tuple[LostPicks, ...]] = (None, ())
 
     def of(self, edits: tuple[Edit, ...]) -> tuple[LostPicks, ...]:
@@ -25,11 +23,9 @@ class LostEdits:
         if service is None or not edits:
             return ()
         catalog = service.catalog
-        key = (id(edits), id(catalog), catalog.revision)
-        if self._known[0] != key:
-            revisions = ((index, catalog[index].revision) for index in range(len(catalog)))
-            fingerprints = {
-                index: revision.removeprefix(_TRAINED) for index, revision in revisions if revision.startswith(_TRAINED)
-            }
-            self._known = (key, lost_picks(edits, fingerprints))
+        key = (catalog, catalog.revision)
+        if self._edits is not edits or self._known[0] != key:  # held, so that nothing else gets their place in memory
+            self._edits = edits
+            origins = {index: origin for index in range(len(catalog)) if (origin := catalog[index].origin)}
+            self._known = (key, lost_picks(edits, origins))
         return self._known[1]

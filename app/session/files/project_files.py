@@ -45,7 +45,7 @@ class ProjectFiles:
         *,
         ask: Callable[[FileQuestion | None], None],
         open_project: Callable[[OpenProject], None],
-        settle: Callable[[], None],
+        settle: Callable[[], object],
     ) -> None:
         self._jobs, self._notices = jobs, notices
         self._ask, self._open_project, self._settle = ask, open_project, settle

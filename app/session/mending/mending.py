@@ -10,7 +10,7 @@ from app.background.jobs import Job, JobContext, Jobs
 from app.mending.mend_project import MendOutcome, mend_work
 from app.mending.request import MendRequest
 from app.playback.timeline import Timeline
-from app.project.mends.in_place import take_back, version_before
+from app.project.mends.in_place import as_cut_now, take_back, version_before
 from app.project.opened_project import OpenedProject
 from app.session.clips.clip_commands import CompareVersion
 from app.session.clips.comparing import show_version
@@ -47,12 +47,15 @@ class Mending:
         self._live, self._overlays = live, overlays
         self._jobs = Jobs()
         self._job: Job | None = None
+        self._stopped: tuple[int, ...] = ()
         self._opened: OpenedProject | None = None
 
     def open(self, opened: OpenedProject) -> None:
         """Take up a project, or the same one with other settings."""
         if self._opened is None or self._opened.generation != opened.generation:
             self._close_page()
+        elif self._opened.clips != opened.clips and self.page is not None and self.page.state == "asking":
+            self._close_page()  # what it asks about is numbered otherwise now
         self._opened = opened
 
     @property
@@ -65,6 +68,15 @@ class Mending:
     def is_busy(self) -> bool:
         """Whether something is being mended."""
         return self.page is not None and self.page.state == "running"
+
+    def check_idle(self) -> None:
+        """See that nothing is mended, so that clips may be cut otherwise.
+
+        Raises:
+            ProjectError: Something is.
+        """
+        if self.is_busy:
+            raise ProjectError("Clips are being mended as they are now.", hint="Wait for it, or stop it first.")
 
     def apply(self, command: MendCommand, timeline: Timeline) -> None:
         """Carry out a command.
@@ -159,7 +171,7 @@ class Mending:
         if page.compared is not None:
             self._end_comparing()
             return
-        clips, here = page.record.clips, timeline.clip
+        clips, here = as_cut_now(opened.project, page.record).clips, timeline.clip
         chosen = next((one for one in clips if here is not None and one.clip_index == here.clip_index), clips[0])
         version = version_before(opened.project, chosen)
         if version is None:
@@ -178,7 +190,7 @@ class Mending:
         if page is None or page.state != "done" or page.record is None or not page.record.has_helped:
             return
         self._end_comparing()
-        record, project = page.record, opened.project
+        record, project = as_cut_now(opened.project, page.record), opened.project
 
         def done(_: None) -> None:
             for clip in record.clips:
@@ -189,14 +201,19 @@ class Mending:
         self._start(lambda context: take_back(project, record), done)
 
     def _note_change(self, clip_index: int) -> None:
-        if self._live.service is not None:
+        if self._live.service is not None and clip_index < len(self._live.service.catalog):
             self._live.service.catalog.update(clip_index)
 
     # ---------------------------------------------------------------- the page and its job
 
     def poll(self) -> bool:
         """Take in what was finished. Whether anything was."""
-        return self._jobs.poll()
+        has_ended = self._jobs.poll()
+        if has_ended and self._stopped:  # it may have been too late
+            for clip_index in self._stopped:
+                self._note_change(clip_index)
+            self._stopped = ()
+        return has_ended
 
     @property
     def finished(self) -> tuple[object, ...]:
@@ -220,7 +237,7 @@ class Mending:
     def _cancel(self) -> None:
         if self._job is not None:
             self._job.context.cancel()
-            self._job = None
+            self._job, self._stopped = None, self.page.clip_indices if self.page is not None else ()
 
     def _close_page(self) -> None:
         if self.page is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from msgspec.structs import replace
 
 from engine.clip_files.anchor_record import AnchorRecord, StoredAnchors
 from engine.clip_files.array_names import is_said_of_anchors, own_kind
@@ -47,7 +48,10 @@ def without_anchors(state: ClipState, own: Chosen, inherited: Chosen, gone_from_
     if reasons is not None:
         gone = own.get("replacing")
         arrays |= AnchorRecord(reasons=reasons if gone is None else reasons[~gone]).arrays("replacing")
-    return ClipState(arrays, state.header).stamped()
+    smaller = ClipState(arrays, state.header).stamped()
+    if smaller.header.fingerprint == state.header.fingerprint:
+        return smaller
+    return ClipState(arrays, replace(smaller.header, rows_of=""))  # rows are others now
 
 
 def _own_without(record: AnchorRecord, gone: np.ndarray) -> AnchorRecord:

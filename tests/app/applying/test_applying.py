@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace as with_entries
 
 from app.applying import applying
 from app.applying.applying import apply_permanently, stage
@@ -15,9 +16,10 @@ from app.applying.deletions import find_deletions
 from app.evaluation.headless import TrainedProject, open_trained
 from app.export.scene_frames import SceneFrames
 from app.project import clip_exchange
-from app.project.clip_versions import list_versions, restore_version
+from app.project.clip_versions import list_versions, restore_version, set_aside
 from app.project.project import Project, open_project
-from engine.clip_files.clip_state import read_clip_state
+from engine.clip_files.array_names import LOG_DRIFT
+from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
 from engine.editing.edit import (
     Box,
     Delete,
@@ -273,3 +275,27 @@ def test_a_damaged_list_is_a_typed_error(folder: Path) -> None:
     (folder / "exchange" / "exchange.json").unlink()
     open_project(folder).close()
     assert not (folder / "exchange").exists()
+
+
+def test_picks_hold_for_a_mended_clip_and_for_what_it_was(folder: Path) -> None:
+    """Mending gives a clip another look and leaves its anchors in their rows."""
+    project = open_project(folder)
+    path, before = project.clip_path(1), seen(project)
+    target = picks(project, 1, "residual", np.arange(12))
+    give(project, Edit(1, "", target, Delete()))
+    edited = seen(project)
+    assert len(edited[4]) < len(before[4])
+
+    state = read_clip_state(path)
+    arrays = state.arrays | {LOG_DRIFT: np.full((len(state.header.camera_names), 3, 3), 0.1, np.float32)}
+    mended = ClipState(arrays, with_entries(state.header, rows_of=state.header.origin)).stamped()
+    set_aside(project, 1)
+    write_clip_state(path, mended)
+    assert origin(project, 1) != state.header.fingerprint
+    assert_same(edited, seen(project))
+
+    applied(project)
+    assert not project.document.edits
+    assert_same(edited, seen(project))
+    assert read_clip_state(path).header.origin == origin(project, 1), "rows are others now"
+    project.close()

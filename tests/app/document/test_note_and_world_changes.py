@@ -8,7 +8,7 @@ import pytest
 
 from app.document import note_changes as notes
 from app.document import world_changes as world
-from app.document.project_document import Marker, ProjectDocument
+from app.document.project_document import Label, Marker, ProjectDocument
 from app.document.project_settings import ProjectSettings
 from app.document.stored_document import document_of, plain_document
 from engine.errors import ProjectError
@@ -52,11 +52,9 @@ def test_there_is_room_for_so_many_markers_and_no_more(monkeypatch: pytest.Monke
 
 def test_labels_name_clips_and_cameras() -> None:
     document = notes.set_label(notes.set_label(EMPTY, "clip", "10", " jump "), "camera", "cam01", "door")
-    assert notes.label_of(document, "clip", "10") == "jump"
-    assert notes.label_of(document, "camera", "cam01") == "door"
-    assert notes.label_of(document, "camera", "10") == ""
+    assert document.labels == (Label("camera", "cam01", "door"), Label("clip", "10", "jump"))
     assert document_of(plain_document(document)) == document
-    assert notes.label_of(notes.set_label(document, "clip", "10", " "), "clip", "10") == ""
+    assert notes.set_label(document, "clip", "10", " ").labels == document.labels[:1]
     with pytest.raises(ProjectError, match="characters"):
         notes.set_label(EMPTY, "clip", "10", "x" * 201)
 

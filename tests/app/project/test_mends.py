@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import errno
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace as with_entries
 
 from app.project.clip_versions import list_versions, set_aside
 from app.project.mends import in_place
-from app.project.mends.in_place import put_in_place, take_back, version_before, why_not_back
+from app.project.mends.in_place import as_cut_now, put_in_place, take_back, version_before, why_not_back
 from app.project.mends.record import (
     MAX_KEPT,
     UNFINISHED,
@@ -108,6 +110,53 @@ def test_what_was_trained_since_is_not_taken_back(project: Project) -> None:
     with pytest.raises(ProjectError, match="Clip 1 was trained"):
         take_back(project, RECORD)
     assert current(project) == ["trained", "new-2"], "none of them, rather than one"
+
+
+def test_mended_clips_are_found_where_clips_before_them_were_merged(project: Project) -> None:
+    """Clips of two frames, of which the first two become one: clip 2 is clip 1 from then on."""
+    for index in range(3):
+        write_header(project.clip_path(index), clip_header(index, start=2 * index, n_frames=2, clip_length=2))
+    settings = replace(project.settings, clip_length=2, clip_bounds=(0, 2, 4, 6))
+    project.change(replace(project.document, settings=settings), "cut")
+    write_header(project.clip_path(2), clip_header(2, start=4, n_frames=2, clip_length=2, fingerprint="new-2"))
+    record = with_entries(RECORD, clips=(MendedClip(2, "old-2", "new-2"),))
+    project.change(replace(project.document, settings=replace(settings, clip_bounds=(0, 4, 6))), "merge")
+    assert [clip.clip_index for clip in as_cut_now(project, record).clips] == [1]
+    assert "The version of clip 1" in why_not_back(project, record), "that is all that is missing"
+
+
+def test_taking_back_that_was_killed_is_finished_when_the_project_is_opened(
+    project: Project, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    put_in_place(project, RECORD, drafts(project))
+    restore = in_place.restore_version
+
+    def killed(at: Project, clip_index: int, number: int) -> None:
+        if clip_index == 2:
+            raise KeyboardInterrupt
+        restore(at, clip_index, number)
+
+    monkeypatch.setattr(in_place, "restore_version", killed)
+    with pytest.raises(KeyboardInterrupt):
+        take_back(project, RECORD)
+    assert current(project) == ["old-1", "new-2"]
+    monkeypatch.undo()
+    folder = project.folder
+    project.close()
+    reopened = open_project(folder)
+    assert current(reopened) == ["old-1", "old-2"]
+    reopened.close()
+
+
+def test_what_was_trained_after_something_was_left_unfinished_stays(project: Project) -> None:
+    put_in_place(project, RECORD, drafts(project))
+    write_record(records_dir(project) / UNFINISHED, RECORD)
+    write_header(project.clip_path(1), of(1, "trained"))
+    folder = project.folder
+    project.close()
+    reopened = open_project(folder)
+    assert current(reopened) == ["trained", "old-2"]
+    reopened.close()
 
 
 @pytest.mark.parametrize("fails_at", [1, 2])

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
-import torch  # noqa: F401  playback loads it on a thread; half loaded it would meet the seeds of the next test
+from msgspec.structs import replace as with_entries
 
 from app.background.jobs import JobCancelled, JobContext
 from app.mending.mend_project import MendOutcome
@@ -16,11 +17,16 @@ from app.project.mends.in_place import put_in_place
 from app.project.mends.record import MendedClip, MendRecord
 from app.project.project import Project
 from app.session import commands as c
+from app.session.clips.clip_commands import SplitClip
+from app.session.editing.edit_commands import AddEdit
+from app.session.files.file_commands import SaveProjectAs
 from app.session.mending import mending
 from app.session.mending.mend_commands import AskMend, CloseMend, CompareMended, RevertMend, StartMend, StopMend
 from app.session.mending.mend_page import MendPage
 from app.session.session import Session
 from engine.clip_files.clip_state import ClipState, read_clip_state, write_clip_state
+from engine.editing.edit import Hide, Picked, PickedRows
+from engine.editing.picks import pack_rows
 from engine.errors import ProjectError
 from engine.mending.figures import StretchFigures
 from tests.app.conftest import poll_until
@@ -36,7 +42,8 @@ def made_up(project: Project, request: MendRequest) -> Callable[[JobContext], Me
     def work(context: JobContext) -> MendOutcome:
         context.report(0.5, "Fading")
         state = read_clip_state(project.clip_path(1))
-        changed = ClipState(state.arrays | {"value": np.array([7.0], np.float32)}, state.header).stamped()
+        arrays = state.arrays | {"value": np.array([7.0], np.float32)}
+        changed = ClipState(arrays, with_entries(state.header, rows_of=state.header.origin)).stamped()
         draft = project.folder / "draft.safetensors"
         write_clip_state(draft, changed)
         clip = MendedClip(1, state.header.fingerprint, changed.header.fingerprint)
@@ -109,6 +116,19 @@ def test_a_mended_clip_is_shown_compared_and_taken_back(session: Session) -> Non
     assert page_of(session).state == "reverted"
 
 
+def test_what_was_picked_in_a_clip_is_not_lost_by_mending_it(session: Session) -> None:
+    picked = Picked((PickedRows(1, fingerprint(session), "residual", pack_rows(np.arange(2))),))
+    session.dispatch(AddEdit(Hide(), picked))
+    before = fingerprint(session)
+    mend(session)
+    assert fingerprint(session) != before
+    session.poll()
+    assert (len(session.edits.edits), session.edits.lost) == (1, ())
+    session.dispatch(RevertMend())
+    poll_until(session, lambda: page_of(session).state == "reverted", what="the way back")
+    assert session.edits.lost == ()
+
+
 def test_what_cannot_be_mended_says_why(session: Session, make_session: Make) -> None:
     session.dispatch(AskMend(after=2))
     assert "no boundary before clip 2" in list(session.notices)[-1].detail
@@ -172,6 +192,59 @@ def test_stopping_leaves_the_clips_as_they_were(session: Session, monkeypatch: p
     assert has_ended.wait(30.0)
     poll_until(session, lambda: session.mending.progress is None)
     assert fingerprint(session) == before
+
+
+def test_stopping_too_late_shows_what_was_put_in_place(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    may_go_on = threading.Event()
+
+    def slow(project: Project, request: MendRequest) -> Callable[[JobContext], MendOutcome]:
+        mended = made_up(project, request)
+
+        def work(context: JobContext) -> MendOutcome:
+            outcome = mended(context)
+            may_go_on.wait(30.0)
+            return outcome
+
+        return work
+
+    monkeypatch.setattr(mending, "mend_work", slow)
+    before = fingerprint(session)
+    session.dispatch(AskMend(after=1))
+    session.dispatch(StartMend())
+    poll_until(session, lambda: fingerprint(session) != before, what="the mended clip")
+    session.dispatch(StopMend())
+    may_go_on.set()
+    service = session.live_training.service
+    assert service is not None
+    revision = f"trained-{fingerprint(session)}"
+    poll_until(session, lambda: service.catalog[1].revision == revision, what="the clip as it is now")
+
+
+def test_clips_are_not_cut_or_copied_while_they_are_mended(
+    session: Session, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    may_go_on = threading.Event()
+
+    def slow(project: Project, request: MendRequest) -> Callable[[JobContext], MendOutcome]:
+        def work(context: JobContext) -> MendOutcome:
+            may_go_on.wait(30.0)
+            raise JobCancelled
+
+        return work
+
+    monkeypatch.setattr(mending, "mend_work", slow)
+    session.dispatch(AskMend(after=1))
+    session.dispatch(StartMend())
+    session.dispatch(SplitClip(1, is_confirmed=True))
+    assert len(session.clips) == 2
+    assert "being mended" in list(session.notices)[-1].detail
+    session.dispatch(SaveProjectAs(tmp_path / "copy"))
+    assert "being mended" in list(session.notices)[-1].detail
+    session.dispatch(StopMend())
+    may_go_on.set()
+    session.dispatch(SplitClip(1, is_confirmed=True))
+    assert len(session.clips) == 3
+    assert session.mending.page is None, "boundaries have other numbers now"
 
 
 def test_nothing_is_mended_while_a_clip_trains(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,6 +18,7 @@ from engine.clip_files.clip_state import read_clip_state
 from engine.editing.edit import Delete, Expose, Picked, PickedRows
 from engine.editing.lost_picks import LostPicks
 from engine.editing.picks import pack_rows
+from engine.errors import DiskError
 from tests.app.conftest import poll_until
 from tests.app.residuals.conftest import make_project
 
@@ -90,3 +91,22 @@ def test_edits_that_have_lost_their_picks_are_named(session: Session):
     session.dispatch(AddEdit(Expose(1.0), other))
     session.poll()
     assert session.edits.lost == (LostPicks(2, (1,), is_all=True),)
+
+
+def test_clips_stay_as_long_as_the_disk_does_not_keep_what_was_edited(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only with the numbers that picks get do edits fit the new clips."""
+    session.dispatch(AddEdit(Delete(), picked(session, np.arange(4))))
+    session.dispatch(AddEdit(Expose(1.0), picked(session, np.arange(3, 6))))
+    session.document.settle()
+    before = n_static(session)
+
+    def refuse(*arguments: object) -> None:
+        raise DiskError("The project could not be written.")
+
+    monkeypatch.setattr(project_of(session).store, "write", refuse)
+    session.dispatch(ApplyDeletions(is_confirmed=True))
+    poll_until(session, lambda: any("kept yet" in notice.detail for notice in session.notices), what="the notice")
+    assert n_static(session) == before
+    assert not (project_of(session).folder / "exchange").exists()

@@ -100,6 +100,7 @@ def test_wrong_exposure_of_some_cameras_is_measured_again(tiny: Tiny, trained: C
     header = mended.clips[1].state.header
     assert (header.step, header.config) == (trained.header.step, trained.header.config), "it was not trained anew"
     assert header.reference_fingerprint == tiny.reference.header.fingerprint
+    assert header.origin == case.states[1].header.fingerprint, "what was picked in it stays picked"
 
 
 def test_a_shifted_camera_is_outweighed_by_the_clip_beside(tiny: Tiny) -> None:

@@ -58,9 +58,9 @@ SMALLEST_BRUSH, LARGEST_BRUSH = 2.0, 400.0
 GROWTH = 1.15
 """Factor of a tick of the wheel, or a press of a key."""
 LEAST_STEP_PX = 1.5
+"""Points of a line that are nearer to each other than this count once."""
 STANDING_SHARE = 0.95
 """How far the middle of a box lies above the surface that it stands on, in half heights: the surface belongs to it."""
-"""Points of a line that are nearer to each other than this count once."""
 
 
 @dataclass(eq=False)
