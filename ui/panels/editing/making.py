@@ -138,8 +138,8 @@ def make_edit(session: MakingNeeds, dispatch: Dispatch, ui: UiState, making: Mak
 
 
 def mark_moving(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    """Let everything move in what was drawn, or in the box around what is selected: a region of the gate, in clips whose
-    training starts from now on."""
+    """Let everything move in what was drawn, or in the box around what is selected: a region of the gate, in clips that
+    are trained from now on."""
     volume, _ = meant(session, ui)
     bounds = bounds_of(session, volume)
     if isinstance(volume, Sphere):
@@ -188,5 +188,7 @@ def draw_making(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
         mark_moving(session, dispatch, ui)
     ui.mark("edits.make moving")
     imgui.end_disabled()
-    imgui.set_item_tooltip("Marks what was drawn, or the box around the selection, as moving; clips take it up when they are trained")
+    imgui.set_item_tooltip(
+        "Marks what was drawn, or the box around the selection, as moving; clips take it up when they are trained"
+    )
     imgui.end_disabled()
