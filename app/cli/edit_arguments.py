@@ -231,7 +231,7 @@ def chosen_scope(options: argparse.Namespace, project: ScriptedProject) -> Scope
         if found is None:
             raise ProjectError(f"--frames is '{options.frames}', which is not a range A:B.")
         first, stop = int(found[1] or 0), int(found[2]) if found[2] else None
-    return _made("The frames", lambda: Scope(first, stop, options.reference))
+    return _made("--frames", lambda: Scope(first, stop, options.reference))
 
 
 def _transform(options: argparse.Namespace, target: Target) -> Transform:

@@ -26,7 +26,8 @@ PROJECT_FILE, BACKUP_FILE = "project.json", "project.backup.json"
 GATE_FILE, CAMERA_PATHS_FILE = "gate.json", "camera_paths.json"
 """Of schema 1: regions and camera paths, which are part of the document now."""
 MAX_DOCUMENT_BYTES = 256 << 20
-_RESTORE = "Restore it from a copy."
+RESTORE = "Restore it from a copy."
+"""Where nobody knows yet what else is left of the project."""
 _REMOVE = "Correct or remove the file."
 
 
@@ -65,7 +66,7 @@ def read_stored(folder: Path, name: str = PROJECT_FILE) -> StoredDocument:
     """
     path = folder / name
     try:
-        found = kept_object(path, "The project file", hint=_RESTORE, max_bytes=MAX_DOCUMENT_BYTES)
+        found = kept_object(path, "The project file", hint=RESTORE, max_bytes=MAX_DOCUMENT_BYTES)
     except ProjectError as error:
         raise _damaged(error) from error
     if found is None:
@@ -86,7 +87,7 @@ def read_stored(folder: Path, name: str = PROJECT_FILE) -> StoredDocument:
         )
     step = content.pop("step", 0) if schema == SCHEMA else 0
     if type(step) is not int or not 0 <= step < 2**53:
-        raise DamagedDocument(f"The project file has the step {step!r:.60}.", hint=_RESTORE, path=path)
+        raise DamagedDocument(f"The project file has the step {step!r:.60}.", hint=RESTORE, path=path)
     if schema == 1:
         content = _from_schema_1(folder, content)
     unknown = sorted(content.keys() - set(ENTRIES))
@@ -100,7 +101,7 @@ def read_stored(folder: Path, name: str = PROJECT_FILE) -> StoredDocument:
         raise DamagedDocument(error.message, hint="Correct it or restore the file from a copy.", path=path) from error
     except EntryError as error:
         raise DamagedDocument(
-            f"The project file has a missing or wrong entry ({error}).", hint=_RESTORE, path=path
+            f"The project file has a missing or wrong entry ({error}).", hint=RESTORE, path=path
         ) from error
 
 

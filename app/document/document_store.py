@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.document.capture_place import found_place, stored_place, with_capture
-from app.document.document_file import DamagedDocument, document_text, write_document_text
+from app.document.document_file import RESTORE, DamagedDocument, document_text, write_document_text
 from app.document.history import Changed, DocumentHistory, Event, Placed, coalesced
 from app.document.history_file import write_history
 from app.document.journal_file import JournalDamage, append_rows, create_journal, leave_journal
@@ -68,7 +68,7 @@ class DocumentStore:
         try:
             known = self._known = replayed(self.folder)
         except (JournalDamage, DamagedDocument) as error:
-            if not error.hint:
+            if error.hint in ("", RESTORE):
                 raise type(error)(error.message, hint=self._repair_hint, path=error.path) from error
             raise
         self.n_replayed, self.notes = known.n_replayed, known.notes

@@ -159,7 +159,10 @@ class TrainingService:
         return 0 <= clip_index < len(self.clips) and self.catalog[clip_index].state in ("trained", "damaged")
 
     def shown_state(self, clip_index: int) -> ShownState | None:
-        """The state of a clip to look at: the newest snapshot while it trains, else what is on disk, if anything."""
+        """The state of a clip to look at: the newest snapshot while it trains, else what is on disk, if anything; None
+        for one that there is no more, since clips are cut otherwise now."""
+        if not 0 <= clip_index < len(self.clips):
+            return None
         if clip_index == self.running_clip and self._run is not None and self._run.file is not None:
             return ShownState(self._run.file, self._run.revision, is_live=True)
         record = self.catalog[clip_index]

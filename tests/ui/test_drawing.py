@@ -109,7 +109,7 @@ def test_menus_work_with_the_keyboard_alone(pilot: Pilot, symbol: int) -> None:
     assert "menu.Quit; what was learned is kept" in pilot.rects
     pilot.key(key.RIGHT)
     pilot.rest()
-    assert "menu.Frame the whole scene" in pilot.rects, "Right goes on to the next menu"
+    assert "menu.Hide what is selected" in pilot.rects, "Right goes on to the next menu"
     pilot.key(key.LEFT)
     pilot.rest()
     pilot.key(key.UP)  # from the first entry round to the last

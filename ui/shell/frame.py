@@ -89,6 +89,8 @@ FIRST_FRAMES = 6
 """A new layout: docked panels get their tabs, then their sizes, then they lose scrollbars that are not needed."""
 FRAMES_TO_DOCK = 2
 """Until all panels of a kept layout have their tabs; the one that got its tab last is in front."""
+TAB_PADDING_SHARE = 0.6
+"""How wide tabs are beside their words, as a share of other things: side by side, all of a side panel are seen."""
 TRAINING_REFRESH_S = 0.2
 """Often enough for numbers that nobody waits for; each frame is taken from the training where the CPU draws."""
 ATTENDED_S = 0.5
@@ -326,7 +328,9 @@ class Frame:
         is_software = self.viewport.scene.is_software
         self._guard("Status bar", lambda: draw_status_bar(session, ui, is_software=is_software))
         imgui.push_style_color(imgui.Col_.window_bg, NOTHING)  # the frame is cleared to the panels' colour
+        imgui.push_style_var_x(imgui.StyleVar_.frame_padding, imgui.get_style().frame_padding.x * TAB_PADDING_SHARE)
         dock_id = imgui.dock_space_over_viewport(0, imgui.get_main_viewport(), imgui.DockNodeFlags_.none)
+        imgui.pop_style_var()
         imgui.pop_style_color()
         layout = LAYOUTS[0] if ui.is_layout_reset_requested else self.layouts.take_own(ui)
         if layout is not None or not (ui.is_picture_only or is_laid_out(dock_id)):

@@ -54,7 +54,7 @@ def lay_out(dock_id: int, name: str = LAYOUTS[0]) -> None:
     internal = imgui.internal
     size = imgui.get_main_viewport().work_size
     is_wide = size.x >= WIDE_UNITS
-    left_width, right_width = (236.0, 312.0) if is_wide else (206.0, 270.0)
+    left_width, right_width = (236.0, 344.0) if is_wide else (206.0, 270.0)
     internal.dock_builder_remove_node(dock_id)
     internal.dock_builder_add_node(dock_id, internal.DockNodeFlagsPrivate_.dock_space)
     internal.dock_builder_set_node_size(dock_id, size)

@@ -74,8 +74,8 @@ class QuestionDialogs:
         flags |= imgui.WindowFlags_.no_nav_inputs  # Enter, Escape and the arrows belong to the dialog
         is_open, is_kept = imgui.begin_popup_modal(title, True, flags)
         if not is_open:
-            if not is_new:  # closed by its cross
-                dispatch(_closing(question))
+            imgui.open_popup(title)  # a panel that came to the front has closed it; nobody has answered
+            ui.redraw_within(0.0)
             return
         imgui.push_text_wrap_pos(0.0)
         # the key that led to the question is still pressed in its first frame, and is not an answer to it

@@ -158,6 +158,7 @@ def apply_style() -> None:
     style.child_border_size = 0
     style.popup_border_size = 1
     style.tab_bar_border_size = 0
+    style.tab_min_width_shrink = 40  # all tabs of the side panels are seen, rather than arrows
     style.docking_separator_size = 3
     style.selectable_text_align = ImVec2(0.0, 0.5)
     style.window_menu_button_position = imgui.Dir.none

@@ -300,3 +300,11 @@ def test_a_disk_that_refuses_leaves_what_was_there(tmp_path: Path, monkeypatch: 
     assert again.notes == ()
     history = happen(store, history, marked(history, 3))
     same(DocumentStore(tmp_path).read(), history)
+
+
+def test_a_damaged_project_file_names_the_command_that_says_what_is_left(tmp_path: Path) -> None:
+    made(tmp_path / "p")
+    (tmp_path / "p" / "project.json").write_text("{")
+    with pytest.raises(ProjectError) as caught:
+        DocumentStore(tmp_path / "p").read()
+    assert caught.value.hint == f'"clipgstream repair {tmp_path / "p"}" says what can be kept.'

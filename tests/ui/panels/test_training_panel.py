@@ -82,7 +82,7 @@ def busy(open_pilot: Open) -> Pilot:
     return pilot
 
 
-@pytest.mark.parametrize(("size", "width"), [((1280, 800), 312), ((900, 600), 270)])
+@pytest.mark.parametrize(("size", "width"), [((1280, 800), 344), ((900, 600), 270)])
 def test_nothing_in_the_panel_is_wider_than_the_panel(open_pilot: Open, size: tuple[int, int], width: int) -> None:
     pilot = open_pilot(busy_session(), size=size)
     pilot.rest()

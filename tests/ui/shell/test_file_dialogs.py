@@ -24,6 +24,7 @@ from app.session.files.file_questions import (
 from app.status import JobStatus
 from tests.ui.fake_session import FakeSession
 from tests.ui.pilot import Pilot
+from ui.panels.state import EDITS
 from ui.shell.dialogs import RELOCATE
 
 pytestmark = [pytest.mark.gl, pytest.mark.slow]
@@ -64,6 +65,15 @@ def test_a_way_can_be_chosen_by_the_pointer(pilot: Pilot) -> None:
     pilot.click("question.way1")
     pilot.click("question.yes")
     assert pilot.sent(OpenProject) == [OpenProject(FOLDER, ProjectChoices(is_journal_used=False))]
+
+
+def test_a_question_outlives_panels_that_come_to_the_front(pilot: Pilot) -> None:
+    asked(pilot, RecoveryQuestion(RECOVERY))
+    pilot.studio.frame.ui.wanted_panel = EDITS  # as the first frames of a window bring its panels
+    pilot.draw(4)
+    assert pilot.sent(CloseQuestion) == []
+    pilot.key(key.ENTER)
+    assert pilot.sent(OpenProject) == [OpenProject(FOLDER, ProjectChoices(is_repaired=True))]
 
 
 def test_where_nothing_can_be_read_only_the_folder_is_offered(pilot: Pilot) -> None:

@@ -44,18 +44,18 @@ def test_a_new_key_works_at_once_and_after_a_restart(open_pilot: Callable[..., P
     open_keys(pilot, "play or pause")
     pilot.click("keys.time.play")
     pilot.draw(2)
-    pilot.key(key.K, modifiers=(key.LALT,))
+    pilot.key(key.Y, modifiers=(key.LALT,))
     pilot.draw(2)
     pilot.key(key.ESCAPE)
     pilot.rest()
     assert "preferences.Keys" not in pilot.rects
     pilot.key(key.SPACE)
     assert pilot.sent(TogglePlay) == []
-    pilot.key(key.K, modifiers=(key.LALT,))
+    pilot.key(key.Y, modifiers=(key.LALT,))
     assert len(pilot.sent(TogglePlay)) == 1
     pilot.studio.close()
     again = open_pilot(preferences=PreferencesFile(path))
-    again.key(key.K, modifiers=(key.LALT,))
+    again.key(key.Y, modifiers=(key.LALT,))
     assert len(again.sent(TogglePlay)) == 1
 
 

@@ -114,7 +114,9 @@ ACTIONS = (
         Action(f"edit.{making.name}", making.words, EDIT, _make(making), keys=making.keys, lacks=_cannot_edit)
         for making in MAKINGS
     ),
-    Action("edit.moving", "Set moving: mark what was drawn as moving", EDIT, mark_moving, lacks=_cannot_edit),
+    Action(
+        "edit.moving", "Set moving: mark what is selected or drawn as moving", EDIT, mark_moving, lacks=_cannot_edit
+    ),
     Action("edit.unhide", "Show again what was hidden last", EDIT, _show_again, keys=("Alt+H",), lacks=_no_edits),
     Action("edit.outside", "Edit everything outside of what was drawn", EDIT, _outside, keys=("Shift+I",)),
     Action("edit.next_scope", "Let new edits hold elsewhere: the next choice", EDIT, _next_scope, keys=("Shift+U",)),

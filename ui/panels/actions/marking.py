@@ -148,6 +148,7 @@ ACTIONS = (
         MARK,
         _undo,
         keys=("Ctrl+Z",),
+        menu="Edit",
         lacks=lambda session: "" if session.history.undo else "There is nothing to take back.",
     ),
     Action(
@@ -156,6 +157,7 @@ ACTIONS = (
         MARK,
         _redo,
         keys=("Ctrl+Shift+Z", "Ctrl+Y"),
+        menu="Edit",
         lacks=lambda session: "" if session.history.redo else "Nothing was taken back.",
     ),
 )

@@ -16,7 +16,7 @@ from app.session.editing.selection_commands import InvertSelection
 from app.session.editing.selection_status import SelectionStatus
 from engine.editing.edit import Box, Edit, Sphere, Transform, Vector
 from ui.panels.state import Dispatch, UiState
-from ui.viewport.editing.handles import Thing, middle_of
+from ui.viewport.editing.handles import Thing, axes_of, middle_of
 
 
 class Selects(Protocol):
@@ -99,12 +99,31 @@ def pivot_of(session: SubjectNeeds, volume: Box | Sphere | None) -> Vector:
     """Where a movement turns about: the middle of what it moves, as it is shown. Scene units"""
     if volume is not None:
         return _vector(middle_of(volume))
+    means = _selected_means(session)
+    return _vector(np.median(means, axis=0)) if len(means) else (0.0, 0.0, 0.0)
+
+
+def bounds_of(session: SubjectNeeds, volume: Box | Sphere | None) -> tuple[Vector, Vector] | None:
+    """The box along the axes of the scene around a volume, else around the centres of what is selected and shown; None
+    where nothing is, or its box has no room in it. Scene units"""
+    if volume is not None:
+        reach = volume.radius if isinstance(volume, Sphere) else abs(axes_of(volume)) @ volume.half_sizes
+        low, high = middle_of(volume) - reach, middle_of(volume) + reach
+    else:
+        means = _selected_means(session)
+        if not len(means):
+            return None
+        low, high = means.min(axis=0), means.max(axis=0)
+    return (_vector(low), _vector(high)) if (high > low).all() else None
+
+
+def _selected_means(session: SubjectNeeds) -> np.ndarray:
+    """Centres of what is selected, as far as it is shown. [N, 3]"""
     gaussians = session.shown_gaussians()
     if gaussians is None or gaussians.rows is None or not session.selection.n_gaussians:
-        return (0.0, 0.0, 0.0)
+        return np.zeros((0, 3))
     means = gaussians.means[session.selecting.mask(gaussians)]
-    means = means[np.isfinite(means).all(axis=1)]
-    return _vector(np.median(means, axis=0)) if len(means) else (0.0, 0.0, 0.0)
+    return means[np.isfinite(means).all(axis=1)]
 
 
 def _vector(values: np.ndarray) -> Vector:

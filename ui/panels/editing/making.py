@@ -27,10 +27,9 @@ from engine.editing.edit import (
     Target,
     Transform,
 )
-from ui.panels.editing.edit_subject import SubjectNeeds, invert_selection, meant, pivot_of
+from ui.panels.editing.edit_subject import SubjectNeeds, bounds_of, invert_selection, meant, pivot_of
 from ui.panels.state import EDITS, Dispatch, UiState
 from ui.panels.widgets import segment, text_wrapped_dim
-from ui.viewport.editing.handles import axes_of, middle_of
 
 FIRST_STOPS, FIRST_OPACITY, FIRST_SIGMA_FRAMES = 0.5, 0.5, 2.0
 """What new edits begin with."""
@@ -139,14 +138,14 @@ def make_edit(session: MakingNeeds, dispatch: Dispatch, ui: UiState, making: Mak
 
 
 def mark_moving(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
-    """Let everything in what was drawn move: a region of the gate, in clips whose training starts from now on."""
+    """Let everything move in what was drawn, or in the box around what is selected: a region of the gate, in clips that
+    are trained from now on."""
     volume, _ = meant(session, ui)
+    bounds = bounds_of(session, volume)
     if isinstance(volume, Sphere):
         dispatch(MarkRegion("dynamic", volume.center, volume.radius))
-    elif volume is not None:
-        reach = abs(axes_of(volume)) @ volume.half_sizes
-        low, high = middle_of(volume) - reach, middle_of(volume) + reach
-        dispatch(MarkBox("dynamic", (low[0], low[1], low[2]), (high[0], high[1], high[2])))
+    elif bounds is not None:
+        dispatch(MarkBox("dynamic", *bounds))
 
 
 def draw_making(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
@@ -184,10 +183,12 @@ def draw_making(session: MakingNeeds, dispatch: Dispatch, ui: UiState) -> None:
         imgui.end_disabled()
         key = f" ({making.keys[0]})" if making.keys else ""
         imgui.set_item_tooltip(f"{making.words}{key}")
-    imgui.begin_disabled(volume is None)
+    imgui.begin_disabled(volume is None and not session.selection.n_shown)
     if imgui.button("Set moving", ImVec2(width, 0)):
         mark_moving(session, dispatch, ui)
     ui.mark("edits.make moving")
     imgui.end_disabled()
-    imgui.set_item_tooltip("Marks what was drawn as moving; clips take it up when they are trained")
+    imgui.set_item_tooltip(
+        "Marks what was drawn, or the box around the selection, as moving; clips take it up when they are trained"
+    )
     imgui.end_disabled()

@@ -55,6 +55,16 @@ def titles(session: Session) -> list[str]:
     return [notice.title for notice in session.notices]
 
 
+def test_frames_that_were_ready_under_other_cuts_do_no_harm(session: Session) -> None:
+    session.dispatch(SplitClip(3, is_confirmed=True))
+    session.dispatch(c.SetFrame(5))
+    poll_until(session, lambda: 5 in [i for run in session.cached_frames() for i in range(*run)], what="frame 5")
+    session.dispatch(c.Undo())
+    session.poll()
+    assert session.live_training.state_of(3) is None
+    assert all(stop <= 6 for _, stop in session.cached_frames())
+
+
 def test_a_split_asks_and_undo_brings_the_trained_clip_back(session: Session) -> None:
     path = project_of(session).clip_path(1)
     before = path.read_bytes()
