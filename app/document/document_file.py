@@ -27,7 +27,7 @@ GATE_FILE, CAMERA_PATHS_FILE = "gate.json", "camera_paths.json"
 """Of schema 1: regions and camera paths, which are part of the document now."""
 MAX_DOCUMENT_BYTES = 256 << 20
 RESTORE = "Restore it from a copy."
-"""Where nobody knows yet what else is left of the project."""
+"""Where it is not known yet what else is left of the project."""
 _REMOVE = "Correct or remove the file."
 
 

@@ -1,4 +1,4 @@
-"""What is said of commands: what could not be done, and what a change of settings is called in the history."""
+"""Words about commands: titles of notices where one was refused, and names of settings in the history."""
 
 from __future__ import annotations
 

@@ -29,6 +29,6 @@ void main() {
         return;
     }
     bool is_stripe = mod(at.x + at.y, 9.0 * unit_px) < 3.0 * unit_px;
-    float alpha = smoothstep(0.15, HALF, here) * (is_stripe ? 0.6 : 0.22);
+    float alpha = smoothstep(0.16, HALF, here) * (is_stripe ? 0.6 : 0.22);
     color = vec4(hue * alpha, alpha);
 }

@@ -98,7 +98,7 @@ def test_what_is_asked_says_what_depends_on_the_clip_and_what_it_costs() -> None
     damaged = RetrainQuestion(3, True, "Its header cannot be read.", None, (), None, True, None, None)
     text = "\n".join(retrain_texts(damaged))
     assert "Its header cannot be read." in text
-    assert "replaces the file for good" in text
+    assert "puts the damaged file aside" in text
 
 
 def test_one_of_several_projects_is_chosen(pilot: Pilot) -> None:

@@ -62,7 +62,7 @@ def test_a_damaged_clip_is_named_before_anything_is_written(run, capture_folder,
     ):
         code, _, err = run(*command)
         assert code == 2
-        assert err.rstrip().endswith(f"remove it and train the clip again. - {clip}")
+        assert err.rstrip().endswith(f"or train clip 1 again. - {clip}")
     assert not list(tmp_path.glob("o.*"))
     assert not (tmp_path / "pictures").exists()
 

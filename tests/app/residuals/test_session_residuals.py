@@ -80,8 +80,12 @@ def test_a_clip_that_cannot_be_read_is_told_once_and_marked(open_session, launch
     write_clip_state(path, with_header(state, camera_names=["1"]))  # the gains are those of no camera
     session.live_training.service.catalog.update(0)
     session.notices._notices = []
-    session.residuals.heat(session.timeline, 0, "error")
-    poll_until(session, lambda: len(session.notices) > 0, what="the notice")
+
+    def is_told() -> bool:
+        session.residuals.heat(session.timeline, 0, "error")  # asked for anew with every frame of the window
+        return len(session.notices) > 0
+
+    poll_until(session, is_told, what="the notice")
     (notice,) = session.notices
     assert notice.title == "The residual cannot be shown"
     assert "does not say what the cameras make of its colours" in notice.detail

@@ -51,6 +51,12 @@ class TinyCapture:
     def valid(self, camera: int) -> None:
         return None
 
+    def valid_in(self, camera: int, frame: int) -> None:
+        return None
+
+    def is_usable(self, camera: int, frame: int) -> bool:
+        return True
+
 
 def clips() -> list[Clip]:
     return split_clips(N_FRAMES, CLIP_LENGTH)

@@ -80,7 +80,7 @@ def test_hidden_anchors_and_light(tiny: Tiny, reference: Path, tmp_path: Path):
 
 def test_a_frame_of_a_project_by_its_number(tiny: Tiny, reference: Path, tmp_path: Path):
     project = reference.parents[1]
-    (project / "project.json").write_text('{"clip_length": 4, "reference_clip": 0}')
+    (project / "project.json").write_text('{"schema": 2, "settings": {"clip_length": 4, "reference_clip": 0}}')
     write_compact_clip(
         project / "clips" / "0001.safetensors",
         compact_clip(tiny.trained(1, reference=read_clip_state(reference), prep_dir=tmp_path / "prep")),

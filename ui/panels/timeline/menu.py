@@ -40,14 +40,14 @@ def draw_clip_menu(stage: Stage, session: TimelineNeeds, dispatch: Dispatch) -> 
     if clip is not None:
         state = session.clip_states[clip.clip_index].state
         imgui.text_disabled(f"{clip_title(clip.clip_index, session.reference_index)}: {state_words(state)}")
-        draw_label_field(session, dispatch, ui, "clip", str(clip.start))
-        imgui.separator()
         draw_clip_training(session, dispatch, ui, clip.clip_index, is_by_key=is_by_key)
         imgui.separator()
         frame, n_clips = ui.timeline.menu_frame, len(session.clips)
         draw_cutting(session, dispatch, ui, clip, frame_index=frame, n_clips=n_clips)
         imgui.separator()
         _draw_time(clip, session, dispatch, ui)
+        imgui.separator()
+        draw_label_field(session, dispatch, ui, "clip", str(clip.start))
     imgui.end_popup()
 
 
