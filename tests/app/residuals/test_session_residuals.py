@@ -75,17 +75,16 @@ def test_a_clip_that_cannot_be_read_is_told_once_and_marked(open_session, launch
     session = open_session()
     session.dispatch(TrainNextClip())
     poll_until(session, lambda: session.training.state == "idle", what="the training")
+    poll_until(session, lambda: session.playback.is_loaded(session.timeline), what="the clip in playback")
     path = session.project.clip_path(0)
     state = read_clip_state(path)
-    write_clip_state(path, with_header(state, camera_names=["1"]))  # the gains are those of no camera
+    # another state by its fingerprint as well, or what playback has read of the first one would serve
+    of_others = with_header(state, camera_names=["1"], fingerprint="of other cameras")
+    write_clip_state(path, of_others)
     session.live_training.service.catalog.update(0)
     session.notices._notices = []
-
-    def is_told() -> bool:
-        session.residuals.heat(session.timeline, 0, "error")  # asked for anew with every frame of the window
-        return len(session.notices) > 0
-
-    poll_until(session, is_told, what="the notice")
+    session.residuals.heat(session.timeline, 0, "error")
+    poll_until(session, lambda: len(session.notices) > 0, what="the notice")
     (notice,) = session.notices
     assert notice.title == "The residual cannot be shown"
     assert "does not say what the cameras make of its colours" in notice.detail
