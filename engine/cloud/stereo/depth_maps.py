@@ -57,6 +57,7 @@ class DepthMaps:
         is_agreed: At least two other cameras measured the same depth. [C, h, w] bool
         checks: Agreement of the completed maps, one per camera.
         is_usable: The background can be trusted there. [C, h, w] bool
+        near, far: Depths that were searched. [C]
     """
 
     rig: CameraRig
@@ -64,6 +65,8 @@ class DepthMaps:
     is_agreed: np.ndarray
     checks: list[Agreement]
     is_usable: np.ndarray
+    near: np.ndarray
+    far: np.ndarray
 
 
 def estimate_depth_maps(
@@ -74,16 +77,23 @@ def estimate_depth_maps(
     sparse_points: np.ndarray | None,
     report: Report,
     keep: Keep = do_now,
+    ranges: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> tuple[np.ndarray, DepthMaps]:
-    """First gains [C, 3] and a complete, checked depth map per camera. Arguments as in build_static_cloud."""
+    """First gains [C, 3] and a complete, checked depth map per camera.
+
+    Args:
+        ranges: Nearest and farthest depth per camera [C], where they are known. The others: as in build_static_cloud.
+    """
     started = time.perf_counter()
 
     def search() -> Arrays:
         near, far = _search_ranges(backgrounds, is_stable, rig, sparse_points, report)
         return {"near": near, "far": far}
 
-    ranges = keep("depth range", search)
-    near, far = ranges["near"], ranges["far"]
+    if ranges is None:
+        kept = keep("depth range", search)
+        ranges = kept["near"], kept["far"]
+    near, far = ranges
     greys, is_usable, small_rig, gains = _prepare(backgrounds, is_stable, rig, WORKING_PIXELS)
     sources = choose_sources(small_rig, near, far)
     inverse, n_planes = _sweep_all(greys, is_usable, small_rig, sources, near, far, keep)
@@ -103,7 +113,7 @@ def estimate_depth_maps(
         f"neighbours within {AGREE_TOLERANCE:.0%}; the rest filled by a thin plate "
         f"({time.perf_counter() - started:.1f} s)"
     )
-    return gains, DepthMaps(small_rig, depths, is_agreed, checks, is_usable)
+    return gains, DepthMaps(small_rig, depths, is_agreed, checks, is_usable, near, far)
 
 
 @dataclass(frozen=True, slots=True)
