@@ -18,8 +18,10 @@ from engine.camera.rig import CameraRig
 from engine.cloud.background.gains import scene_colors
 from engine.cloud.fusion import fuse_tiers, keep_inliers
 from engine.cloud.keeping import Arrays, Keep, do_now
+from engine.cloud.stereo.changed_depths import changed_depth_maps
 from engine.cloud.stereo.coloring import balance, colored_by_neighbors, observe
-from engine.cloud.stereo.depth_maps import DepthMaps, estimate_depth_maps
+from engine.cloud.stereo.depth_maps import estimate_depth_maps
+from engine.cloud.stereo.depth_scene import DepthMaps
 from engine.cloud.stereo.sampling import median_footprint, sample_tiers, seen_pixels, working_pictures
 from engine.cloud.voxel import voxel_keys, voxel_means
 from engine.errors import PreparationError
@@ -168,7 +170,7 @@ class _FrameStereo:
         self._has_gains = gains is not None
         self.gains = np.ones((len(rig), 3)) if gains is None else np.asarray(gains, dtype=np.float64)
         self.fine_spacing = 0.0
-        self._ranges: tuple[np.ndarray, np.ndarray] | None = None
+        self._first: DepthMaps | None = None
 
     def cloud(self, frame_in_clip: int, spacing: float | None) -> tuple[np.ndarray, np.ndarray]:
         """Points [P, 3] and colours [P, 3] 0..255 of one frame, float64. Frames have to come in order.
@@ -190,20 +192,20 @@ class _FrameStereo:
     def _find(self, frame_in_clip: int, spacing: float | None) -> Arrays:
         """What is kept of a frame: its points and colours, and the spacing and the gains that they have."""
         pictures, is_stable, is_valid = self._pictures(frame_in_clip)
-        first_gains, maps = self._maps(frame_in_clip, pictures, is_stable)
+        maps, is_new = self._maps(frame_in_clip, pictures, is_stable)
         width = int(maps.rig.image_sizes[0, 0])
         if not self.fine_spacing:
             self.fine_spacing = FRAME_SPACING_PX * median_footprint(maps) * width / self._rig.image_sizes[0, 0]
             self.fine_spacing = min(self.fine_spacing, spacing or np.inf)
-        samples = working_pictures(pictures, width) / first_gains[:, None, None]
-        tiers = sample_tiers(maps, samples, is_seen=seen_pixels(is_valid, width))[:2]
+        samples = working_pictures(pictures, width) / maps.scene.gains[:, None, None]
+        tiers = sample_tiers(maps, samples, is_seen=seen_pixels(is_valid, width), is_wanted=is_new)[:2]
         points, _, colors = fuse_tiers(tiers, self.fine_spacing)
         is_kept = keep_inliers(points)
         points, colors = points[is_kept], colors[is_kept]
         log_colors = observe(points, pictures, is_stable, self._rig, maps)
         gains = self.gains
         if not self._has_gains and len(points):
-            gains, seen_colors, decision = balance(points, log_colors, first_gains, self._color)
+            gains, seen_colors, decision = balance(points, log_colors, maps.scene.gains, self._color)
             self._report(f"White balance: {decision}")
         else:
             seen_colors = scene_colors(log_colors, gains)
@@ -214,38 +216,31 @@ class _FrameStereo:
             "fine_spacing": np.array(self.fine_spacing),
         }
 
-    def _maps(self, frame_in_clip: int, pictures: np.ndarray, is_stable: np.ndarray) -> tuple[np.ndarray, DepthMaps]:
-        """First gains [C, 3] and depth maps of a frame; all are searched in the depth range of the first one."""
+    def _maps(self, frame_in_clip: int, pictures: np.ndarray, is_stable: np.ndarray) -> tuple[DepthMaps, np.ndarray]:
+        """Depth maps of a frame, and the pixels [C, h, w] whose points those of the first frame do not have yet."""
+        if self._first is None:
+            first = (pictures, is_stable) if frame_in_clip == 0 else self._pictures(0)[:2]
+            self._first = self._first_maps(*first)
         if frame_in_clip == 0:
-            return self._first_maps(pictures, is_stable)
-        if self._ranges is None:  # the first frame's points were kept
-            self._first_maps(*self._pictures(0)[:2])
-        return estimate_depth_maps(
-            pictures, is_stable, self._rig, sparse_points=None, ranges=self._ranges, report=_say_nothing
-        )
+            return self._first, np.ones_like(self._first.is_agreed)
+        return changed_depth_maps(pictures, is_stable, self._rig, self._first)
 
-    def _first_maps(self, pictures: np.ndarray, is_stable: np.ndarray) -> tuple[np.ndarray, DepthMaps]:
+    def _first_maps(self, pictures: np.ndarray, is_stable: np.ndarray) -> DepthMaps:
         sparse_points = None
         if self._find_sparse is not None:
             find, is_valid = self._find_sparse, self._valid_in(0)
             sparse_points = self._keep("sparse points", lambda: {"points": find(pictures, is_valid)})["points"]
-        gains, maps = estimate_depth_maps(
+        return estimate_depth_maps(
             pictures,
             is_stable,
             self._rig,
             sparse_points=sparse_points if sparse_points is not None and len(sparse_points) else None,
             report=self._report,
             keep=self._keep,
-        )
-        self._ranges = maps.near, maps.far
-        return gains, maps
+        )[1]
 
     def _pictures(self, frame_in_clip: int) -> tuple[np.ndarray, np.ndarray, np.ndarray | None]:
         """Pictures of a frame [C, H, W, 3], pixels that count in them [C, H, W] bool, and the same or None for all."""
         pictures = np.stack([self._frames(row, frame_in_clip) for row in range(len(self._rig))])
         is_valid = self._valid_in(frame_in_clip)
         return pictures, np.ones(pictures.shape[:3], dtype=bool) if is_valid is None else is_valid, is_valid
-
-
-def _say_nothing(line: str) -> None:
-    """A `Report` for what every frame does alike."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from engine.camera.projection import focal_px, unproject
 from engine.cloud.fusion import Samples
-from engine.cloud.stereo.depth_maps import MIN_AGREE, DepthMaps
+from engine.cloud.stereo.depth_scene import MIN_AGREE, DepthMaps
 from engine.images.image_filters import block_mean
 
 MIN_VALID_SHARE = 0.99
@@ -33,13 +33,16 @@ def seen_pixels(is_valid: np.ndarray | None, working_width: int) -> np.ndarray |
     return None if is_valid is None else working_pictures(is_valid, working_width) > MIN_VALID_SHARE
 
 
-def sample_tiers(maps: DepthMaps, pictures: np.ndarray, *, is_seen: np.ndarray | None) -> list[Samples]:
+def sample_tiers(
+    maps: DepthMaps, pictures: np.ndarray, *, is_seen: np.ndarray | None, is_wanted: np.ndarray | None = None
+) -> list[Samples]:
     """Oriented coloured points in three tiers of trust: agreed, filled and agreed, filled and uncontradicted.
 
     Args:
         maps: Depths and what backs them.
         pictures: At working size, whose colours the points get. [C, h, w, 3]
         is_seen: Pixels that the cameras see at all; None for all. [C, h, w] bool
+        is_wanted: Pixels of which points are made; None for all. [C, h, w] bool
     """
     parts: list[list[Samples]] = [[], [], []]
     for camera, check in enumerate(maps.checks):
@@ -54,6 +57,7 @@ def sample_tiers(maps: DepthMaps, pictures: np.ndarray, *, is_seen: np.ndarray |
         # behind people who never left nothing was matched, yet leaving those pixels out would leave holes
         tiers = (agreed & (check.n_see_through <= 1), is_filled_agreed, ~agreed & is_clear & ~is_filled_agreed)
         for part, rows in zip(parts, tiers, strict=True):
+            rows = rows if is_wanted is None else rows & is_wanted[camera]
             part.append(Samples(points[rows], normals[rows], pictures[camera][rows]))
     return [
         Samples(*(np.concatenate([getattr(s, name) for s in part]) for name in ("points", "normals", "colors")))
