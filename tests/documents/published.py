@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from engine.training.published import POINTS, Point
+from engine.training.published.point import Point
+from engine.training.published.points import POINTS
 from engine.training.setting import value_text
 from tests.documents.table import table
 

@@ -26,7 +26,8 @@ from engine.model.grid import corner_table
 from engine.training.config import SETTINGS, TrainConfig
 from engine.training.optimizer.optimizer import PhaseOptimizer
 from engine.training.presets import preset
-from engine.training.published import POINTS, Point
+from engine.training.published.point import Point
+from engine.training.published.points import POINTS
 from engine.training.step.order import ShuffledOrder
 
 PAPER = TrainConfig(**preset("paper"))
