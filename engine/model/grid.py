@@ -56,9 +56,7 @@ def corner_table(unit_positions: np.ndarray, cells: tuple[int, ...], n_entries: 
     clamped = np.clip(np.nan_to_num(unit_positions.astype(np.float64)), 0.0, 1.0)
     shape = len(clamped), len(cells), 8
     indices, weights = np.empty(shape, np.int32), np.empty(shape, np.float32)
-    fill_corners(
-        np.ascontiguousarray(clamped), np.array(cells, np.int64), n_entries, _PRIMES_64, indices, weights
-    )
+    fill_corners(np.ascontiguousarray(clamped), np.array(cells, np.int64), n_entries, _PRIMES_64, indices, weights)
     return CornerTable(torch.from_numpy(indices), torch.from_numpy(weights), n_entries)
 
 
