@@ -15,6 +15,8 @@ from engine.backends.table import backend_called
 from engine.camera.depth_range import NEAR_SHARE
 from engine.clip_files.clip_header import FieldShape
 from engine.cloud.motion.dedup import residual_rows
+from engine.cloud.stereo.depth_scene import WORKING_PIXELS
+from engine.cloud.stereo.frames_cloud import FRAME_SPACING_PX
 from engine.conventions import ALPHA_MAX, ALPHA_MIN
 from engine.errors import NonFiniteLoss
 from engine.model.anchors import AnchorSet
@@ -108,6 +110,14 @@ def heads_are_equally_wide() -> None:
     assert {decoder.first[head].shape[1] for head in decoder.first} == {256}
 
 
+def depth_maps_are_as_small_as_said() -> None:
+    assert WORKING_PIXELS == 160 * 90
+
+
+def voxels_are_four_pixels() -> None:
+    assert FRAME_SPACING_PX == 4.0
+
+
 def coverage_is_the_union() -> None:
     centers, radii = np.array([[0.0, 0, 0], [1.0, 0, 0]]), np.array([0.9, 0.05])
     candidates = np.array([[0.8, 0, 0], [0.901, 0, 0]])  # nearest to the small sphere, the first one in the large one
@@ -163,6 +173,8 @@ CHECKS: dict[str, Callable[[], None]] = {
     "numbers in the field": the_field_is_float32_and_starts_like_the_heads,
     "outside of the box": places_outside_are_the_nearest_inside,
     "head of offsets": heads_are_equally_wide,
+    "stereo": depth_maps_are_as_small_as_said,
+    "density of the point clouds": voxels_are_four_pixels,
     "deduplication": coverage_is_the_union,
     "end of a pass": passes_follow_each_other,
     "where rates end": rates_end_with_the_clip,
