@@ -56,19 +56,28 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
 
 
 def _show_evaluation(line: ProgressLine, document: dict[str, Any]) -> None:
+    from engine.metrics.clips.flicker import flicker_figures
+
     for clip, summary in document["means"]["clips"].items():
         for group, words in (("held_out", "held out"), ("trained_on", "trained on")):
             found = summary[group]
             if found:
                 line.say(
-                    f"Clip {clip}, {words}: PSNR {_figure(found['psnr'], 2)} dB, after colour fit "
-                    f"{_figure(found['psnr_fit'], 2)} dB, SSIM {_figure(found['ssim'], 4)}"
+                    f"Clip {clip}, {words}: PSNR {_figure(found['psnr'], 2)} dB, cc_psnr "
+                    f"{_figure(found['cc_psnr'], 2)} dB, after colour fit {_figure(found['psnr_fit'], 2)} dB, "
+                    f"SSIM {_figure(found['ssim'], 4)}"
                 )
     for seam in document["seams"]["boundaries"]:
         line.say(
             f"Seam at frame {seam['frame_index']}: score {_figure(seam['score'], 2)}/255, change at the boundary "
             f"{_figure(seam['ratio_static'], 2)} times that inside the clips on static pixels, "
             f"{_figure(seam['ratio_moving'], 2)} times on moving ones (truth: {_figure(seam['truth_ratio_moving'], 2)})"
+        )
+    flow = flicker_figures(document["seams"]["rows"])
+    if flow["tof"] is not None:
+        line.say(
+            f"tOF: {_figure(flow['tof'], 3)} px per frame, {_figure(flow['tof_inside'], 3)} inside clips, "
+            f"{_figure(flow['tof_borders'], 3)} at borders"
         )
     missing = document["columns"]["lpips"]["why_missing"]
     if document["metrics"] == "all" and missing:

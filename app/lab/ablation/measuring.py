@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from engine.metrics.pictures.colors import Precision
     from engine.metrics.pictures.picture import Choice
 
-MEASURED_SCHEMA = 5
+MEASURED_SCHEMA = 6
 MEASURED_FILE = "measured.json"
 
 

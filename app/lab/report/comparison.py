@@ -17,6 +17,7 @@ from engine.metrics.clips.flicker import FIGURES, definition_of, flicker_figures
 
 _FIGURES = (
     ("psnr", "PSNR", "dB", 2),
+    ("cc_psnr", "cc PSNR", "dB", 2),
     ("psnr_moving", "PSNR, moving", "dB", 2),
     ("ssim", "SSIM", "", 4),
     ("dssim1", "DSSIM1", "", 4),
@@ -31,6 +32,9 @@ _SEAMS = (
     ("seam_ratio_static", "Seam ratio, static", "", 2),
     ("seam_ratio_moving", "Seam ratio, moving", "", 2),
     ("score", "Seam score", "1/255", 3),
+    ("tof", "tOF", "px", 3),
+    ("tof_borders", "tOF at borders", "px", 3),
+    ("tof_inside", "tOF inside clips", "px", 3),
 )
 
 
@@ -78,7 +82,10 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
     columns = (
         TableColumn("project", "Project"),
         TableColumn("settings", "Settings that differ from the first"),
-        *(TableColumn(key, title, n, key.startswith(("psnr", "ssim")), unit) for key, title, unit, n in _FIGURES),
+        *(
+            TableColumn(key, title, n, key.startswith(("psnr", "cc_psnr", "ssim")), unit)
+            for key, title, unit, n in _FIGURES
+        ),
         *(TableColumn(key, title, n, False, unit) for key, title, unit, n in _SEAMS),
         TableColumn("minutes", "Time", 2, False, "min"),
         TableColumn("megabytes", "Size", 1, False, "MB"),
