@@ -36,6 +36,9 @@ COLUMNS: dict[str, tuple[str, int]] = {
     "later_s": ("s per later clip", 0),
     "minutes": ("minutes", 1),
     "megabytes": ("MB", 2),
+    "fps_cpu": ("FPS CPU", 1),
+    "fps_gl": ("FPS GL", 1),
+    "n_gaussians": ("Gaussians", 0),
 }
 """Figure to its heading and decimals. Held-out cameras, raw colours unless the name says fit. PSNR in dB. "later" ones
 are means over the clips that inherit, their time that of preparation and training."""

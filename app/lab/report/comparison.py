@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.evaluation.source_clip_means import LATER_MOVING, LATER_PSNR, LATER_S, later_figures
+from app.evaluation.speed.frame_rates import FIGURES as FIGURES_OF_RATES
+from app.evaluation.speed.frame_rates import FrameRates
 from app.lab.report.about import all_settings
 from app.lab.report.charts import SpeedPanel, draw_speed_error
 from app.lab.report.page.parts import Figure, Section
@@ -40,10 +42,11 @@ _SEAMS = (
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """One project of a comparison: its files and its evaluation document."""
+    """One project of a comparison: its files, its evaluation document, and how fast it is rendered, if measured."""
 
     facts: ProjectFacts
     evaluation: dict[str, Any]
+    rates: FrameRates | None = None
 
     @property
     def group(self) -> str:
@@ -65,6 +68,11 @@ class Compared:
         """What its later clips take and give, see app.evaluation.source_clip_means."""
         seconds = {clip.clip_index: clip.wall_s for clip in self.facts.clips if clip.role == "source"}
         return later_figures(self.evaluation["means"]["clips"], self.group, seconds)
+
+    @property
+    def frame_rates(self) -> dict[str, float | None]:
+        """How fast it is rendered, see app.evaluation.speed.frame_rates.FIGURES."""
+        return dict.fromkeys(FIGURES_OF_RATES) if self.rates is None else self.rates.figures()
 
     @property
     def minutes(self) -> float | None:
@@ -89,6 +97,9 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
         *(TableColumn(key, title, n, False, unit) for key, title, unit, n in _SEAMS),
         TableColumn("minutes", "Time", 2, False, "min"),
         TableColumn("megabytes", "Size", 1, False, "MB"),
+        TableColumn("fps_cpu", "FPS, CPU", 1, True),
+        TableColumn("fps_gl", "FPS, OpenGL", 1, True),
+        TableColumn("n_gaussians", "Gaussians drawn"),
         TableColumn("clips", "Clips"),
         TableColumn("columns", "Columns"),
     )
@@ -101,6 +112,7 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
             **{key: one.seam(key) for key, *_ in _SEAMS},
             "minutes": one.minutes,
             "megabytes": one.facts.n_bytes / 1e6,
+            **one.frame_rates,
             "clips": len(one.facts.clips),
             "columns": one.evaluation["metrics"],
         }

@@ -79,8 +79,10 @@ def flow_between(before: Expansion, after: Expansion) -> np.ndarray:
         raise ValueError(f"pictures of {before[0].shape[1:]} and {after[0].shape[1:]} pixels have no flow between them")
     flow = np.zeros((2, *before[-1].shape[1:]), np.float32)
     for first, second in zip(reversed(before), reversed(after), strict=True):
-        if flow.shape[1:] != first.shape[1:]:
-            flow = np.stack([resized(part, *first.shape[1:]) for part in flow]) / np.float32(PYRAMID_SCALE)
+        _, height, width = first.shape
+        if flow.shape[1:] != (height, width):
+            parts = (resized(flow[axis], height, width) for axis in (0, 1))
+            flow = np.stack([part / np.float32(PYRAMID_SCALE) for part in parts])
         sums = np.empty_like(first)
         for _ in range(N_ITERATIONS):
             _compare(first, second, flow, _BORDER, sums)
@@ -136,9 +138,9 @@ def _fit_weights() -> _Weights:
     basis = [np.ones((len(x), len(x))), *np.meshgrid(x, x), *(part**2 for part in np.meshgrid(x, x)), np.outer(x, x)]
     products = np.array([[np.einsum("yx,yx,y,x", a, b, g, g) for a in basis] for b in basis])
     inverse = np.linalg.inv(products)
-    half = [part[RADIUS:].astype(np.float32) for part in (g, x * g, x**2 * g)]
+    g_half, xg, xxg = (part[RADIUS:].astype(np.float32) for part in (g, x * g, x**2 * g))
     linear, constant, square, mixed = (np.float32(inverse[at]) for at in ((1, 1), (0, 3), (3, 3), (5, 5)))
-    return _Weights(*half, linear, constant, square, mixed)
+    return _Weights(g_half, xg, xxg, linear, constant, square, mixed)
 
 
 _WEIGHTS = _fit_weights()
