@@ -29,8 +29,8 @@ MEASURED_FILE = "measured.json"
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Figures of a trained variant, None where one does not exist; on how many frames of each camera; and how fast it is
-    rendered, None where nobody measured that."""
+    """Figures of a trained variant, None where one does not exist; on how many frames of each camera; and how fast it
+    is rendered, None where nobody measured that."""
 
     figures: dict[str, float | None]
     n_frames: int
