@@ -15,6 +15,7 @@ from app.evaluation.evaluation import Measuring
 from app.evaluation.headless import TrainedProject, open_trained
 from app.evaluation.speed.frame_rates import RatesOf
 from app.lab.report.about import capture_section, settings_section, setup_section, split_section
+from app.lab.report.beside_published import published_section
 from app.lab.report.comparison import Compared, comparison_section, speed_section
 from app.lab.report.costs import storage_section, times_section
 from app.lab.report.measured import clips_section, time_section, worst_pictures, worst_section
@@ -155,6 +156,7 @@ def _sections(
 
     capture = describe(opened.capture)
     speed, rendering = speed_section(compared), rendering_section(compared)
+    published = published_section(compared, capture)
     has_others = len(compared) > 1 or bool(left_out)
     return [
         *([comparison_section(compared, left_out), speed] if has_others else []),
@@ -163,6 +165,7 @@ def _sections(
         split_section(facts, capture, len(opened.clips)),
         settings_section(facts),
         clips_section(evaluation),
+        *([] if published is None else [published]),
         over_clips_section(evaluation, exposures_of(opened, evaluation["clips"])),
         time_section(evaluation),
         worst_section(evaluation, pictures, tick),
