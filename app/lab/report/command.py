@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from app.cli.arguments import EXIT_OK, add_figure_choices, path_argument
+from app.cli.frame_rate_arguments import add_no_fps, wanted_rates
 from app.cli.terminal.progress import ProgressLine, row_progress
 from app.export.staging import check_target
 from app.project.project import read_settings
@@ -29,6 +30,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "--out", type=path_argument, metavar="DIR", help="folder for the page (default: PROJECT/reports)"
     )
     add_figure_choices(command, default=None, said="all for the project, quick for the others")
+    add_no_fps(command)
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
@@ -53,6 +55,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             precision=options.precision,
             on_stage=show,
             say=line.say,
+            rates_of=wanted_rates(options),
         )
     finally:
         line.finish()

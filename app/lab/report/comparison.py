@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.evaluation.source_clip_means import LATER_MOVING, LATER_PSNR, LATER_S, later_figures
+from app.evaluation.speed.frame_rates import FIGURES as FIGURES_OF_RATES
+from app.evaluation.speed.frame_rates import FrameRates
 from app.lab.report.about import all_settings
 from app.lab.report.charts import SpeedPanel, draw_speed_error
 from app.lab.report.page.parts import Figure, Section
@@ -17,6 +19,7 @@ from engine.metrics.clips.flicker import FIGURES, definition_of, flicker_figures
 
 _FIGURES = (
     ("psnr", "PSNR", "dB", 2),
+    ("cc_psnr", "cc PSNR", "dB", 2),
     ("psnr_moving", "PSNR, moving", "dB", 2),
     ("ssim", "SSIM", "", 4),
     ("dssim1", "DSSIM1", "", 4),
@@ -31,15 +34,19 @@ _SEAMS = (
     ("seam_ratio_static", "Seam ratio, static", "", 2),
     ("seam_ratio_moving", "Seam ratio, moving", "", 2),
     ("score", "Seam score", "1/255", 3),
+    ("tof", "tOF", "px", 3),
+    ("tof_borders", "tOF at borders", "px", 3),
+    ("tof_inside", "tOF inside clips", "px", 3),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """One project of a comparison: its files and its evaluation document."""
+    """One project of a comparison: its files, its evaluation document, and how fast it is rendered, if measured."""
 
     facts: ProjectFacts
     evaluation: dict[str, Any]
+    rates: FrameRates | None = None
 
     @property
     def group(self) -> str:
@@ -63,6 +70,11 @@ class Compared:
         return later_figures(self.evaluation["means"]["clips"], self.group, seconds)
 
     @property
+    def frame_rates(self) -> dict[str, float | None]:
+        """How fast it is rendered, see app.evaluation.speed.frame_rates.FIGURES."""
+        return dict.fromkeys(FIGURES_OF_RATES) if self.rates is None else self.rates.figures()
+
+    @property
     def minutes(self) -> float | None:
         """Wall time of all clips; None when not recorded."""
         return None if self.facts.wall_s is None else self.facts.wall_s / 60.0
@@ -78,10 +90,16 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
     columns = (
         TableColumn("project", "Project"),
         TableColumn("settings", "Settings that differ from the first"),
-        *(TableColumn(key, title, n, key.startswith(("psnr", "ssim")), unit) for key, title, unit, n in _FIGURES),
+        *(
+            TableColumn(key, title, n, key.startswith(("psnr", "cc_psnr", "ssim")), unit)
+            for key, title, unit, n in _FIGURES
+        ),
         *(TableColumn(key, title, n, False, unit) for key, title, unit, n in _SEAMS),
         TableColumn("minutes", "Time", 2, False, "min"),
         TableColumn("megabytes", "Size", 1, False, "MB"),
+        TableColumn("fps_cpu", "FPS, CPU", 1, True),
+        TableColumn("fps_gl", "FPS, OpenGL", 1, True),
+        TableColumn("n_gaussians", "Gaussians drawn"),
         TableColumn("clips", "Clips"),
         TableColumn("columns", "Columns"),
     )
@@ -94,6 +112,7 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
             **{key: one.seam(key) for key, *_ in _SEAMS},
             "minutes": one.minutes,
             "megabytes": one.facts.n_bytes / 1e6,
+            **one.frame_rates,
             "clips": len(one.facts.clips),
             "columns": one.evaluation["metrics"],
         }

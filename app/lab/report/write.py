@@ -6,13 +6,16 @@ import logging
 import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import asdict
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.evaluation.evaluation import Measuring
 from app.evaluation.headless import TrainedProject, open_trained
+from app.evaluation.speed.frame_rates import RatesOf
 from app.lab.report.about import capture_section, settings_section, setup_section, split_section
+from app.lab.report.beside_published import published_section
 from app.lab.report.comparison import Compared, comparison_section, speed_section
 from app.lab.report.costs import storage_section, times_section
 from app.lab.report.measured import clips_section, time_section, worst_pictures, worst_section
@@ -21,6 +24,7 @@ from app.lab.report.over_clips import exposures_of, over_clips_section
 from app.lab.report.page.page import page_html
 from app.lab.report.page.parts import Section
 from app.lab.report.pictures import Pictures, ProjectPictures
+from app.lab.report.rendering import rendering_section
 from app.lab.report.seam_parts import seams_section, shown_boundaries
 from app.project.project_facts import find_projects, read_facts, short_names
 from engine.capture.capture_summary import describe
@@ -56,6 +60,7 @@ def write_report(
     say: Callable[[str], None] = logger.warning,
     measuring: Measuring | None = None,
     make_pictures: Callable[[TrainedProject], Pictures] = ProjectPictures,
+    rates_of: RatesOf = lambda opened: None,
 ) -> Path:
     """Write the report of a project.
 
@@ -72,6 +77,7 @@ def write_report(
         on_stage: Told what is done.
         say: Told what the user should know, see app.evaluation.evaluation.evaluate_project.
         measuring, make_pictures: Tests bring quick ones.
+        rates_of: Measures how fast a project is rendered; nothing is said of that by default.
     Returns:
         The page.
     Raises:
@@ -91,20 +97,22 @@ def write_report(
     ):
         try:
             one = read_facts(path, name)
+            trained = open_trained(one.project) if compared else opened
             document = evaluation_of(
-                open_trained(one.project) if compared else opened,
+                trained,
                 choices=choices,
                 precision=precision,
                 on_progress=_measuring(on_stage, name),
                 say=say,
                 measuring=measuring,
             )
+            rates = rates_of(trained)
         except (ProjectError, CaptureError) as error:
             if is_named:
                 raise
             left_out.append(f"{name} is left out: {error.message}")
             continue
-        compared.append(Compared(one, document))
+        compared.append(Compared(one, document, rates))
     sections = _sections(compared, opened, make_pictures(opened), left_out, on_stage)
     return _write(out, compared, sections)
 
@@ -147,7 +155,8 @@ def _sections(
     from app.lab.machine import describe_machine
 
     capture = describe(opened.capture)
-    speed = speed_section(compared)
+    speed, rendering = speed_section(compared), rendering_section(compared)
+    published = published_section(compared, capture)
     has_others = len(compared) > 1 or bool(left_out)
     return [
         *([comparison_section(compared, left_out), speed] if has_others else []),
@@ -156,12 +165,14 @@ def _sections(
         split_section(facts, capture, len(opened.clips)),
         settings_section(facts),
         clips_section(evaluation),
+        *([] if published is None else [published]),
         over_clips_section(evaluation, exposures_of(opened, evaluation["clips"])),
         time_section(evaluation),
         worst_section(evaluation, pictures, tick),
         seams_section(evaluation, pictures, tick),
         storage_section(facts),
         times_section(facts),
+        *([] if rendering is None else [rendering]),
         *([] if has_others else [speed]),
     ]
 
@@ -171,7 +182,8 @@ def _sections(
 
 def report_document(compared: Sequence[Compared], sections: Sequence[Section]) -> dict[str, Any]:
     """What report.json holds: schema, projects (name, folder, settings, clips, means, columns, seams and flicker of
-    their evaluations), tables by name as on the page and in the CSV files, and files (of figures and tables)."""
+    their evaluations, and frame_rates), tables by name as on the page and in the CSV files, and files (of figures and
+    tables)."""
     tables = {table.name: table for section in sections for table in section.tables()}
     figures = [figure.name for section in sections for figure in section.figures()]
     return {
@@ -213,6 +225,7 @@ def _project_document(one: Compared) -> dict[str, Any]:
         "means": evaluation["means"],
         "seams": {key: value for key, value in evaluation["seams"].items() if key != "rows"},
         "flicker": flicker_figures(evaluation["seams"]["rows"]),
+        "frame_rates": None if one.rates is None else asdict(one.rates),
     }
 
 
