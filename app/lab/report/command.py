@@ -28,12 +28,28 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--out", type=path_argument, metavar="DIR", help="folder for the page (default: PROJECT/reports)"
     )
+    command.add_argument(
+        "--boundary",
+        type=int,
+        metavar="FRAME",
+        help="maps of what changes where the clip that begins at this frame begins (default: where it is worst)",
+    )
+    command.add_argument("--camera", metavar="NAME", help="camera of these maps (default: where it is worst)")
+    command.add_argument(
+        "--crop",
+        action="append",
+        default=[],
+        metavar="CAMERA:FRAME:X,Y,W,H",
+        help="a window to cut out of the capture and every project, in pixels; may be given several times "
+        "(default: where the projects differ most)",
+    )
     add_figure_choices(command, default=None, said="all for the project, quick for the others")
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream report: write a page about a project. Returns the exit code."""
+    from app.lab.report.paper_figures.by_hand import Wishes
     from app.lab.report.write import PAGE_FILE, REPORTS, write_report
 
     read_settings(options.project)  # refuses a folder that is not a project before anything else
@@ -51,6 +67,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             out=options.out,
             metrics=options.metrics,
             precision=options.precision,
+            wishes=Wishes(options.boundary, options.camera, options.crop),
             on_stage=show,
             say=line.say,
         )

@@ -67,6 +67,16 @@ class Compared:
         """Wall time of all clips; None when not recorded."""
         return None if self.facts.wall_s is None else self.facts.wall_s / 60.0
 
+    @property
+    def megabytes(self) -> float:
+        """Of all clip files."""
+        return self.facts.n_bytes / 1e6
+
+    @property
+    def mb_per_frame(self) -> float:
+        """The same for each frame that is trained."""
+        return self.megabytes / sum(clip.n_frames for clip in self.facts.clips)
+
 
 def main_group(evaluation: dict[str, Any]) -> str:
     """held_out, or trained_on where nothing was held out."""
@@ -82,6 +92,7 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
         *(TableColumn(key, title, n, False, unit) for key, title, unit, n in _SEAMS),
         TableColumn("minutes", "Time", 2, False, "min"),
         TableColumn("megabytes", "Size", 1, False, "MB"),
+        TableColumn("mb_per_frame", "Size per frame", 3, False, "MB"),
         TableColumn("clips", "Clips"),
         TableColumn("columns", "Columns"),
     )
@@ -93,7 +104,8 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
             **{key: one.figure(key) for key, *_ in _FIGURES},
             **{key: one.seam(key) for key, *_ in _SEAMS},
             "minutes": one.minutes,
-            "megabytes": one.facts.n_bytes / 1e6,
+            "megabytes": one.megabytes,
+            "mb_per_frame": one.mb_per_frame,
             "clips": len(one.facts.clips),
             "columns": one.evaluation["metrics"],
         }

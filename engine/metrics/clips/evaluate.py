@@ -138,7 +138,7 @@ class Evaluation:
             has_pair = frame in pairs and frame > 0 and self.capture.is_usable(camera, frame - 1)
             if has_pair and frame == clip.start:
                 assert before is not None, "the pair at a boundary needs the clip before it"
-                yield self._boundary(clip, shot, before, camera)[0]
+                yield self._boundary(clip, shot, before, camera)
             elif has_pair:
                 if last is None or last.frame_index != frame - 1:
                     last = self._shot(trained, camera, frame - 1)
@@ -154,16 +154,25 @@ class Evaluation:
         clip = after.clip
         if before.clip.stop != clip.start:
             raise ValueError(f"clips {before.clip.clip_index} and {clip.clip_index} are not neighbours")
-        return self._boundary(clip, self._shot(after, camera, clip.start), before, camera)[1]
+        return self.change_maps(before, after, camera, clip.start)
 
-    def _boundary(self, clip: Clip, shot: _Shot, before: TrainedClip, camera: int) -> tuple[PairRow, SeamMaps]:
+    def change_maps(self, before: TrainedClip, after: TrainedClip, camera: int, frame: int) -> SeamMaps:
+        """R, G and E of one camera from the frame before to a frame, for a picture.
+
+        Args:
+            before, after: What shows the two frames; one clip for both inside of it.
+            frame: Capture frame index of the later one.
+        """
+        return self._maps(camera, self._shot(after, camera, frame), self._shot(before, camera, frame - 1))
+
+    def _boundary(self, clip: Clip, shot: _Shot, before: TrainedClip, camera: int) -> PairRow:
         last = self._shot(before, camera, clip.start - 1)
         maps = self._maps(camera, shot, last)
         # the same instant by the clip before: its field may end with its last frame, and the picture with it
         is_held = before.is_held_beyond
         image = last.image if is_held else self._render(before, camera, before.beyond)
         two_clips = maps.means(change_of(shot.image, image))
-        row = _pair_row(
+        return _pair_row(
             maps,
             clip,
             clip.start,
@@ -173,7 +182,6 @@ class Evaluation:
             two_clips=two_clips,
             is_held=is_held,
         )
-        return row, maps
 
     def _shot(self, trained: TrainedClip, camera: int, frame: int) -> _Shot:
         pixels = self.capture.frame(camera, frame)
