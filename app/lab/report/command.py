@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from typing import Any
 
 from app.cli.arguments import EXIT_OK, add_figure_choices, path_argument
-from app.cli.terminal.progress import ProgressLine, row_progress
+from app.cli.terminal.progress import ProgressLine, stage_progress
 from app.export.staging import check_target
 from app.project.project import read_settings
 from app.training.service import Launch
@@ -55,11 +53,6 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     read_settings(options.project)  # refuses a folder that is not a project before anything else
     check_target((options.project / REPORTS if options.out is None else options.out) / PAGE_FILE)
     line = ProgressLine(is_quiet=options.quiet)
-    shown: dict[str, Callable[[int, int, Any], None]] = {}
-
-    def show(stage: str, done: int, n: int) -> None:
-        shown.setdefault(stage, row_progress(line, stage))(done, n, None)
-
     try:
         page = write_report(
             options.project,
@@ -68,7 +61,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             metrics=options.metrics,
             precision=options.precision,
             wishes=Wishes(options.boundary, options.camera, options.crop),
-            on_stage=show,
+            on_stage=stage_progress(line),
             say=line.say,
         )
     finally:

@@ -12,7 +12,9 @@ from app.project.project_facts import ProjectFacts
 from engine.capture.capture import Capture
 from engine.errors import ProjectError
 
-_CROP = re.compile(r"(?P<camera>.+):(?P<frame>\d+):(?P<x>\d+),(?P<y>\d+),(?P<width>\d+),(?P<height>\d+)", re.DOTALL)
+_CROP = re.compile(
+    r"(?P<camera>.+):(?P<frame>\d{1,9}):(?P<x>\d{1,9}),(?P<y>\d{1,9}),(?P<width>\d{1,9}),(?P<height>\d{1,9})", re.DOTALL
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,6 +15,8 @@ from engine.metrics.clips.summary import mean_of
 
 _PARTS = ("static", "moving")
 _KINDS = ("change", "excess")
+_STATIC = tuple(f"{kind}_static" for kind in _KINDS)
+_INSIDE = "inside clip"
 
 
 def change_maps_section(projects: Sequence[Pictured], places: Places, left_out: Sequence[str]) -> Section:
@@ -39,7 +41,7 @@ def change_maps_section(projects: Sequence[Pictured], places: Places, left_out: 
     rows = [_row(one, frame, found) for one, found in zip(shown, maps, strict=True)]
     capture_row = _capture_row(maps[0])
     columns = [
-        ChangeColumn(row["project"], _said(row), found.change, found.excess)
+        ChangeColumn(row["project"], *_said(row), found.change, found.excess)
         for row, found in zip(rows, maps, strict=True)
     ]
     chosen = "chosen by hand" if places.boundary is not None and places.camera is not None else _rule(places)
@@ -113,7 +115,7 @@ def _row(one: Pictured, frame: int, maps: SeamMaps) -> dict[str, Any]:
     assert before is not None
     assert after is not None
     meet = before.clip_index != after.clip_index
-    clips = f"{before.clip_index} to {after.clip_index}" if meet else f"inside {after.clip_index}"
+    clips = f"{before.clip_index} to {after.clip_index}" if meet else f"{_INSIDE} {after.clip_index}"
     return {"project": one.name, "clips": clips} | _levels(
         change=maps.means(maps.change), excess=maps.means(maps.excess)
     )
@@ -133,7 +135,6 @@ def _levels(**means: tuple[float | None, float | None]) -> dict[str, float | Non
 
 
 def _said(row: dict[str, Any]) -> tuple[str, str]:
-    """Means on static pixels, for the titles of R and E."""
-    values = (row["change_static"], row["excess_static"])
-    change, excess = ("" if value is None else f"{value:.2f}/255" for value in values)
-    return change, excess
+    """Means on static pixels, for the titles of R (or G) and E; whether no clips meet here."""
+    change, excess = ("" if row[name] is None else f"{row[name]:.2f}/255" for name in _STATIC)
+    return f"{change}, {row['clips']}" if row["clips"].startswith(_INSIDE) else change, excess

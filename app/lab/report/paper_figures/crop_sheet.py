@@ -49,8 +49,8 @@ def draw_crops(truth: np.ndarray, window: Window, tiles: Sequence[Tile]) -> Shee
     overview = _overview(truth, window)
     left = overview.shape[1] + 2 * _GAP_PX
     n_columns = max((SHEET_WIDTH_PX - left) // (tile_width + _GAP_PX), 1)
-    n_columns = min(n_columns, len(tiles))
     n_rows = -(-len(tiles) // n_columns)
+    n_columns = -(-len(tiles) // n_rows)
     width = left + n_columns * (tile_width + _GAP_PX)
     height = max(n_rows * (tile_height + _TITLE_PX + _GAP_PX), overview.shape[0] + _TITLE_PX + _GAP_PX)
     sheet = np.full((height, width, 3), 255, np.uint8)

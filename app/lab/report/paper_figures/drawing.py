@@ -18,17 +18,18 @@ _DPI = 150
 
 @dataclass(frozen=True, slots=True)
 class ChangeColumn:
-    """R and E of one project. means: of each, as a text.  change, excess: [H, W] in 0..1."""
+    """R and E of one project. change_said, excess_said: their means.  change, excess: [H, W] in 0..1."""
 
     title: str
-    means: tuple[str, str]
+    change_said: str
+    excess_said: str
     change: np.ndarray
     excess: np.ndarray
 
 
 def draw_change_maps(
     truth_change: np.ndarray,
-    truth_mean: str,
+    truth_said: str,
     truth: np.ndarray,
     columns: Sequence[ChangeColumn],
     value_range: tuple[float, float],
@@ -37,7 +38,7 @@ def draw_change_maps(
 
     Args:
         truth_change: G. [H, W] in 0..1
-        truth_mean: Of G, as a text.
+        truth_said: Its mean.
         truth: The later frame. [H, W, 3] uint8
         value_range: Ends of the colour range of all maps.
     """
@@ -51,13 +52,13 @@ def draw_change_maps(
         for axes in grid.flat:
             axes.set_axis_off()
         options = map_options(value_range)
-        shown = _show(grid[0, 0], truth_change, f"capture, {truth_mean}" if truth_mean else "capture", "G", options)
-        _show(grid[1, 0], truth, "what the camera took", "", {})
+        shown = _show(grid[0, 0], truth_change, f"capture\nG {truth_said}", options)
+        _show(grid[1, 0], truth, "what the camera took", {})
         for i, column in enumerate(columns, start=1):
             band, place = divmod(i, n_columns)
             name = shortened(column.title)
-            _show(grid[2 * band, place], column.change, f"{name}\nR {column.means[0]}", "", options)
-            _show(grid[2 * band + 1, place], column.excess, f"E {column.means[1]}", "", options)
+            _show(grid[2 * band, place], column.change, f"{name}\nR {column.change_said}", options)
+            _show(grid[2 * band + 1, place], column.excess, f"E {column.excess_said}", options)
         add_color_bar(figure, shown, grid.flat, "mean absolute difference, colours in 0..1")
         return png_of(figure)
 
@@ -72,7 +73,7 @@ def draw_picture_rows(titles: Sequence[str], rows: Sequence[tuple[str, Sequence[
     height, width = rows[0][1][0][0].shape[:2]
     with plain_texts():
         cell_inches = 0.96 * WIDTH_INCHES / len(titles)
-        figure = new_figure(WIDTH_INCHES, len(rows) * (cell_inches * height / width + 0.32) + 0.3, dpi=_DPI)
+        figure = new_figure(WIDTH_INCHES, len(rows) * (cell_inches * height / width + 0.2) + 0.2, dpi=_DPI)
         grid = figure.subplots(len(rows), len(titles), squeeze=False)
         for axes_row, (label, pictures) in zip(grid, rows, strict=True):
             axes_row[0].set_ylabel(label, fontsize=8)
@@ -93,6 +94,6 @@ def as_8bit(picture: np.ndarray) -> np.ndarray:
     return np.rint(255.0 * np.clip(np.nan_to_num(picture), 0.0, 1.0)).astype(np.uint8)
 
 
-def _show(axes: Any, picture: np.ndarray, title: str, label: str, options: dict[str, Any]) -> Any:
-    axes.set_title(f"{label}: {title}" if label else title, loc="left", fontsize=7.5)
+def _show(axes: Any, picture: np.ndarray, title: str, options: dict[str, Any]) -> Any:
+    axes.set_title(title, loc="left", fontsize=7.5)
     return axes.imshow(picture if picture.ndim == 3 else np.ma.masked_invalid(picture), **options)

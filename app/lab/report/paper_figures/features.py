@@ -14,6 +14,7 @@ from engine.images.psnr import psnr
 if TYPE_CHECKING:
     from engine.metrics.clips.features_apart import Features
 
+_TITLE = "Static and dynamic features"
 _WAYS: dict[Features, str] = {"both": "full render", "static": "f_s only", "dynamic": "f_d only"}
 
 
@@ -30,6 +31,8 @@ def features_section(own: Pictured) -> Section:
         shown += [(render, f"{levels[way]:.2f} dB") for way, (_, render) in pairs.items()]
         rows.append((f"clip {clip}", shown))
         table.append({"clip_index": clip, "camera": camera, "frame_index": frame, **levels})
+    if not rows:
+        return Section("features_apart", _TITLE, ["No picture was measured, so none is shown."])
     caption = (
         "f_s only: the field's features are zero; f_d only: those of the anchors are. Positions, colours of the cloud, "
         "sizes, presence and decoder stay. Above the reference clip, below the last clip that inherits from it, each "
@@ -50,7 +53,7 @@ def features_section(own: Pictured) -> Section:
     )
     return Section(
         "features_apart",
-        "Static and dynamic features",
+        _TITLE,
         [figure, Table("features_apart", "PSNR of the pictures above", columns, table)],
     )
 

@@ -20,8 +20,8 @@ _FIGURES = {
     "psnr": ("PSNR", "dB", 2),
     "flicker_inside": ("Flicker inside clips", "1/255", 3),
     "flicker_borders": ("Flicker at borders", "1/255", 3),
-    "seam_ratio_static": ("Seam ratio, static", "", 3),
-    "score": ("Seam score", "1/255", 3),
+    "seam_ratio_static": ("Seam ratio, static (1: no seam)", "", 3),
+    "score": ("Seam score (0: no seam)", "1/255", 3),
     "megabytes": ("Size", "MB", 2),
     "mb_per_frame": ("Size per frame", "MB", 3),
 }
@@ -63,7 +63,8 @@ def clip_length_section(compared: Sequence[Compared]) -> Section | None:
         return found
 
     n_frames = sum(clip.n_frames for clip in chosen[0].facts.clips)
-    chart = draw_over_length(_panels(series, _FIGURES), "M, frames per clip", ticks=lengths)
+    drawn = {name: words for name, words in _FIGURES.items() if name != "megabytes"}  # of equal frames: the same curve
+    chart = draw_over_length(_panels(series, drawn), "M, frames per clip", ticks=lengths)
     caption = (
         f"Every project on the same {n_frames} frames. A line joins projects that differ by the length of their clips "
         "alone; it is called by the first of them. One clip for all frames has no borders."
