@@ -171,6 +171,7 @@ def kept_figures(opened: TrainedProject, scope: Scope, clip_index: int, say: Cal
         "field": _fingerprint(opened, opened.last_trained) if config.field == "continue" else None,
         "metrics": scope.metrics,
         "precision": scope.precision,
+        "holdout": sorted(opened.project.settings.holdout),  # whose optical flow is measured
         "lpips": scope.metrics == "all" and lpips.why_missing() is None,
     }
     first = clip.start if scope.before(clip_index) is None else clip.start - 1

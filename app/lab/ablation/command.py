@@ -12,6 +12,7 @@ from app.cli.arguments import (
     parse_cameras,
     path_argument,
 )
+from app.cli.frame_rate_arguments import add_no_fps, wanted_rates
 from app.cli.terminal.progress import ProgressLine, row_progress, stage_progress
 from app.cli.terminal.training_lines import show_outcome, show_status
 from app.cli.training_settings import add_training_settings, overrides_of
@@ -42,6 +43,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     add_figure_choices(command, default="quick", said="quick")
     add_follow_links(command)
     add_training_settings(command)
+    add_no_fps(command)
     command.add_argument(
         "--report",
         action="store_true",
@@ -132,6 +134,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             precision=options.precision,
             launch=launch,
             callbacks=callbacks,
+            rates_of=wanted_rates(options),
         )
         if options.report:
             page = write_ablation_report(
@@ -142,6 +145,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
                 precision=options.precision,
                 on_stage=stage_progress(line),
                 say=line.say,
+                rates_of=wanted_rates(options),
             )
     finally:
         line.finish()
@@ -150,6 +154,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     else:
         compared = "".join(f"\n{sentence}" for sentence in curve_lines(document["curves"]))
         print(f"{as_text(document['lines'])}\n{compared}\n{document['definition']}")
+        if document["rendering"] is not None:
+            print(document["rendering"]["words"])
     line.say(f"All figures: {options.project / RESULT_FILE} and {TABLE_FILE}")
     if page is not None:
         line.say(f"Report: {page}")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.evaluation.speed.frame_rates import RatesOf
 from app.lab.ablation.running import project_folder
 from app.lab.ablation.table import COLUMNS
 from app.lab.ablation.variants import FULL
@@ -30,13 +31,14 @@ def write_ablation_report(
     precision: Precision,
     on_stage: OnStage,
     say: Callable[[str], None],
+    rates_of: RatesOf,
 ) -> Path:
     """Set all variants in a folder that were trained with one seed beside "full"; the page begins with the table.
 
     Args:
         document: What `run_ablation` returned.
         seed: Of the projects that are shown; other seeds are in the table only.
-        metrics, precision, on_stage, say: See app.lab.report.write.write_report.
+        metrics, precision, on_stage, say, rates_of: See app.lab.report.write.write_report.
     Returns:
         The page.
     Raises:
@@ -52,6 +54,7 @@ def write_ablation_report(
         beginning=[ablation_section(document, seed)],
         on_stage=on_stage,
         say=say,
+        rates_of=rates_of,
     )
 
 
@@ -74,7 +77,10 @@ def ablation_section(document: dict[str, Any], seed: int) -> Section:
     n_seeds = len(document["seeds"])
     said = "Means over the seeds; ± is the standard deviation over them. " if n_seeds > 1 else ""
     said += f"All pictures below are of the projects of seed {seed}."
-    return Section("ablation", "Ablation", [said, Table("ablation", "Variants", columns, rows), document["definition"]])
+    parts = [said, Table("ablation", "Variants", columns, rows), document["definition"]]
+    if document["rendering"] is not None:
+        parts.append(document["rendering"]["words"])
+    return Section("ablation", "Ablation", parts)
 
 
 def _column(key: str) -> TableColumn:

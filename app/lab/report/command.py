@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from app.cli.arguments import EXIT_OK, add_figure_choices, path_argument
+from app.cli.frame_rate_arguments import add_no_fps, wanted_rates
 from app.cli.terminal.progress import ProgressLine, stage_progress
 from app.export.staging import check_target
 from app.project.project import read_settings
@@ -42,6 +43,7 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
         "(default: where the projects differ most)",
     )
     add_figure_choices(command, default=None, said="all for the project, quick for the others")
+    add_no_fps(command)
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
@@ -63,6 +65,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             wishes=Wishes(options.boundary, options.camera, options.crop),
             on_stage=stage_progress(line),
             say=line.say,
+            rates_of=wanted_rates(options),
         )
     finally:
         line.finish()

@@ -6,13 +6,14 @@ import logging
 import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.evaluation.evaluation import Measuring
 from app.evaluation.headless import TrainedProject, open_trained
+from app.evaluation.speed.frame_rates import RatesOf
 from app.lab.report.about import capture_section, settings_section, setup_section, split_section
 from app.lab.report.comparison import Compared, comparison_section, speed_section
 from app.lab.report.costs import storage_section, times_section
@@ -24,6 +25,7 @@ from app.lab.report.page.parts import Section
 from app.lab.report.paper_figures.by_hand import Places, Wishes, checked_places
 from app.lab.report.paper_figures.sections import STEPS, paper_sections
 from app.lab.report.pictures import Pictures, ProjectPictures
+from app.lab.report.rendering import rendering_section
 from app.lab.report.seam_parts import seams_section, shown_boundaries
 from app.project.project_facts import ProjectFacts, find_projects, read_facts, short_names
 from engine.capture.capture_summary import describe
@@ -61,6 +63,7 @@ def write_report(
     say: Callable[[str], None] = logger.warning,
     measuring: Measuring | None = None,
     make_pictures: Callable[[TrainedProject], Pictures] = ProjectPictures,
+    rates_of: RatesOf = lambda opened: None,
 ) -> Path:
     """Write the report of a project.
 
@@ -79,6 +82,7 @@ def write_report(
         on_stage: Told what is done.
         say: Told what the user should know, see app.evaluation.evaluation.evaluate_project.
         measuring, make_pictures: Tests bring quick ones.
+        rates_of: Measures how fast a project is rendered; nothing is said of that by default.
     Returns:
         The page.
     Raises:
@@ -98,8 +102,9 @@ def write_report(
         [(facts, True), *others], names, [own, *(rest for _ in others)], strict=True
     ):
         try:
+            trained = open_trained(one.project) if compared else opened
             document = evaluation_of(
-                open_trained(one.project) if compared else opened,
+                trained,
                 choices=choices,
                 precision=precision,
                 is_held_out_enough=bool(compared),
@@ -107,12 +112,13 @@ def write_report(
                 say=say,
                 measuring=measuring,
             )
+            rates = rates_of(trained)
         except (ProjectError, CaptureError) as error:
             if is_named:
                 raise
             left_out.append(f"{name} is left out: {error.message}")
             continue
-        compared.append(Compared(replace(one, name=name), document))
+        compared.append(Compared(replace(one, name=name), document, rates))
     sections = _sections(compared, opened, make_pictures, places, left_out, on_stage)
     return _write(out, compared, [*beginning, *sections])
 
@@ -156,7 +162,7 @@ def _sections(
     from app.lab.machine import describe_machine
 
     capture, pictures = describe(opened.capture), make_pictures(opened)
-    speed = speed_section(compared)
+    speed, rendering = speed_section(compared), rendering_section(compared)
     has_others = len(compared) > 1 or bool(left_out)
     return [
         *([comparison_section(compared, left_out), speed] if has_others else []),
@@ -172,6 +178,7 @@ def _sections(
         seams_section(evaluation, pictures, tick),
         storage_section(facts),
         times_section(facts),
+        *([] if rendering is None else [rendering]),
         *([] if has_others else [speed]),
     ]
 
@@ -181,7 +188,8 @@ def _sections(
 
 def report_document(compared: Sequence[Compared], sections: Sequence[Section]) -> dict[str, Any]:
     """What report.json holds: schema, projects (name, folder, settings, clips, means, columns, seams and flicker of
-    their evaluations), tables by name as on the page and in the CSV files, and files (of figures and tables)."""
+    their evaluations, and frame_rates), tables by name as on the page and in the CSV files, and files (of figures and
+    tables)."""
     tables = {table.name: table for section in sections for table in section.tables()}
     figures = [figure.name for section in sections for figure in section.figures()]
     return {
@@ -223,6 +231,7 @@ def _project_document(one: Compared) -> dict[str, Any]:
         "means": evaluation["means"],
         "seams": {key: value for key, value in evaluation["seams"].items() if key != "rows"},
         "flicker": flicker_figures(evaluation["seams"]["rows"]),
+        "frame_rates": None if one.rates is None else asdict(one.rates),
     }
 
 
