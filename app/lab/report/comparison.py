@@ -133,7 +133,8 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
     ]
     said = (
         f"Means over all clips and frames of the {first.group.replace('_', '-')} cameras, raw colours. The best value "
-        "of a column is bold. Projects measured quickly have PSNR, SSIM and DSSIM1 only; --metrics all measures the rest."
+        "of a column is bold. Projects measured quickly have PSNR, SSIM and DSSIM1 only; --metrics "
+        "all measures the rest."
     )
     notes = [note for one in compared[1:] if (note := comparability(first, one))]
     table = Table("comparison", "All projects", columns, rows)
