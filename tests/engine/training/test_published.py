@@ -84,10 +84,10 @@ def cells_double_from_sixteen() -> None:
     assert field_shape().cells == (16, 32, 64)
 
 
-def the_field_is_float32_and_starts_like_the_heads() -> None:
-    field = SpatioTemporalField(field_shape(), torch.Generator().manual_seed(1))
+def the_field_is_float32_and_starts_as_released() -> None:
+    field = SpatioTemporalField(field_shape(), torch.Generator().manual_seed(1), is_published=True)
     for layer in (field.hidden, field.out):
-        bound = 1.0 / math.sqrt(layer.in_features)
+        bound = math.sqrt(6.0 / (layer.in_features + layer.out_features))
         assert layer.weight.dtype == torch.float32
         assert 0.95 * bound < float(layer.weight.detach().abs().max()) <= bound
 
@@ -170,7 +170,7 @@ CHECKS: dict[str, Callable[[], None]] = {
     "scales of an anchor": anchors_have_six_scales,
     "knots in time": knots_lie_on_frames,
     "cells of a level": cells_double_from_sixteen,
-    "numbers in the field": the_field_is_float32_and_starts_like_the_heads,
+    "numbers in the field": the_field_is_float32_and_starts_as_released,
     "outside of the box": places_outside_are_the_nearest_inside,
     "head of offsets": heads_are_equally_wide,
     "stereo": depth_maps_are_as_small_as_said,
