@@ -236,9 +236,10 @@ def sweep_all(
             is_wanted=is_wanted,
         )
         if known is not None and is_wanted is not None:
+            nearest = np.rint((known[camera] - planes[0]) / (planes[1] - planes[0]))  # they are uniform
             y, x = np.nonzero(~is_wanted)
-            costs[y, x] = UNKNOWN_COST
-            costs[y, x, np.abs(planes - known[camera, y, x][:, None]).argmin(axis=1)] = 0.0
+            costs[~is_wanted] = UNKNOWN_COST
+            costs[y, x, np.clip(nearest[y, x], 0, len(planes) - 1).astype(np.int64)] = 0.0
         return smooth_inverse_depth(costs, greys[camera], planes), len(planes)
 
     def sweep(cameras: range) -> Arrays:
