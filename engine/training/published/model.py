@@ -89,7 +89,8 @@ MODEL = (
         "neither",
         paper="a fully fused MLP",
         released="tiny-cuda-nn: half precision, weights that start as Xavier's",
-        here="float32, weights that start within 1 / sqrt(inputs), like those of the heads",
+        here="float32; weights start likewise",
+        settings={"initial": "published"},
         reason="the library needs CUDA; the kernels here compute in float32",
     ),
     Point(
