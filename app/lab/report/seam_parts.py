@@ -203,7 +203,7 @@ def _over_time(evaluation: dict[str, Any]) -> Figure:
 
 def _maps(boundary: dict[str, Any], pictures: Pictures) -> Figure:
     camera, clips, frame = boundary["worst_camera"], boundary["clips"], boundary["frame_index"]
-    maps = pictures.seam(clips[1], camera)
+    maps = pictures.changes(frame, camera)
     panels = [
         MapPanel("R: change of the render", maps.change),
         MapPanel("G: change of the truth", maps.truth_change),

@@ -163,7 +163,16 @@ class Evaluation:
         clip = after.clip
         if before.clip.stop != clip.start:
             raise ValueError(f"clips {before.clip.clip_index} and {clip.clip_index} are not neighbours")
-        return self._maps(camera, self._shot(after, camera, clip.start), self._shot(before, camera, clip.start - 1))
+        return self.change_maps(before, after, camera, clip.start)
+
+    def change_maps(self, before: TrainedClip, after: TrainedClip, camera: int, frame: int) -> SeamMaps:
+        """R, G and E of one camera from the frame before to a frame, for a picture.
+
+        Args:
+            before, after: What shows the two frames; one clip for both inside of it.
+            frame: Capture frame index of the later one.
+        """
+        return self._maps(camera, self._shot(after, camera, frame), self._shot(before, camera, frame - 1))
 
     def _boundary(self, clip: Clip, shot: _Shot, before: TrainedClip, camera: int) -> PairRow:
         last = self._shot(before, camera, clip.start - 1)
