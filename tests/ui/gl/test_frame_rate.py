@@ -10,7 +10,7 @@ from app.evaluation.speed.laps import frames_of
 from app.project.project import open_project
 from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import change_header, train
-from ui.gl import frame_rate
+from ui import frame_rate
 from ui.gl.context import ContextError
 
 HEADER = {"camera_names": [], "near_plane": 0.1, "spacing": 0.2}

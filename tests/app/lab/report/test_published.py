@@ -1,4 +1,4 @@
-"""Published figures beside a project's own: when they are shown, which ones, and what is said of ours."""
+"""Published figures beside a project's own: when they are shown, which ones, and how ours are marked."""
 
 from pathlib import Path
 from types import SimpleNamespace
