@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -69,13 +70,16 @@ def draw_over_time(
     Args:
         frames: Frame indices of the values, or other numbers that count time.
         borders: First frames of clips; a line stands before each.
-        unit: What is counted.
+        unit: What is counted. Where frames are missing, lines end and begin anew.
     """
+    breaks = [
+        i for i, (before, after) in enumerate(pairwise(frames), start=1) if unit == "frame" and after > before + 1
+    ]
     with plain_texts():
         figure = new_figure(WIDTH_INCHES, 0.4 + 2.5 * len(panels))
         rows = figure.subplots(len(panels), 1, squeeze=False, sharex=True)[:, 0]
         for axes, panel in zip(rows, panels, strict=True):
-            _draw_curves(axes, panel, frames)
+            _draw_curves(axes, panel, frames, breaks)
             for i, border in enumerate(borders):
                 label = "clip border" if i == 0 else None
                 axes.axvline(border - 0.5, color=FAINT_COLOR, linestyle="--", linewidth=1.0, label=label)
@@ -87,20 +91,28 @@ def draw_over_time(
         return png_of(figure)
 
 
-def _draw_curves(axes: Any, panel: CurvePanel, frames: Sequence[int]) -> None:
+def _draw_curves(axes: Any, panel: CurvePanel, frames: Sequence[int], breaks: Sequence[int]) -> None:
     n_thin = 0
+    places = np.insert(np.asarray(frames, dtype=float), breaks, math.nan)
     for curve in panel.curves:
-        values = [math.nan if value is None else value for value in curve.values]
+        known = np.array([math.nan if value is None else value for value in curve.values])
+        values = np.insert(known, breaks, math.nan)
         if curve.is_main:
-            axes.plot(frames, values, color="#000000", linewidth=2.2, marker=".", label=curve.label, zorder=3)
+            axes.plot(places, values, color="#000000", linewidth=2.2, marker=".", label=curve.label, zorder=3)
             continue
         if curve.is_faint:
-            axes.plot(frames, values, color=FAINT_COLOR, alpha=0.35, linewidth=0.8, label=curve.label or "_")
+            axes.plot(places, values, color=FAINT_COLOR, alpha=0.35, linewidth=0.8, label=curve.label or "_")
             continue
         color, style = PALETTE[n_thin % (len(PALETTE) - 1)], _STYLES[n_thin // (len(PALETTE) - 1) % len(_STYLES)]
-        marker = "." if len(frames) < 3 else None
-        axes.plot(frames, values, color=color, linestyle=style, linewidth=1.2, marker=marker, label=curve.label)
+        marker = "." if has_lone_value(values) else None
+        axes.plot(places, values, color=color, linestyle=style, linewidth=1.2, marker=marker, label=curve.label)
         n_thin += 1
+
+
+def has_lone_value(values: np.ndarray) -> bool:
+    """Whether a value has none beside it, so that no line would show it. values: [N], NaN for none."""
+    is_known = np.pad(~np.isnan(values), 1)
+    return bool((is_known[1:-1] & ~is_known[:-2] & ~is_known[2:]).any())
 
 
 def draw_pictures(truth: np.ndarray, render: np.ndarray, error_range: tuple[float, float]) -> bytes:

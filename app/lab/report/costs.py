@@ -64,7 +64,7 @@ def times_section(facts: ProjectFacts) -> Section:
     )
     rows = []
     for clip in facts.clips:
-        compiling_s = None if clip.wall_s is None else clip.stages_s.get(COMPILING, 0.0)
+        compiling_s = None if clip.wall_s is None else clip.compiling_s
         rows.append(
             {
                 "clip": str(clip.clip_index),
