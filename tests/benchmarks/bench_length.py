@@ -197,7 +197,7 @@ def table_text(lines: Sequence[dict[str, Any]], lengths: Sequence[int]) -> str:
         for line in lines
         if "failure" in line
     ]
-    return "\n".join(["| " + " | ".join(row) + " |" for row in rows] + ([""] + failures if failures else []))
+    return "\n".join(["| " + " | ".join(row) + " |" for row in rows] + (["", *failures] if failures else []))
 
 
 def _cell(value: float | None, digits: int) -> str:
