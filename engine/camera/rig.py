@@ -71,6 +71,12 @@ class CameraRig:
             image_sizes=np.asarray(image_sizes, dtype=np.int64),
         )
 
+    @property
+    def extent(self) -> float:
+        """How far the cameras reach, scene units: 1.1 times the largest distance to their mean, the unit in which 3DGS
+        gives the rate of positions."""
+        return 1.1 * float(np.linalg.norm(self.centers - self.centers.mean(0), axis=1).max())
+
     def focus_point(self) -> np.ndarray:
         """The point nearest to all viewing axes in the least-squares sense, in front of the rig. [3]
 

@@ -57,9 +57,11 @@ class FieldShape(Struct, frozen=True):
         channels: Values per entry.
         hidden: Width of the network's hidden layer.
         feature_dim: Width of the dynamic feature.
-        bounds_min: Lower corner of the cube, scene units. [3]
-        side: Length of the cube's side, scene units.
+        bounds_min: Lower corner of the box, scene units. [3]
+        side: Length of the box's longest side, scene units.
         is_shared: Whether all knots share one table, as in the published 4D hash, instead of one each.
+        aspect: Sides of the box as shares of the longest; every axis has the same number of cells. A cube unless said.
+        is_rectified: Whether the network ends in a ReLU, so that no dynamic feature is negative.
     """
 
     n_knots: Size
@@ -71,6 +73,8 @@ class FieldShape(Struct, frozen=True):
     bounds_min: tuple[float, float, float]
     side: Length
     is_shared: bool = False
+    aspect: tuple[Length, Length, Length] = (1.0, 1.0, 1.0)
+    is_rectified: bool = False
 
     def __post_init__(self) -> None:
         if self.n_knots * self.n_entries * self.channels * len(self.cells) > _MAX_TABLE_VALUES:

@@ -54,13 +54,16 @@ class CompactClip:
         return replace(self, state=ClipState(self.state.arrays, with_entries(self.state.header, metrics=figures)))
 
 
-def compact_clip(state: ClipState, entries_in_use: list[np.ndarray] | None = None) -> CompactClip:
+def compact_clip(
+    state: ClipState, entries_in_use: list[np.ndarray] | None = None, *, is_exact: bool = False
+) -> CompactClip:
     """Round a finished clip to what is stored.
 
     Args:
         state: As trained.
         entries_in_use: Entries of each table of the field that some anchor reads at some time, see
             ClipModel.entries_in_use; the others become zero and are not stored. None keeps all. [L, T] bool each
+        is_exact: Keep every value as it is.
     Raises:
         NonFiniteLoss: An array holds numbers that are not finite; names it.
         ProjectError: A decoded array differs from the original by more than its codec states.
@@ -71,7 +74,7 @@ def compact_clip(state: ClipState, entries_in_use: list[np.ndarray] | None = Non
         table = table_index(name)
         if entries_in_use is not None and table is not None:
             array = np.where(entries_in_use[table][..., None], array, np.float32(0))
-        coded[name] = _encode(array, _codecs(name, array, state))
+        coded[name] = _encode(array, [("exact", {})] if is_exact else _codecs(name, array, state))
         decoded[name] = decode_array(coded[name].payload, coded[name].spec)
         _check_error(name, array, decoded[name], coded[name])
     return CompactClip(ClipState(decoded, with_entries(state.header, schema=SCHEMA)).stamped(), coded)

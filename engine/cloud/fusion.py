@@ -35,14 +35,14 @@ class Samples:
 
 
 def fuse_tiers(tiers: list[Samples], spacing: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fuse samples, best tier first, into about one point per voxel of edge `spacing`.
+    """Fuse samples of at most three tiers, best first, into about one point per voxel of edge `spacing`.
 
     Returns:
         points [P, 3], normals [P, 3], colors [P, 3], float64.
     """
     points, normals, colors = (np.zeros((0, 3)) for _ in range(3))
     weights = np.zeros(0)
-    for samples, weight, distance in zip(tiers, TIER_WEIGHTS, TIER_DISTANCES, strict=True):
+    for samples, weight, distance in zip(tiers, TIER_WEIGHTS, TIER_DISTANCES, strict=False):
         if len(samples.points) == 0:
             continue
         own_weights = np.full(len(samples.points), weight)

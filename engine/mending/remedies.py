@@ -50,7 +50,8 @@ def relit(state: ClipState, reference: ClipState, make: MakeTraining) -> Compact
         arrays.pop(name, None)
     if colors.light is not None:
         arrays |= AnchorRecord(light=colors.light).arrays(STATIC)
-    compact = compact_clip(ClipState(arrays, state.header))
+    is_exact = state.header.config.get("storage") == "exact"
+    compact = compact_clip(ClipState(arrays, state.header), is_exact=is_exact)
     return None if compact.state.fingerprint == state.fingerprint else _measured_anew(compact, state)
 
 

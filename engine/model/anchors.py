@@ -1,8 +1,8 @@
 """AnchorSet: named rows of anchors that share a role (engine.clip_files.roles).
 
-An anchor is a fixed position with a static feature and two sets of log scales; Gaussians are decoded from it. Sets
-are kept apart by name and never recovered by position in a concatenation. A set whose `presence` is None is static:
-it has no dynamic feature and exists at all times.
+An anchor is a position, which learns only after `learn_positions`, with a static feature and two sets of log scales;
+Gaussians are decoded from it. Sets are kept apart by name and never recovered by position in a concatenation. A set
+whose `presence` is None is static: it has no dynamic feature and exists at all times.
 """
 
 from __future__ import annotations
@@ -87,6 +87,35 @@ class AnchorSet(nn.Module):
             is_trainable=True,
         )
 
+    @classmethod
+    def from_points(cls, points: Tensor, *, distances: Tensor, feature_dim: int, presence: Tensor | None) -> AnchorSet:
+        """Fresh trainable anchors as the published method starts them: zero features, all scales the distance to the
+        neighbours, and no colour.
+
+        Args:
+            points: Scene units. [A, 3]
+            distances: Positive, scene units. [A]
+            feature_dim: Width of the static feature.
+            presence: Frames of the clip in which each anchor exists, or None for a static set. [A, M] bool
+        """
+        log_scales = torch.log(distances.float())[:, None].expand(-1, 3)
+        return cls(
+            positions=points.float(),
+            color_logits=torch.zeros(len(points), 3),
+            features=torch.zeros(len(points), feature_dim),
+            log_offset_scales=log_scales.clone(),
+            log_base_scales=log_scales.clone(),
+            presence=presence,
+            is_trainable=True,
+        )
+
+    def learn_positions(self) -> None:
+        """From here on the positions are parameters. Nothing happens where they are already, or nothing here learns."""
+        if self.is_trainable and not self.positions.requires_grad:
+            positions = self.positions
+            del self.positions
+            self.positions = nn.Parameter(positions)
+
     def subset(
         self, is_chosen: Tensor, *, presence: Tensor | None = None, is_trainable: bool | None = None
     ) -> AnchorSet:
@@ -99,7 +128,7 @@ class AnchorSet(nn.Module):
         """
         own = None if self.presence is None else self.presence[is_chosen]
         return AnchorSet(
-            positions=self.positions[is_chosen],
+            positions=self.positions.detach()[is_chosen],
             color_logits=self.color_logits[is_chosen],
             features=self.features.detach()[is_chosen],
             log_offset_scales=self.log_offset_scales.detach()[is_chosen],

@@ -153,6 +153,14 @@ class ClipModel(nn.Module):
         dynamic = (role for role in self.roles() if self.anchor_set(role).is_dynamic)
         self._corners = {role: field.corners(self.anchor_set(role).positions) for role in dynamic}
 
+    def follow_positions(self) -> None:
+        """Interpolation constants of sets whose positions learn, where they are now."""
+        for role in self._corners:
+            positions = self.anchor_set(role).positions
+            if positions.requires_grad:
+                assert self.field is not None
+                self._corners[role] = self.field.corners(positions.detach())
+
     def is_constant(self, role: str) -> bool:
         """Whether the set's Gaussians never change: static anchors under a frozen decoder."""
         anchors = self.anchor_set(role)

@@ -23,6 +23,13 @@ class Decoder(nn.Module):
 
     The four first layers are one matrix and the four second layers a block each; each head has parameters of its own
     so that its learning rate can differ.
+
+    Args:
+        static_dim, dynamic_dim: Widths of f_s and f_d.
+        gaussians_per_anchor: K.
+        hidden: Width of each head's hidden layer.
+        generator: Draws the start.
+        is_plain: Whether biases start as all others do; else Gaussians start unrotated and spread over their cell.
     """
 
     def __init__(
@@ -33,6 +40,7 @@ class Decoder(nn.Module):
         gaussians_per_anchor: int,
         hidden: int,
         generator: torch.Generator | None = None,
+        is_plain: bool = False,
     ) -> None:
         super().__init__()
         self.static_dim, self.dynamic_dim = static_dim, dynamic_dim
@@ -52,6 +60,8 @@ class Decoder(nn.Module):
             self.first_bias[head] = uniform(hidden, fan_in=n_in)
             self.second[head] = uniform(hidden, gaussians_per_anchor * width, fan_in=hidden)
             self.second_bias[head] = uniform(gaussians_per_anchor * width, fan_in=hidden)
+        if is_plain:
+            return
         with torch.no_grad():
             shape_bias = self.second_bias["shape"].view(gaussians_per_anchor, 7)
             shape_bias[:, 3:] = torch.tensor([1.0, 0.0, 0.0, 0.0])  # start unrotated

@@ -18,11 +18,19 @@ from engine.clip_files.clip_header import FieldShape
 from engine.model.grid import CornerTable, corner_table, encode, time_keys
 from engine.model.host_array import host_array
 
-_TABLE_INIT = 1e-3  # uniform half-width of the start; small enough that the field starts at zero look
+TABLE_INIT = 1e-3
+"""Half-width of a table's uniform start: small enough that the field starts at zero look."""
+PUBLISHED_TABLE_INIT = 1e-4
 
 
 class SpatioTemporalField(nn.Module):
     """(anchor rows, clip time) to f_d. Owns its tables and network; corner constants belong to the caller.
+
+    Args:
+        shape: Sizes.
+        generator: Draws the start.
+        is_published: Whether it starts as that of the released code: smaller tables, weights as Glorot and Bengio
+            have them.
 
     Attributes:
         keys: Per knot and level what entries are combined with; zeros where every knot has a table. [n_knots, L] int32
@@ -30,13 +38,16 @@ class SpatioTemporalField(nn.Module):
 
     keys: Tensor
 
-    def __init__(self, shape: FieldShape, generator: torch.Generator | None = None) -> None:
+    def __init__(
+        self, shape: FieldShape, generator: torch.Generator | None = None, *, is_published: bool = False
+    ) -> None:
         super().__init__()
         self.shape = shape
+        half_width = PUBLISHED_TABLE_INIT if is_published else TABLE_INIT
         size = (len(shape.cells), shape.n_entries, shape.channels)
         # One parameter per knot: knots without gradient are left alone by the optimiser, which makes it lazy for free.
         self.tables = nn.ParameterList(
-            nn.Parameter((torch.rand(size, generator=generator) * 2 - 1) * _TABLE_INIT) for _ in range(shape.n_tables)
+            nn.Parameter((torch.rand(size, generator=generator) * 2 - 1) * half_width) for _ in range(shape.n_tables)
         )
         keys = torch.zeros(shape.n_knots, len(shape.cells), dtype=torch.int32)
         if shape.is_shared:
@@ -46,7 +57,8 @@ class SpatioTemporalField(nn.Module):
         self.hidden = nn.Linear(n_in, shape.hidden, bias=False)
         self.out = nn.Linear(shape.hidden, shape.feature_dim, bias=False)
         for layer in (self.hidden, self.out):
-            bound = 1.0 / math.sqrt(layer.in_features)
+            scale = 6.0 / (layer.in_features + layer.out_features) if is_published else 1.0 / layer.in_features
+            bound = math.sqrt(scale)
             with torch.no_grad():
                 layer.weight.copy_((torch.rand(layer.weight.shape, generator=generator) * 2 - 1) * bound)
 
@@ -57,7 +69,7 @@ class SpatioTemporalField(nn.Module):
     def corners(self, positions: Tensor) -> CornerTable:
         """Interpolation constants of fixed positions, scene units, on their device. [A, 3]"""
         lower = np.asarray(self.shape.bounds_min)
-        unit = (host_array(positions).astype(np.float64) - lower) / self.shape.side
+        unit = (host_array(positions).astype(np.float64) - lower) / (self.shape.side * np.asarray(self.shape.aspect))
         return corner_table(unit, self.shape.cells, self.shape.n_entries).to(positions.device)
 
     def knots(self, clip_time: float, clip_length: int) -> list[tuple[int, float]]:
@@ -78,4 +90,5 @@ class SpatioTemporalField(nn.Module):
             knots: From `knots`.
         """
         encoded = sum(weight * encode(self.table(knot), rows, corners, self.keys[knot]) for knot, weight in knots)
-        return self.out(torch.relu(self.hidden(encoded)))
+        features = self.out(torch.relu(self.hidden(encoded)))
+        return torch.relu(features) if self.shape.is_rectified else features

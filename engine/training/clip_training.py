@@ -51,6 +51,9 @@ from engine.training.step.training_cameras import TrainingCameras
 from engine.training.step.valid_pixels import ValidPixels
 from engine.training.step.visible_anchors import Sight, camera_views
 
+_SEED_STEP = 1_000_003
+"""Between clips that are trained independently; far more than the seeds that people try."""
+
 
 class ClipTraining:
     """Trains one clip. See the module docstring.
@@ -99,13 +102,14 @@ class ClipTraining:
                 hint="Hold out fewer cameras, or exclude fewer.",
                 path=capture.path,
             )
-        self.seed, self.prep_dir, self.report = seed, Path(prep_dir), report
+        self.seed = seed if self._base is not None else seed_of(config, clip, seed)
+        self.prep_dir, self.report = Path(prep_dir), report
         self.rig = capture.rig.subset(self.camera_indices)
         self.near_plane = float(near_plane(self.rig)) if self._base is None else self._base.header.near_plane
         n_cameras = len(self.camera_indices)
         self.phases = phases_of(config, n_cameras=n_cameras, n_frames=clip.n_frames, is_source=self._base is not None)
         self.steps_done = 0
-        self._generator = torch.Generator().manual_seed(seed)
+        self._generator = torch.Generator().manual_seed(self.seed)
         self._views = camera_views(capture.rig, near_plane=self.near_plane)
         self._cameras = TrainingCameras(
             self.rig,
@@ -125,7 +129,7 @@ class ClipTraining:
             base=self._base,
             previous=previous,
             regions=self.regions,
-            seed=seed,
+            seed=self.seed,
             generator=self._generator,
             prep_dir=self.prep_dir,
             report=report,
@@ -157,7 +161,9 @@ class ClipTraining:
         """
         torch.manual_seed(self.seed)
         self.pictures = self._preparation.read_pictures()
-        if self._base is None:
+        if self._base is None and self.config.cloud == "frames":
+            self._take(self._preparation.whole_parts(self.pictures))
+        elif self._base is None:
             self._take(self._preparation.static_parts(self.pictures))
         else:
             self._take(self._preparation.source_parts(self._base, self.pictures))
@@ -182,7 +188,10 @@ class ClipTraining:
         name, n_steps = self.phases[index]
         has_gains = bool((self.gains != 1.0).any())  # all 1 where the cameras do not differ: nothing to learn
         self.gains.requires_grad_(self.reference is None and has_gains)
-        parameters = named_parameters(self.model, self.gains, self.config, self._cameras.pixels)
+        if self.config.position_lr:
+            for role in self.model.roles():
+                self.model.anchor_set(role).learn_positions()
+        parameters = named_parameters(self.model, self.gains, self.config, self._cameras.pixels, extent=self.rig.extent)
         ratios = self.method.final_ratios(parameters, self.config)
         self._optimizer = PhaseOptimizer(
             parameters, n_steps=n_steps, config=self.config, final_ratios=ratios, backend=self.backend
@@ -235,6 +244,7 @@ class ClipTraining:
             clip_time = frame / self.clip.clip_length
             truth, is_counted = self.pictures.picture(camera_row, frame), self._counted(camera_row, frame)
         view = self._cameras.view(camera_row)
+        self.model.follow_positions()
         active = self._active_picture(camera_row, view, clip_time)
         self._cameras.watch(active.gaussians)
         image = render_gaussians(active.gaussians, view, backend=self.backend, tile_mask=active.tile_mask).image[0]
@@ -253,9 +263,9 @@ class ClipTraining:
         if self._tiles is not None and pixels.dtype == torch.uint8:  # sums of what was taken are kept, no others
             mean_square += self._tiles.square_outside(active, item, pixels, self.gains[camera_row])
         if self.config.volume_weight and active.n_all:
-            volume = (self.config.volume_weight / active.n_all) * self.backend.volume_sum(
-                active.learning.scales, self.spacing
-            )
+            is_mean = self.config.volume == "mean"
+            unit, n_counted = (self.spacing, active.n_all) if is_mean else (1.0, 1)
+            volume = (self.config.volume_weight / n_counted) * self.backend.volume_sum(active.learning.scales, unit)
             loss = loss + volume
         value = float(loss.detach())
         where = f"step {self.steps_done + 1}, camera {self.rig.names[camera_row]}"
@@ -376,8 +386,9 @@ class ClipTraining:
             self._preparation.keep_backgrounds(self.model, self.gains, self.backgrounds)
         state = self.state()
         self._trained = self.model
+        self.model.follow_positions()
         entries = None if self.method.keeps_unread_entries else self.model.entries_in_use()
-        compact = compact_clip(state, entries)
+        compact = compact_clip(state, entries, is_exact=self.config.storage == "exact")
         self.model = load_clip_model(compact.state, self.reference, backend=self.backend, is_learning=True)
         self._sight = Sight(self.model, self._cameras.first_views, reach=self._reach)
         return compact
@@ -508,6 +519,15 @@ class ClipTraining:
         self._optimizer.restore(kept.state.arrays, place.steps_in_phase)
         self._order.restore(place.order)
         self._generator.set_state(torch.tensor(place.generator, dtype=torch.uint8))
+
+
+def seed_of(config: TrainConfig, clip: Clip, seed: int) -> int:
+    """The seed of a clip that inherits nothing: independent ones have one each, so that they share no start either.
+
+    Args:
+        seed: Of the project, and of its first clip.
+    """
+    return seed + _SEED_STEP * clip.clip_index if config.independent else seed
 
 
 def _training_cameras(capture: Capture, holdout: Sequence[int], base: ClipState | None) -> list[int]:

@@ -114,6 +114,52 @@ class TrainConfig(msgspec.Struct, frozen=True):
         ),
     ] = "shared"
 
+    field_form: Annotated[
+        str,
+        _choice(
+            MODEL,
+            "Where the field lies and what its network ends in.",
+            {
+                "fitted": "a cube around nearly all anchors, and no activation",
+                "published": "from the first to the last anchor along each axis, and a ReLU",
+            },
+        ),
+    ] = "fitted"
+    initial: Annotated[
+        str,
+        _choice(
+            MODEL,
+            "What anchors, heads and field start with.",
+            {
+                "cloud": "colours of the cloud, Gaussians spread over the anchor's cell, residual anchors like the "
+                "inherited ones beside them",
+                "published": "no colour, scales from the distance to three neighbours, features of zero",
+            },
+        ),
+    ] = "cloud"
+
+    cloud: Annotated[
+        str,
+        _choice(
+            CLOUDS,
+            "The point clouds that anchors come from.",
+            {
+                "parts": "what stands still by stereo of the backgrounds, what moves by visual hulls",
+                "frames": "everything by stereo of every frame of the clip, as published; needs gate=off",
+            },
+        ),
+    ] = "parts"
+    backgrounds: Annotated[
+        str,
+        _choice(
+            CLOUDS,
+            "Where the frames lie that a camera's background is estimated from.",
+            {
+                "capture": "spread over the whole capture",
+                "clip": "in the clip itself, so that it can be trained before the capture is complete",
+            },
+        ),
+    ] = "capture"
     max_static_points: Annotated[
         int, _points("Anchors of the static part at most; the voxel grows until they fit.", "Static anchors, at most")
     ] = 22_000
@@ -129,7 +175,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
         int,
         setting(
             CLOUDS,
-            "Frames, spread over the capture, from which each camera's background is estimated.",
+            "Frames from which each camera's background is estimated, at most.",
             low=2,
             high=1000,
             unit="frames",
@@ -193,6 +239,10 @@ class TrainConfig(msgspec.Struct, frozen=True):
     shape_head_lr: Annotated[float, _rate("the head of scales and rotations")] = 4e-3
     color_head_lr: Annotated[float, _rate("the head of colours")] = 4e-3
     offset_head_lr: Annotated[float, _rate("the head of offsets")] = 4e-3
+    position_lr: Annotated[
+        float,
+        _rate("the anchors' positions, as a share of how far the cameras reach; with 0 they stay as they are,"),
+    ] = 0.0
     gain_lr: Annotated[float, _rate("the cameras' colour gains in the reference clip")] = 3e-4
     camera_lr: Annotated[float, _rate("corrections of cameras, in pixels at the working size,")] = 0.015
     final_lr_ratio: Annotated[
@@ -207,6 +257,7 @@ class TrainConfig(msgspec.Struct, frozen=True):
     ] = 0.02
     feature_final_ratio: Annotated[float, _final("static features")] = 0.0
     scale_final_ratio: Annotated[float, _final("scales")] = 0.0
+    position_final_ratio: Annotated[float, _final("positions")] = 0.0
     field_final_ratio: Annotated[float, _final("the field's tables and network")] = 0.0
     opacity_head_final_ratio: Annotated[float, _final("the head of opacities")] = 0.0
     shape_head_final_ratio: Annotated[float, _final("the head of scales and rotations")] = 0.0
@@ -218,10 +269,19 @@ class TrainConfig(msgspec.Struct, frozen=True):
     ] = 0.2
     volume_weight: Annotated[
         float,
-        setting(
-            LOSS, "Weight of the mean volume of the Gaussians, in cubes of the anchor spacing.", low=0.0, high=10.0
-        ),
+        setting(LOSS, "Weight of the volume term.", low=0.0, high=10.0),
     ] = 1e-3
+    volume: Annotated[
+        str,
+        _choice(
+            LOSS,
+            "What the volume term is of.",
+            {
+                "mean": "the mean over the Gaussians, in cubes of the anchor spacing",
+                "sum": "the sum over the Gaussians, in cubes of scene units, as published",
+            },
+        ),
+    ] = "mean"
     max_gradient_norm: Annotated[
         float,
         setting(
@@ -261,6 +321,15 @@ class TrainConfig(msgspec.Struct, frozen=True):
             {name: entry.words for name, entry in BACKENDS.items()},
         ),
     ] = DEFAULT
+
+    storage: Annotated[
+        str,
+        _choice(
+            STEP,
+            "How a finished clip is stored, shown and inherited.",
+            {"compact": "rounded to few bits", "exact": "as it was trained, in float32"},
+        ),
+    ] = "compact"
 
     decoder: Annotated[
         str,
@@ -343,6 +412,11 @@ class TrainConfig(msgspec.Struct, frozen=True):
             raise ProjectError(
                 "inherit=off with residual=none leaves a source clip without anything that moves.",
                 hint="Leave out one of them.",
+            )
+        if self.cloud == "frames" and self.gate != "off":
+            raise ProjectError(
+                f"cloud=frames does not tell what moves from what stands still, so it cannot go with gate={self.gate}.",
+                hint="Add gate=off, or leave out cloud=frames.",
             )
         if self.start == "previous" and not self.independent:
             raise ProjectError("start=previous needs independent=true.", hint="Add it, or leave out start=previous.")

@@ -16,6 +16,8 @@ def phases_of(config: TrainConfig, *, n_cameras: int, n_frames: int, is_source: 
         is_source: Whether the clip inherits from another one.
     """
     n_pictures = n_cameras * n_frames
+    if config.cloud == "frames" and not is_source:  # one cloud, so there is nothing to begin with
+        return [("joint", config.n_joint_steps(n_pictures))]
     if is_source:
         return [("source", config.n_source_steps(n_pictures))]
     return [("static", config.n_static_steps(n_cameras)), ("joint", config.n_joint_steps(n_pictures))]

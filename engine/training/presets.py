@@ -42,21 +42,21 @@ PRESETS: dict[str, dict[str, Any]] = {
         "field_max_levels": 8,
         "passes": 16,
     },
-    # Sizes, rates, where the rates end, weights, passes, no gate and no colour gains as published. Points are thinned
-    # by the pixel spacing alone. 2^17 entries are the released default and 2^20 its largest (field_log2_entries=20).
-    #
-    # What stays different: the offset head is 2 F wide (published 4 F); knots of the field lie on the frames (there,
-    # time has cells of its own), Adam divides by 1e-15 at least for the field too (1e-8), and its rate carries no
-    # scene scale (there, that of the reference clip is multiplied by the extent of the cameras); rates end with the
-    # phase (there after 30,000 steps or more, so that most have hardly fallen when a clip is done); the volume is
-    # measured in cubes of the anchor spacing (scene units); and the reference clip has a static phase before.
+    # The published method: the paper where it speaks, the released code where it does not. What stays different, and
+    # why, is listed in docs/method.md.
     "paper": PUBLISHED_SIZES
     | {
         "max_static_points": 1_000_000,
         "max_moving_points": 1_000_000,
+        "cloud": "frames",
+        "backgrounds": "clip",
+        "initial": "published",
+        "field_form": "published",
         "color": "off",
         "passes": 34,
         # features, scales, opacity and shape heads start as in every preset
+        "position_lr": 1.6e-4,
+        "position_final_ratio": 0.01,
         "table_lr": 2e-4,
         "field_mlp_lr": 2e-4,
         "color_head_lr": 8e-3,
@@ -68,8 +68,12 @@ PRESETS: dict[str, dict[str, Any]] = {
         "shape_head_final_ratio": 1.0,
         "color_head_final_ratio": 0.00625,
         "offset_head_final_ratio": 0.00625,
+        "volume": "sum",
         "volume_weight": 0.01,
+        "max_gradient_norm": 0.0,
         "gate": "off",
+        "tiles": "all",
+        "storage": "exact",
     },
 }
 """Name to the settings in which a preset differs from the defaults."""

@@ -57,16 +57,29 @@ MIN_STEPS_PER_FRAME = 20
 """Of a stream, also where the clips of "full" have fewer."""
 VARIANTS = (
     Variant(FULL, "the settings as they are"),
-    Variant("decoder-new", "without decoder inheritance: new heads in every source clip", {"decoder": "new"}),
+    Variant("decoder-new", "without decoder inheritance (DI): new heads in every source clip", {"decoder": "new"}),
     Variant("decoder-finetune", "inherited heads go on learning in every source clip", {"decoder": "finetune"}),
     Variant("residual-none", "without residual anchors: inherited anchors only", {"residual": "none"}),
-    Variant("residual-full", "residual anchors without deduplication", {"residual": "full"}),
+    Variant(
+        "residual-full",
+        "without residual anchor compensation (RAC): all points of a clip beside the inherited anchors, however many",
+        {"residual": "full"},
+    ),
     Variant("inherit-moving", "inherited moving anchors go on learning, static ones stay", {"inherit": "moving"}),
-    Variant("inherit-trainable", "inherited anchors go on learning in every source clip", {"inherit": "trainable"}),
-    Variant("inherit-off", "without anchor inheritance: every source clip builds its own", {"inherit": "off"}),
+    Variant(
+        "inherit-trainable",
+        "without anchor inheritance (AI): inherited anchors go on learning in every source clip",
+        {"inherit": "trainable"},
+    ),
+    Variant(
+        "inherit-off",
+        "stricter than without AI: every source clip builds its own anchors and inherits the heads alone; without a "
+        "static phase, and its static cloud from the reference clip's backgrounds",
+        {"inherit": "off"},
+    ),
     Variant(
         "inherit-trainable-residual-full",
-        "without both: no deduplication, and inherited anchors go on learning",
+        "without RAC and AI: all points of a clip, however many, and inherited anchors go on learning",
         {"inherit": "trainable", "residual": "full"},
     ),
     Variant(
@@ -83,8 +96,19 @@ VARIANTS = (
         shares_reference=False,
         is_reference_moved=True,
     ),
-    Variant("gate-off", "every anchor at every time, as published", {"gate": "off"}, shares_reference=False),
-    Variant("independent", "clips share nothing", {"independent": True}, is_baseline=True, shares_reference=False),
+    Variant(
+        "gate-off",
+        "every anchor at every time, as published; the field has the levels and entries for all of them",
+        {"gate": "off", "field_max_levels": 16},
+        shares_reference=False,
+    ),
+    Variant(
+        "independent",
+        "clips share nothing: each has clouds of its own frames, its own seed, and as many steps as a clip of full "
+        "that inherits; the first is that of full",
+        {"independent": True, "backgrounds": "clip"},
+        is_baseline=True,
+    ),
     Variant(
         "field-joint",
         "one clip, and so one field, for all frames",
@@ -102,7 +126,8 @@ VARIANTS = (
     ),
     Variant(
         "first-frame",
-        "static Gaussians of the first frame, measured on that frame alone",
+        "static Gaussians of the first frame alone, measured on it",
+        {"backgrounds": "clip"},
         is_baseline=True,
         cut="first",
         shares_reference=False,
@@ -203,12 +228,17 @@ def settings_of(
         n_capture_frames: Where the chosen frames end before the capture does, they are cut without a remainder, because
             the last clip would go on beyond them.
     """
-    overrides = base | variant.overrides
-    if variant.cut == "clips":
-        return overrides, clips[0].clip_length, range(len(clips))
     from engine.training.config import TrainConfig
 
+    overrides = base | variant.overrides
     config = TrainConfig(**base)
+    if variant.cut == "clips":
+        if variant.overrides.get("independent"):
+            n_steps = config.n_source_steps(n_cameras * clips[0].n_frames)
+            n_static = 0 if config.cloud == "frames" else config.n_static_steps(n_cameras)
+            n_static = min(n_static, n_steps // 2)  # of a short schedule, so that both phases have some
+            overrides |= {"static_steps": n_static, "joint_steps": n_steps - n_static}
+        return overrides, clips[0].clip_length, range(len(clips))
     n_frames = clips[-1].stop
     n_first, *n_others = (n_cameras * clip.n_frames for clip in clips)
     joint_steps = config.n_joint_steps(n_first)

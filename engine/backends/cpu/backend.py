@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import torch
@@ -62,8 +63,11 @@ class CpuBackend:
         field: SpatioTemporalField | None,
         knots: Sequence[tuple[int, float]],
     ) -> Gaussians:
-        """See Backend. Without gradient for positions and colour logits, which never learn."""
-        return decode_cpu(chosen, decoder, field, knots)
+        """See Backend. Without gradient for colour logits, which never learn."""
+        gaussians = decode_cpu(chosen, decoder, field, knots)
+        if torch.is_grad_enabled() and any(part.anchors.positions.requires_grad for part in chosen):
+            return replace(gaussians, means=_with_positions(gaussians.means, chosen, decoder.gaussians_per_anchor))
+        return gaussians
 
     def join(self, frozen: Gaussians, rows: Tensor, learning: Gaussians) -> Gaussians:
         """See Backend."""
@@ -108,6 +112,15 @@ class CpuBackend:
             TypeError: A parameter is not contiguous float32 on the cpu.
         """
         return CpuAdam(parameters)
+
+
+def _with_positions(means: Tensor, chosen: Sequence[ChosenAnchors], k: int) -> Tensor:
+    """The same means, through which a gradient reaches the positions: a mean is a position and an offset."""
+    steps = []
+    for part in chosen:
+        positions = part.anchors.positions
+        steps.append((positions - positions.detach()).index_select(0, part.rows).repeat_interleave(k, 0))
+    return means + torch.cat(steps)
 
 
 def _require_float32(name: str, tensor: Tensor) -> None:

@@ -56,12 +56,17 @@ def residual_rows(
 
 def mean_neighbor_distance(points: np.ndarray, k: int = 3) -> np.ndarray:
     """Mean distance of each point to its k nearest others (fewer if there are fewer; 0 for a lone point). [P]"""
+    return neighbor_distances(points, k).mean(axis=1)
+
+
+def neighbor_distances(points: np.ndarray, k: int) -> np.ndarray:
+    """Distances of each point to its k nearest others, or to all of fewer; one of 0 for a lone point. [P, k]"""
     points = np.asarray(points, dtype=np.float64)
     n_neighbors = min(k, len(points) - 1)
     if n_neighbors < 1:
-        return np.zeros(len(points))
+        return np.zeros((len(points), 1))
     distances, _ = KDTree(points).query(points, n_neighbors + 1, workers=n_cores())
-    return distances[:, 1:].mean(axis=1)
+    return distances[:, 1:]
 
 
 def _search_band(points: np.ndarray, centers: np.ndarray, radii: np.ndarray, best: np.ndarray) -> None:

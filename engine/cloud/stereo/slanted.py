@@ -51,6 +51,7 @@ def refine_slanted(
     prior: np.ndarray,
     low: float,
     high: float,
+    is_wanted: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Inverse depth of every pixel of one camera by slanted patches.
 
@@ -61,6 +62,8 @@ def refine_slanted(
         seeds: Inverse depth maps to begin with; their slopes are tried too. [N, H, W]
         prior: Inverse depth that pixels without texture stay near. [H, W]
         low, high: Bounds of inverse depth.
+        is_wanted: Pixels to be searched; the others keep what the first seed says and pass it on to their neighbours.
+            None for all. [H, W] bool
     Returns:
         inverse depth [H, W] float64, cost of its match [H, W] float64: about 0 to 1, UNKNOWN_COST where nothing can
         be said.
@@ -69,10 +72,13 @@ def refine_slanted(
     planes = np.zeros((height, width, 3))
     planes[..., 0] = np.clip(prior, low, high)
     costs = np.full((height, width), np.inf)
+    candidates = np.stack([_with_slopes(seed) for seed in seeds])
+    is_wanted = np.ones((height, width), dtype=bool) if is_wanted is None else np.ascontiguousarray(is_wanted)
+    planes[~is_wanted] = candidates[0][~is_wanted]
+    costs[~is_wanted] = UNKNOWN_COST
     if not sources:
         return planes[..., 0], np.full((height, width), UNKNOWN_COST)
     pairs = [relative_homography(rig, camera, other) for other in sources]
-    candidates = np.stack([_with_slopes(seed) for seed in seeds])
     _search(
         greys[camera],
         np.ascontiguousarray(greys[sources]),
@@ -80,6 +86,7 @@ def refine_slanted(
         np.stack([pair[0] for pair in pairs]),
         np.stack([pair[1] for pair in pairs]),
         candidates,
+        is_wanted,
         np.ascontiguousarray(prior, dtype=np.float64),
         low,
         high,
@@ -228,8 +235,8 @@ def _shaken(plane, size, is_depth, is_slope, state, trial):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _search(grey, sources, are_usable, matrices, shifts, seeds, prior, low, high, planes, costs):
-    """Writes the plane [inverse depth, slope along x, slope along y] and the cost of every pixel."""
+def _search(grey, sources, are_usable, matrices, shifts, seeds, is_wanted, prior, low, high, planes, costs):
+    """Writes the plane [inverse depth, slope along x, slope along y] and the cost of every wanted pixel."""
     height, width = grey.shape
     side = 2 * (RADIUS_PX // STRIDE_PX) + 1
     own, weights, places = np.empty(side * side), np.empty(side * side), np.empty((side * side, 2))
@@ -241,6 +248,8 @@ def _search(grey, sources, are_usable, matrices, shifts, seeds, prior, low, high
             y = row if step > 0 else height - 1 - row
             for column in range(width):
                 x = column if step > 0 else width - 1 - column
+                if not is_wanted[y, x]:
+                    continue
                 n, n_weight = _gather(grey, x, y, own, weights, places)
                 patch = own, weights, places, n, n_weight
                 views = sources, are_usable, matrices, shifts

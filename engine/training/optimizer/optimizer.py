@@ -1,6 +1,7 @@
 """Optimiser of a phase: Adam with one learning rate per kind of parameter, falling log-linearly to its end.
 
-Rates carry no scene scale and the horizon is the phase's own number of steps, so every clip sees the whole schedule.
+Of the rates only that of positions carries a scene scale. The horizon is the phase's own number of steps, so every clip
+sees the whole schedule.
 """
 
 from __future__ import annotations
@@ -22,9 +23,19 @@ _HEADS = ("opacity", "color", "shape", "offset")
 
 
 def named_parameters(
-    model: ClipModel, gains: nn.Parameter, config: TrainConfig, corrections: nn.Parameter | None = None
+    model: ClipModel,
+    gains: nn.Parameter,
+    config: TrainConfig,
+    corrections: nn.Parameter | None = None,
+    *,
+    extent: float = 1.0,
 ) -> dict[str, tuple[nn.Parameter, float]]:
-    """Trainable parameters by name with their initial rate; frozen ones are left out altogether."""
+    """Trainable parameters by name with their initial rate; frozen ones are left out altogether.
+
+    Args:
+        corrections: Of cameras.
+        extent: Of the cameras, scene units: the unit of the rate of positions.
+    """
     chosen: dict[str, tuple[nn.Parameter, float]] = {}
 
     def add(name: str, parameter: Tensor | None, rate: float) -> None:
@@ -33,6 +44,7 @@ def named_parameters(
 
     for role in model.roles():
         anchors = model.anchor_set(role)
+        add(f"sets.{role}.positions", anchors.positions, config.position_lr * extent)
         add(f"sets.{role}.features", anchors.features, config.feature_lr)
         add(f"sets.{role}.log_offset_scales", anchors.log_offset_scales, config.scale_lr)
         add(f"sets.{role}.log_base_scales", anchors.log_base_scales, config.scale_lr)

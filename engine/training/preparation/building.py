@@ -5,7 +5,7 @@ Sizes follow the data and the reasons are returned as lines to report. Nothing h
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,7 @@ from engine.capture.clip import Clip
 from engine.clip_files.clip_header import Coverage
 from engine.clip_files.clip_state import ClipState
 from engine.cloud.motion.budget import NOBODY, choose_within_budget
-from engine.cloud.motion.dedup import mean_neighbor_distance, residual_rows
+from engine.cloud.motion.dedup import mean_neighbor_distance, neighbor_distances, residual_rows
 from engine.cloud.motion.moving_cloud import MovingCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
 from engine.model.anchors import AnchorSet
@@ -29,6 +29,9 @@ from engine.training.config import TrainConfig
 _REACH_SPACINGS = 1.05
 """How far an anchor stands in for points that did not become anchors: the voxels that share a face with its own."""
 
+_MIN_SQUARE = 1e-7
+"""Of a distance to neighbours, scene units squared, as released: points that coincide."""
+
 
 def static_model(
     cloud: StaticCloud, clip: Clip, config: TrainConfig, backend: ModelBackend, generator: torch.Generator
@@ -40,6 +43,7 @@ def static_model(
         gaussians_per_anchor=config.gaussians_per_anchor,
         hidden=config.head_hidden,
         generator=generator,
+        is_plain=config.initial == "published",
     )
     sets = {"static": static_anchors(cloud, config)}
     return _without_field(sets, decoder, clip, backend)
@@ -58,12 +62,36 @@ def _without_field(sets: dict[str, AnchorSet], decoder: Decoder, clip: Clip, bac
 
 def static_anchors(cloud: StaticCloud, config: TrainConfig) -> AnchorSet:
     """Fresh trainable anchors on a static cloud."""
+    return _fresh(cloud.points, cloud.colors, cloud.sizes, None, config)
+
+
+def _fresh(
+    points: np.ndarray,
+    colors: np.ndarray,
+    sizes: np.ndarray | float,
+    presence: np.ndarray | None,
+    config: TrainConfig,
+    others: np.ndarray | None = None,
+) -> AnchorSet:
+    """Anchors with the start that the settings say.
+
+    Args:
+        others: Anchors that are there already, neighbours as well. [S, 3]
+    """
+    places, present = torch.from_numpy(points), None if presence is None else torch.from_numpy(presence)
+    if config.initial == "published":
+        among = points if others is None else np.concatenate([points, others.astype(points.dtype)])
+        squares = (neighbor_distances(among, k=3)[: len(points)] ** 2).mean(1)
+        distances = torch.from_numpy(np.sqrt(np.maximum(squares, _MIN_SQUARE)))
+        return AnchorSet.from_points(
+            places, distances=distances, feature_dim=config.static_feature_dim, presence=present
+        )
     return AnchorSet.from_cloud(
-        torch.from_numpy(cloud.points),
-        torch.from_numpy(cloud.colors),
-        spacing=torch.from_numpy(cloud.sizes),
+        places,
+        torch.from_numpy(colors),
+        spacing=torch.as_tensor(sizes),
         feature_dim=config.static_feature_dim,
-        presence=None,
+        presence=present,
     )
 
 
@@ -83,15 +111,16 @@ def inheriting_model(reference: ClipState, clip: Clip, backend: ModelBackend, *,
     return _without_field(sets, decoder, clip, backend)
 
 
-def moving_anchors(cloud: MovingCloud, rows: np.ndarray, config: TrainConfig) -> AnchorSet:
-    """Fresh trainable anchors on the chosen rows of a moving cloud. rows: [P] bool"""
-    return AnchorSet.from_cloud(
-        torch.from_numpy(cloud.points[rows]),
-        torch.from_numpy(cloud.colors[rows]),
-        spacing=float(cloud.spacing),
-        feature_dim=config.static_feature_dim,
-        presence=torch.from_numpy(cloud.presence[rows]),
-    )
+def moving_anchors(
+    cloud: MovingCloud, rows: np.ndarray, config: TrainConfig, others: np.ndarray | None = None
+) -> AnchorSet:
+    """Fresh trainable anchors on the chosen rows of a moving cloud.
+
+    Args:
+        rows: [P] bool
+        others: Anchors that are there already. [S, 3]
+    """
+    return _fresh(cloud.points[rows], cloud.colors[rows], float(cloud.spacing), cloud.presence[rows], config, others)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,33 +166,40 @@ def add_residual(
     cloud: MovingCloud,
     config: TrainConfig,
     choose: Callable[[MovingCloud, np.ndarray, int, TrainConfig], ResidualAnchors] = uncovered_points,
+    covering: Sequence[str] = ("moving",),
 ) -> Coverage:
-    """Split a source clip's moving points into those the reference covers and residual anchors; says how many.
+    """Split a source clip's points into those the reference covers and residual anchors; says how many.
 
-    A point is covered when it lies inside the union of spheres around the inherited moving anchors, each with the
-    mean distance to its three nearest neighbours as radius. Covered points switch on the inherited anchor nearest to
-    them in the frames they are present in, so nothing covered is left without an anchor; the others become residual
+    A point is covered when it lies inside the union of spheres around the inherited anchors that can change, each with
+    the mean distance to its three nearest neighbours as radius. Covered points switch on the inherited anchor nearest
+    to them in the frames they are present in, so nothing covered is left without an anchor; the others become residual
     anchors. Source: ClipGStream, geometry-aware deduplication, with the exact union.
 
     Args:
         choose: Chooses residual anchors, see engine.training.preparation.method.Method.choose_residual.
+        covering: Roles of the inherited anchors that have spheres, see Method.covering.
     """
     is_new = np.ones(len(cloud.points), bool)
-    moving = model.anchor_set("moving") if "moving" in model.roles() else None
+    inherited = [model.anchor_set(role) for role in covering if role in model.roles()]
     n_used = 0
-    if moving is not None and len(cloud.points):
-        centers = host_array(moving.positions)
+    if inherited and len(cloud.points):
+        centers = np.concatenate([host_array(anchors.positions) for anchors in inherited])
         is_new = residual_rows(cloud.points, centers, mean_neighbor_distance(centers, k=3))
         _, nearest = KDTree(centers).query(cloud.points[~is_new])
         presence = np.zeros((len(centers), cloud.presence.shape[1]), bool)
         np.logical_or.at(presence, nearest, cloud.presence[~is_new])
-        moving.presence = torch.from_numpy(presence).to(model.backend.device)
         n_used = int(presence.any(1).sum())
+        parts = np.split(presence, np.cumsum([len(anchors) for anchors in inherited])[:-1])
+        for anchors, part in zip(inherited, parts, strict=True):
+            anchors.presence = torch.from_numpy(part).to(model.backend.device)
     chosen = choose(cloud, is_new, n_used, config)
     if chosen.rows.any():
-        residual = moving_anchors(replace(cloud, presence=chosen.presence), chosen.rows, config)
-        if moving is not None:
-            _start_like_neighbors(residual, moving)
+        others = [host_array(model.anchor_set(role).positions) for role in model.roles()]
+        residual = moving_anchors(
+            replace(cloud, presence=chosen.presence), chosen.rows, config, np.concatenate(others) if others else None
+        )
+        if inherited and config.initial == "cloud":
+            _start_like_neighbors(residual, inherited)
         model.add_set("residual", residual)
     return Coverage(
         n_points=len(is_new),
@@ -219,11 +255,12 @@ def _within_budget(cloud: MovingCloud, is_new: np.ndarray, budget: int) -> tuple
     return chosen, presence, is_reached
 
 
-def _start_like_neighbors(residual: AnchorSet, moving: AnchorSet) -> None:
-    """Residual anchors begin with the look of the nearest inherited moving anchor: frozen heads know it."""
-    _, nearest = KDTree(host_array(moving.positions)).query(host_array(residual.positions))
+def _start_like_neighbors(residual: AnchorSet, inherited: Sequence[AnchorSet]) -> None:
+    """Residual anchors begin with the look of the nearest of the inherited ones: frozen heads know it."""
+    centers = np.concatenate([host_array(anchors.positions) for anchors in inherited])
+    _, nearest = KDTree(centers).query(host_array(residual.positions))
     rows = torch.from_numpy(nearest)
     with torch.no_grad():
-        residual.features.copy_(moving.features[rows])
-        residual.log_offset_scales.copy_(moving.log_offset_scales[rows])
-        residual.log_base_scales.copy_(moving.log_base_scales[rows])
+        for name in ("features", "log_offset_scales", "log_base_scales"):
+            values = torch.cat([getattr(anchors, name) for anchors in inherited])
+            getattr(residual, name).copy_(values[rows])

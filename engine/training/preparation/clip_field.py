@@ -11,6 +11,9 @@ from engine.model.field import SpatioTemporalField
 from engine.model.field_sizes import derive_cells, derive_log2_entries
 from engine.training.config import TrainConfig
 
+_MOST_LOG2 = 20
+"""Of table entries where every anchor is in the field, so that each has as many of them as with the gate."""
+
 
 def fit_field(
     model: ClipModel, *, spacing: float, config: TrainConfig, generator: torch.Generator, is_shared: bool = True
@@ -24,12 +27,17 @@ def fit_field(
     positions, most_alive = _alive_positions(model), n_alive(model)
     if len(positions) == 0:
         return "no field: nothing moves in this clip"
+    is_published = config.field_form == "published"
     # percentiles, so that one stray point does not stretch the grid; beyond them positions clamp to the border
-    lower, upper = positions.quantile(0.005, dim=0), positions.quantile(0.995, dim=0)
-    side = max(float((upper - lower).max()), 4 * spacing) + 2 * spacing
+    ends = (0.0, 1.0) if is_published else (0.005, 0.995)
+    lower, upper = (positions.quantile(end, dim=0) for end in ends)
+    margin = 0.0 if is_published else spacing
+    side = max(float((upper - lower).max()), 4 * spacing) + 2 * margin
     n_levels = config.field_levels or config.field_max_levels
     n_shared = model.n_frames if is_shared else 1
-    log2_entries = config.field_log2_entries or derive_log2_entries(most_alive, n_shared_knots=n_shared)
+    log2_entries = config.field_log2_entries or derive_log2_entries(
+        most_alive, n_shared_knots=n_shared, at_most=_MOST_LOG2 if config.gate == "off" else 17
+    )
     cells = derive_cells(
         side=side,
         spacing=0.0 if config.field_levels else spacing,  # a fixed number of levels does not look at the anchors
@@ -37,7 +45,8 @@ def fit_field(
         growth=config.field_growth,
         max_levels=n_levels,
     )
-    x, y, z = (lower - spacing).tolist()
+    x, y, z = (lower - margin).tolist()
+    sides = (upper - lower).clamp(min=1e-6 * side) / side
     shape = FieldShape(
         n_knots=model.n_frames,
         cells=cells,
@@ -48,8 +57,11 @@ def fit_field(
         bounds_min=(x, y, z),
         side=side,
         is_shared=is_shared,
+        aspect=tuple(sides.tolist()) if is_published else (1.0, 1.0, 1.0),
+        is_rectified=is_published,
     )
-    model.attach_field(SpatioTemporalField(shape, generator))
+    is_published = config.initial == "published"
+    model.attach_field(SpatioTemporalField(shape, generator, is_published=is_published))
     return (
         f"{len(cells)} levels up to {cells[-1]} cells (anchors {spacing:.3g} apart), "
         f"2^{log2_entries} entries {'in all' if is_shared else 'per frame'} ({most_alive} anchors alive)"

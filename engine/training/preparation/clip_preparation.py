@@ -20,11 +20,12 @@ from engine.capture.came_along import came_along
 from engine.capture.capture import Capture
 from engine.capture.clip import Clip
 from engine.capture.exclusions import exclusion_key
-from engine.clip_files.clip_header import Coverage
+from engine.clip_files.clip_header import ClipHeader, Coverage
 from engine.clip_files.clip_state import ClipState, fingerprint_of
 from engine.cloud.background.exposure import Exposure
 from engine.cloud.keeping import Keep
 from engine.cloud.motion.moving_cloud import MovingCloud
+from engine.cloud.stereo.frames_cloud import FramesCloud
 from engine.cloud.stereo.static_cloud import StaticCloud
 from engine.errors import PreparationError, ProjectError
 from engine.gate.regions import GateRegion
@@ -42,8 +43,10 @@ from engine.training.preparation.building import (
 )
 from engine.training.preparation.cloud_preparation import (
     Backgrounds,
+    blank,
     correct_backgrounds,
     estimate_backgrounds,
+    frames_cloud,
     key_of_corrected,
     motion_masks,
     moving_cloud,
@@ -166,12 +169,27 @@ class ClipPreparation:
             PreparationError: No static point was found.
         """
         drift, exposures = self._without_drift(pictures)
-        backgrounds = self._estimated(exposures)
+        backgrounds = self._estimated(self._clip, exposures)
         cloud = self._static_cloud(backgrounds, self._stages.keep)
         gains = self._gains(cloud.gains)
         model = static_model(cloud, self._clip, self._config, self._backend, self._generator)
         self._say("Building the static cloud", f"{len(cloud.points)} static anchors, spacing {cloud.spacing:.4g}")
         return ClipParts(model, gains, drift, backgrounds, float(cloud.spacing))
+
+    def whole_parts(self, pictures: TrainingPictures) -> ClipParts:
+        """A reference clip with cloud=frames, complete: one cloud, and all of it changes. Removes the pictures' drift.
+
+        Raises:
+            PreparationError: No point was found.
+        """
+        drift, exposures = self._without_drift(pictures)
+        backgrounds = self._estimated(self._clip, exposures) if self._needs_backgrounds else blank(pictures)
+        cloud = self._frames_cloud(pictures)
+        sizes = np.full(len(cloud.points), cloud.spacing, np.float32)
+        static = StaticCloud(cloud.points, cloud.colors, sizes, cloud.gains, cloud.spacing)
+        model = static_model(static, self._clip, self._config, self._backend, self._generator)
+        parts = ClipParts(model, self._gains(cloud.gains), drift, backgrounds, cloud.spacing)
+        return replace(parts, reasons=self._make_dynamic(parts, cloud.spacing))
 
     def with_motion(self, parts: ClipParts, pictures: TrainingPictures) -> ClipParts:
         """A reference clip whose static anchors were trained, with corrected backgrounds and what moves."""
@@ -184,7 +202,7 @@ class ClipPreparation:
         if len(cloud.points):
             parts.model.add_set("moving", moving_anchors(cloud, np.ones(len(cloud.points), bool), self._config))
         self._say("Carving what moves", f"{len(cloud.points)} moving anchors")
-        reasons = self._make_dynamic(parts, cloud)
+        reasons = self._make_dynamic(parts, self._field_spacing(parts, cloud))
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons)
 
     def source_parts(self, reference: ClipState, pictures: TrainingPictures) -> ClipParts:
@@ -195,12 +213,18 @@ class ClipPreparation:
             ProjectError: The reference was trained with other cameras, or the field before cannot go on.
         """
         parts = self._inherited_parts(reference, pictures)
-        model = parts.model
-        cloud, moving_spacing = self._moving_cloud(parts, pictures, self._motion_masks(parts, pictures))
-        coverage = add_residual(model, cloud, self._config, self._method.choose_residual)
+        model, moving_spacing = parts.model, None
+        if self._config.cloud == "frames":
+            found = self._frames_cloud(pictures, spacing=parts.spacing, gains=host_array(parts.gains))
+            everywhere = np.ones((len(found.points), self._clip.n_frames), bool)
+            cloud = MovingCloud(found.points, found.colors, everywhere, found.spacing)
+        else:
+            cloud, moving_spacing = self._moving_cloud(parts, pictures, self._motion_masks(parts, pictures))
+        covering = self._method.covering(model)
+        coverage = add_residual(model, cloud, self._config, self._method.choose_residual, covering)
         self._method.adapt(model, self._config)
         self._say("Comparing with the reference", coverage.text)
-        reasons = self._make_dynamic(parts, cloud)
+        reasons = self._make_dynamic(parts, self._field_spacing(parts, cloud))
         return replace(parts, moving_spacing=moving_spacing, reasons=reasons, coverage=coverage)
 
     def measured_colors(self, reference: ClipState, pictures: TrainingPictures) -> ClipColors:
@@ -222,17 +246,22 @@ class ClipPreparation:
             )
         model = inheriting_model(reference, self._clip, self._backend, learns=self._method.learns_inherited)
         self._say("Taking over the reference", self._method.words(self._config))
-        backgrounds = read_backgrounds(self._prep_dir, self._key_of_corrected())
-        if backgrounds is None:
-            backgrounds = self._backgrounds_of(reference, model, gains)
+        backgrounds = blank(pictures)
+        if self._needs_backgrounds:
+            kept = read_backgrounds(self._prep_dir, self._key_of_corrected())
+            backgrounds = kept or self._backgrounds_of(reference, model, gains)
         exposures = exposures_in(backgrounds.images) if self._has_drift else None
         drift = no_drift(pictures) if exposures is None else remove_drift(pictures, exposures, self._report)
         self._method.choose_decoder(model, seed=self._seed)
-        if self._method.builds_static:
+        if self._method.builds_static and self._config.cloud == "frames":
+            model.replace_sets({})  # everything comes from the clip's own cloud
+        elif self._method.builds_static:
             own = self._static_cloud(backgrounds, self._keep_after(model, gains, backgrounds))
             model.replace_sets({"static": static_anchors(own, self._config)})
             self._say("Building the static cloud", f"{len(own.points)} static anchors of the clip's own")
         parts = ClipParts(model, gains, drift, backgrounds, reference.header.spacing)
+        if "static" in self._method.covering(model):  # what can change learns its light by itself
+            return parts
         measure_light(model, pictures, self._cameras.rig, backgrounds, exposures, self._report)
         return parts
 
@@ -242,6 +271,8 @@ class ClipPreparation:
         Raises:
             DiskError: The disk refused.
         """
+        if not self._needs_backgrounds:
+            return
         is_valid = self._capture.valid_of(self._camera_indices)
         backgrounds = shown_elsewhere(backgrounds, self._render_static(model, gains), is_valid)
         key = self._key_of_corrected()
@@ -288,6 +319,11 @@ class ClipPreparation:
     def _has_drift(self) -> bool:
         return self._config.color != "off"
 
+    @property
+    def _needs_backgrounds(self) -> bool:
+        """With cloud=frames nothing but exposures is measured against them."""
+        return self._config.cloud != "frames" or self._has_drift
+
     def _without_drift(self, pictures: TrainingPictures) -> tuple[np.ndarray, list[Exposure] | None]:
         """Drift within a reference clip, which its pictures lose, and its exposures; None where they do not count."""
         if not self._has_drift:
@@ -295,17 +331,25 @@ class ClipPreparation:
         exposures = exposures_of(pictures)
         return remove_drift(pictures, exposures, self._report), exposures
 
-    def _estimated(self, exposures: Sequence[Exposure] | None) -> Backgrounds:
-        keep = self._stages.keep
-        return estimate_backgrounds(self._capture, self._camera_indices, exposures, self._config, self._report, keep)
+    def _estimated(self, clip: Clip, exposures: Sequence[Exposure] | None) -> Backgrounds:
+        """Backgrounds as they are needed for a reference clip."""
+        cameras, keep = self._camera_indices, self._stages.keep
+        return estimate_backgrounds(self._capture, clip, cameras, exposures, self._config, self._report, keep)
+
+    def _frames_cloud(
+        self, pictures: TrainingPictures, *, spacing: float | None = None, gains: np.ndarray | None = None
+    ) -> FramesCloud:
+        rig, config, keep = self._cameras.rig, self._config, self._stages.keep
+        cloud = frames_cloud(pictures, rig, config, self._report, spacing=spacing, gains=gains, keep=keep)
+        self._say("Building the cloud", f"{len(cloud.points)} points, spacing {cloud.spacing:.4g}")
+        return cloud
 
     def _backgrounds_of(self, reference: ClipState, model: ClipModel, gains: nn.Parameter) -> Backgrounds:
         """What the reference clip left behind, made anew from its pictures where it is gone."""
-        header = reference.header
-        clip = Clip(header.clip_index, header.start, header.n_frames, header.clip_length)
+        clip = _clip_of(reference.header)
         pictures = TrainingPictures(self._capture, clip, self._camera_indices)
         _, exposures = self._without_drift(pictures)
-        estimated = self._estimated(exposures)
+        estimated = self._estimated(clip, exposures)
         keep = self._keep_after(model, gains, estimated)
         backgrounds = self._corrected(estimated, model, gains, pictures, keep)
         seen = seen_still(backgrounds, pictures, motion_masks(pictures, backgrounds, None, self._report))
@@ -326,7 +370,9 @@ class ClipPreparation:
         return lambda camera_row: _render_static(model, self._cameras.view(camera_row), gains[camera_row])
 
     def _key_of_corrected(self) -> dict:
-        return key_of_corrected(self._capture, self._camera_indices, self._config)
+        header = None if self._base is None else self._base.header
+        clip = self._clip if header is None else _clip_of(header)
+        return key_of_corrected(self._capture, clip, self._camera_indices, self._config)
 
     def _static_cloud(self, backgrounds: Backgrounds, keep: Keep) -> StaticCloud:
         is_valid = self._capture.valid_of(self._camera_indices)
@@ -372,14 +418,20 @@ class ClipPreparation:
             cloud = without_static_regions(cloud, self._regions)
         return cloud, moving_spacing
 
-    def _make_dynamic(self, parts: ClipParts, cloud: MovingCloud) -> dict[str, np.ndarray]:
-        """Last step: the gate and the field. Returns the reasons of the gate."""
+    def _field_spacing(self, parts: ClipParts, cloud: MovingCloud) -> float:
+        has_promoted = {"promoted", "replacing"} & set(parts.model.roles())
+        return parts.spacing if has_promoted and len(cloud.points) == 0 else float(cloud.spacing)
+
+    def _make_dynamic(self, parts: ClipParts, spacing: float) -> dict[str, np.ndarray]:
+        """Last step: the gate and the field. Returns the reasons of the gate.
+
+        Args:
+            spacing: Distance between anchors that change, scene units.
+        """
         model, config = parts.model, self._config
         reasons, said = self._method.gate(model, self._regions, is_source=self._base is not None)
         if said:
             self._say("Deciding what is static", said)
-        has_promoted = {"promoted", "replacing"} & set(model.roles())
-        spacing = parts.spacing if has_promoted and len(cloud.points) == 0 else float(cloud.spacing)
         made = self._method.attach_field(
             model, self._clip, config, spacing=spacing, previous=self._previous, generator=self._generator
         )
@@ -388,6 +440,10 @@ class ClipPreparation:
 
     def _say(self, stage: str, message: str) -> None:
         self._report(Progress(stage, 1.0, message))
+
+
+def _clip_of(header: ClipHeader) -> Clip:
+    return Clip(header.clip_index, header.start, header.n_frames, header.clip_length)
 
 
 def _render_static(model: ClipModel, view: View, gain: torch.Tensor) -> np.ndarray:

@@ -19,6 +19,7 @@ import numpy as np
 from engine.camera.rig import CameraRig
 from engine.capture.came_along import came_along
 from engine.capture.capture import Capture
+from engine.capture.clip import Clip
 from engine.capture.exclusions import NOTHING_EXCLUDED, exclusion_key
 from engine.capture.format_result import Layout
 from engine.capture.points import points_of
@@ -28,6 +29,7 @@ from engine.cloud.background.masks import motion_mask
 from engine.cloud.background.recheck import recheck_background
 from engine.cloud.keeping import Arrays, Keep, do_now
 from engine.cloud.motion.moving_cloud import MovingCloud, build_moving_cloud, motion_bounds
+from engine.cloud.stereo.frames_cloud import FramesCloud, build_frames_cloud
 from engine.cloud.stereo.given_points import true_points
 from engine.cloud.stereo.sparse import triangulate
 from engine.cloud.stereo.static_cloud import StaticCloud, build_static_cloud
@@ -65,6 +67,12 @@ class Backgrounds:
         return np.array_equal(self.images, other.images) and np.array_equal(self.is_stable, other.is_stable)
 
 
+def blank(pictures: TrainingPictures) -> Backgrounds:
+    """Black ones, of which no pixel is trusted: where nothing is compared with them."""
+    images = np.zeros((pictures.n_cameras, *pictures.picture(0, 0).shape), np.uint8)
+    return Backgrounds(images, np.zeros(images.shape[:3], bool))
+
+
 def spread_frames(n_frames: int, at_most: int) -> list[int]:
     """Frame indices spread evenly over a capture."""
     count = min(n_frames, at_most)
@@ -73,18 +81,21 @@ def spread_frames(n_frames: int, at_most: int) -> list[int]:
 
 def estimate_backgrounds(
     capture: Capture,
+    clip: Clip,
     camera_indices: Sequence[int],
     exposures: Sequence[Exposure] | None,
     config: TrainConfig,
     report: ReportProgress,
     keep: Keep = do_now,
 ) -> Backgrounds:
-    """Backgrounds from frames spread over the whole capture.
+    """Backgrounds from frames spread over the whole capture, or over the clip with backgrounds=clip.
 
     Args:
+        clip: What is prepared.
         exposures: Of each camera, the one that its background comes in; None leaves frames as they are.
     """
-    frames = spread_frames(capture.n_frames, config.background_frames)
+    start, stop = _background_range(capture, clip, config)
+    frames = [start + frame for frame in spread_frames(stop - start, config.background_frames)]
 
     def estimate(camera: int, exposure: Exposure | None) -> Arrays:
         pictures = capture.frames_of(camera, frames)
@@ -337,6 +348,47 @@ def shown_elsewhere(
     return Backgrounds(images, backgrounds.is_stable)
 
 
+def frames_cloud(
+    pictures: TrainingPictures,
+    rig: CameraRig,
+    config: TrainConfig,
+    report: ReportProgress,
+    *,
+    spacing: float | None = None,
+    gains: np.ndarray | None = None,
+    keep: Keep = do_now,
+) -> FramesCloud:
+    """Dense points of everything in a clip, frame by frame, with cloud=frames.
+
+    Args:
+        spacing: The reference clip's for a source clip; None derives it from the pixel footprint.
+        gains: White balance gains where they are known; None measures them as `config.color` says. [C, 3]
+    """
+
+    def say(line: str) -> None:
+        report(Progress("Building the cloud", 0.5, line))
+
+    def sparse_points(images: np.ndarray, is_valid: np.ndarray | None) -> np.ndarray:
+        def alive() -> None:  # whoever wants to stop is heard here
+            report(Progress("Building the cloud", 0.5))
+
+        return triangulate(images, rig, is_valid=is_valid, report=say, alive=alive).points
+
+    return build_frames_cloud(
+        pictures.picture,
+        pictures.clip.n_frames,
+        rig,
+        valid_in=pictures.valid_in_frame,
+        max_points=config.max_static_points + config.max_moving_points,
+        spacing=spacing,
+        find_sparse=sparse_points,
+        gains=gains,
+        color=config.color,
+        report=say,
+        keep=keep,
+    )
+
+
 def moving_cloud(
     pictures: TrainingPictures,
     masks: np.ndarray,
@@ -375,8 +427,16 @@ def moving_cloud(
     )
 
 
-def key_of_corrected(capture: Capture, camera_indices: Sequence[int], config: TrainConfig) -> dict:
-    """What corrected backgrounds belong to, as `write_backgrounds` keeps it beside them."""
+def _background_range(capture: Capture, clip: Clip, config: TrainConfig) -> tuple[int, int]:
+    return (clip.start, clip.stop) if config.backgrounds == "clip" else (0, capture.n_frames)
+
+
+def key_of_corrected(capture: Capture, clip: Clip, camera_indices: Sequence[int], config: TrainConfig) -> dict:
+    """What corrected backgrounds belong to, as `write_backgrounds` keeps it beside them.
+
+    Args:
+        clip: What they were estimated for.
+    """
     rig = capture.rig.subset(list(camera_indices))
     excluded = exclusion_key(capture.exclusions, (0, capture.n_frames))
     return came_along(capture.layout) | {
@@ -386,6 +446,7 @@ def key_of_corrected(capture: Capture, camera_indices: Sequence[int], config: Tr
         "frames": config.background_frames,
         "is_corrected": True,
         **({"excluded": excluded} if excluded else {}),
+        **({"of": [clip.start, clip.stop]} if config.backgrounds == "clip" else {}),
     }
 
 

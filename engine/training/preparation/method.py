@@ -58,6 +58,10 @@ class Method:
         """
         model.decoder.requires_grad_(requires_grad=False)
 
+    def covering(self, model: ClipModel) -> list[str]:
+        """Roles of the inherited anchors that cover what is new: those that can change, and so show it."""
+        return ["moving"]
+
     def choose_residual(
         self, cloud: MovingCloud, is_new: np.ndarray, n_used: int, config: TrainConfig
     ) -> ResidualAnchors:

@@ -22,7 +22,7 @@ def camera_views(rig: CameraRig, *, near_plane: float) -> list[View]:
 
 
 class Sight:
-    """Rows to decode, camera by camera. What a camera can see of fixed anchors never changes, so it is kept.
+    """Rows to decode, camera by camera. What a camera can see of anchors that stay in place is found once.
 
     Args:
         model: Its sets must stay as they are; another one is needed where anchors come, go or become dynamic.
@@ -55,7 +55,7 @@ class Sight:
         rows = {}
         for role in self._model.roles():
             key, anchors = (role, camera_row), self._model.anchor_set(role)
-            if key not in self._seen:
+            if key not in self._seen or anchors.positions.requires_grad:
                 is_seen = self._views[camera_row].sees(anchors.positions, reach=self.reaches[role])
                 self._seen[key] = is_seen if anchors.is_dynamic else is_seen.nonzero()[:, 0]
             rows[role] = self._seen[key]

@@ -25,6 +25,7 @@ from engine.training.preparation.method import Method
 _FINAL_RATIOS = {
     "sets.*.features": "feature_final_ratio",
     "sets.*.log_*_scales": "scale_final_ratio",
+    "sets.*.positions": "position_final_ratio",
     "field.*": "field_final_ratio",
     **{f"decoder.{head}.*": f"{head}_head_final_ratio" for head in ("opacity", "color", "shape", "offset")},
 }
@@ -45,7 +46,7 @@ def method_of(config: TrainConfig, *, previous: ClipState | None) -> Method:
 
 def _is_product(config: TrainConfig) -> bool:
     default = TrainConfig()
-    names = ["gate", "tiles", "decoder", "residual", "field_tables", *_FINAL_RATIOS.values()]
+    names = ["gate", "tiles", "decoder", "residual", "field_tables", "field_form", "initial", *_FINAL_RATIOS.values()]
     is_default = all(getattr(config, name) == getattr(default, name) for name in names)
     return is_default and config.inherit in ("frozen", "moving") and config.field != "continue"
 
@@ -60,6 +61,7 @@ class VariantMethod(Method):
     def __init__(self, config: TrainConfig) -> None:
         self._gate, self._tables = config.gate, config.field_tables
         self._inherit, self._decoder, self._residual = config.inherit, config.decoder, config.residual
+        self._is_plain = config.initial == "published"
         self._field_goes_on = config.field == "continue"
         self.learns_inherited = self._inherit == "trainable"
         self.builds_static = self._inherit == "off"
@@ -82,9 +84,15 @@ class VariantMethod(Method):
         """New heads have a generator of their own: what else starts at random is the same for any choice."""
         if self._decoder == "new":
             model.decoder = Decoder(
-                **asdict(decoder_shape(model.decoder)), generator=torch.Generator().manual_seed(seed)
+                **asdict(decoder_shape(model.decoder)),
+                generator=torch.Generator().manual_seed(seed),
+                is_plain=self._is_plain,
             ).to(model.backend.device, model.backend.dtype)
         model.decoder.requires_grad_(self._decoder != "frozen")
+
+    def covering(self, model: ClipModel) -> list[str]:
+        """gate=off: every inherited anchor has a dynamic feature."""
+        return model.roles() if self._gate == "off" else super().covering(model)
 
     def choose_residual(
         self, cloud: MovingCloud, is_new: np.ndarray, n_used: int, config: TrainConfig

@@ -121,6 +121,12 @@ def zero_row(typing_context, out):
 
 
 @kernel_intrinsic
+def where_positive_row(typing_context, x, out):
+    """out becomes 0 where x is not positive"""
+    return _on_rows(2, lambda x, out: out.build.constant(0.0).where(x.compare("<=", 0.0), out))
+
+
+@kernel_intrinsic
 def d_sigmoid_row(typing_context, d_value, value, out):
     """out = d_value * value * (1 - value), for value = sigmoid(x)"""
     return _on_rows(3, lambda d_value, value, _: d_value * value * (1.0 - value))

@@ -150,6 +150,10 @@ def _field_backward(arguments, n_lanes, encoded, d_encoded, sums, scratch):
     hidden_by_anchor = scratch + job.at_hidden_rows
     d_out = scratch + job.at_d_inputs + job.n_static * ROW_BYTES
     n_hidden, n_encoded, n_dynamic = job.n_field_hidden, job.n_encoded, job.n_dynamic
+    if job.is_rectified != 0:
+        features = scratch + job.at_inputs + job.n_static * ROW_BYTES
+        for row in range(n_dynamic):
+            act.where_positive_row(features + row * ROW_BYTES, d_out + row * ROW_BYTES)
     multiply(
         d_hidden, ROW_BYTES, d_out, ROW_BYTES, load_int(job.weights + 8 * _FIELD_OUT), 4, 4 * n_hidden,
         n_hidden, n_dynamic, _VECTORS, 0, WHERE_POSITIVE, hidden,

@@ -67,6 +67,7 @@ class _Plan:
         sizes: Widths.
         knot_weights: One or two.
         knot_keys: Of these knots, see engine.model.grid.time_keys. [2, L] int32
+        is_rectified: 1 where the field's network ends in a ReLU.
     """
 
     chosen: list[ChosenAnchors]
@@ -75,6 +76,7 @@ class _Plan:
     sizes: Sizes
     knot_weights: list[float]
     knot_keys: np.ndarray
+    is_rectified: int
 
     @property
     def n_own(self) -> int:
@@ -180,7 +182,8 @@ def _plan(
     keys = np.zeros((2, 0 if field is None else len(field.shape.cells)), np.int32)
     if field is not None:
         keys[: len(knots)] = field.keys.numpy()[[knot for knot, _ in knots]]
-    return _Plan(filled, starts[:-1], starts[-1], sizes, [weight for _, weight in knots], keys)
+    is_rectified = int(field is not None and field.shape.is_rectified)
+    return _Plan(filled, starts[:-1], starts[-1], sizes, [weight for _, weight in knots], keys, is_rectified)
 
 
 def _frozen_rows(plan: _Plan) -> Tensor | None:
@@ -314,6 +317,7 @@ class _Kernels:
             "next_table": tables[1] if len(tables) > 1 else None,
             "knot_weights": self._knot_weights,
             "knot_keys": plan.knot_keys,
+            "is_rectified": plan.is_rectified,
             "n_levels": 0 if table is None else table.shape[0],
             "n_entries": 0 if table is None else table.shape[1],
             "n_channels": 0 if table is None else table.shape[2],

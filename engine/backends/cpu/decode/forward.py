@@ -71,7 +71,7 @@ def load_inputs(arguments, first, n_lanes, encoded, scratch):
     multiply(
         inputs + job.n_static * ROW_BYTES, ROW_BYTES, hidden, ROW_BYTES,
         load_int(job.weights + 8 * _FIELD_OUT), 4 * job.n_field_hidden, 4,
-        job.n_dynamic, job.n_field_hidden, _VECTORS, 0, PLAIN, 0,
+        job.n_dynamic, job.n_field_hidden, _VECTORS, 0, RELU if job.is_rectified != 0 else PLAIN, 0,
     )  # fmt: skip
 
 

@@ -119,6 +119,7 @@ class Job(NamedTuple):
         table, next_table: Of the one or two knots. [L, T, C] float32
         knot_weights: [2] float32
         knot_keys: What entries of each knot and level are combined with. [2, L] int32
+        is_rectified: Whether the field's network ends in a ReLU.
         n_levels, n_entries, n_channels: L, T, C.
         encoded: Grid values, one row of padded width per chosen anchor. [blocks * 64, ..] float32, or one block per
             worker if not `keeps_encoded`.
@@ -170,6 +171,7 @@ class Job(NamedTuple):
     next_table: FloatsAt
     knot_weights: FloatsAt
     knot_keys: SmallIntsAt
+    is_rectified: int
     n_levels: int
     n_entries: int
     n_channels: int
