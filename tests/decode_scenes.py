@@ -34,11 +34,13 @@ class Scene:
         channels: int = 4,
         spread: float = 1.0,
         is_shared: bool = False,
+        is_rectified: bool = False,
     ) -> None:
         self.generator = torch.Generator().manual_seed(n)
         shape = FieldShape(
             n_knots=3, cells=(3, 7, 12), n_entries=512, channels=channels, hidden=hidden, feature_dim=features,
             bounds_min=(0.0, 0.0, 0.0), side=1.0, is_shared=is_shared,
+            is_rectified=is_rectified,
         )  # fmt: skip
         self.field = SpatioTemporalField(shape, self.generator)
         self.decoder = Decoder(

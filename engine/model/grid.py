@@ -17,8 +17,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from engine.model.corner_kernel import fill_corners
+
 _PRIMES = (1, 2654435761, 805459861, 3674653429)
 """The usual hash primes, of x, y, z and time (Teschner et al. 2003; Mueller et al. 2022)."""
+_PRIMES_64 = np.array(_PRIMES, np.uint64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +53,15 @@ def corner_table(unit_positions: np.ndarray, cells: tuple[int, ...], n_entries: 
     Returns:
         CornerTable with indices in 0..n_entries-1.
     """
+    clamped = np.clip(np.nan_to_num(unit_positions.astype(np.float64)), 0.0, 1.0)
+    shape = len(clamped), len(cells), 8
+    indices, weights = np.empty(shape, np.int32), np.empty(shape, np.float32)
+    fill_corners(np.ascontiguousarray(clamped), np.array(cells, np.int64), n_entries, _PRIMES_64, indices, weights)
+    return CornerTable(torch.from_numpy(indices), torch.from_numpy(weights), n_entries)
+
+
+def corner_table_reference(unit_positions: np.ndarray, cells: tuple[int, ...], n_entries: int) -> CornerTable:
+    """`corner_table` in plain numpy: the slow truth."""
     clamped = np.clip(np.nan_to_num(unit_positions.astype(np.float64)), 0.0, 1.0)
     n_rows = len(clamped)
     indices = np.empty((n_rows, len(cells), 8), np.int32)

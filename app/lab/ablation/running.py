@@ -27,6 +27,7 @@ from engine.capture.clip import Clip
 from engine.errors import ProjectError, TrainingError
 from engine.storage.files import atomic_path
 from engine.storage.json_files import json_text
+from engine.training.preparation.kept_clouds import CLOUD_FILES
 
 if TYPE_CHECKING:
     from engine.metrics.pictures.colors import Precision
@@ -179,6 +180,7 @@ def _measured(place: Path, task: _Task, first: Path, scope: Scope, launch: Launc
     try:
         if place != first:
             _take_reference(project, first)
+        _take_clouds(project)
         service = TrainingService(
             project,
             project.clips(capture.n_frames),
@@ -213,6 +215,15 @@ def _open(place: Path, settings: ProjectSettings) -> Project:
             "The folder holds this variant with other settings.", hint="Choose another --project folder.", path=place
         )
     return project
+
+
+def _take_clouds(project: Project) -> None:
+    """Copy clouds of frames that other variants and seeds have made; their names say what they are of."""
+    project.prep_dir.mkdir(parents=True, exist_ok=True)
+    for path in sorted(project.folder.parent.glob(f"*/{project.prep_dir.name}/{CLOUD_FILES}")):
+        if not (project.prep_dir / path.name).exists():
+            with atomic_path(project.prep_dir / path.name) as partial:
+                shutil.copyfile(path, partial)
 
 
 def _take_reference(project: Project, first: Path) -> None:

@@ -66,11 +66,9 @@ def colored_by_neighbors(points: np.ndarray, colors: np.ndarray, seen_colors: np
         seen_colors: NaN where not seen. [P, 3]
     """
     is_colored = np.isfinite(seen_colors).all(axis=1)
-    if not is_colored.any():
-        return colors
-    colors = seen_colors.copy()
-    if not is_colored.all():
+    colors = np.where(is_colored[:, None], seen_colors, colors)
+    if is_colored.any() and not is_colored.all():
         n_neighbors = min(4, int(is_colored.sum()))
         neighbors = np.asarray(KDTree(points[is_colored]).query(points[~is_colored], n_neighbors)[1])
-        colors[~is_colored] = np.median(seen_colors[is_colored][neighbors.reshape(len(neighbors), -1)], axis=1)
+        colors[~is_colored] = np.median(colors[is_colored][neighbors.reshape(len(neighbors), -1)], axis=1)
     return colors

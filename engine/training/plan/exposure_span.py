@@ -33,9 +33,9 @@ def exposure_span(
     Raises:
         CaptureError: A picture cannot be read.
     """
-    if config.color == "off":
+    if config.color == "off" or config.backgrounds == "clip":  # of which clip, is not known here
         return None
-    backgrounds = read_backgrounds(prep_dir, key_of_corrected(capture, camera_indices, config))
+    backgrounds = read_backgrounds(prep_dir, key_of_corrected(capture, clip, camera_indices, config))
     if backgrounds is None:
         return None
     rows = np.unique(np.linspace(0, len(camera_indices) - 1, N_CAMERAS).round().astype(int))

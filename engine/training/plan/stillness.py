@@ -35,9 +35,9 @@ def looks_still(
     Raises:
         CaptureError: A picture cannot be read.
     """
-    if config.gate != "hull" or not config.keeps_static or config.field != "per_clip":
+    if config.gate != "hull" or not config.keeps_static or config.field != "per_clip" or config.backgrounds == "clip":
         return False
-    backgrounds = read_backgrounds(prep_dir, key_of_corrected(capture, camera_indices, config))
+    backgrounds = read_backgrounds(prep_dir, key_of_corrected(capture, clip, camera_indices, config))
     if backgrounds is None:
         return False
     last = clip.n_frames - 1

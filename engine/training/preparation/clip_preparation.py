@@ -58,6 +58,7 @@ from engine.training.preparation.cloud_preparation import (
 )
 from engine.training.preparation.drift import exposures_in, exposures_of, no_drift, remove_drift
 from engine.training.preparation.gating import without_static_regions
+from engine.training.preparation.kept_clouds import kept_cloud
 from engine.training.preparation.light import brightness_in, measure_light
 from engine.training.preparation.method import Method
 from engine.training.preparation.stages import Stages
@@ -340,7 +341,20 @@ class ClipPreparation:
         self, pictures: TrainingPictures, *, spacing: float | None = None, gains: np.ndarray | None = None
     ) -> FramesCloud:
         rig, config, keep = self._cameras.rig, self._config, self._stages.keep
-        cloud = frames_cloud(pictures, rig, config, self._report, spacing=spacing, gains=gains, keep=keep)
+
+        def build() -> FramesCloud:
+            return frames_cloud(pictures, rig, config, self._report, spacing=spacing, gains=gains, keep=keep)
+
+        names = ("capture", "size", "cameras", "came_along", "frames", "excluded")
+        of_clip = {name: value for name, value in self._key().items() if name in names}
+        key = of_clip | {
+            "poses": fingerprint_of({"poses": rig.world_to_camera, "Ks": rig.Ks}),
+            "at_most": [config.max_static_points, config.max_moving_points],
+            "color": config.color,
+            "spacing": spacing,
+            "gains": None if gains is None else gains.tolist(),
+        }
+        cloud = kept_cloud(self._prep_dir, self._clip.start, key, build)
         self._say("Building the cloud", f"{len(cloud.points)} points, spacing {cloud.spacing:.4g}")
         return cloud
 

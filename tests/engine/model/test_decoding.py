@@ -77,6 +77,35 @@ def test_any_number_of_channels_and_a_table_for_all_knots(channels, is_shared, k
     assert_close(scene, ours, twin, truth, 3e-6)
 
 
+@pytest.mark.parametrize("frozen", [(), ("decoder", "static", "moving")], ids=["all learn", "a source clip"])
+def test_a_field_that_ends_in_a_relu(frozen):
+    scene = Scene(**ODD, is_rectified=True)
+    for name, parameter in scene.parameters().items():
+        parameter.requires_grad_(not name.startswith(frozen) if frozen else True)
+    twin, rows = scene.double(), scene.rows()
+    ours, truth = scene.decode(rows, TWO_KNOTS, "cpu"), twin.decode(rows, TWO_KNOTS, "reference")
+    plain = Scene(**ODD).decode(rows, TWO_KNOTS, "cpu")
+    assert not torch.allclose(ours.means, plain.means), "some of its outputs are below zero"
+    backward(ours)
+    backward(truth)
+    assert_close(scene, ours, twin, truth, 3e-6)
+
+
+@pytest.mark.parametrize("roles", [("moving",), ("static", "moving", "residual")])
+def test_positions_learn_where_they_may(roles):
+    scene = Scene(**ODD)
+    for role in roles:
+        scene.sets[role].learn_positions()
+    twin, rows = scene.double(), scene.rows()
+    before = Scene(**ODD).decode(rows, ONE_KNOT, "cpu")
+    ours, truth = scene.decode(rows, ONE_KNOT, "cpu"), twin.decode(rows, ONE_KNOT, "reference")
+    assert torch.equal(ours.means, before.means), "the same values, with a way back"
+    backward(ours)
+    backward(truth)
+    assert_close(scene, ours, twin, truth, 3e-6)
+    assert {role for role, anchors in scene.sets.items() if anchors.positions.grad is not None} == set(roles)
+
+
 def test_reference_gradients_are_finite_differences():
     scene = Scene(features=3, hidden=5, k=2, n=4).double()
     rows = {role: torch.arange(len(anchors)) for role, anchors in scene.sets.items()}

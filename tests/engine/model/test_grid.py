@@ -5,7 +5,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from engine.model.grid import corner_table, encode, time_keys
+from engine.model.grid import corner_table, corner_table_reference, encode, time_keys
 
 
 @settings(max_examples=30, deadline=None)
@@ -15,6 +15,19 @@ def test_corners_stay_inside_the_table_for_any_position(position):
     assert corners.indices.min() >= 0
     assert corners.indices.max() < 256
     assert torch.allclose(corners.weights.sum(-1), torch.ones(()), atol=1e-6)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.lists(st.floats(allow_nan=True, allow_infinity=True, width=32), min_size=3, max_size=30),
+    st.sampled_from([(1,), (3, 30), (16, 524_288)]),
+    st.sampled_from([64, 1 << 17]),
+)
+def test_corners_are_bit_for_bit_those_of_plain_numpy(values, cells, n_entries):
+    positions = np.array(values[: len(values) // 3 * 3], np.float64).reshape(-1, 3)
+    ours, truth = corner_table(positions, cells, n_entries), corner_table_reference(positions, cells, n_entries)
+    assert torch.equal(ours.indices, truth.indices)
+    assert torch.equal(ours.weights, truth.weights)
 
 
 def test_dense_levels_interpolate_a_linear_function_exactly():

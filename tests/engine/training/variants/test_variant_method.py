@@ -37,6 +37,8 @@ def test_numbers_and_which_clips_there_are_leave_the_method_as_it_is(settings):
         {"decoder": "finetune"},
         {"field": "continue"},
         {"field_tables": "per_frame"},
+        {"field_form": "published"},
+        {"initial": "published"},
     ],
 )
 def test_any_other_decision_is_a_variant(settings):
