@@ -22,6 +22,12 @@ _LABEL_OFFSETS = ((7, 5), (7, -12), (-7, 5), (-7, -12), (7, 17), (7, -24), (-7, 
 _LABEL_LENGTH = 28
 MAX_NAMED_MARKS = 6
 """Of more results the marks are numbered, and the names stand beside the panels."""
+MANY_VALUES = 100
+"""Values over which lines are drawn thinner and without marks."""
+MANY_BORDERS, MAX_BORDERS = 15, 120
+"""Borders from which their lines are thinner, and from which none is drawn."""
+MAX_BARS_INCHES, MAX_NAMED_BARS = 9.0, 30
+"""Height at most of stacked bars, and how many of them are named."""
 _STYLES = ("-", "--", ":", "-.")
 
 
@@ -69,7 +75,7 @@ def draw_over_time(
 
     Args:
         frames: Frame indices of the values, or other numbers that count time.
-        borders: First frames of clips; a line stands before each.
+        borders: First frames of clips; a line stands before each, unless they are too many to be told apart.
         unit: What is counted. Where frames are missing, lines end and begin anew.
     """
     breaks = [
@@ -80,9 +86,10 @@ def draw_over_time(
         rows = figure.subplots(len(panels), 1, squeeze=False, sharex=True)[:, 0]
         for axes, panel in zip(rows, panels, strict=True):
             _draw_curves(axes, panel, frames, breaks)
-            for i, border in enumerate(borders):
+            for i, border in enumerate(borders if len(borders) <= MAX_BORDERS else ()):
                 label = "clip border" if i == 0 else None
-                axes.axvline(border - 0.5, color=FAINT_COLOR, linestyle="--", linewidth=1.0, label=label)
+                width = 1.0 if len(borders) <= MANY_BORDERS else 0.5
+                axes.axvline(border - 0.5, color=FAINT_COLOR, linestyle="--", linewidth=width, label=label)
             axes.set_ylabel(panel.label)
             add_grid(axes)
             axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
@@ -93,19 +100,30 @@ def draw_over_time(
 
 def _draw_curves(axes: Any, panel: CurvePanel, frames: Sequence[int], breaks: Sequence[int]) -> None:
     n_thin = 0
+    has_many = len(frames) > MANY_VALUES
     places = np.insert(np.asarray(frames, dtype=float), breaks, math.nan)
     for curve in panel.curves:
         known = np.array([math.nan if value is None else value for value in curve.values])
         values = np.insert(known, breaks, math.nan)
         if curve.is_main:
-            axes.plot(places, values, color="#000000", linewidth=2.2, marker=".", label=curve.label, zorder=3)
+            marker = "." if not has_many or has_lone_value(values) else None
+            width = 1.4 if has_many else 2.2
+            axes.plot(places, values, color="#000000", linewidth=width, marker=marker, label=curve.label, zorder=3)
             continue
         if curve.is_faint:
             axes.plot(places, values, color=FAINT_COLOR, alpha=0.35, linewidth=0.8, label=curve.label or "_")
             continue
         color, style = PALETTE[n_thin % (len(PALETTE) - 1)], _STYLES[n_thin // (len(PALETTE) - 1) % len(_STYLES)]
         marker = "." if has_lone_value(values) else None
-        axes.plot(places, values, color=color, linestyle=style, linewidth=1.2, marker=marker, label=curve.label)
+        axes.plot(
+            places,
+            values,
+            color=color,
+            linestyle=style,
+            linewidth=0.8 if has_many else 1.2,
+            marker=marker,
+            label=curve.label,
+        )
         n_thin += 1
 
 
@@ -179,17 +197,18 @@ def draw_stacked(parts: Mapping[str, Sequence[float]], names: Sequence[str], lab
     """
     hatches = ("", "//", "..", "xx")
     with plain_texts():
-        figure = new_figure(WIDTH_INCHES, max(1.0 + 0.32 * len(names), 2.2))
+        figure = new_figure(WIDTH_INCHES, min(max(1.0 + 0.32 * len(names), 2.2), MAX_BARS_INCHES))
         axes = figure.subplots()
         left = np.zeros(len(names))
         shown = [(part, np.asarray(values, dtype=float)) for part, values in parts.items() if any(values)]
         for i, (part, values) in enumerate(shown):
             color, hatch = PALETTE[i % len(PALETTE)], hatches[i // len(PALETTE) % len(hatches)]
-            axes.barh(
-                range(len(names)), values, left=left, color=color, hatch=hatch, edgecolor="#FFFFFF", lw=0.5, label=part
-            )
+            gap = {"edgecolor": "#FFFFFF", "lw": 0.5} if len(names) <= MANY_VALUES else {"height": 1.0}
+            axes.barh(range(len(names)), values, left=left, color=color, hatch=hatch, label=part, **gap)
             left += values
-        axes.set_yticks(range(len(names)), names)
+        step = -(-len(names) // MAX_NAMED_BARS)
+        axes.set_yticks(range(0, len(names), step), names[::step])
+        axes.margins(y=0.3 / len(names) if len(names) > 1 else None)
         axes.invert_yaxis()
         axes.set_xlabel(label)
         add_grid(axes)
