@@ -9,13 +9,16 @@ MAX_SPANS = 20
 
 
 def spans_text(numbers: Sequence[int]) -> str:
-    """As "0, 3 to 7, 9", and how many more numbers there are after MAX_SPANS runs. numbers: Rising."""
+    """As "0, 1, 3 to 7", and how many more numbers there are after MAX_SPANS runs. numbers: Rising."""
     spans: list[tuple[int, int]] = []
     for number in numbers:
         if spans and number == spans[-1][1] + 1:
             spans[-1] = spans[-1][0], number
         else:
             spans.append((number, number))
-    said = ", ".join(str(first) if first == last else f"{first} to {last}" for first, last in spans[:MAX_SPANS])
+    said = ", ".join(
+        f"{first} to {last}" if last > first + 1 else ", ".join(map(str, range(first, last + 1)))
+        for first, last in spans[:MAX_SPANS]
+    )
     n_more = sum(last - first + 1 for first, last in spans[MAX_SPANS:])
     return f"{said} and {n_more} more" if n_more else said

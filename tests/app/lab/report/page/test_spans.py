@@ -14,7 +14,7 @@ from tests.app.lab.report.made_up import Page
     [
         ([], ""),
         ([4], "4"),
-        ([0, 1], "0 to 1"),
+        ([0, 1], "0, 1"),
         ([0, 3, 4, 5, 9], "0, 3 to 5, 9"),
         (range(1000), "0 to 999"),
         (range(0, 300, 2), ", ".join(map(str, range(0, 2 * MAX_SPANS, 2))) + " and 130 more"),
