@@ -81,7 +81,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     if arguments and arguments[0] in COMMANDS:
         from app.cli.cli import main as run_command
+        from app.evaluation.speed.window_drawing import draw_with
 
+        draw_with("ui.gl.frame_rate")
         return int(run_command(arguments) or 0)
     if arguments and arguments[0] == "demo":
         use_kernel_cache()

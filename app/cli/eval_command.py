@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from app.cli.terminal.progress import ProgressLine, row_progress
 from app.cli.terminal.results import write_text
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
+from app.evaluation.speed.frame_rates import DEFINITION, frame_rates
 from app.export.staging import check_target
 from app.project.project import open_project
 from app.training.service import Launch
@@ -23,6 +25,9 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument("--json", required=True, metavar="OUT", help="file for all rows and means; - prints them")
     command.add_argument("--clips", default=":", metavar="A:B", help="clips to measure (default: all trained)")
     add_figure_choices(command, default="all", said="all")
+    command.add_argument(
+        "--fps", action="store_true", help="measure how many pictures are rendered per second too, some seconds"
+    )
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
@@ -45,30 +50,44 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         say=line.say,
     )
     line.finish()
+    rates = frame_rates(opened) if options.fps else None
+    if rates is not None:
+        document["frame_rates"] = {**asdict(rates), "definition": DEFINITION}
     text = json_text(document, indent=1)
     if options.json == "-":
         print(text)
         return EXIT_OK
     write_text(Path(options.json), text + "\n")
     _show_evaluation(line, document)
+    if rates is not None:
+        line.say(f"{rates.words()}.")
     line.say(f"{len(document['rows'])} rows in {options.json}")
     return EXIT_OK
 
 
 def _show_evaluation(line: ProgressLine, document: dict[str, Any]) -> None:
+    from engine.metrics.clips.flicker import flicker_figures
+
     for clip, summary in document["means"]["clips"].items():
         for group, words in (("held_out", "held out"), ("trained_on", "trained on")):
             found = summary[group]
             if found:
                 line.say(
-                    f"Clip {clip}, {words}: PSNR {_figure(found['psnr'], 2)} dB, after colour fit "
-                    f"{_figure(found['psnr_fit'], 2)} dB, SSIM {_figure(found['ssim'], 4)}"
+                    f"Clip {clip}, {words}: PSNR {_figure(found['psnr'], 2)} dB, cc_psnr "
+                    f"{_figure(found['cc_psnr'], 2)} dB, after colour fit {_figure(found['psnr_fit'], 2)} dB, "
+                    f"SSIM {_figure(found['ssim'], 4)}"
                 )
     for seam in document["seams"]["boundaries"]:
         line.say(
             f"Seam at frame {seam['frame_index']}: score {_figure(seam['score'], 2)}/255, change at the boundary "
             f"{_figure(seam['ratio_static'], 2)} times that inside the clips on static pixels, "
             f"{_figure(seam['ratio_moving'], 2)} times on moving ones (truth: {_figure(seam['truth_ratio_moving'], 2)})"
+        )
+    flow = flicker_figures(document["seams"]["rows"])
+    if flow["tof"] is not None:
+        line.say(
+            f"tOF: {_figure(flow['tof'], 3)} px per frame, {_figure(flow['tof_inside'], 3)} inside clips, "
+            f"{_figure(flow['tof_borders'], 3)} at borders"
         )
     missing = document["columns"]["lpips"]["why_missing"]
     if document["metrics"] == "all" and missing:

@@ -174,6 +174,7 @@ def kept_figures(opened: TrainedProject, scope: Scope, clip_index: int, say: Cal
         "field": _fingerprint(opened, opened.last_trained) if config.field == "continue" else None,
         "metrics": scope.metrics,
         "precision": scope.precision,
+        "holdout": sorted(opened.project.settings.holdout),  # whose optical flow is measured
         "lpips": scope.metrics == "all" and lpips.why_missing() is None,
     }
     first = clip.start if scope.before(clip_index) is None else clip.start - 1
@@ -283,10 +284,25 @@ def boundary_maps(opened: TrainedProject, *, clip_index: int, camera_index: int)
     """
     if clip_index < 1:
         raise ValueError(f"clip {clip_index} has no clip before it")
+    return change_maps(opened, frame_index=opened.clips[clip_index].start, camera_index=camera_index)
+
+
+def change_maps(opened: TrainedProject, *, frame_index: int, camera_index: int) -> SeamMaps:
+    """Maps of R, G and E of one camera from the frame before to a frame, whether clips meet there or not.
+
+    Raises:
+        ProjectError: A clip of the two frames is not trained.
+        ValueError: No frame comes before.
+    """
+    if not 0 < frame_index < opened.clips[-1].stop:
+        raise ValueError(f"frame {frame_index} has no frame before it")
     use_threads(None)
     opened = opened.measured
-    before, after = opened.load(clip_index - 1), opened.load(clip_index)
-    return _evaluation(opened).boundary_maps(before, after, camera_index)
+    before, after = (
+        opened.load(next(clip.clip_index for clip in opened.clips if frame < clip.stop))
+        for frame in (frame_index - 1, frame_index)
+    )
+    return _evaluation(opened).change_maps(before, after, camera_index, frame_index)
 
 
 def _evaluation(opened: TrainedProject, *, metrics: Choice = "all", precision: Precision = "float") -> Evaluation:

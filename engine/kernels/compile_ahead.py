@@ -30,7 +30,7 @@ GROUPS = (
     ("decoder", "engine.backends.cpu.decode.warm", 4.1),
     ("rasterizer", "engine.backends.cpu.raster.warm", 4.9),
     ("loss and optimiser", "engine.backends.cpu.step.warm", 5.0),
-    ("figures", "engine.metrics.pictures.warm", 1.5),
+    ("figures", "engine.metrics.pictures.warm", 4.0),
     ("view modes", "engine.backends.inspection.warm", 1.5),
     ("selection", "engine.editing.selection.warm", 4.0),
 )

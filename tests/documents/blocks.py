@@ -9,6 +9,7 @@ from pathlib import Path
 from tests.documents.commands import command_sections
 from tests.documents.gestures import gesture_tables
 from tests.documents.keys import key_tables
+from tests.documents.published import differences_table, published_table
 from tests.documents.settings import presets_table, settings_tables
 from tests.documents.tree import ROOT, tree_block
 
@@ -19,6 +20,8 @@ GENERATORS: dict[str, Callable[[], str]] = {
     "commands": command_sections,
     "settings": settings_tables,
     "presets": presets_table,
+    "published": published_table,
+    "differences": differences_table,
 }
 """What each block is filled with."""
 _BLOCK = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end -->)", re.DOTALL)

@@ -86,3 +86,13 @@ def row_progress(line: ProgressLine, stage: str) -> Callable[[int, int, Any], No
         line.update(stage, done / max(n, 1), f"{done}/{n}, {speed}{duration_text(rate.eta_s(n - done))} left")
 
     return show
+
+
+def stage_progress(line: ProgressLine) -> Callable[[str, int, int], None]:
+    """A callback for the name of a stage, done and all, for work in stages."""
+    shown: dict[str, Callable[[int, int, Any], None]] = {}
+
+    def show(stage: str, done: int, n: int) -> None:
+        shown.setdefault(stage, row_progress(line, stage))(done, n, None)
+
+    return show

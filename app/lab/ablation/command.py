@@ -12,7 +12,8 @@ from app.cli.arguments import (
     parse_cameras,
     path_argument,
 )
-from app.cli.terminal.progress import ProgressLine, row_progress
+from app.cli.frame_rate_arguments import add_no_fps, wanted_rates
+from app.cli.terminal.progress import ProgressLine, row_progress, stage_progress
 from app.cli.terminal.training_lines import show_outcome, show_status
 from app.cli.training_settings import add_training_settings, overrides_of
 from app.export.staging import check_target
@@ -42,6 +43,12 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     add_figure_choices(command, default="quick", said="quick")
     add_follow_links(command)
     add_training_settings(command)
+    add_no_fps(command)
+    command.add_argument(
+        "--report",
+        action="store_true",
+        help="write a page with the figures of the paper: all variants of the first seed side by side",
+    )
     command.add_argument("--json", action="store_true", help="print the table as JSON on standard output")
     command.add_argument("--quiet", action="store_true", help="no progress")
 
@@ -49,9 +56,11 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream ablate: train variants and compare them; prints the table. Returns the exit code."""
     from app.lab.ablation.curves import curve_lines
+    from app.lab.ablation.report import REPORT, write_ablation_report
     from app.lab.ablation.running import RESULT_FILE, TABLE_FILE, Callbacks, run_ablation
     from app.lab.ablation.table import as_text
     from app.lab.ablation.variants import VARIANTS, chosen_variants, with_source_steps
+    from app.lab.report.write import PAGE_FILE
 
     if options.list:
         width = max(len(variant.name) for variant in VARIANTS)
@@ -98,6 +107,8 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             hint=f"Choose one from 0 to {n_clips - 1}, or raise --n-clips.",
         )
     check_target(options.project / RESULT_FILE)
+    if options.report:
+        check_target(options.project / REPORT / PAGE_FILE)
     line = ProgressLine(is_quiet=options.quiet)
 
     def show_variant(name: str, seed: int, n_done: int, n: int) -> None:
@@ -110,6 +121,7 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
         on_outcome=lambda outcome: show_outcome(line, outcome),
         on_row=row_progress(line, "Measuring"),
     )
+    page = None
     try:
         document = run_ablation(
             options.project,
@@ -122,7 +134,19 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             precision=options.precision,
             launch=launch,
             callbacks=callbacks,
+            rates_of=wanted_rates(options),
         )
+        if options.report:
+            page = write_ablation_report(
+                options.project,
+                document,
+                seed=seeds[0],
+                metrics=options.metrics,
+                precision=options.precision,
+                on_stage=stage_progress(line),
+                say=line.say,
+                rates_of=wanted_rates(options),
+            )
     finally:
         line.finish()
     if options.json:
@@ -130,7 +154,11 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
     else:
         compared = "".join(f"\n{sentence}" for sentence in curve_lines(document["curves"]))
         print(f"{as_text(document['lines'])}\n{compared}\n{document['definition']}")
+        if document["rendering"] is not None:
+            print(document["rendering"]["words"])
     line.say(f"All figures: {options.project / RESULT_FILE} and {TABLE_FILE}")
+    if page is not None:
+        line.say(f"Report: {page}")
     return EXIT_OK
 
 

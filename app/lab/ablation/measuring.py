@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +11,11 @@ from app.cli.terminal.results import named_failure
 from app.evaluation.evaluation import evaluate_project
 from app.evaluation.headless import open_trained
 from app.evaluation.source_clip_means import later_figures
+from app.evaluation.speed.frame_rates import FrameRates, RatesOf, kept_rates
 from app.project.project import Project, ProjectSettings, open_project
 from app.project.project_facts import read_facts
 from engine.clip_files.clip_state import read_clip_header
-from engine.errors import ProjectError
+from engine.errors import CaptureError, ProjectError
 from engine.metrics.clips.flicker import flicker_figures
 from engine.storage.json_files import JsonError, read_checked_json, write_checked_json
 
@@ -22,16 +23,22 @@ if TYPE_CHECKING:
     from engine.metrics.pictures.colors import Precision
     from engine.metrics.pictures.picture import Choice
 
-MEASURED_SCHEMA = 5
+MEASURED_SCHEMA = 6
 MEASURED_FILE = "measured.json"
 
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Figures of a trained variant, None where one does not exist, and on how many frames of each camera."""
+    """Figures of a trained variant, None where one does not exist; on how many frames of each camera; and how fast it
+    is rendered, None where nobody measured that."""
 
     figures: dict[str, float | None]
     n_frames: int
+    rates: FrameRates | None = None
+
+    def with_rates(self, rates: FrameRates | None) -> Measured:
+        """The same with how fast it is rendered, which no file of figures holds: times differ from run to run."""
+        return self if rates is None else replace(self, figures=self.figures | rates.figures(), rates=rates)
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,21 +57,22 @@ class Scope:
     precision: Precision
 
 
-def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None]) -> Measured:
+def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None], rates_of: RatesOf) -> Measured:
     """Figures of a trained variant, from its file when that is of these clips and this scope.
 
     Args:
         place: The variant's project.
         on_row: Gets rows measured, rows in all and the newest row.
+        rates_of: Measures how fast it is rendered.
     Raises:
         ProjectError, CaptureError: It cannot be measured, or the figures cannot be written.
     """
     project = open_project(place, is_writable=False)
     key = _key(project, scope)
     kept = _read(place / MEASURED_FILE, key)
-    if kept is not None:
-        return kept
     opened = open_trained(project)
+    if kept is not None:
+        return kept.with_rates(rates_of(opened))
     holdout = opened.capture.camera_indices(project.settings.holdout)
     document = evaluate_project(
         opened,
@@ -86,8 +94,9 @@ def measure(place: Path, scope: Scope, on_row: Callable[[int, int, Any], None]) 
     figures["megabytes"] = sum(project.clip_path(i).stat().st_size for i in scope.clips) / 1e6
     measured = Measured(figures, sum(opened.clips[i].n_frames for i in scope.clips))
     with named_failure(place / MEASURED_FILE):
-        write_checked_json(place / MEASURED_FILE, {"key": key, **asdict(measured)})
-    return measured
+        content = {"key": key, "figures": measured.figures, "n_frames": measured.n_frames}
+        write_checked_json(place / MEASURED_FILE, content)
+    return measured.with_rates(rates_of(opened))
 
 
 def kept_figures(place: Path, settings: ProjectSettings, scope: Scope) -> Measured | None:
@@ -98,7 +107,13 @@ def kept_figures(place: Path, settings: ProjectSettings, scope: Scope) -> Measur
         return None
     if project.settings != settings:
         return None
-    return _read(place / MEASURED_FILE, _key(project, scope))
+    kept = _read(place / MEASURED_FILE, _key(project, scope))
+    if kept is None:
+        return None
+    try:
+        return kept.with_rates(kept_rates(open_trained(project)))
+    except (CaptureError, ProjectError):  # of the capture, or a clip; the figures are there all the same
+        return kept
 
 
 def _key(project: Project, scope: Scope) -> dict[str, Any]:

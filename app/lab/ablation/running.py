@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from app.cli.terminal.results import write_text
 from app.evaluation.headless import ClipOutcome, train_clips
+from app.evaluation.speed.frame_rates import DEFINITION as DEFINITION_OF_RATES
+from app.evaluation.speed.frame_rates import FrameRates, RatesOf
 from app.lab.ablation.curves import curves_of
 from app.lab.ablation.measuring import Measured, Scope, kept_figures, measure
 from app.lab.ablation.table import DEFINITION, VariantResult, as_csv, summarize
@@ -67,6 +69,7 @@ def run_ablation(
     precision: Precision = "float",
     launch: Launch,
     callbacks: Callbacks,
+    rates_of: RatesOf = lambda opened: None,
 ) -> dict[str, Any]:
     """Train what is not trained yet, measure what is not measured yet, and write the table after every variant.
 
@@ -78,15 +81,18 @@ def run_ablation(
         settings: Of "full"; its seed is replaced.
         n_clips: From the first.
         metrics, precision: See engine.metrics.pictures.picture.measure_picture.
+        rates_of: Measures how fast a variant is rendered; nothing does by default.
     Returns:
         JSON-able: schema, capture, holdout, clip_length, n_clips, metrics, precision, seeds, words (what each variant
-        is), definition (of flicker and seam ratios), lines (`summarize`), curves (`curves_of`) and results per seed.
+        is), definition (of flicker and seam ratios), rendering (`rendering_of`; null where no frame rates were
+        measured), lines (`summarize`), curves (`curves_of`) and results per seed.
     Raises:
         ProjectError, CaptureError: Bad input.
         TrainingError: A clip failed; what was finished is kept.
         KeyboardInterrupt: Likewise.
     """
     document: dict[str, Any] = {}
+    rendering: dict[str, Any] | None = None
     if settings.config().field == "joint":
         raise ProjectError("field=joint leaves no clips to compare.", hint="Take the variant field-joint.")
     clips = settings.clips(capture.n_frames)[:n_clips]
@@ -100,8 +106,11 @@ def run_ablation(
     for n_done, task in enumerate(todo):
         variant, seed = task.variant, task.settings.seed
         callbacks.on_variant(variant.name, seed, n_done, len(todo))
-        measured = _measured(task.place(folder), task, first_of[variant.family, seed], all_clips, launch, callbacks)
+        measured = _measured(
+            task.place(folder), task, first_of[variant.family, seed], all_clips, launch, callbacks, rates_of
+        )
         found[variant.name, seed] = VariantResult(variant.name, seed, measured.figures, measured.n_frames)
+        rendering = rendering if measured.rates is None else rendering_of(measured.rates)
         results = [found[key] for key in sorted(found, key=lambda key: (rank(key[0]), key[1]))]
         shown = list(dict.fromkeys(result.variant for result in results))
         document = {
@@ -115,6 +124,7 @@ def run_ablation(
             "seeds": sorted({*seeds, *(result.seed for result in results)}),
             "words": {name: item.words for name in shown if (item := variant_called(name)) is not None},
             "definition": DEFINITION,
+            "rendering": rendering,
             "lines": (lines := summarize(results)),
             "curves": curves_of(lines),
             "results": [{"variant": r.variant, "seed": r.seed, "n_frames": r.n_frames, **r.figures} for r in results],
@@ -122,6 +132,15 @@ def run_ablation(
         write_text(folder / RESULT_FILE, json_text(document, indent=1) + "\n")
         write_text(folder / TABLE_FILE, as_csv(document["lines"]))
     return document
+
+
+def rendering_of(rates: FrameRates) -> dict[str, Any]:
+    """What the frame rates of a table are of, the same for all its lines: width, height, camera, what drew, words."""
+    drawn_by = [rate.drawn_by for rate in (rates.cpu, rates.gl) if rate is not None]
+    missing = f" No OpenGL: {rates.why_no_gl}." if rates.why_no_gl else ""
+    words = f"{DEFINITION_OF_RATES} Here {rates.size} px, by {' and '.join(drawn_by) or 'nothing'}.{missing}"
+    found = {"width": rates.width, "height": rates.height, "camera": rates.camera}
+    return found | {"drawn_by": drawn_by, "why_no_gl": rates.why_no_gl, "words": words}
 
 
 def project_folder(folder: Path, name: str, seed: int) -> Path:
@@ -173,7 +192,9 @@ class _Task:
         return project_folder(folder, self.variant.name, self.settings.seed)
 
 
-def _measured(place: Path, task: _Task, first: Path, scope: Scope, launch: Launch, callbacks: Callbacks) -> Measured:
+def _measured(
+    place: Path, task: _Task, first: Path, scope: Scope, launch: Launch, callbacks: Callbacks, rates_of: RatesOf
+) -> Measured:
     """Train what is missing and measure. first: the project whose reference clip this one takes over."""
     variant, settings, capture, seed = task.variant, task.settings, task.capture, task.settings.seed
     project = _open(place, settings)
@@ -202,7 +223,7 @@ def _measured(place: Path, task: _Task, first: Path, scope: Scope, launch: Launc
             raise TrainingError(f"{variant.name}, seed {seed}: {outcomes[-1].message}", hint=outcomes[-1].hint)
     finally:
         project.close()
-    return measure(place, replace(scope, clips=task.chosen), callbacks.on_row)
+    return measure(place, replace(scope, clips=task.chosen), callbacks.on_row, rates_of)
 
 
 def _open(place: Path, settings: ProjectSettings) -> Project:

@@ -14,6 +14,7 @@ from engine.metrics.clips.flicker import definition_of
 
 COLUMNS: dict[str, tuple[str, int]] = {
     "psnr": ("PSNR", 2),
+    "cc_psnr": ("cc PSNR", 2),
     "psnr_fit": ("PSNR fit", 2),
     "psnr_moving": ("moving", 2),
     "psnr_rest": ("static", 2),
@@ -27,11 +28,17 @@ COLUMNS: dict[str, tuple[str, int]] = {
     "flicker_borders": ("flicker borders /255", 3),
     "seam_ratio_static": ("seam ratio static", 3),
     "seam_ratio_moving": ("seam ratio moving", 3),
+    "tof": ("tOF px", 3),
+    "tof_inside": ("tOF inside px", 3),
+    "tof_borders": ("tOF borders px", 3),
     "later_psnr": ("later PSNR", 2),
     "later_psnr_moving": ("later moving", 2),
     "later_s": ("s per later clip", 0),
     "minutes": ("minutes", 1),
     "megabytes": ("MB", 2),
+    "fps_cpu": ("FPS CPU", 1),
+    "fps_gl": ("FPS GL", 1),
+    "n_gaussians": ("Gaussians", 0),
 }
 """Figure to its heading and decimals. Held-out cameras, raw colours unless the name says fit. PSNR in dB. "later" ones
 are means over the clips that inherit, their time that of preparation and training."""

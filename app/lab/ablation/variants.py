@@ -88,8 +88,12 @@ VARIANTS = (
         {"field": "continue"},
         shares_reference=True,
     ),
-    Variant("clips-shorter", "clips of half the length", cut="shorter", shares_reference=False),
-    Variant("clips-longer", "clips of twice the length", cut="longer", shares_reference=False),
+    Variant(
+        "clips-shorter", "clips of half the length, with as many steps a frame", cut="shorter", shares_reference=False
+    ),
+    Variant(
+        "clips-longer", "clips of twice the length, with as many steps a frame", cut="longer", shares_reference=False
+    ),
     Variant(
         "reference-middle",
         "the clip in the middle is the reference",
@@ -111,14 +115,14 @@ VARIANTS = (
     ),
     Variant(
         "field-joint",
-        "one clip, and so one field, for all frames",
+        "one clip, and so one field, for all frames, with all steps",
         is_baseline=True,
         cut="whole",
         shares_reference=False,
     ),
     Variant(
         "frame-stream",
-        "frame after frame: each starts from the one before, and everything learns on",
+        "frame after frame: each starts from the one before, and everything learns on; all steps over all frames",
         {"independent": True, "start": "previous"},
         is_baseline=True,
         cut="frames",
@@ -126,7 +130,7 @@ VARIANTS = (
     ),
     Variant(
         "first-frame",
-        "static Gaussians of the first frame alone, measured on it",
+        "static Gaussians of the first frame alone, measured on it, with the steps of a whole clip",
         {"backgrounds": "clip"},
         is_baseline=True,
         cut="first",
@@ -146,8 +150,8 @@ VARIANTS = (
         )
         for name, words, changed, reference_of in (
             ("published", "every anchor at every time, all tiles", {"gate": "off", "tiles": "all"}, ""),
-            ("published-static", "static anchors decoded once", {"gate": "static", "tiles": "all"}, ""),
-            ("published-gate", "moving anchors only where they can be", {"tiles": "all"}, ""),
+            ("published-static", "static anchors decoded once, all tiles", {"gate": "static", "tiles": "all"}, ""),
+            ("published-gate", "moving anchors only where they can be, all tiles", {"tiles": "all"}, ""),
             ("published-tiles", "gate, and only active tiles", {}, "published-gate"),
         )
     ),

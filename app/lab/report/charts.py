@@ -148,10 +148,10 @@ def draw_pictures(truth: np.ndarray, render: np.ndarray, error_range: tuple[floa
         columns = figure.subplots(1, 3)
         shown: Any = None
         for axes, picture, title in zip(columns, (truth, image, error), ("truth", "render", "error"), strict=True):
-            shown = axes.imshow(picture, **_map_options(error_range) if picture is error else {})
+            shown = axes.imshow(picture, **map_options(error_range) if picture is error else {})
             axes.set_title(title, loc="left", fontsize=9)
             axes.set_axis_off()
-        _add_color_bar(figure, shown, columns, "mean absolute difference, colours in 0..1")
+        add_color_bar(figure, shown, columns, "mean absolute difference, colours in 0..1")
         return png_of(figure)
 
 
@@ -166,15 +166,16 @@ def draw_maps(panels: Sequence[MapPanel], value_range: tuple[float, float], labe
             if panel.is_shown is not None:
                 values = np.ma.masked_where(~panel.is_shown, values)
             axes.set_facecolor("#B0B0B0")
-            shown = axes.imshow(values, **_map_options(value_range))
+            shown = axes.imshow(values, **map_options(value_range))
             axes.set_title(panel.title, loc="left", fontsize=8)
             axes.set_xticks([])
             axes.set_yticks([])
-        _add_color_bar(figure, shown, columns, label)
+        add_color_bar(figure, shown, columns, label)
         return png_of(figure)
 
 
-def _map_options(value_range: tuple[float, float]) -> dict[str, Any]:
+def map_options(value_range: tuple[float, float]) -> dict[str, Any]:
+    """How `imshow` is to draw a map: colours, ends of their range, pixels as they are."""
     return {"cmap": MAP_COLORS, "vmin": value_range[0], "vmax": value_range[1], "interpolation": "nearest"}
 
 
@@ -182,7 +183,8 @@ def _row_height(shape: Sequence[int], n_panels: int) -> float:
     return max(0.88 * WIDTH_INCHES / n_panels * shape[0] / shape[1] + 0.35, 1.6)
 
 
-def _add_color_bar(figure: Any, shown: Any, axes: Any, label: str) -> None:
+def add_color_bar(figure: Any, shown: Any, axes: Any, label: str) -> None:
+    """One bar for all axes. shown: What `imshow` returned for one of them."""
     bar = figure.colorbar(shown, ax=list(axes), fraction=0.04, pad=0.01, extend="max")
     bar.set_label(label, fontsize=7)
     bar.ax.tick_params(labelsize=7)
@@ -229,7 +231,7 @@ def draw_speed_error(
     """
     with plain_texts():
         figure = new_figure(WIDTH_INCHES, 4.2)
-        labels = [_shortened(name) for name in names]
+        labels = [shortened(name) for name in names]
         if len(names) > MAX_NAMED_MARKS:
             from matplotlib.lines import Line2D
 
@@ -282,7 +284,8 @@ def _use_log_time(axes: Any) -> None:
     axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-def _shortened(name: str) -> str:
+def shortened(name: str) -> str:
+    """A name for a label: a long one without its middle."""
     return name if len(name) <= _LABEL_LENGTH else f"{name[: _LABEL_LENGTH // 2 - 1]}…{name[-_LABEL_LENGTH // 2 :]}"
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from typing import Any
 
 from app.cli.arguments import EXIT_OK, add_figure_choices, path_argument
-from app.cli.terminal.progress import ProgressLine, row_progress
+from app.cli.frame_rate_arguments import add_no_fps, wanted_rates
+from app.cli.terminal.progress import ProgressLine, stage_progress
 from app.export.staging import check_target
 from app.project.project import read_settings
 from app.training.service import Launch
@@ -28,22 +27,34 @@ def add_arguments(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--out", type=path_argument, metavar="DIR", help="folder for the page (default: PROJECT/reports)"
     )
+    command.add_argument(
+        "--boundary",
+        type=int,
+        metavar="FRAME",
+        help="maps of what changes where the clip that begins at this frame begins (default: where it is worst)",
+    )
+    command.add_argument("--camera", metavar="NAME", help="camera of these maps (default: where it is worst)")
+    command.add_argument(
+        "--crop",
+        action="append",
+        default=[],
+        metavar="CAMERA:FRAME:X,Y,W,H",
+        help="a window to cut out of the capture and every project, in pixels; may be given several times "
+        "(default: where the projects differ most)",
+    )
     add_figure_choices(command, default=None, said="all for the project, quick for the others")
+    add_no_fps(command)
     command.add_argument("--quiet", action="store_true", help="no progress")
 
 
 def run(options: argparse.Namespace, launch: Launch) -> int:
     """clipgstream report: write a page about a project. Returns the exit code."""
+    from app.lab.report.paper_figures.by_hand import Wishes
     from app.lab.report.write import PAGE_FILE, REPORTS, write_report
 
     read_settings(options.project)  # refuses a folder that is not a project before anything else
     check_target((options.project / REPORTS if options.out is None else options.out) / PAGE_FILE)
     line = ProgressLine(is_quiet=options.quiet)
-    shown: dict[str, Callable[[int, int, Any], None]] = {}
-
-    def show(stage: str, done: int, n: int) -> None:
-        shown.setdefault(stage, row_progress(line, stage))(done, n, None)
-
     try:
         page = write_report(
             options.project,
@@ -51,8 +62,10 @@ def run(options: argparse.Namespace, launch: Launch) -> int:
             out=options.out,
             metrics=options.metrics,
             precision=options.precision,
-            on_stage=show,
+            wishes=Wishes(options.boundary, options.camera, options.crop),
+            on_stage=stage_progress(line),
             say=line.say,
+            rates_of=wanted_rates(options),
         )
     finally:
         line.finish()

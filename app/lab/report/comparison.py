@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from app.evaluation.source_clip_means import LATER_MOVING, LATER_PSNR, LATER_S, later_figures
+from app.evaluation.speed.frame_rates import FIGURES as FIGURES_OF_RATES
+from app.evaluation.speed.frame_rates import FrameRates
 from app.lab.report.about import all_settings
 from app.lab.report.charts import SpeedPanel, draw_speed_error
 from app.lab.report.page.parts import Figure, Section
@@ -15,14 +17,18 @@ from app.lab.report.pareto import pareto_front
 from app.project.project_facts import ProjectFacts
 from engine.metrics.clips.flicker import FIGURES, definition_of, flicker_figures
 
-_FIGURES = (
+_PAPER = (
     ("psnr", "PSNR", "dB", 2),
-    ("psnr_moving", "PSNR, moving", "dB", 2),
     ("ssim", "SSIM", "", 4),
     ("dssim1", "DSSIM1", "", 4),
-    ("dssim_range2", "DSSIM range 2", "", 4),
-    ("dssim_ms", "DSSIM MS", "", 4),
+    ("dssim_range2", "DSSIM2, range 2", "", 4),
+    ("dssim_ms", "DSSIM2, multi-scale", "", 4),
     ("lpips", "LPIPS", "", 4),
+)
+"""Figures of pictures that the paper has, too; it does not say which of two its DSSIM2 is."""
+_OTHERS = (
+    ("cc_psnr", "cc PSNR", "dB", 2),
+    ("psnr_moving", "PSNR, moving", "dB", 2),
     ("flip", "FLIP", "", 4),
 )
 _SEAMS = (
@@ -31,15 +37,19 @@ _SEAMS = (
     ("seam_ratio_static", "Seam ratio, static", "", 2),
     ("seam_ratio_moving", "Seam ratio, moving", "", 2),
     ("score", "Seam score", "1/255", 3),
+    ("tof", "tOF", "px", 3),
+    ("tof_borders", "tOF at borders", "px", 3),
+    ("tof_inside", "tOF inside clips", "px", 3),
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """One project of a comparison: its files and its evaluation document."""
+    """One project of a comparison: its files, its evaluation document, and how fast it is rendered, if measured."""
 
     facts: ProjectFacts
     evaluation: dict[str, Any]
+    rates: FrameRates | None = None
 
     @property
     def group(self) -> str:
@@ -63,9 +73,24 @@ class Compared:
         return later_figures(self.evaluation["means"]["clips"], self.group, seconds)
 
     @property
+    def frame_rates(self) -> dict[str, float | None]:
+        """How fast it is rendered, see app.evaluation.speed.frame_rates.FIGURES."""
+        return dict.fromkeys(FIGURES_OF_RATES) if self.rates is None else self.rates.figures()
+
+    @property
     def minutes(self) -> float | None:
         """Wall time of all clips; None when not recorded."""
         return None if self.facts.wall_s is None else self.facts.wall_s / 60.0
+
+    @property
+    def megabytes(self) -> float:
+        """Of all clip files."""
+        return self.facts.n_bytes / 1e6
+
+    @property
+    def mb_per_frame(self) -> float:
+        """The same for each frame that is trained."""
+        return self.megabytes / sum(clip.n_frames for clip in self.facts.clips)
 
 
 def main_group(evaluation: dict[str, Any]) -> str:
@@ -77,12 +102,17 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
     """One line per project, the page's own first. left_out: sentences on projects that could not be compared."""
     columns = (
         TableColumn("project", "Project"),
-        TableColumn("settings", "Settings that differ from the first"),
-        *(TableColumn(key, title, n, key.startswith(("psnr", "ssim")), unit) for key, title, unit, n in _FIGURES),
-        *(TableColumn(key, title, n, False, unit) for key, title, unit, n in _SEAMS),
+        *_figure_columns(_PAPER),
+        TableColumn("mb_per_frame", "Size per frame", 3, False, "MB"),
         TableColumn("minutes", "Time", 2, False, "min"),
+        TableColumn("fps_cpu", "FPS, CPU", 1, True),
+        TableColumn("fps_gl", "FPS, OpenGL", 1, True),
+        *_figure_columns(_OTHERS),
+        *(TableColumn(key, title, n, False, unit) for key, title, unit, n in _SEAMS),
         TableColumn("megabytes", "Size", 1, False, "MB"),
+        TableColumn("n_gaussians", "Gaussians drawn"),
         TableColumn("clips", "Clips"),
+        TableColumn("settings", "Settings that differ from the first"),
         TableColumn("columns", "Columns"),
     )
     first = compared[0]
@@ -90,10 +120,12 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
         {
             "project": one.facts.name,
             "settings": _settings_text(first, one),
-            **{key: one.figure(key) for key, *_ in _FIGURES},
+            **{key: one.figure(key) for key, *_ in (*_PAPER, *_OTHERS)},
             **{key: one.seam(key) for key, *_ in _SEAMS},
             "minutes": one.minutes,
-            "megabytes": one.facts.n_bytes / 1e6,
+            "megabytes": one.megabytes,
+            "mb_per_frame": one.mb_per_frame,
+            **one.frame_rates,
             "clips": len(one.facts.clips),
             "columns": one.evaluation["metrics"],
         }
@@ -101,11 +133,17 @@ def comparison_section(compared: Sequence[Compared], left_out: Sequence[str]) ->
     ]
     said = (
         f"Means over all clips and frames of the {first.group.replace('_', '-')} cameras, raw colours. The best value "
-        "of a column is bold. Projects measured quickly have PSNR, SSIM and DSSIM1 only."
+        "of a column is bold. Projects measured quickly have PSNR, SSIM and DSSIM1 only; --metrics "
+        "all measures the rest."
     )
     notes = [note for one in compared[1:] if (note := comparability(first, one))]
     table = Table("comparison", "All projects", columns, rows)
     return Section("comparison", "Comparison", [said, table, definition_of(), *notes, *left_out])
+
+
+def _figure_columns(figures: Sequence[tuple[str, str, str, int]]) -> list[TableColumn]:
+    is_higher_better = ("psnr", "cc_psnr", "ssim")
+    return [TableColumn(key, title, n, key.startswith(is_higher_better), unit) for key, title, unit, n in figures]
 
 
 def comparability(first: Compared, other: Compared) -> str:

@@ -104,7 +104,7 @@ def missing_text(column: dict[str, Any]) -> str:
 
 
 def _cameras(evaluation: dict[str, Any]) -> Folded:
-    shown = ("psnr", "psnr_fit", "psnr_moving", "psnr_rest", "ssim", "flip")
+    shown = ("psnr", "cc_psnr", "psnr_fit", "psnr_moving", "psnr_rest", "ssim", "flip")
     described = measured_columns(evaluation)
     columns = [TableColumn("camera", "Camera"), TableColumn("is_held_out", "Held out")]
     columns += [

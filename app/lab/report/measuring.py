@@ -18,6 +18,7 @@ def evaluation_of(
     *,
     choices: Sequence[Choice],
     precision: Precision = "float",
+    is_held_out_enough: bool = False,
     on_progress: Callable[[int, int, Any], None],
     say: Callable[[str], None],
     measuring: Measuring | None = None,
@@ -27,17 +28,20 @@ def evaluation_of(
     Args:
         choices: Metrics that will do, the best first; the last is measured where none is there completely.
         precision: Pictures as rendered, or rounded to 8 bit.
+        is_held_out_enough: Leave out cameras that were trained on, where some are held out.
         on_progress, say, measuring: See app.evaluation.evaluation.evaluate_project.
     Raises:
         ProjectError: A clip is damaged or does not fit.
         KeyboardInterrupt: With what is kept, in a sentence.
     """
-    cameras = range(len(opened.capture.rig))
+    held_out = opened.capture.camera_indices(opened.project.settings.holdout) if is_held_out_enough else []
+    cameras = held_out or range(len(opened.capture.rig))
     scopes = [Scope(opened.trained, cameras, choice, precision) for choice in choices]
     scope = next((scope for scope in scopes if is_measured(opened, scope)), scopes[-1])
     return evaluate_project(
         opened,
         clip_indices=scope.clips,
+        cameras=scope.cameras,
         metrics=scope.metrics,
         precision=precision,
         on_progress=on_progress,

@@ -1,16 +1,18 @@
-"""Pictures of a trained project for its report: truth and render of a frame, maps of a clip boundary."""
+"""Pictures of a trained project for its report: truth and render of a frame, maps of what changes between frames."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from app.background.kernels import use_threads
-from app.evaluation.evaluation import boundary_maps
+from app.evaluation.evaluation import change_maps
 from app.evaluation.headless import TrainedProject
 
 if TYPE_CHECKING:
+    from engine.metrics.clips.features_apart import Features
     from engine.metrics.clips.seams import SeamMaps
     from engine.metrics.clips.trained_clip import TrainedClip
 
@@ -18,12 +20,18 @@ if TYPE_CHECKING:
 class Pictures(Protocol):
     """Where a report gets its pictures; tests bring small ones."""
 
-    def pair(self, clip_index: int, frame_index: int, camera: str) -> tuple[np.ndarray, np.ndarray]:
-        """What a camera took [H, W, 3] uint8, and the render in its colours [H, W, 3] float32."""
+    def pair(
+        self, clip_index: int, frame_index: int, camera: str, features: Features = "both"
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What a camera took [H, W, 3] uint8, and the render in its colours [H, W, 3] float32.
+
+        Args:
+            features: Which features of the anchors are used, see engine.metrics.clips.features_apart.
+        """
         ...
 
-    def seam(self, clip_index: int, camera: str) -> SeamMaps:
-        """Maps at the start of a clip."""
+    def changes(self, frame_index: int, camera: str) -> SeamMaps:
+        """Maps from the frame before to a frame."""
         ...
 
 
@@ -35,16 +43,21 @@ class ProjectPictures:
         self._clip: TrainedClip | None = None
         use_threads(None)
 
-    def pair(self, clip_index: int, frame_index: int, camera: str) -> tuple[np.ndarray, np.ndarray]:
+    def pair(
+        self, clip_index: int, frame_index: int, camera: str, features: Features = "both"
+    ) -> tuple[np.ndarray, np.ndarray]:
         """See Pictures."""
+        from engine.metrics.clips.features_apart import with_features
+
         if self._clip is None or self._clip.clip.clip_index != clip_index:
             self._clip = self._opened.load(clip_index)
+        shown = replace(self._clip, model=with_features(self._clip.model, features))
         capture = self._opened.capture
         row = capture.rig.names.index(camera)
-        image = self._clip.picture(capture.rig, row, self._clip.clip.clip_time(frame_index))
+        image = shown.picture(capture.rig, row, shown.clip.clip_time(frame_index))
         return capture.frame(row, frame_index), image
 
-    def seam(self, clip_index: int, camera: str) -> SeamMaps:
+    def changes(self, frame_index: int, camera: str) -> SeamMaps:
         """See Pictures."""
         camera_index = self._opened.capture.rig.names.index(camera)
-        return boundary_maps(self._opened, clip_index=clip_index, camera_index=camera_index)
+        return change_maps(self._opened, frame_index=frame_index, camera_index=camera_index)

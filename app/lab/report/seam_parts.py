@@ -134,7 +134,7 @@ def _normal(seams: dict[str, Any]) -> Table:
         for part in _PARTS
         for what, letter in _LETTERS.items()
     ]
-    columns += [TableColumn("static_share", "Share of static pixels", 3)]
+    columns += [TableColumn("static_share", "Share of static pixels", 3), TableColumn("tof", "tOF", 3, unit="px")]
     rows = []
     for place, words in (("boundary", "at a boundary"), ("interior", "inside a clip")):
         for group, group_words in _GROUPS.items():
@@ -148,6 +148,7 @@ def _normal(seams: dict[str, Any]) -> Table:
                         "n_pairs": found["n_pairs"],
                         **{key: None if value is None else 255.0 * value for key, value in levels.items()},
                         "static_share": found["static_share"],
+                        "tof": found["tof"],
                     }
                 )
     return Table("seam_means", "Static and moving pixels apart, at boundaries and inside clips", columns, rows)
@@ -202,7 +203,7 @@ def _over_time(evaluation: dict[str, Any]) -> Figure:
 
 def _maps(boundary: dict[str, Any], pictures: Pictures) -> Figure:
     camera, clips, frame = boundary["worst_camera"], boundary["clips"], boundary["frame_index"]
-    maps = pictures.seam(clips[1], camera)
+    maps = pictures.changes(frame, camera)
     panels = [
         MapPanel("R: change of the render", maps.change),
         MapPanel("G: change of the truth", maps.truth_change),

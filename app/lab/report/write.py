@@ -6,13 +6,16 @@ import logging
 import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import asdict, replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.evaluation.evaluation import Measuring
 from app.evaluation.headless import TrainedProject, open_trained
+from app.evaluation.speed.frame_rates import RatesOf
 from app.lab.report.about import capture_section, settings_section, setup_section, split_section
+from app.lab.report.beside_published import published_section
 from app.lab.report.comparison import Compared, comparison_section, speed_section
 from app.lab.report.costs import storage_section, times_section
 from app.lab.report.length import length_section
@@ -21,9 +24,12 @@ from app.lab.report.measuring import evaluation_of
 from app.lab.report.over_clips import exposures_of, over_clips_section
 from app.lab.report.page.page import page_html
 from app.lab.report.page.parts import Section
+from app.lab.report.paper_figures.by_hand import Places, Wishes, checked_places
+from app.lab.report.paper_figures.sections import STEPS, paper_sections
 from app.lab.report.pictures import Pictures, ProjectPictures
+from app.lab.report.rendering import rendering_section
 from app.lab.report.seam_parts import seams_section, shown_boundaries
-from app.project.project_facts import find_projects, read_facts, short_names
+from app.project.project_facts import ProjectFacts, find_projects, read_facts, short_names
 from engine.capture.capture_summary import describe
 from engine.errors import CaptureError, ProjectError
 from engine.metrics.clips.flicker import flicker_figures
@@ -53,10 +59,13 @@ def write_report(
     out: Path | None = None,
     metrics: Choice | None = None,
     precision: Precision = "float",
+    wishes: Wishes | None = None,
+    beginning: Sequence[Section] = (),
     on_stage: OnStage,
     say: Callable[[str], None] = logger.warning,
     measuring: Measuring | None = None,
     make_pictures: Callable[[TrainedProject], Pictures] = ProjectPictures,
+    rates_of: RatesOf = lambda opened: None,
 ) -> Path:
     """Write the report of a project.
 
@@ -70,58 +79,64 @@ def write_report(
         metrics: Columns of all projects; None measures all of the project and the quick ones of the others, or shows
             all where they were measured before.
         precision: Of all projects: pictures as rendered, or rounded to 8 bit.
+        wishes: Places that figures are to show; chosen by their rules when None.
+        beginning: Sections before all others.
         on_stage: Told what is done.
         say: Told what the user should know, see app.evaluation.evaluation.evaluate_project.
         measuring, make_pictures: Tests bring quick ones.
+        rates_of: Measures how fast a project is rendered; nothing is said of that by default.
     Returns:
         The page.
     Raises:
-        ProjectError, CaptureError: A folder is not a project, nothing is trained in it, its capture is gone, or the
-            report cannot be written.
+        ProjectError, CaptureError: A folder is not a project, nothing is trained in it, its capture is gone, there
+            is no such place as wished for, or the report cannot be written.
     """
     out = folder / REPORTS if out is None else out
     facts = read_facts(folder, short_names([folder])[0])
     others, left_out = _others(folder, compare)
-    names = short_names([folder, *(path for path, _ in others)])
+    names = short_names([folder, *(one.project.folder for one, _ in others)])
     opened = open_trained(facts.project)
+    places = checked_places(wishes or Wishes(), opened.capture, [facts, *(one for one, _ in others)])
     own: list[Choice] = ["all", "quick"] if metrics == "quick" else ["all"]
     rest: list[Choice] = ["all"] if metrics == "all" else ["all", "quick"]
     compared: list[Compared] = []
-    for (path, is_named), name, choices in zip(
-        [(folder, True), *others], names, [own, *(rest for _ in others)], strict=True
+    for (one, is_named), name, choices in zip(
+        [(facts, True), *others], names, [own, *(rest for _ in others)], strict=True
     ):
         try:
-            one = read_facts(path, name)
+            trained = open_trained(one.project) if compared else opened
             document = evaluation_of(
-                open_trained(one.project) if compared else opened,
+                trained,
                 choices=choices,
                 precision=precision,
+                is_held_out_enough=bool(compared),
                 on_progress=_measuring(on_stage, name),
                 say=say,
                 measuring=measuring,
             )
+            rates = rates_of(trained)
         except (ProjectError, CaptureError) as error:
             if is_named:
                 raise
             left_out.append(f"{name} is left out: {error.message}")
             continue
-        compared.append(Compared(one, document))
-    sections = _sections(compared, opened, make_pictures(opened), left_out, on_stage)
-    return _write(out, compared, sections)
+        compared.append(Compared(replace(one, name=name), document, rates))
+    sections = _sections(compared, opened, make_pictures, places, left_out, on_stage)
+    return _write(out, compared, [*beginning, *sections])
 
 
-def _others(folder: Path, compare: Sequence[Path]) -> tuple[list[tuple[Path, bool]], list[str]]:
-    """Projects to compare with, and sentences on those below a folder that have nothing trained."""
+def _others(folder: Path, compare: Sequence[Path]) -> tuple[list[tuple[ProjectFacts, bool]], list[str]]:
+    """Projects to compare with, each with whether it was named itself, and sentences on those that are left out."""
     found, left_out = [], []
     for path, is_named in find_projects(compare, besides=folder):
         try:
-            read_facts(path, path.name)
+            facts = read_facts(path, path.name)
         except ProjectError as error:
             if is_named:
                 raise
             left_out.append(f"{path.name} is left out: {error.message}")
         else:
-            found.append((path, is_named))
+            found.append((facts, is_named))
     return found, left_out
 
 
@@ -132,12 +147,13 @@ def _measuring(on_stage: OnStage, name: str) -> Callable[[int, int, Any], None]:
 def _sections(
     compared: Sequence[Compared],
     opened: TrainedProject,
-    pictures: Pictures,
+    make_pictures: Callable[[TrainedProject], Pictures],
+    places: Places,
     left_out: Sequence[str],
     on_stage: OnStage,
 ) -> list[Section]:
     facts, evaluation = compared[0].facts, compared[0].evaluation
-    n_pictures = len(worst_pictures(evaluation)) + len(shown_boundaries(evaluation["seams"]))
+    n_pictures = len(worst_pictures(evaluation)) + len(shown_boundaries(evaluation["seams"])) + STEPS
     n_drawn = 0
 
     def tick() -> None:
@@ -147,16 +163,19 @@ def _sections(
 
     from app.lab.machine import describe_machine
 
-    capture = describe(opened.capture)
-    speed = speed_section(compared)
+    capture, pictures = describe(opened.capture), make_pictures(opened)
+    speed, rendering = speed_section(compared), rendering_section(compared)
+    published = published_section(compared, capture)
     has_others = len(compared) > 1 or bool(left_out)
     return [
         *([comparison_section(compared, left_out), speed] if has_others else []),
+        *paper_sections(compared, pictures, opened, make_pictures, places, tick),
         setup_section(facts, describe_machine(0), datetime.now(), evaluation),
         capture_section(facts, capture),
         split_section(facts, capture, len(opened.clips)),
         settings_section(facts),
         clips_section(evaluation),
+        *([] if published is None else [published]),
         length_section(evaluation, facts.clips),
         over_clips_section(evaluation, exposures_of(opened, evaluation["clips"])),
         time_section(evaluation),
@@ -164,6 +183,7 @@ def _sections(
         seams_section(evaluation, pictures, tick),
         storage_section(facts),
         times_section(facts),
+        *([] if rendering is None else [rendering]),
         *([] if has_others else [speed]),
     ]
 
@@ -173,7 +193,8 @@ def _sections(
 
 def report_document(compared: Sequence[Compared], sections: Sequence[Section]) -> dict[str, Any]:
     """What report.json holds: schema, projects (name, folder, settings, clips, means, columns, seams and flicker of
-    their evaluations), tables by name as on the page and in the CSV files, and files (of figures and tables)."""
+    their evaluations, and frame_rates), tables by name as on the page and in the CSV files, and files (of figures and
+    tables)."""
     tables = {table.name: table for section in sections for table in section.tables()}
     figures = [figure.name for section in sections for figure in section.figures()]
     return {
@@ -216,6 +237,7 @@ def _project_document(one: Compared) -> dict[str, Any]:
         "means": evaluation["means"],
         "seams": {key: value for key, value in evaluation["seams"].items() if key != "rows"},
         "flicker": flicker_figures(evaluation["seams"]["rows"]),
+        "frame_rates": None if one.rates is None else asdict(one.rates),
     }
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from engine.cloud.background.exposure import Exposure
 from engine.cloud.background.masks import motion_mask
 from engine.metrics.clips.seams import PairRow, SeamMaps, change_of, seam_maps
 from engine.metrics.clips.summary import EvalRow
+from engine.metrics.clips.tof import Motion, motion_of, tof
 from engine.metrics.clips.trained_clip import TrainedClip
 from engine.metrics.pictures.colors import Precision, as_shown
 from engine.metrics.pictures.picture import Choice, measure_picture
@@ -27,7 +29,7 @@ from engine.training.preparation.cloud_preparation import spread_frames
 _BACKGROUND_FRAMES = 50
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _Shot:
     """One frame of one camera: the render as compared [H, W, 3], the truth [H, W, 3] uint8, what moves [H, W] bool."""
 
@@ -35,6 +37,11 @@ class _Shot:
     image: np.ndarray
     pixels: np.ndarray
     is_moving: np.ndarray
+
+    @cached_property
+    def motion(self) -> Motion | None:
+        """The frame made ready for tOF, which both of its pairs need."""
+        return motion_of(self.image, self.pixels) if np.isfinite(self.image).all() else None
 
 
 class Evaluation:
@@ -138,11 +145,13 @@ class Evaluation:
             has_pair = frame in pairs and frame > 0 and self.capture.is_usable(camera, frame - 1)
             if has_pair and frame == clip.start:
                 assert before is not None, "the pair at a boundary needs the clip before it"
-                yield self._boundary(clip, shot, before, camera)[0]
+                yield self._boundary(clip, shot, before, camera)
             elif has_pair:
                 if last is None or last.frame_index != frame - 1:
                     last = self._shot(trained, camera, frame - 1)
-                yield _pair_row(self._maps(camera, shot, last), clip, frame, name, is_held_out, is_boundary=False)
+                maps = self._maps(camera, shot, last)
+                flow = self._tof(camera, shot, last, maps)
+                yield _pair_row(maps, clip, frame, name, is_held_out, is_boundary=False, flow_error=flow)
             last = shot
 
     def boundary_maps(self, before: TrainedClip, after: TrainedClip, camera: int) -> SeamMaps:
@@ -154,16 +163,25 @@ class Evaluation:
         clip = after.clip
         if before.clip.stop != clip.start:
             raise ValueError(f"clips {before.clip.clip_index} and {clip.clip_index} are not neighbours")
-        return self._boundary(clip, self._shot(after, camera, clip.start), before, camera)[1]
+        return self.change_maps(before, after, camera, clip.start)
 
-    def _boundary(self, clip: Clip, shot: _Shot, before: TrainedClip, camera: int) -> tuple[PairRow, SeamMaps]:
+    def change_maps(self, before: TrainedClip, after: TrainedClip, camera: int, frame: int) -> SeamMaps:
+        """R, G and E of one camera from the frame before to a frame, for a picture.
+
+        Args:
+            before, after: What shows the two frames; one clip for both inside of it.
+            frame: Capture frame index of the later one.
+        """
+        return self._maps(camera, self._shot(after, camera, frame), self._shot(before, camera, frame - 1))
+
+    def _boundary(self, clip: Clip, shot: _Shot, before: TrainedClip, camera: int) -> PairRow:
         last = self._shot(before, camera, clip.start - 1)
         maps = self._maps(camera, shot, last)
         # the same instant by the clip before: its field may end with its last frame, and the picture with it
         is_held = before.is_held_beyond
         image = last.image if is_held else self._render(before, camera, before.beyond)
         two_clips = maps.means(change_of(shot.image, image))
-        row = _pair_row(
+        return _pair_row(
             maps,
             clip,
             clip.start,
@@ -172,8 +190,15 @@ class Evaluation:
             is_boundary=True,
             two_clips=two_clips,
             is_held=is_held,
+            flow_error=self._tof(camera, shot, last, maps),
         )
-        return row, maps
+
+    def _tof(self, camera: int, shot: _Shot, last: _Shot, maps: SeamMaps) -> float | None:
+        """tOF of a pair, None where it is not measured: it takes as long as all other figures of a picture."""
+        is_wanted = self.metrics == "all" and (camera in self.holdout or not self.holdout)
+        if not is_wanted or shot.motion is None or last.motion is None:
+            return None
+        return tof(last.motion, shot.motion, maps.is_valid)
 
     def _shot(self, trained: TrainedClip, camera: int, frame: int) -> _Shot:
         pixels = self.capture.frame(camera, frame)
@@ -224,6 +249,7 @@ def _pair_row(
     is_boundary: bool,
     two_clips: tuple[float | None, float | None] = (None, None),
     is_held: bool = False,
+    flow_error: float | None = None,
 ) -> PairRow:
     (r_static, r_moving), (g_static, g_moving), (e_static, e_moving) = (
         maps.means(values) for values in (maps.change, maps.truth_change, maps.excess)
@@ -245,4 +271,5 @@ def _pair_row(
         two_clips_moving=two_clips[1],
         is_extrapolated=is_boundary,
         is_held=is_held,
+        tof=flow_error,
     )

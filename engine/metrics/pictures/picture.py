@@ -11,7 +11,7 @@ import numpy as np
 from engine.images.psnr import psnr_of, squared_error
 from engine.metrics.columns import COLUMNS
 from engine.metrics.pictures import flip, lpips
-from engine.metrics.pictures.colors import Precision, as_shown, fit_colors
+from engine.metrics.pictures.colors import Precision, as_shown, correct_colors, fit_colors
 from engine.metrics.pictures.light import fit_light
 from engine.metrics.pictures.similarity import (
     MS_MIN_SIDE_PX,
@@ -24,7 +24,7 @@ from engine.metrics.pictures.similarity import (
 
 Choice = Literal["quick", "all"]
 CHOICES: tuple[Choice, ...] = get_args(Choice)
-FIGURES_VERSION = 4
+FIGURES_VERSION = 5
 """Raised when a figure of the same picture changes: kept figures of earlier versions are not mixed with new ones."""
 
 
@@ -78,6 +78,7 @@ def measure_picture(
     parts = {"": is_valid, "_moving": is_moving, "_rest": still}
     fitted = np.clip(fit_colors(shown, truth, is_valid), 0.0, 1.0).astype(np.float32)
     fitted = _with_truth(fitted, truth, is_valid)
+    found["cc_psnr"] = psnr_of(squared_error(correct_colors(shown, truth, is_valid), truth), is_valid)
     found["psnr_light"] = _psnr_in_same_light(fitted, truth, still, is_valid)
     for fit, picture in (("", shown), ("_fit", fitted)):
         similarity = Similarity.of(picture, truth)

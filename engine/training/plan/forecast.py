@@ -17,6 +17,8 @@ _KEEPING_SHARE = 0.03
 """Of the steps' time: held-out figures, snapshots and checkpoints between them."""
 _START_S, _CAMERA_S, _PICTURE_S = {True: 2.5, False: 3.5}, 0.45, 5e-3
 """Rough preparation: of a source clip or not; of a camera whose depths are found; of a picture."""
+_DEPTHS_S = 0.15
+"""Of a picture whose depths are found with those of the frame before as a start."""
 _PROGRAM_MB, _CACHE_MB = 650.0, 537.0
 """Python, torch, numba and compiled kernels; decoded pictures that a capture keeps at most."""
 
@@ -122,9 +124,15 @@ def expected_training(
     return Expected(total_s, f"a step of about this size takes {listed} here")
 
 
-def rough_preparation_s(*, n_cameras: int, n_pictures: int, is_source: bool) -> float:
+def rough_preparation_s(*, n_cameras: int, n_pictures: int, is_source: bool, is_by_frame: bool = False) -> float:
     """Seconds before the first step, and between the phases of a reference clip, give or take half; kernels are
-    compiled."""
+    compiled.
+
+    Args:
+        is_by_frame: Whether depths are found in every picture, as with cloud=frames.
+    """
+    if is_by_frame:
+        return _START_S[is_source] + (_DEPTHS_S + _PICTURE_S) * n_pictures
     return _START_S[is_source] + (0.0 if is_source else _CAMERA_S * n_cameras) + _PICTURE_S * n_pictures
 
 

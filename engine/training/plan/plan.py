@@ -15,6 +15,7 @@ from engine.capture.clip import Clip
 from engine.clip_files.clip_header import ClipHeader
 from engine.errors import PreparationError
 from engine.training.config import JOINT_RULE, SOURCE_RULE, STATIC_RULE, StepRule, TrainConfig
+from engine.training.phases import phases_of
 from engine.training.plan.forecast import (
     Expected,
     MeasuredClip,
@@ -246,7 +247,13 @@ def make_plan(
     n_pictures = footage.n_cameras * clip.n_frames
     n_read = n_pictures if is_source else footage.n_cameras * min(footage.n_frames, config.background_frames)
     preparation = expected_from(same, "preparation_s") or Expected(
-        rough_preparation_s(n_cameras=footage.n_cameras, n_pictures=n_pictures, is_source=is_source), "rough"
+        rough_preparation_s(
+            n_cameras=footage.n_cameras,
+            n_pictures=n_pictures,
+            is_source=is_source,
+            is_by_frame=config.cloud == "frames",
+        ),
+        "rough",
     )
     training = expected_training(same, steps, lambda phase: step_time(sizes, phase))
     memory = expected_from(same, "memory_mb") or Expected(
@@ -296,9 +303,12 @@ def _picture_lines(footage: Footage, clip: Clip, config: TrainConfig, *, is_sour
     n_pictures = footage.n_cameras * clip.n_frames
     counted = f"{footage.n_cameras} cameras ({left_out}) x {_plural(clip.n_frames, 'frame')}"
     lines = [PlanLine("pictures", n_pictures, "", f"{counted}, {footage.width}x{footage.height}")]
-    if not is_source:
-        n_frames = min(footage.n_frames, config.background_frames)
-        spread = "all there are" if n_frames == footage.n_frames else "spread over the capture"
+    if not is_source and (config.cloud == "parts" or config.color != "off"):
+        whose, n_all = "the clip", clip.n_frames
+        if config.backgrounds == "capture":
+            whose, n_all = "the capture", footage.n_frames
+        n_frames = min(n_all, config.background_frames)
+        spread = f"all of {whose}" if n_frames == n_all else f"spread over {whose}"
         lines.append(PlanLine("background frames", n_frames, "", f"of every camera, {spread}"))
     return lines
 
@@ -310,20 +320,12 @@ def _phase_lines(footage: Footage, clip: Clip, config: TrainConfig, *, is_source
         n_steps = config.n_source_steps(n_pictures)
         reason = _step_reason(config.source_steps, config.passes, SOURCE_RULE, n_pictures, "picture")
         return [PlanLine("source steps", n_steps, "", reason)]
-    return [
-        PlanLine(
-            "static steps",
-            config.n_static_steps(n_cameras),
-            "",
-            _step_reason(config.static_steps, 0.0, STATIC_RULE, n_cameras, "background"),
-        ),
-        PlanLine(
-            "joint steps",
-            config.n_joint_steps(n_pictures),
-            "",
-            _step_reason(config.joint_steps, config.passes, JOINT_RULE, n_pictures, "picture"),
-        ),
-    ]
+    reasons = {
+        "static": _step_reason(config.static_steps, 0.0, STATIC_RULE, n_cameras, "background"),
+        "joint": _step_reason(config.joint_steps, config.passes, JOINT_RULE, n_pictures, "picture"),
+    }
+    phases = phases_of(config, n_cameras=n_cameras, n_frames=clip.n_frames, is_source=False)
+    return [PlanLine(f"{name} steps", n_steps, "", reasons[name]) for name, n_steps in phases]
 
 
 def _step_reason(given: int, passes: float, rule: StepRule, n_items: int, item: str) -> str:
@@ -343,6 +345,9 @@ def _step_reason(given: int, passes: float, rule: StepRule, n_items: int, item: 
 def _anchor_lines(config: TrainConfig, reference: ClipHeader | None, *, is_source: bool) -> list[PlanLine]:
     """Limits, and what a trained reference clip has; how many anchors a clip gets its pictures decide."""
     n_static, n_moving = f"<= {config.max_static_points:,}", f"<= {config.max_moving_points:,}"
+    if config.cloud == "frames" and not is_source:
+        n_most = f"<= {config.max_static_points + config.max_moving_points:,}"
+        return [PlanLine("anchors", n_most, "", "of all frames; the voxel grows until there are no more")]
     if not is_source:
         grows = "the voxel grows until there are no more"
         return [PlanLine("static anchors", n_static, "", grows), PlanLine("moving anchors", n_moving, "", grows)]

@@ -264,6 +264,17 @@ def test_an_independent_clip_is_a_reference_clip_and_loads_without_another(tiny,
     assert np.array_equal(picture(tiny, state, None), picture(tiny, state, other))  # it is not looked at
 
 
+def test_independent_clips_share_neither_a_start_nor_a_background(tiny, tmp_path):
+    first, second = (
+        tiny.prepared(i, is_source=False, independent=True, backgrounds="clip", prep_dir=tmp_path) for i in (0, 1)
+    )
+    assert first.seed != second.seed
+    assert not torch.equal(first.model.decoder.first["color"], second.model.decoder.first["color"])
+    assert not np.array_equal(first.backgrounds.images, second.backgrounds.images)
+    again = tiny.prepared(1, is_source=False, independent=True, backgrounds="clip", prep_dir=tmp_path)
+    assert torch.equal(again.model.decoder.first["color"], second.model.decoder.first["color"])
+
+
 @pytest.fixture(scope="module")
 def streamed(tiny, tmp_path_factory) -> list[ClipState]:
     """The first three frames, each trained from where the one before ended."""

@@ -80,6 +80,31 @@ def test_a_source_clip_of_the_paper_preset_adds_what_no_inherited_anchor_covers(
     finish(training)
 
 
+def test_a_source_clip_of_the_paper_preset_learns_only_what_is_its_own(tiny, paper_prep, reference):
+    training = tiny.prepared(1, reference=reference, prep_dir=paper_prep, **PAPER)
+    model, start = training.model, _arrays_of(training)
+    assert all(model.anchor_set(role).presence.all() for role in model.roles())
+    assert model.light is None
+    positions = np.concatenate([values for name, values in start.items() if name.endswith(".positions")])
+    shape = model.field.shape  # from the first to the last anchor along every axis
+    sides = shape.side * np.asarray(shape.aspect)
+    assert shape.bounds_min == pytest.approx(positions.min(0), abs=1e-5)
+    assert shape.bounds_min + sides == pytest.approx(positions.max(0), rel=1e-4, abs=1e-5)
+    assert 0.9e-4 < np.abs(start["field.tables.0"]).max() <= 1e-4
+    with torch.no_grad():
+        corners = model.field.corners(model.anchor_set("static").positions.detach())
+        features = model.field(torch.arange(len(corners.indices)), corners, [(0, 1.0)])
+    assert float(features.min()) == 0.0 < float(features.max())
+    finish(training)
+    changed = {name for name, values in _arrays_of(training).items() if not np.array_equal(values, start[name])}
+    own = {f"sets.residual.{name}" for name in ("positions", "features", "log_offset_scales", "log_base_scales")}
+    assert changed == own | {"field.tables.0", "field.hidden.weight", "field.out.weight"}
+
+
+def _arrays_of(training) -> dict[str, np.ndarray]:
+    return {name: host_array(value).copy() for name, value in training.model.state_dict().items()}
+
+
 def test_without_deduplication_points_of_still_things_become_anchors_too(tiny, paper_prep, reference):
     settings = PAPER | {"residual": "full"}
     training = tiny.prepared(1, reference=reference, prep_dir=paper_prep, **settings)

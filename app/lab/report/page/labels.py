@@ -6,6 +6,7 @@ from engine.metrics.columns import COLUMNS
 
 _KINDS = {
     "psnr": "PSNR",
+    "cc_psnr": "PSNR, colours corrected as gsplat does (cc_psnr)",
     "psnr_light": "PSNR, after the fit of colour and light",
     "ssim": "SSIM",
     "dssim1": "DSSIM1",

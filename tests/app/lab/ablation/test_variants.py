@@ -2,32 +2,137 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import pytest
 
-from app.lab.ablation.variants import FULL, MIN_STEPS_PER_FRAME, VARIANTS, chosen_variants, settings_of
+from app.lab.ablation.variants import FULL, MIN_STEPS_PER_FRAME, VARIANTS, Variant, chosen_variants, settings_of
 from engine.capture.clip import split_clips
 from engine.errors import ProjectError
+from engine.training.clip_training import seed_of
 from engine.training.config import TrainConfig
+from engine.training.phases import phases_of
+from engine.training.presets import PUBLISHED_SIZES, preset
 from tests.app.lab.ablation.runs import BY_NAME
 
+SIZES = PUBLISHED_SIZES
+OWN: dict[str, Any] = {"shares_reference": False}
+BASELINE: dict[str, Any] = {"is_baseline": True, "shares_reference": False}
+ON_REQUEST = BASELINE | {"is_on_request": True}
+PINNED: dict[str, tuple[dict[str, Any], dict[str, Any], list[str]]] = {
+    "full": ({}, {}, ["settings as they are"]),
+    "decoder-new": ({"decoder": "new"}, {}, ["new heads in every source clip"]),
+    "decoder-finetune": ({"decoder": "finetune"}, {}, ["inherited heads go on learning"]),
+    "residual-none": ({"residual": "none"}, {}, ["inherited anchors only"]),
+    "residual-full": ({"residual": "full"}, {}, ["all points of a clip", "however many"]),
+    "inherit-moving": ({"inherit": "moving"}, {}, ["moving anchors go on learning, static ones stay"]),
+    "inherit-trainable": ({"inherit": "trainable"}, {}, ["inherited anchors go on learning"]),
+    "inherit-off": (
+        {"inherit": "off"},
+        {},
+        ["its own anchors", "without a static phase", "reference clip's backgrounds"],
+    ),
+    "inherit-trainable-residual-full": (
+        {"inherit": "trainable", "residual": "full"},
+        {},
+        ["all points of a clip, however many", "inherited anchors go on learning"],
+    ),
+    "field-continue": ({"field": "continue"}, {}, ["one field goes on from clip to clip"]),
+    "clips-shorter": ({}, OWN | {"cut": "shorter"}, ["half the length", "as many steps a frame"]),
+    "clips-longer": ({}, OWN | {"cut": "longer"}, ["twice the length", "as many steps a frame"]),
+    "reference-middle": ({}, OWN | {"is_reference_moved": True}, ["in the middle is the reference"]),
+    "gate-off": ({"gate": "off", "field_max_levels": 16}, OWN, ["every anchor at every time", "levels and entries"]),
+    "independent": (
+        {"independent": True, "backgrounds": "clip"},
+        {"is_baseline": True},
+        ["share nothing", "clouds of its own frames", "its own seed", "as many steps", "the first is that of full"],
+    ),
+    "field-joint": ({}, BASELINE | {"cut": "whole"}, ["one clip, and so one field, for all frames", "all steps"]),
+    "frame-stream": (
+        {"independent": True, "start": "previous"},
+        BASELINE | {"cut": "frames"},
+        ["frame after frame", "from the one before", "everything learns on", "all steps"],
+    ),
+    "first-frame": (
+        {"backgrounds": "clip"},
+        BASELINE | {"cut": "first"},
+        ["first frame alone", "measured on it", "steps of a whole clip"],
+    ),
+    "published": (SIZES | {"gate": "off", "tiles": "all"}, ON_REQUEST, ["published sizes", "every time", "all tiles"]),
+    "published-static": (
+        SIZES | {"gate": "static", "tiles": "all"},
+        ON_REQUEST,
+        ["published sizes", "static anchors decoded once", "all tiles"],
+    ),
+    "published-gate": (
+        SIZES | {"tiles": "all"},
+        ON_REQUEST,
+        ["published sizes", "only where they can be", "all tiles"],
+    ),
+    "published-tiles": (
+        SIZES,
+        ON_REQUEST | {"reference_of": "published-gate"},
+        ["published sizes", "gate", "only active tiles"],
+    ),
+}
+"""What each variant changes of "full": settings, how it is trained, and what its words have to say of that."""
 
-def test_variants_are_named_once_and_their_settings_are_valid():
-    assert len(BY_NAME) == len(VARIANTS)
-    assert VARIANTS[0].name == FULL
-    assert not VARIANTS[0].overrides
+
+def test_a_variant_is_what_is_pinned_and_its_words_say_all_of_it():
+    assert [variant.name for variant in VARIANTS] == list(PINNED)
+    usual = Variant("", "")
     for variant in VARIANTS:
-        assert TrainConfig(**variant.overrides).difference() == variant.overrides  # none repeats a default
-        assert variant.words
-    listed = {"decoder": "new", "residual": "none", "inherit": "off", "field": "continue", "independent": True}
-    for name, value in listed.items():
-        assert any(variant.overrides.get(name) == value for variant in VARIANTS)
+        overrides, others, said = PINNED[variant.name]
+        assert variant == replace(usual, name=variant.name, words=variant.words, overrides=overrides, **others)
+        assert TrainConfig(**overrides).difference() == overrides  # none repeats a default
+        assert [part for part in said if part not in variant.words] == [], variant.name
+
+
+BASES = ({}, {"gate": "off", "cloud": "frames"}, preset("paper"))
+
+
+@pytest.mark.parametrize("base", BASES, ids=["default", "gate=off", "paper"])
+def test_beside_what_is_pinned_only_lengths_follow_from_how_a_variant_is_cut(base):
+    clips = split_clips(12, 4)
+    full, *_ = settings_of(BY_NAME[FULL], base, clips=clips, n_cameras=10, n_capture_frames=12)
+    assert full == base
+    for variant in VARIANTS:
+        settings, *_ = settings_of(variant, base, clips=clips, n_cameras=10, n_capture_frames=12)
+        steps = {
+            "clips": {"static_steps", "joint_steps"} if variant.name == "independent" else set(),
+            "shorter": {"joint_steps", "source_steps"},
+            "longer": {"joint_steps", "source_steps"},
+            "frames": {"joint_steps", "source_steps"},
+            "whole": {"joint_steps"},
+            "first": {"joint_steps"},
+        }[variant.cut]
+        changed = {name for name, value in settings.items() if base.get(name) != value}
+        assert changed - steps == {name for name, value in variant.overrides.items() if base.get(name) != value}
+        assert base | variant.overrides == {name: settings[name] for name in settings.keys() - (steps - base.keys())}
 
 
 def test_only_variants_whose_reference_clip_is_trained_alike_share_it():
     for variant in VARIANTS:
         is_source_only = variant.cut == "clips" and not variant.is_reference_moved and variant.overrides.keys() <= {
             "decoder", "residual", "inherit", "field"}  # fmt: skip
-        assert variant.shares_reference == is_source_only, variant.name
+        # the first of independent clips is that of full by its words; the settings are those of the others
+        assert variant.shares_reference == (is_source_only or variant.name == "independent"), variant.name
+
+
+@pytest.mark.parametrize("base", [*BASES, {"passes": 1.0}, {"passes": 8.0}, {"source_steps": 7}])
+def test_independent_clips_are_trained_as_long_as_those_of_full(base):
+    clips, n_cameras = split_clips(30, 10), 18
+    settings, *_ = settings_of(BY_NAME["independent"], base, clips=clips, n_cameras=n_cameras, n_capture_frames=30)
+    config = TrainConfig(**settings)
+    for clip in clips[1:]:
+        in_full = phases_of(TrainConfig(**base), n_cameras=n_cameras, n_frames=clip.n_frames, is_source=True)
+        alone = phases_of(config, n_cameras=n_cameras, n_frames=clip.n_frames, is_source=False)
+        assert sum(n for _, n in alone) == sum(n for _, n in in_full)
+        assert all(n > 0 for _, n in alone)
+    seeds = [seed_of(config, clip, seed) for seed in range(3) for clip in clips]
+    assert len(set(seeds)) == len(seeds)
+    assert {seed_of(TrainConfig(**base), clip, 5) for clip in clips} == {5}
 
 
 def test_variants_are_chosen_by_name_in_the_order_of_the_table_with_full_beside_them():
@@ -54,7 +159,8 @@ def test_a_variant_changes_what_it_names_and_trains_as_long_as_full(variant):
     n_frames_covered = sum(clip.n_frames for clip in split_clips(10, clip_length)[chosen.start : chosen.stop])
     match variant.cut:
         case "clips":
-            assert (changed, clip_length, chosen) == (set(), 4, range(3))
+            steps = {"static_steps", "joint_steps"} if variant.name == "independent" else set()
+            assert (changed, clip_length, chosen) == (steps, 4, range(3))
         case "whole":
             assert (changed, clip_length, chosen) == ({"joint_steps"}, 10, range(1))
             assert config.n_joint_steps(1000) == n_steps

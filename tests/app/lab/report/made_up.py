@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import zlib
 from collections.abc import Iterator
 from html.parser import HTMLParser
 from pathlib import Path
@@ -71,17 +72,23 @@ class Measure:
 
 
 class FakePictures:
-    """Noise of the capture's size."""
+    """Noise of the capture's size: the same for the same question, other renders for other projects."""
 
-    def __init__(self, opened) -> None:
-        self._rng = np.random.default_rng(0)
+    def __init__(self, opened: TrainedProject) -> None:
+        self._name = opened.project.folder.name
 
-    def pair(self, clip_index, frame_index, camera):
-        return self._rng.integers(0, 255, (24, 32, 3), dtype=np.uint8), self._rng.random((24, 32, 3), np.float32)
+    def pair(self, clip_index, frame_index, camera, features="both"):
+        truth = _noise(frame_index, camera).integers(0, 255, (24, 32, 3), dtype=np.uint8)
+        return truth, _noise(frame_index, camera, self._name, features).random((24, 32, 3), np.float32)
 
-    def seam(self, clip_index, camera):
-        change, truth = self._rng.random((2, 24, 32), np.float32) * 0.1
+    def changes(self, frame_index, camera):
+        truth = _noise(frame_index, camera).random((24, 32), np.float32) * 0.1
+        change = _noise(frame_index, camera, self._name).random((24, 32), np.float32) * 0.1
         return SeamMaps(change, truth, np.maximum(change - truth, 0), truth < 0.05)
+
+
+def _noise(*what: object) -> np.random.Generator:
+    return np.random.default_rng(zlib.crc32(repr(what).encode("utf-8", "replace")))
 
 
 class Page(HTMLParser):

@@ -82,7 +82,7 @@ def test_a_reference_clip():
     assert (found.role, found.n_steps) == ("reference", 6210)
     lines = texts(found)
     assert lines["pictures"] == (270, "27 cameras (4 held out) x 10 frames, 640x360")
-    assert lines["background frames"] == (40, "of every camera, all there are")
+    assert lines["background frames"] == (40, "of every camera, all of the capture")
     assert lines["static steps"] == (810, "30 for each of 27 backgrounds")
     assert lines["joint steps"] == (5400, "20 for each of 270 pictures")
     assert lines["static anchors"][0] == "<= 22,000"

@@ -1,0 +1,1 @@
+"""What the published method says, point by point, and what `--preset paper` does about it."""

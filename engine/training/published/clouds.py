@@ -1,0 +1,62 @@
+"""Points about where anchors come from: cameras, point clouds, deduplication."""
+
+from __future__ import annotations
+
+from engine.training.published.point import Point
+
+CLOUDS = (
+    Point(
+        "frames of the point clouds",
+        "both",
+        paper="all frames of the clip, with what stands still, for reference and source clips alike",
+        settings={"cloud": "frames", "backgrounds": "clip"},
+    ),
+    Point(
+        "cameras and pictures",
+        "neither",
+        paper="poses by COLMAP",
+        released="COLMAP on one frame, focal lengths rounded down to whole pixels, pictures undistorted and saved "
+        "as JPEG",
+        here="as a calibrated capture has them, or by `clipgstream calibrate`; pictures as they were recorded",
+        reason="captures come calibrated by many programs; rounding and saving again only lose",
+    ),
+    Point(
+        "stereo",
+        "neither",
+        paper="COLMAP",
+        released="COLMAP's PatchMatch for every frame, and its fusion",
+        here="our own: a plane sweep and slanted patches, in a later frame only where its picture has changed; what "
+        "two cameras agree on is kept",
+        reason="COLMAP's PatchMatch needs CUDA",
+        settings={"cloud": "frames"},
+    ),
+    Point(
+        "density of the point clouds",
+        "neither",
+        released="one point per voxel of 0.012 scene units; a later frame adds points to empty voxels only",
+        here="likewise, with voxels of some pixels; statistical outliers are removed; as many anchors as a setting "
+        "allows at most",
+        reason="0.012 means something else in every scene",
+        settings={"max_static_points": 1_000_000, "max_moving_points": 1_000_000},
+    ),
+    Point(
+        "deduplication",
+        "paper",
+        paper="outside of the union of spheres around all anchors of the reference clip, with the mean distance to "
+        "three neighbours as radius",
+        released="at least 0.005 scene units outside of the sphere around the nearest one, with the root mean "
+        "square as radius; the points before training",
+        here="the exact union; the anchors where training has put them",
+        reason="the paper comes first; a nearest centre is not the union, and 0.005 means something else in every "
+        "scene",
+        settings={"residual": "dedup"},
+    ),
+    Point(
+        "scales of residual anchors at their start",
+        "neither",
+        released="by mistake those of as many anchors of the reference clip",
+        here="the distance to three neighbours among all anchors of the clip",
+        reason="it is plainly a mistake: rows of the wrong cloud",
+        settings={"initial": "published"},
+    ),
+)
