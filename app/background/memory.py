@@ -23,3 +23,10 @@ def peak_bytes(*, is_reset: bool = False) -> int:
         raise NotImplementedError("peak memory is not known on this system") from None
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024
+
+
+def peak_mb() -> float | None:
+    """Most memory this process ever held, 10^6 bytes; None where the system does not say."""
+    with suppress(NotImplementedError):
+        return round(peak_bytes() / 1e6, 1)
+    return None

@@ -126,7 +126,10 @@ def evaluate_project(
         raise KeyboardInterrupt(f"{n_done} of {n_rows} pictures were measured and are {words}.") from None
     rows, pairs = _in_order(opened, scope, kept)
 
-    per_clip = {str(i): summary.by_group([row for row in rows if row.clip_index == i]) for i in scope.clips}
+    rows_of: dict[int, list[EvalRow]] = {i: [] for i in scope.clips}
+    for row in rows:
+        rows_of[row.clip_index].append(row)
+    per_clip = {str(i): summary.by_group(found) for i, found in rows_of.items()}
     return {
         "schema": EVAL_SCHEMA,
         "project": str(project.folder),

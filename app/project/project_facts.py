@@ -32,6 +32,7 @@ class ClipFacts:
         preparation_s, training_s: Together all of it; None when not recorded.
         coverage: Of a clip that inherits: what moves and how much of it has an anchor near it, see
             engine.clip_files.clip_header.Coverage; None when not recorded.
+        memory_mb: Most that the process held which prepared and trained it, 10^6 bytes; None when not recorded.
     """
 
     clip_index: int
@@ -45,13 +46,19 @@ class ClipFacts:
     preparation_s: float | None
     training_s: float | None
     coverage: Coverage | None = None
+    memory_mb: float | None = None
 
     @property
     def wall_s(self) -> float | None:
         """Preparation and training, without the kernels that a machine compiles once; None when not recorded."""
         if self.preparation_s is None or self.training_s is None:
             return None
-        return self.preparation_s + self.training_s - self.stages_s.get(COMPILING, 0.0)
+        return self.preparation_s + self.training_s - self.compiling_s
+
+    @property
+    def compiling_s(self) -> float:
+        """Of the preparation, what went into kernels that a machine compiles once."""
+        return self.stages_s.get(COMPILING, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +128,7 @@ def _read_clip(path: Path, clip_index: int) -> ClipFacts | DamagedClip | None:
             preparation_s=header.figures.preparation_s,
             training_s=header.figures.training_s,
             coverage=header.coverage,
+            memory_mb=header.figures.memory_mb,
         )
     except ProjectError as error:  # removed or replaced since
         return DamagedClip(path, error.message)

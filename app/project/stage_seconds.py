@@ -1,4 +1,4 @@
-"""Seconds per stage of a training, as its metrics rows and clip files keep them."""
+"""Seconds per stage and memory of a training, as its metrics rows and clip files keep them."""
 
 from __future__ import annotations
 
@@ -17,3 +17,10 @@ def stages_of(row: Mapping[str, Any]) -> dict[str, float]:
         for stage, seconds in found.items()
         if isinstance(seconds, int | float) and math.isfinite(seconds) and seconds >= 0
     }
+
+
+def memory_of(row: Mapping[str, Any]) -> float:
+    """The memory_mb of a metrics row; 0 where there is none or it is not a number."""
+    held = row.get("memory_mb")
+    is_known = isinstance(held, int | float) and math.isfinite(held) and held >= 0
+    return float(held) if is_known else 0.0

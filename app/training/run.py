@@ -16,11 +16,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from app.background.memory import peak_bytes
+from app.background.memory import peak_mb
 from app.project.clip_versions import forget_oldest, set_aside
 from app.project.metrics_file import read_metrics
 from app.project.project import Project, open_project
-from app.project.stage_seconds import stages_of
+from app.project.stage_seconds import memory_of, stages_of
 from app.training.interface import MakeTraining, Training
 from app.training.keeping import FolderWatch, ProjectGone, Refusals, Retries
 from app.training.messages import (
@@ -124,6 +124,8 @@ class TrainingRun:
         """Those of them whose gradients were scaled down."""
         self._rate = Rate()
         self._watch = StageWatch(clock)
+        self._memory_before_mb = 0.0
+        """Most that earlier runs of the same training held."""
         self._paused_stage: str | None = None
         self._report_cadence = Cadence(REPORT_EVERY_S)
         self._live_view = job.live_view
@@ -292,16 +294,14 @@ class TrainingRun:
         clip = training.finish()
         value = self._measure(training)
         norms, times = self._gradient_norms, self._watch.document()
-        memory_mb = None
-        with suppress(NotImplementedError):
-            memory_mb = round(peak_bytes() / 1e6, 1)
-        self._note({"step": training.steps_done, **times})
+        memory = self._memory()
+        self._note({"step": training.steps_done, **times, **memory})
         figures = ClipFigures(
             held_out_psnr=value,
             gradient_norm_median=statistics.median(norms) if norms else None,
             gradient_norm_max=max(norms, default=None),
             gradient_clipped_steps=self._n_clipped if norms else None,
-            memory_mb=memory_mb,
+            **memory,
             **times,
         )
         return clip.with_figures(figures)
@@ -420,7 +420,7 @@ class TrainingRun:
             is_written = False
             self._checkpoint_refusals.refused(error)
         if is_written:  # beside the checkpoint, so that a run that goes on from it knows what it took
-            self._note({"step": training.steps_done, **self._watch.document()})
+            self._note({"step": training.steps_done, **self._watch.document(), **self._memory()})
         self._checkpoint_cadence.done(started_s, self._clock())
         return is_written
 
@@ -443,12 +443,18 @@ class TrainingRun:
             found.rename(self._project.unfinished_metrics_path(self._job.clip_index))
 
     def _recall_times(self, step: int) -> None:
-        """Add what earlier runs took up to the checkpoint that this one goes on from."""
+        """Add what earlier runs took up to the checkpoint that this one goes on from, and the most that they held."""
         assert self._project is not None
         rows = read_metrics(self._project.unfinished_metrics_path(self._job.clip_index))
-        known = [stages_of(row) for row in rows if row["step"] <= step and "stages_s" in row]
-        for stage, seconds in (known[-1] if known else {}).items():
+        noted = [row for row in rows if row["step"] <= step and "stages_s" in row]
+        for stage, seconds in (stages_of(noted[-1]) if noted else {}).items():
             self._watch.seconds[stage] = self._watch.seconds.get(stage, 0.0) + seconds
+        self._memory_before_mb = max(map(memory_of, noted), default=0.0)
+
+    def _memory(self) -> dict[str, float | None]:
+        """memory_mb: most that this process held, or an earlier one of the same training; None where not known."""
+        memory_mb = peak_mb()
+        return {"memory_mb": None if memory_mb is None else max(memory_mb, self._memory_before_mb)}
 
     def _measure(self, training: Training) -> float | None:
         started_s = self._clock()

@@ -346,6 +346,27 @@ def test_a_finished_clip_says_how_long_its_stages_took_and_how_large_gradients_w
     assert read_metrics(it.project.metrics_path(0))[-1]["training_s"] == pytest.approx(2.0)
 
 
+def test_the_most_memory_of_a_training_is_kept_across_its_runs(bench, monkeypatch):
+    held = iter([700.0, 700.0])
+    monkeypatch.setattr("app.training.run.peak_mb", lambda: next(held, 650.0))
+    it = bench(n_steps=6)
+    it.steps(4)
+    it.commands.append(m.Stop(keep=True))
+    assert it.steps(1) is False
+    held = iter(())
+    it.start()  # another process, which holds less
+    assert it.steps(20) is False
+    assert read_clip_state(it.project.clip_path(0)).header.figures.memory_mb == 700.0
+    assert read_metrics(it.project.metrics_path(0))[-1]["memory_mb"] == 700.0
+
+
+def test_memory_that_the_system_does_not_say_is_unknown(bench, monkeypatch):
+    monkeypatch.setattr("app.training.run.peak_mb", lambda: None)
+    it = bench(n_steps=3)
+    assert it.steps(10) is False
+    assert read_clip_state(it.project.clip_path(0)).header.figures.memory_mb is None
+
+
 def test_the_times_of_a_training_that_was_stopped_add_up(bench):
     it = bench(n_steps=6)
     it.steps(4)  # the first prepares, at second 1

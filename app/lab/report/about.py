@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -11,9 +11,10 @@ from msgspec import structs
 
 from app.lab.machine import Machine
 from app.lab.report.page.parts import Section
+from app.lab.report.page.spans import MAX_SPANS, spans_text
 from app.lab.report.page.tables import Table, TableColumn
 from app.project.project import ProjectSettings
-from app.project.project_facts import ProjectFacts
+from app.project.project_facts import ClipFacts, ProjectFacts
 from engine.training.config import SETTINGS
 
 _PAIR = (TableColumn("what", "What"), TableColumn("value", "Value"))
@@ -72,8 +73,7 @@ def split_section(facts: ProjectFacts, capture: Mapping[str, Any], n_clips: int)
         "Held out": ", ".join(name for name in names if name in held_out) or "none",
         "Trained on": f"{len(trained_on)}: {', '.join(trained_on)}",
         "Clip length, frames": facts.settings.clip_length,
-        "Clips": f"{len(measured)} of {n_clips} trained: "
-        + ", ".join(f"{c.clip_index} (frames {c.start} to {c.start + c.n_frames - 1})" for c in facts.clips),
+        "Clips": f"{len(measured)} of {n_clips} trained: " + _clips_text(facts.clips),
     }
     parts: list[Any] = [_pairs("split", "Cameras and clips", rows)]
     covered = [{"clip": clip.clip_index, **structs.asdict(clip.coverage)} for clip in facts.clips if clip.coverage]
@@ -90,10 +90,18 @@ def split_section(facts: ProjectFacts, capture: Mapping[str, Any], n_clips: int)
         parts.append(Table("coverage", "What moves in later clips, and the anchors that reach it", columns, covered))
     if len(measured) < n_clips:
         left = [index for index in range(n_clips) if index not in measured]
-        parts.append(f"Not trained, and so in no figure of this page: clip {', '.join(map(str, left))}.")
+        parts.append(f"Not trained, and so in no figure of this page: clip {spans_text(left)}.")
     if not held_out:
         parts.append("No camera was held out: every figure is of pictures that the training has seen.")
     return Section("split", "Split", parts)
+
+
+def _clips_text(clips: Sequence[ClipFacts]) -> str:
+    """Clips with their frames; of many, runs of clips and runs of frames."""
+    if len(clips) <= MAX_SPANS:
+        return ", ".join(f"{c.clip_index} (frames {c.start} to {c.start + c.n_frames - 1})" for c in clips)
+    frames = [frame for clip in clips for frame in range(clip.start, clip.start + clip.n_frames)]
+    return f"{spans_text([clip.clip_index for clip in clips])} (frames {spans_text(frames)})"
 
 
 def settings_section(facts: ProjectFacts) -> Section:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,12 @@ _LABEL_OFFSETS = ((7, 5), (7, -12), (-7, 5), (-7, -12), (7, 17), (7, -24), (-7, 
 _LABEL_LENGTH = 28
 MAX_NAMED_MARKS = 6
 """Of more results the marks are numbered, and the names stand beside the panels."""
+MANY_VALUES = 100
+"""Values over which lines are drawn thinner and without marks."""
+MANY_BORDERS, MAX_BORDERS = 15, 120
+"""Borders from which their lines are thinner, and from which none is drawn."""
+MAX_BARS_INCHES, MAX_NAMED_BARS = 9.0, 30
+"""Height at most of stacked bars, and how many of them are named."""
 _STYLES = ("-", "--", ":", "-.")
 
 
@@ -68,17 +75,21 @@ def draw_over_time(
 
     Args:
         frames: Frame indices of the values, or other numbers that count time.
-        borders: First frames of clips; a line stands before each.
-        unit: What is counted.
+        borders: First frames of clips; a line stands before each, unless they are too many to be told apart.
+        unit: What is counted. Where frames are missing, lines end and begin anew.
     """
+    breaks = [
+        i for i, (before, after) in enumerate(pairwise(frames), start=1) if unit == "frame" and after > before + 1
+    ]
     with plain_texts():
         figure = new_figure(WIDTH_INCHES, 0.4 + 2.5 * len(panels))
         rows = figure.subplots(len(panels), 1, squeeze=False, sharex=True)[:, 0]
         for axes, panel in zip(rows, panels, strict=True):
-            _draw_curves(axes, panel, frames)
-            for i, border in enumerate(borders):
+            _draw_curves(axes, panel, frames, breaks)
+            for i, border in enumerate(borders if len(borders) <= MAX_BORDERS else ()):
                 label = "clip border" if i == 0 else None
-                axes.axvline(border - 0.5, color=FAINT_COLOR, linestyle="--", linewidth=1.0, label=label)
+                width = 1.0 if len(borders) <= MANY_BORDERS else 0.5
+                axes.axvline(border - 0.5, color=FAINT_COLOR, linestyle="--", linewidth=width, label=label)
             axes.set_ylabel(panel.label)
             add_grid(axes)
             axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
@@ -87,20 +98,39 @@ def draw_over_time(
         return png_of(figure)
 
 
-def _draw_curves(axes: Any, panel: CurvePanel, frames: Sequence[int]) -> None:
+def _draw_curves(axes: Any, panel: CurvePanel, frames: Sequence[int], breaks: Sequence[int]) -> None:
     n_thin = 0
+    has_many = len(frames) > MANY_VALUES
+    places = np.insert(np.asarray(frames, dtype=float), breaks, math.nan)
     for curve in panel.curves:
-        values = [math.nan if value is None else value for value in curve.values]
+        known = np.array([math.nan if value is None else value for value in curve.values])
+        values = np.insert(known, breaks, math.nan)
         if curve.is_main:
-            axes.plot(frames, values, color="#000000", linewidth=2.2, marker=".", label=curve.label, zorder=3)
+            marker = "." if not has_many or has_lone_value(values) else None
+            width = 1.4 if has_many else 2.2
+            axes.plot(places, values, color="#000000", linewidth=width, marker=marker, label=curve.label, zorder=3)
             continue
         if curve.is_faint:
-            axes.plot(frames, values, color=FAINT_COLOR, alpha=0.35, linewidth=0.8, label=curve.label or "_")
+            axes.plot(places, values, color=FAINT_COLOR, alpha=0.35, linewidth=0.8, label=curve.label or "_")
             continue
         color, style = PALETTE[n_thin % (len(PALETTE) - 1)], _STYLES[n_thin // (len(PALETTE) - 1) % len(_STYLES)]
-        marker = "." if len(frames) < 3 else None
-        axes.plot(frames, values, color=color, linestyle=style, linewidth=1.2, marker=marker, label=curve.label)
+        marker = "." if has_lone_value(values) else None
+        axes.plot(
+            places,
+            values,
+            color=color,
+            linestyle=style,
+            linewidth=0.8 if has_many else 1.2,
+            marker=marker,
+            label=curve.label,
+        )
         n_thin += 1
+
+
+def has_lone_value(values: np.ndarray) -> bool:
+    """Whether a value has none beside it, so that no line would show it. values: [N], NaN for none."""
+    is_known = np.pad(~np.isnan(values), 1)
+    return bool((is_known[1:-1] & ~is_known[:-2] & ~is_known[2:]).any())
 
 
 def draw_pictures(truth: np.ndarray, render: np.ndarray, error_range: tuple[float, float]) -> bytes:
@@ -169,17 +199,18 @@ def draw_stacked(parts: Mapping[str, Sequence[float]], names: Sequence[str], lab
     """
     hatches = ("", "//", "..", "xx")
     with plain_texts():
-        figure = new_figure(WIDTH_INCHES, max(1.0 + 0.32 * len(names), 2.2))
+        figure = new_figure(WIDTH_INCHES, min(max(1.0 + 0.32 * len(names), 2.2), MAX_BARS_INCHES))
         axes = figure.subplots()
         left = np.zeros(len(names))
         shown = [(part, np.asarray(values, dtype=float)) for part, values in parts.items() if any(values)]
         for i, (part, values) in enumerate(shown):
             color, hatch = PALETTE[i % len(PALETTE)], hatches[i // len(PALETTE) % len(hatches)]
-            axes.barh(
-                range(len(names)), values, left=left, color=color, hatch=hatch, edgecolor="#FFFFFF", lw=0.5, label=part
-            )
+            gap = {"edgecolor": "#FFFFFF", "lw": 0.5} if len(names) <= MANY_VALUES else {"height": 1.0}
+            axes.barh(range(len(names)), values, left=left, color=color, hatch=hatch, label=part, **gap)
             left += values
-        axes.set_yticks(range(len(names)), names)
+        step = -(-len(names) // MAX_NAMED_BARS)
+        axes.set_yticks(range(0, len(names), step), names[::step])
+        axes.margins(y=0.3 / len(names) if len(names) > 1 else None)
         axes.invert_yaxis()
         axes.set_xlabel(label)
         add_grid(axes)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from app.background.kernels import COMPILING
 from app.lab.report.charts import draw_stacked
+from app.lab.report.measured import MAX_CLIP_COLUMNS
 from app.lab.report.page.parts import Figure, Section
+from app.lab.report.page.spans import spans_text
 from app.lab.report.page.tables import Table, TableColumn
 from app.project.clip_bytes import COMPONENT_NAMES
 from app.project.project_facts import ProjectFacts
@@ -64,7 +66,7 @@ def times_section(facts: ProjectFacts) -> Section:
     )
     rows = []
     for clip in facts.clips:
-        compiling_s = None if clip.wall_s is None else clip.stages_s.get(COMPILING, 0.0)
+        compiling_s = None if clip.wall_s is None else clip.compiling_s
         rows.append(
             {
                 "clip": str(clip.clip_index),
@@ -82,9 +84,9 @@ def times_section(facts: ProjectFacts) -> Section:
         "Wall time, pauses left out. Kernels are compiled once on every machine, so that time is not counted; "
         "preparation includes what a step builds when it begins a new phase."
     ]
-    unknown = [str(clip.clip_index) for clip in facts.clips if clip.wall_s is None]
+    unknown = [clip.clip_index for clip in facts.clips if clip.wall_s is None]
     if unknown:
-        parts.append(f"Not recorded when it was trained: clip {', '.join(unknown)}.")
+        parts.append(f"Not recorded when it was trained: clip {spans_text(unknown)}.")
     if stages:
         chart = draw_stacked(
             {stage: [clip.stages_s.get(stage, 0.0) for clip in facts.clips] for stage in stages if stage != COMPILING},
@@ -103,7 +105,8 @@ def times_section(facts: ProjectFacts) -> Section:
             {"stage": stage, **{f"clip_{clip.clip_index}_s": clip.stages_s.get(stage) for clip in facts.clips}}
             for stage in stages
         ]
-        parts.append(Table("stages", "Seconds per stage", stage_columns, stage_rows))
+        is_shown = len(facts.clips) <= MAX_CLIP_COLUMNS
+        parts.append(Table("stages", "Seconds per stage", stage_columns, stage_rows, is_shown=is_shown))
     return Section("times", "Times", parts)
 
 

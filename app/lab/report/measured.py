@@ -19,6 +19,9 @@ _DIRECTIONS = {True: "higher", False: "lower", None: ""}
 ERROR_RANGE = (0.0, 0.25)
 """Colour range of error pictures, the same in every report; colours lie in 0..1."""
 N_PICTURES = 6
+MAX_CLIP_COLUMNS = 10
+"""Clips up to which a table has columns for each of them; those of more are in files only."""
+MAX_NAMED_BORDERS = 12
 Tick = Callable[[], None]
 
 
@@ -27,13 +30,18 @@ def clips_section(evaluation: dict[str, Any]) -> Section:
     means, described = evaluation["means"], measured_columns(evaluation)
     groups = [group for group in GROUP_WORDS if means.get(group)]
     parts = [("all", means), *((clip, means["clips"][clip]) for clip in means["clips"])]
+    has_few = len(means["clips"]) <= MAX_CLIP_COLUMNS
     columns = [
         TableColumn("figure", "Figure", labels=FIGURE_LABELS),
         TableColumn("unit", "Unit"),
         TableColumn("better", "Better"),
     ]
     columns += [
-        TableColumn(f"{name}_{group}", f"{'All clips' if name == 'all' else f'Clip {name}'}, {GROUP_WORDS[group]}")
+        TableColumn(
+            f"{name}_{group}",
+            f"{'All clips' if name == 'all' else f'Clip {name}'}, {GROUP_WORDS[group]}",
+            is_shown=name == "all" or has_few,
+        )
         for name, _ in parts
         for group in groups
     ]
@@ -71,6 +79,8 @@ def clips_section(evaluation: dict[str, Any]) -> Section:
     n_left_out = len(evaluation["columns"]) - len(described)
     if n_left_out:
         said += f" {n_left_out} figures that take longer were not asked for; --metrics all measures them too."
+    if not has_few:
+        said += f" Those of each of the {len(means['clips'])} clips are in tables/clip_metrics.csv."
     table = Table("clip_metrics", "Figures per clip", columns, rows)
     definitions = Table("columns", "Columns", meaning_columns, meaning)
     rows_table = _rows_table("pictures", "Every picture that was measured", evaluation["rows"])
@@ -135,6 +145,8 @@ def time_section(evaluation: dict[str, Any]) -> Section:
     panels = [panel("psnr", "PSNR, dB"), panel("psnr_moving", "PSNR, moving pixels, dB")]
     if len(borders) == 0:
         border_words = "There is one clip, so no border."
+    elif len(borders) > MAX_NAMED_BORDERS:
+        border_words = f"{len(borders)} clips begin, one after each dashed line."
     else:
         border_words = f"Clips begin at frame {', '.join(map(str, borders))}, after each dashed line."
     chart = Figure(

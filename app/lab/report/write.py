@@ -18,6 +18,7 @@ from app.lab.report.about import capture_section, settings_section, setup_sectio
 from app.lab.report.beside_published import published_section
 from app.lab.report.comparison import Compared, comparison_section, speed_section
 from app.lab.report.costs import storage_section, times_section
+from app.lab.report.length import length_section
 from app.lab.report.measured import clips_section, time_section, worst_pictures, worst_section
 from app.lab.report.measuring import evaluation_of
 from app.lab.report.over_clips import exposures_of, over_clips_section
@@ -175,6 +176,7 @@ def _sections(
         settings_section(facts),
         clips_section(evaluation),
         *([] if published is None else [published]),
+        length_section(evaluation, facts.clips),
         over_clips_section(evaluation, exposures_of(opened, evaluation["clips"])),
         time_section(evaluation),
         worst_section(evaluation, pictures, tick),
@@ -225,6 +227,7 @@ def _project_document(one: Compared) -> dict[str, Any]:
                 "preparation_s": clip.preparation_s,
                 "training_s": clip.training_s,
                 "wall_s": clip.wall_s,
+                "memory_mb": clip.memory_mb,
             }
             for clip in facts.clips
         ],

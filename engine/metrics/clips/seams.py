@@ -164,10 +164,16 @@ def summarize(rows: Sequence[PairRow]) -> dict[str, Any]:
         definitions: what the measures are, in words, with the constants.
     """
     boundaries = []
-    for frame_index in sorted({row.frame_index for row in rows if row.is_boundary}):
-        chosen = [row for row in rows if row.is_boundary and row.frame_index == frame_index]
+    at: dict[int, list[PairRow]] = {}  # by frame; looked up once for all, since a long capture has many boundaries
+    inside: dict[int, list[PairRow]] = {}  # by clip
+    for row in rows:
+        if row.is_boundary:
+            at.setdefault(row.frame_index, []).append(row)
+        else:
+            inside.setdefault(row.clip_index, []).append(row)
+    for frame_index, chosen in sorted(at.items()):
         clips = [chosen[0].clip_index - 1, chosen[0].clip_index]
-        around = chosen + [row for row in rows if not row.is_boundary and row.clip_index in clips]
+        around = chosen + [row for clip in clips for row in inside.get(clip, ())]
         cameras = _by_camera(around)
         scores = {name: found["score"] for name, found in cameras.items() if found["score"] is not None}
         boundaries.append(

@@ -10,6 +10,8 @@ from app.csv_text import csv_text
 from app.lab.report.page.markup import Markup, tag
 
 MISSING = "–"
+MAX_FIRST_ROWS, MAX_LAST_ROWS = 180, 20
+"""Rows of a longer table that the page shows; its files have all of them."""
 _WIDE_TEXT = 24
 """Longer texts are broken into lines, but not into narrow ones."""
 
@@ -25,6 +27,7 @@ class TableColumn:
         is_higher_better: Direction, for an arrow and the best value in bold; None for neither.
         unit: Shown behind the title; empty for none.
         labels: What the page shows in place of values that are texts; files keep those.
+        is_shown: Whether it stands on the page, or in files only.
     """
 
     key: str
@@ -33,6 +36,7 @@ class TableColumn:
     is_higher_better: bool | None = None
     unit: str = ""
     labels: Mapping[str, str] = field(default_factory=dict)
+    is_shown: bool = True
 
     @property
     def heading(self) -> str:
@@ -78,25 +82,32 @@ class Table:
         return csv_text([column.key for column in self.columns], self.rows)
 
     def markup(self) -> Markup:
-        """As HTML that scrolls when it is too wide. The best value of a column with a direction is bold."""
-        best = {column.key: self._best(column) for column in self.columns}
-        heads = [
-            tag("th", column.heading, scope="col", class_="n" if self._is_numeric(column) else None)
-            for column in self.columns
-        ]
+        """As HTML that scrolls when it is too wide. The best value of a column with a direction is bold; of many rows
+        the first and the last ones are shown."""
+        columns = [column for column in self.columns if column.is_shown]
+        best = {column.key: self._best(column) for column in columns}
+        kinds = {column.key: "n" if self._is_numeric(column) else None for column in columns}
+        heads = [tag("th", column.heading, scope="col", class_=kinds[column.key]) for column in columns]
         body = []
-        for row in self.rows:
+        rows, caption = self.rows, self.caption
+        if len(rows) > MAX_FIRST_ROWS + MAX_LAST_ROWS:
+            rows = rows[:MAX_FIRST_ROWS] + rows[-MAX_LAST_ROWS:]
+            caption += (
+                f" (the first {MAX_FIRST_ROWS} and the last {MAX_LAST_ROWS} of {len(self.rows)} rows; all of them are "
+                f"in tables/{self.name}.csv)"
+            )
+        for row in rows:
             cells = []
-            for column in self.columns:
+            for column in columns:
                 value = row[column.key]
                 text = column.labels.get(str(value)) or value_text(value, column.n_digits)
                 is_best = value is not None and value == best[column.key]
-                kind = "n" if self._is_numeric(column) else "w" if len(text) > _WIDE_TEXT else None
+                kind = kinds[column.key] or ("w" if len(text) > _WIDE_TEXT else None)
                 cells.append(tag("td", tag("b", text) if is_best else text, class_=kind))
             body.append(tag("tr", *cells))
         table = tag(
             "table",
-            tag("caption", self.caption),
+            tag("caption", caption),
             tag("thead", tag("tr", *heads)),
             tag("tbody", *body),
             id=f"table-{self.name}",

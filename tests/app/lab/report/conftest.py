@@ -20,6 +20,7 @@ def quick_charts(monkeypatch: pytest.MonkeyPatch) -> None:
     for module, names in {
         "measured": ("draw_over_time", "draw_pictures"),
         "over_clips": ("draw_over_time",),
+        "length": ("draw_over_time",),
         "seam_parts": ("draw_over_time", "draw_maps"),
         "costs": ("draw_stacked",),
         "comparison": ("draw_speed_error",),

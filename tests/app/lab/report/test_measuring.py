@@ -8,12 +8,15 @@ from dataclasses import replace
 
 from app.evaluation.evaluation import Scope, is_measured
 from app.evaluation.headless import open_trained
+from app.lab.report.measured import N_PICTURES
 from app.lab.report.page.labels import FIGURE_LABELS
+from app.lab.report.seam_parts import N_BOUNDARIES
 from app.project.project import open_project
 from engine.clip_files.clip_state import read_clip_header
 from engine.metrics.clips.seams import PairRow
 from engine.metrics.columns import COLUMNS
 from engine.storage.json_files import checked_line
+from tests.app.fakes import write_capture
 from tests.app.lab.report.made_up import CAMERAS, Measure, Page, change_header, report, train
 
 
@@ -23,6 +26,27 @@ def test_one_clip_has_no_seam(tmp_path, capture_folder, quick_charts):
     assert "so there is no boundary to measure" in text
     assert "in no figure of this page: clip 1" in text
     assert not list((project / "reports" / "figures").glob("seam_0*"))
+
+
+def test_many_clips_do_not_make_a_page_of_lists(tmp_path, quick_charts):
+    """24 clips of three frames, of which one in the middle is not trained."""
+    project = train(tmp_path / "p", write_capture(tmp_path / "capture", n_frames=72), n_clips=24)
+    (project / "clips" / "0005.safetensors").unlink()
+    for path in (project / "clips").iterdir():
+        change_header(path, metrics={"stages_s": {"Carving": 1.0}, "preparation_s": 1.0, "training_s": 0.0})
+    page = Page(report(project, metrics="quick").read_text(encoding="utf-8"))
+    assert "23 of 24 trained: 0 to 4, 6 to 23 (frames 0 to 14, 18 to 71)" in page.text
+    assert "in no figure of this page: clip 5." in page.text
+    assert "22 clips begin, one after each dashed line" in page.text
+    assert len(page.tables["clip_metrics"][0]) == 3 + 2 + 1, "all clips together; two groups of cameras"
+    numbers = json.loads((project / "reports" / "report.json").read_text(encoding="utf-8"))
+    assert len(numbers["tables"]["clip_metrics"]["columns"]) == 3 + 2 * 24 + 1
+    assert "stages" in numbers["tables"]
+    assert "stages" not in page.tables
+    assert [row[0] for row in page.tables["length"]] == [str(i) for i in range(24) if i != 5]
+    assert page.tables["length"][5][6] == "–", "there is no seam to a clip that is not trained"
+    assert len(list((project / "reports" / "figures").glob("seam_0*"))) == N_BOUNDARIES
+    assert len(list((project / "reports" / "figures").glob("worst_*"))) <= N_PICTURES
 
 
 def test_without_held_out_cameras_the_page_says_so(tmp_path, capture_folder, quick_charts):
