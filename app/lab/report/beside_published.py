@@ -16,8 +16,8 @@ _COLUMNS = (
     TableColumn("sequence", "Sequence"),
     TableColumn("n_frames", "Frames"),
     TableColumn("psnr", "PSNR, raw", 2, unit="dB"),
-    TableColumn("ssim", "SSIM", 3),
-    TableColumn("lpips", "LPIPS", 3),
+    TableColumn("ssim", "SSIM"),
+    TableColumn("lpips", "LPIPS"),
     TableColumn("source", "Source"),
     TableColumn("caveat", "Note"),
 )
